@@ -1,0 +1,183 @@
+"""Which moments of a recording the film shows, and for how long each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import floor, log10
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chutelab.animate.words import STRUCK, sentence
+from chutelab.plots.sampling import action, subset
+from chutelab.recording import Kind
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from chutelab.plots.scenery import Window
+    from chutelab.recording import Recording
+
+RUNNING = 6.0
+"""s; the longest the motion of a film takes on the screen by default, holds not counted."""
+
+LIVES = 3.0
+"""A stream is filmed for at most this many times what particle 0 takes."""
+
+HOLDS = 6
+"""Impacts that the film stops at; more would be a slide show."""
+
+WORTH = 0.05
+"""Share of the largest impulse that an impact needs for the film to stop at it."""
+
+HOLD_TOTAL, HOLD_SHORTEST, HOLD_LONGEST = 360, 60, 130
+"""Hundredths of a second: all holds together, and the bounds of one."""
+
+TAIL = 150
+"""Hundredths of a second that the last picture stays."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """One picture of the film.
+
+    Attributes
+    ----------
+    t : float
+        s, the recording's time.
+    delay : int
+        Hundredths of a second that the picture stays.
+    words : str
+        What happened last, and when.
+    """
+
+    t: float
+    delay: int
+    words: str
+
+
+def film(
+    recording: Recording, begin: float, end: float, *, fps: int, slow: float
+) -> tuple[Moment, ...]:
+    """Return the moments from `begin` to `end`: even steps, and a hold at each impact worth it.
+
+    Parameters
+    ----------
+    begin, end : float
+        s.
+    fps : int
+        Pictures a second, see `frame_delay`.
+    slow : float
+        Seconds on the screen for one second of the recording.
+
+    Raises
+    ------
+    ValueError
+        If `fps` is no divisor of 100 up to 50, or `slow` is not positive and finite.
+    """
+    delay = frame_delay(fps)
+    if not 0.0 < slow < float("inf"):
+        raise ValueError(f"slow = {slow!r}: allowed is a positive number")
+    step = 0.01 * delay / slow
+    mine = _events_of_nominal(recording, begin, end)
+    held = _held(mine)
+    stops = mine["t"][held]
+    times = np.linspace(begin, end, max(2, round((end - begin) / step) + 1))
+    if len(stops):
+        # A step that almost coincides with a stop would be a stumble.
+        times = times[np.abs(times[:, None] - stops).min(axis=1) > 0.5 * step]
+    times = np.unique(np.concatenate([[begin], times, stops, [end]]))
+    hold = int(np.clip(HOLD_TOTAL // max(len(stops), 1), HOLD_SHORTEST, HOLD_LONGEST))
+    delays = np.where(np.isin(times, stops), hold, delay)
+    delays[-1] = max(delays[-1], TAIL)
+    words = _words(recording, mine, held, times)
+    return tuple(
+        Moment(float(t), int(d), w) for t, d, w in zip(times, delays, words, strict=True)
+    )
+
+
+def frame_delay(fps: int) -> int:
+    """Return the delay (hundredths of a second) between pictures.
+
+    Raises
+    ------
+    ValueError
+        If it is not whole, or under 2, which browsers take for 10.
+    """
+    if not 0 < fps <= 50 or 100 % fps:
+        raise ValueError(
+            f"fps = {fps!r}: GIF delays are whole hundredths of a second; allowed are"
+            " 1, 2, 4, 5, 10, 20, 25 and 50"
+        )
+    return 100 // fps
+
+
+def span(recording: Recording, shown: Window) -> tuple[float, float]:
+    """Return the times (s) between which to film.
+
+    From when particle 0 comes into the window to the end of the recording, but of a stream for no
+    longer than `LIVES` times particle 0 takes.
+    """
+    track = recording.track(0)
+    first, last = float(track["t"][0]), float(track["t"][-1])
+    times = np.linspace(first, max(action(recording)[0], first), 400)
+    x, y = subset(recording, [0]).at(times)[0][:, 0].T
+    inside = (x > shown.left) & (x < shown.right) & (y > shown.bottom) & (y < shown.top)
+    begin = float(times[np.argmax(inside)]) if inside.any() else first
+    end = float(recording.knots["t"].max())
+    return begin, min(end, begin + LIVES * (last - begin)) if last > begin else end
+
+
+def slowness(length: float) -> float:
+    """Return the round factor that shows `length` seconds in at most `RUNNING`, but not by much.
+
+    >>> slowness(0.6), slowness(2.5), slowness(40.0)
+    (10.0, 2.0, 0.15)
+    """
+    if length <= 0.0:
+        return 1.0
+    exact = RUNNING / length * (1.0 + 1e-9)
+    power = floor(log10(exact))
+    mantissa = exact / 10.0**power
+    return float(f"{max(m for m in (1, 1.5, 2, 3, 4, 5, 6, 8) if m <= mantissa)}e{power}")
+
+
+def _events_of_nominal(recording: Recording, begin: float, end: float) -> NDArray[Any]:
+    events = recording.events
+    mine = (events["particle"] == 0) | (events["other"] == 0)
+    return events[mine & (events["t"] >= begin) & (events["t"] <= end)]
+
+
+def _held(mine: NDArray[Any]) -> NDArray[np.int64]:
+    """Return the indices of the first impacts worth a hold, one for each time."""
+    struck = np.flatnonzero(np.isin(mine["kind"], [int(kind) for kind in STRUCK]))
+    if not len(struck):
+        return struck
+    impulse = np.abs(mine["normal_impulse"][struck])
+    struck = struck[impulse >= WORTH * impulse.max()]
+    _, first = np.unique(mine["t"][struck], return_index=True)
+    return struck[first][:HOLDS]
+
+
+def _words(
+    recording: Recording,
+    mine: NDArray[Any],
+    held: NDArray[np.int64],
+    times: NDArray[np.float64],
+) -> list[str]:
+    """Return the caption at each time: the last event that is held at, or is no impact."""
+    struck = np.isin(mine["kind"], [int(kind) for kind in STRUCK])
+    told = ~struck & (mine["kind"] != Kind.RELEASE)
+    told[held] = True
+    lines = [""]
+    when = [-np.inf]
+    for i in np.flatnonzero(told):
+        lines.append(f"t = {mine['t'][i]:.3f} s: {sentence(recording, mine[i])}")
+        when.append(float(mine["t"][i]))
+    captions = [lines[int(k) - 1] for k in np.searchsorted(when, times, side="right")]
+    for i in held:
+        # What else happens in the same instant has to wait for the next picture.
+        captions[int(np.searchsorted(times, mine["t"][i]))] = (
+            f"t = {mine['t'][i]:.3f} s: {sentence(recording, mine[i])}"
+        )
+    return captions

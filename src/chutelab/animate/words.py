@@ -1,0 +1,93 @@
+"""What happened to particle 0, in words."""
+
+from __future__ import annotations
+
+from math import atan2, degrees, hypot
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chutelab.plots.style import quantity
+from chutelab.recording import PARTICLES, Kind
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from chutelab.recording import Recording
+
+STRUCK = (Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
+
+
+def surface_words(name: str) -> str:
+    """Return how a surface is spoken of."""
+    named = {"incoming": "the incoming belt", "outgoing": "the outgoing belt", "plate": "the plate"}
+    return named.get(name, f"“{name}”")
+
+
+def contact_normal(event: Any, mass: float) -> NDArray[np.float64]:
+    """Return the unit normal of an impact, away from the surface, from the impulses it gave.
+
+    m Δv = J_n n + J_t (n_y, -n_x), solved for n; NaN if there was no impulse.
+    """
+    pushed = mass * (event["velocity_after"] - event["velocity_before"])
+    normal, tangential = float(event["normal_impulse"]), float(event["tangential_impulse"])
+    size = normal**2 + tangential**2
+    if size == 0.0:
+        return np.full(2, np.nan)
+    x, y = float(pushed[0]), float(pushed[1])
+    return np.array([x * normal - y * tangential, y * normal + x * tangential]) / size
+
+
+def losses(recording: Recording, event: Any) -> NDArray[np.float64]:
+    """Return what an impact booked on particle 0, J: belt work, restitution and friction loss."""
+    track = recording.track(0)
+    now = np.flatnonzero(track["t"] == event["t"])
+    if not len(now):
+        return np.zeros(3)
+    return np.asarray(track["entries"][now[-1]] - track["entries"][now[0]])
+
+
+def sentence(recording: Recording, event: Any) -> str:
+    """Return one or two lines on an event of particle 0."""
+    kind = Kind(int(event["kind"]))
+    name = recording.surfaces[event["surface"]] if event["surface"] >= 0 else PARTICLES
+    speed = hypot(*event["velocity_after"])
+    if kind in STRUCK:
+        return _impact(recording, event, kind, name)
+    if kind is Kind.SEPARATION:
+        angle = degrees(atan2(*event["position"]))
+        where = "at the top" if angle < 5e-4 else f"{angle:.1f}° past the top"
+        return f"leaves the drive pulley {where}, at {quantity(speed, 'm/s')}"
+    on = surface_words(name)
+    return {
+        Kind.RELEASE: "is released",
+        Kind.SLIP: f"begins to slip on {on}",
+        Kind.STICK: f"no longer slips on {on}",
+        Kind.SETTLE: f"has settled on {on}",
+        Kind.EXIT: "has left the scene",
+    }[kind]
+
+
+def _impact(recording: Recording, event: Any, kind: Kind, name: str) -> str:
+    before = hypot(*event["velocity_before"])
+    if kind is Kind.COLLISION:
+        # Of the two, the record keeps one as `particle` and the other as `other`.
+        partner = int(event["other"]) if event["particle"] == 0 else int(event["particle"])
+        return f"hits particle {partner} at {quantity(before, 'm/s')}"
+    verb = "lands on" if kind is Kind.LANDING else "strikes"
+    text = f"{verb} {surface_words(name)} at {quantity(before, 'm/s')}"
+    normal = contact_normal(event, recording.particle.mass)
+    if np.all(np.isfinite(normal)):
+        into, off = (abs(float(event[v] @ normal)) for v in ("velocity_before", "velocity_after"))
+        text += f"; speed across it {quantity(into, 'm/s')} → {quantity(off, 'm/s')}"
+    belt, restitution, friction = losses(recording, event)
+    said = [
+        f"{quantity(float(value), 'J')} {what}"
+        for value, what in (
+            (restitution, "lost in the rebound"),
+            (friction, "lost to slip heat"),
+            (belt, "paid by the belt"),
+        )
+        if abs(value) > 1e-15
+    ]
+    return f"{text}\n{', '.join(said) or 'no energy lost'}"

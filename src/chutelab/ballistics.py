@@ -1,0 +1,121 @@
+"""Motion with constant acceleration: when a gap closes, in forms that keep their digits.
+
+A gap is a polynomial in time, positive while two things are apart. Only the crossing from positive
+to negative is a contact; the other one is a departure.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+
+BISECTIONS = 110
+"""Enough halvings to reach neighbouring doubles from any bracket met here (53 bits and a margin for
+roots far below the upper end)."""
+
+
+def closing_time(gap: ArrayLike, rate: ArrayLike, acceleration: ArrayLike) -> Floats:
+    """Return when gap + rate t + acceleration t²/2 crosses zero downwards; inf if never.
+
+    A parabola crosses any level downwards at most once, with derivative -S, where
+    S² = rate² - 2 acceleration gap. Of the two forms of that root the one without cancellation
+    is taken: 2 gap / (S - rate) while closing, -(rate + S) / acceleration while opening.
+
+    Parameters
+    ----------
+    gap, rate, acceleration : array_like
+        m, m/s, m/s²; broadcast together.
+
+    Returns
+    -------
+    ndarray
+        s; may be negative where the crossing lies in the past.
+
+    Examples
+    --------
+    >>> float(closing_time(0.5, 0.0, -9.81)) == (2 * 0.5 / 9.81) ** 0.5
+    True
+    >>> float(closing_time(1.0, 2.0, 0.0))
+    inf
+    """
+    gap, rate, acceleration = np.broadcast_arrays(
+        *(np.asarray(a, dtype=np.float64) for a in (gap, rate, acceleration))
+    )
+    discriminant = rate * rate - 2.0 * acceleration * gap
+    root = np.sqrt(np.maximum(discriminant, 0.0))
+    closing = rate <= 0.0
+    numerator = np.where(closing, 2.0 * gap, -(rate + root))
+    denominator = np.where(closing, root - rate, acceleration)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = numerator / denominator
+    # A line that opens, or a parabola that turns above zero, has no crossing.
+    missing = (discriminant < 0.0) | (denominator == 0.0)
+    at_once = (gap == 0.0) & (rate == 0.0) & (acceleration < 0.0)
+    return np.where(at_once, 0.0, np.where(missing, np.inf, t))
+
+
+def first_descent(coefficients: Floats, until: Floats) -> Floats:
+    """Return the first t in (0, until] where a polynomial of degree up to 4 becomes negative.
+
+    The stationary points of each derivative split the time axis into pieces on which the next one
+    down is monotonic, so bisection cannot miss a root nor land on the wrong one. Touching zero
+    without crossing is not a contact.
+
+    Parameters
+    ----------
+    coefficients : ndarray, (5, k)
+        Constant term first. The polynomial must not be negative just after 0.
+    until : ndarray, (k,)
+        Finite end of the search.
+
+    Returns
+    -------
+    ndarray, (k,)
+        inf where the polynomial stays non-negative.
+    """
+    degree = len(coefficients) - 1
+    derivatives = [coefficients]
+    for _ in range(degree - 1):
+        powers = np.arange(1, len(derivatives[-1]))[:, None]
+        derivatives.append(derivatives[-1][1:] * powers)
+    zero, until = np.zeros(coefficients.shape[1]), np.asarray(until, dtype=np.float64)
+    knots = [zero, until]
+    for derivative in reversed(derivatives[1:]):
+        knots = [zero, *(_bisect(derivative, a, b) for a, b in _pairs(knots)), until]
+    first = np.full(coefficients.shape[1], np.inf)
+    for a, b in reversed(_pairs(knots)):
+        crosses = polynomial(coefficients, b) < 0.0
+        first = np.where(crosses, _bisect(coefficients, a, b), first)
+    return first
+
+
+def polynomial(coefficients: Floats, t: ArrayLike) -> Floats:
+    """Evaluate polynomials (constant term first along axis 0) at t by Horner's rule."""
+    value = np.zeros(np.broadcast_shapes(coefficients.shape[1:], np.shape(t)))
+    for c in coefficients[::-1]:
+        value = value * t + c
+    return value
+
+
+def _pairs(knots: list[Floats]) -> list[tuple[Floats, Floats]]:
+    return list(zip(knots[:-1], knots[1:], strict=True))
+
+
+def _bisect(coefficients: Floats, low: Floats, high: Floats) -> Floats:
+    """Return where a polynomial, monotonic on each [low, high], changes sign, or `high`."""
+    falls = polynomial(coefficients, high) < polynomial(coefficients, low)
+    sign = np.where(falls, 1.0, -1.0)
+    at_high = sign * polynomial(coefficients, high)
+    whole = at_high >= 0.0
+    low, high = low.copy(), high.copy()
+    end = high.copy()
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        if np.all((middle <= low) | (middle >= high)):
+            break
+        above = sign * polynomial(coefficients, middle) >= 0.0
+        low = np.where(above, middle, low)
+        high = np.where(above, high, middle)
+    return np.where(whole, end, high)

@@ -1,0 +1,17 @@
+"""The event-driven engine: particles move on exact arcs, the next event is solved, not stepped.
+
+One round resolves the next event of all particles at once. There is no contact between particles.
+
+- `obstacles`: the machine's surfaces as faces and circles, and how they join.
+- `detect`: the first contact of particles with constant acceleration.
+- `arcs`: what stops a ride round a circle.
+- `swarm`: the state of all particles, and how knots, events and books are written.
+- `touch`: what a contact does: blows, rest, grip and slip.
+- `round`, `straight`: the two kinds of motion.
+- `engine`: the rounds.
+"""
+
+from chutelab.exact.engine import run
+from chutelab.exact.touch import CornerError
+
+__all__ = ["CornerError", "run"]

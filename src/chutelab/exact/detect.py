@@ -1,0 +1,189 @@
+"""When and what a particle in flight (or sliding straight) meets next: solved, not stepped."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chutelab.ballistics import closing_time, first_descent
+from chutelab.exact.obstacles import NONE, Floats, Ints, Obstacles, dot, pick, rows_of
+
+FOOT = 1e-12
+"""Share of a segment's length by which its face reaches past its ends, so that no particle slips
+through the joint of two segments by rounding."""
+
+PARALLEL = 1e-14
+"""Share of the speed below which a velocity along a surface has no component towards it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Particles that move with constant acceleration until something happens, arrays (k, ...).
+
+    Attributes
+    ----------
+    rows : ndarray, (k,)
+        Which particles they are.
+    position, velocity, acceleration : ndarray, (k, 2)
+        SI units.
+    left, left_side, order : ndarray, (k,)
+        Obstacle (and face of it) in contact now that is being left, or -1; how many of the leading
+        coefficients of the gap to it are zero: 1 after a rebound, 2 when leaving tangentially, 3
+        when lifting off a circle. They are exactly zero, so they are divided out.
+    on, on_side : ndarray, (k,)
+        Segment (and face of it) the particle slides on, which it cannot meet, or -1.
+    """
+
+    rows: Ints
+    position: Floats
+    velocity: Floats
+    acceleration: Floats
+    left: Ints
+    left_side: Ints
+    order: Ints
+    on: Ints
+    on_side: Ints
+
+
+def first_contact(
+    motion: Motion, obstacles: Obstacles, radius: float, until: Floats
+) -> tuple[Floats, Ints, Ints]:
+    """Return time from now, obstacle and side of the first contact before `until`, each (k,).
+
+    Finds: faces within a segment's length, ends of segments (for a disk), the pulley. Misses, by
+    design: a point against the end of a segment, and anything the particle overlaps already.
+
+    Parameters
+    ----------
+    motion : Motion
+        k particles.
+    obstacles : Obstacles
+        What they can meet.
+    radius : float
+        r, m.
+    until : ndarray, (k,)
+        Finite time after which nothing matters, s.
+
+    Returns
+    -------
+    time, obstacle, side
+        inf and -1 where there is none; side is +1 or -1 for a face, 0 for a circle.
+    """
+    time = np.full(len(motion.rows), np.inf)
+    obstacle = np.full(len(motion.rows), NONE, dtype=np.int64)
+    side = np.zeros(len(motion.rows), dtype=np.int64)
+    if obstacles.segments:
+        for sign in (1, -1):
+            t = _faces(motion, obstacles, radius, sign)
+            nearest = np.argmin(t, axis=1)
+            t = t[np.arange(len(t)), nearest]
+            sooner = t < time
+            time = np.where(sooner, t, time)
+            obstacle = np.where(sooner, nearest, obstacle)
+            side = np.where(sooner, sign, side)
+    late = time > until
+    time, obstacle, side = np.where(late, np.inf, time), np.where(late, NONE, obstacle), side
+    if obstacles.center.shape[1]:
+        t, circle = _circles(motion, obstacles, np.minimum(time, until))
+        sooner = t < time
+        time = np.where(sooner, t, time)
+        obstacle = np.where(sooner, circle + obstacles.segments, obstacle)
+        side = np.where(sooner, 0, side)
+    return time, obstacle, side
+
+
+def _faces(motion: Motion, obstacles: Obstacles, radius: float, sign: int) -> Floats:
+    """Times to the faces on one side of all segments, (k, S)."""
+    normal = sign * rows_of(obstacles.normal, motion.rows)
+    start = rows_of(obstacles.start, motion.rows)
+    p, v, a = (x[:, None] for x in (motion.position, motion.velocity, motion.acceleration))
+    gap = dot(p - start, normal) - radius
+    rate, acceleration = dot(v, normal), np.broadcast_to(dot(a, normal), gap.shape)
+    rate = np.broadcast_to(rate, gap.shape)
+    columns = np.arange(obstacles.segments)
+    leaving = motion.left[:, None] == columns
+    same = leaving & (motion.left_side[:, None] == sign)
+    touching = (np.abs(gap) <= obstacles.touch) | same
+    gap = np.where(touching, 0.0, gap)
+    along_face = touching & (np.abs(rate) <= PARALLEL * np.sqrt(dot(v, v)))
+    rate = np.where(along_face & ~same, 0.0, rate)
+    time = closing_time(gap, rate, acceleration)
+    own = (motion.on[:, None] == columns) & (motion.on_side[:, None] == sign)
+    never = own | (leaving & ~same) | (same & (motion.order[:, None] > 1)) | (time < 0.0)
+    time = np.where(never, np.inf, time)
+    finite = np.where(np.isfinite(time), time, 0.0)[..., None]
+    there = p + finite * (v + 0.5 * finite * a) - start
+    tangent = rows_of(obstacles.tangent, motion.rows)
+    foot, pace = dot(there, tangent), dot(v, tangent)
+    length = rows_of(obstacles.length, motion.rows)
+    reach = FOOT * length
+    over = (foot >= -reach) & (foot <= length + reach)
+    # Grazing the end on the way out is not lying on the face.
+    outward = ((foot <= reach) & (pace < 0.0)) | ((foot >= length - reach) & (pace > 0.0))
+    return np.where(over & ~(along_face & outward), time, np.inf)
+
+
+def _circles(motion: Motion, obstacles: Obstacles, until: Floats) -> tuple[Floats, Ints]:
+    """Time to the first circle met, and its number, (k,); inf and -1 if none."""
+    time = np.full(len(motion.rows), np.inf)
+    nearest = np.full(len(motion.rows), NONE, dtype=np.int64)
+    who, circle = np.nonzero(_near(motion, obstacles, until))
+    if not len(who):
+        return time, nearest
+    rows = motion.rows[who]
+    v, a = motion.velocity[who], motion.acceleration[who]
+    d = motion.position[who] - pick(obstacles.center, rows, circle)
+    rho = pick(obstacles.rho, rows, circle)
+    distance = np.hypot(d[:, 0], d[:, 1])
+    # |d + v t + a t²/2|² - ρ², as a polynomial of t.
+    gap = np.stack(
+        [
+            (distance - rho) * (distance + rho),
+            2.0 * dot(d, v),
+            dot(v, v) + dot(d, a),
+            dot(v, a),
+            0.25 * dot(a, a),
+        ]
+    )
+    leaving = motion.left[who] == circle + obstacles.segments
+    touching = np.abs(distance - rho) <= obstacles.touch
+    grazing = touching & (np.abs(gap[1]) <= PARALLEL * 2.0 * rho * np.sqrt(dot(v, v)))
+    gap[1] = np.where(grazing & ~leaving, 0.0, gap[1])
+    order = np.where(leaving, motion.order[who], np.where(touching & (gap[1] >= 0.0), 1, 0))
+    now = touching & ~leaving & (gap[1] < 0.0)
+    for n in range(1, 4):
+        shift = order >= n
+        gap[:-1, shift] = gap[1:, shift]
+        gap[-1, shift] = 0.0
+    # Inside already (overlapping), or nothing ever pulls it in: no contact to find.
+    open_ = ~now & (gap[0] >= 0.0) & (gap < 0.0).any(axis=0)
+    t = np.where(now, 0.0, np.inf)
+    if open_.any():
+        t[open_] = first_descent(gap[:, open_], until[who[open_]])
+    best = np.argsort(t, kind="stable")[::-1]
+    time[who[best]], nearest[who[best]] = t[best], circle[best]
+    return time, np.where(np.isfinite(time), nearest, NONE)
+
+
+def _near(motion: Motion, obstacles: Obstacles, until: Floats) -> NDArray[np.bool_]:
+    """Which circles the box of the path up to `until` touches, (k, C): a cheap way to skip most."""
+    p, v, a = motion.position, motion.velocity, motion.acceleration
+    t = until[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        turn = -v / a
+    turn = np.where((turn > 0.0) & (turn < t), turn, 0.0)
+    places = np.stack([p, p + turn * (v + 0.5 * turn * a), p + t * (v + 0.5 * t * a)])
+    low, high = places.min(axis=0)[:, None], places.max(axis=0)[:, None]
+    center = rows_of(obstacles.center, motion.rows)
+    reach = (rows_of(obstacles.rho, motion.rows) - obstacles.touch)[..., None]
+    near = np.all((low < center + reach) & (high > center - reach), axis=-1)
+    # A face that is left with the pull away from it hides its own two ends.
+    behind = np.where(motion.left_side == 0, NONE - 1, motion.left)
+    normal = motion.left_side[:, None] * pick(
+        obstacles.normal, motion.rows, np.clip(motion.left, 0, max(obstacles.segments - 1, 0))
+    ) if obstacles.segments else np.zeros_like(p)
+    hidden = (obstacles.cap_of[None, :, :] == behind[:, None, None]).any(axis=-1)
+    pulled_away = dot(a, normal) >= 0.0
+    return np.asarray(near & ~(hidden & pulled_away[:, None]))

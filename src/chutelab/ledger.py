@@ -1,0 +1,70 @@
+"""The energy ledger of a recording: where every joule came from and where it went.
+
+(K + U) at the end - (K + U) at the start = belt_work - restitution_loss - friction_loss + residual.
+Every entry is accumulated from impulses and contact-point velocities, none is a remainder; so the
+residual is the numerical error, and is shown as such.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from chutelab.recording import ENTRIES, Recording, balance
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """Energies of all particles together, J.
+
+    The start is each particle's release, the end its own end.
+    """
+
+    kinetic: tuple[float, float]
+    potential: tuple[float, float]
+    belt_work: float
+    restitution_loss: float
+    friction_loss: float
+    residual: float
+    turned_over: float
+    by_surface: dict[str, dict[str, float]]
+
+    @property
+    def relative_residual(self) -> float:
+        """|residual| as a share of the energy turned over (0 if nothing was)."""
+        return abs(self.residual) / self.turned_over if self.turned_over > 0.0 else 0.0
+
+
+def ledger(recording: Recording) -> Ledger:
+    """Close the books of a recording.
+
+    "Energy turned over" is the kinetic energy at the start, plus the size of every entry, plus the
+    size of the change of potential energy.
+    """
+    first, last = recording.ends()
+    kinetic_first, potential_first = recording.energies(first)
+    kinetic_last, potential_last = recording.energies(last)
+    change = (kinetic_last - kinetic_first) + (potential_last - potential_first)
+    residual = float((change - balance(last["entries"])).sum())
+    belt_work, restitution_loss, friction_loss = (float(e) for e in last["entries"].sum(axis=0))
+    kinetic = float(kinetic_first.sum()), float(kinetic_last.sum())
+    potential = float(potential_first.sum()), float(potential_last.sum())
+    turned_over = (
+        kinetic[0]
+        + abs(belt_work)
+        + abs(restitution_loss)
+        + abs(friction_loss)
+        + abs(potential[1] - potential[0])
+    )
+    return Ledger(
+        kinetic=kinetic,
+        potential=potential,
+        belt_work=belt_work,
+        restitution_loss=restitution_loss,
+        friction_loss=friction_loss,
+        residual=residual,
+        turned_over=turned_over,
+        by_surface={
+            name: dict(zip(ENTRIES, (float(value) for value in row), strict=True))
+            for name, row in zip(recording.surfaces, recording.by_surface, strict=True)
+        },
+    )

@@ -1,0 +1,43 @@
+"""Pictures of recordings: `overlay`, and small functions that take and return `Axes`.
+
+===============  ==================================================================================
+`style`          colours, text sizes, units
+`sampling`       times and parts of a recording that are worth drawing; energies to stack
+`scenery`        the machine to scale, and the window in which something happens
+`analytic`       the analytic parabola as arcs of flight
+`panels`         tracks, parabola, residual, velocity, energy ledger
+`figure`         the overlay
+`output`         files written whole or not at all
+===============  ==================================================================================
+
+Figures are drawn by Agg through `Figure` objects: no pyplot, no global state.
+"""
+
+from chutelab.plots.analytic import Arc, arcs, flight
+from chutelab.plots.figure import overlay
+from chutelab.plots.panels import (
+    analytic_of,
+    draw_analytic,
+    draw_ledger,
+    draw_residual,
+    draw_tracks,
+    draw_velocity,
+)
+from chutelab.plots.scenery import Window, draw_scene, machine_of, window_of
+
+__all__ = [
+    "Arc",
+    "Window",
+    "analytic_of",
+    "arcs",
+    "draw_analytic",
+    "draw_ledger",
+    "draw_residual",
+    "draw_scene",
+    "draw_tracks",
+    "draw_velocity",
+    "flight",
+    "machine_of",
+    "overlay",
+    "window_of",
+]

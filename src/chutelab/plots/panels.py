@@ -1,0 +1,268 @@
+"""The panels of the overlay; each function takes axes, draws one thing and returns the axes."""
+
+from __future__ import annotations
+
+from textwrap import fill
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.collections import LineCollection
+
+from chutelab.plots import style
+from chutelab.plots.analytic import arcs, flight
+from chutelab.plots.sampling import (
+    action,
+    energies,
+    round_step,
+    round_times,
+    subset,
+    track_times,
+)
+from chutelab.plots.scenery import scene_of, shown_particles
+from chutelab.recording import Kind
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    from chutelab.plots.analytic import Arc
+    from chutelab.recording import Recording
+    from chutelab.theory import Transfer
+
+STREAM_TRACKS = 60
+"""Tracks of a stream that are drawn; more would be one blot."""
+
+STROBES = 10
+"""Strobe dots aimed at between separation and end."""
+
+ROUNDING = 2.0**-52
+"""m; the spacing of floating-point numbers at 1 m."""
+
+FLOOR = 1e-17
+"""m; the lower end of the residual's axis, where an exact zero is drawn."""
+
+
+def analytic_of(recording: Recording, prediction: Transfer) -> tuple[tuple[Arc, ...], float]:
+    """Return the arcs known analytically, and the time (s) of the recording at which they begin."""
+    parts = arcs(prediction, scene_of(recording))
+    separated = recording.select(Kind.SEPARATION)
+    if not np.any(separated["particle"] == 0):
+        return (), 0.0
+    return parts, action(recording)[0]
+
+
+def draw_tracks(ax: Axes, recording: Recording) -> Axes:
+    """Draw particle 0's track, strobe dots at round times and impact markers, over the stream's.
+
+    Of a stream, up to `STREAM_TRACKS` tracks are drawn, thin and translucent.
+    """
+    if recording.count > 1:
+        _draw_stream(ax, recording)
+    nominal = subset(recording, [0])
+    track = recording.track(0)
+    begin, end = float(track["t"][0]), float(track["t"][-1])
+    position, _ = nominal.at(track_times(recording, begin, end))
+    ax.plot(
+        *position[:, 0].T, color=style.TRACK, linewidth=1.6, zorder=5.0, gid="track", label="track"
+    )
+    since = action(recording)[0]
+    step = round_step(max(end - since, 1e-9), STROBES)
+    dots, _ = nominal.at(round_times(begin, end, step))
+    ax.plot(
+        *dots[:, 0].T,
+        linestyle="none",
+        marker="o",
+        markersize=5.0,
+        markerfacecolor="white",
+        markeredgecolor=style.TRACK,
+        zorder=6.0,
+        gid="strobe",
+        label=f"every {step:g} s",
+    )
+    struck = recording.select(Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
+    struck = struck[(struck["particle"] == 0) | (struck["other"] == 0)]
+    if len(struck):
+        where, _ = nominal.at(np.clip(struck["t"], begin, end))
+        ax.plot(
+            *where[:, 0].T,
+            linestyle="none",
+            marker="x",
+            markersize=8.0,
+            markeredgewidth=2.0,
+            color=style.STRIKE,
+            zorder=7.0,
+            gid="impacts",
+            label="impact",
+        )
+    return ax
+
+
+def _draw_stream(ax: Axes, recording: Recording) -> None:
+    chosen = shown_particles(recording, STREAM_TRACKS)
+    chosen = chosen[chosen != 0]
+    if not len(chosen):
+        return
+    some = subset(recording, chosen)
+    times = np.linspace(some.knots["t"].min(), some.knots["t"].max(), 300)
+    lines = []
+    for i in range(len(chosen)):
+        one = subset(some, [i])
+        knots = np.unique(one.knots["t"])
+        times = np.union1d(np.linspace(knots[0], knots[-1], 200), knots[:: len(knots) // 200 + 1])
+        lines.append(one.at(times)[0][:, 0])
+    ax.add_collection(
+        LineCollection(
+            lines, colors=style.STREAM, linewidths=0.8, alpha=0.35, zorder=3.0, gid="stream"
+        ),
+        autolim=False,
+    )
+
+
+def draw_analytic(ax: Axes, parts: tuple[Arc, ...]) -> Axes:
+    """Draw the analytic parabola, dashed; draw the track over it."""
+    if not parts:
+        return ax
+    position, _ = flight(parts, _times_of(parts))
+    ax.plot(
+        *position.T,
+        color=style.ANALYTIC,
+        linewidth=4.0,
+        linestyle=(0, (2.2, 1.1)),
+        zorder=4.5,
+        gid="analytic",
+        label="analytic parabola",
+    )
+    return ax
+
+
+def _times_of(parts: tuple[Arc, ...], each: int = 120) -> NDArray[np.float64]:
+    return np.unique(np.concatenate([np.linspace(arc.begin, arc.end, each) for arc in parts]))
+
+
+def draw_residual(
+    ax: Axes, recording: Recording, parts: tuple[Arc, ...], start: float, reason: str | None = None
+) -> Axes:
+    """Draw the distance between simulated and analytic positions of particle 0, on a log scale.
+
+    Parameters
+    ----------
+    parts, start : tuple of Arc, float
+        See `analytic_of`; without arcs the panel says so, and why.
+    reason : str, optional
+        Why there is no analytic parabola.
+    """
+    style.dress(ax, "time since separation, s", "distance, m", "Simulated − analytic")
+    if not parts:
+        ax.set_axis_off()
+        why = reason or "particle 0 does not separate from a pulley"
+        ax.text(
+            0.5,
+            0.5,
+            fill(f"no analytic parabola: {why}", 60),
+            transform=ax.transAxes,
+            fontsize=style.NORMAL,
+            color=style.MUTED,
+            horizontalalignment="center",
+            verticalalignment="center",
+        )
+        return ax
+    times = _times_of(parts)
+    known, _ = flight(parts, times)
+    position, _ = subset(recording, [0]).at(start + times)
+    distance = np.hypot(*(position[:, 0] - known).T)
+    largest = float(np.nanmax(distance, initial=0.0))
+    ax.set_yscale("log")
+    ax.axhline(ROUNDING, color=style.MUTED, linewidth=1.0, linestyle=":")
+    ax.plot(times, np.maximum(distance, FLOOR), color=style.TRACK, linewidth=1.6, gid="residual")
+    ax.set_ylim(FLOOR, max(1e-14, 30.0 * largest))
+    ax.set_xlim(0.0, times[-1])
+    ax.set_title(
+        f"Simulated − analytic: at most {style.scientific(largest, 'm')}",
+        fontsize=style.NORMAL,
+        loc="left",
+        fontweight="bold",
+    )
+    ax.set_title(
+        "dotted: spacing of doubles at 1 m", fontsize=style.SMALL, loc="right", color=style.MUTED
+    )
+    return ax
+
+
+def draw_velocity(
+    ax: Axes, recording: Recording, parts: tuple[Arc, ...] = (), start: float = 0.0
+) -> Axes:
+    """Draw both velocity components of particle 0 over time, over the analytic ones, dashed."""
+    style.dress(ax, "time, s", "velocity, m/s", "Velocity of particle 0")
+    track = recording.track(0)
+    times = track_times(recording, float(track["t"][0]), float(track["t"][-1]))
+    _, velocity = subset(recording, [0]).at(times)
+    clock = _times_of(parts) if parts else np.empty(0)
+    if parts:
+        clock = np.unique(np.concatenate([clock, np.nextafter([arc.end for arc in parts], 0.0)]))
+    _, known = flight(parts, clock)
+    for axis, (name, label) in enumerate((("vx", "forward"), ("vy", "up"))):
+        if parts:
+            ax.plot(
+                start + clock,
+                known[:, axis],
+                color=style.ANALYTIC,
+                linewidth=4.0,
+                linestyle=(0, (2.2, 1.1)),
+                gid=f"analytic {name}",
+            )
+        ax.plot(
+            times,
+            velocity[:, 0, axis],
+            color=style.VELOCITY[name],
+            linewidth=1.6,
+            label=f"$v_{name[1]}$, {label}",
+            gid=name,
+        )
+    ax.set_xlim(times[0], _beyond(times))
+    ax.legend(fontsize=style.SMALL, loc="best", framealpha=0.85)
+    return ax
+
+
+def _beyond(times: NDArray[np.float64]) -> float:
+    """Return a time a little after the end, so that a jump at the end can be seen."""
+    return float(times[-1] + 0.04 * (times[-1] - times[0]))
+
+
+def draw_ledger(ax: Axes, recording: Recording, count: int = 240) -> Axes:
+    """Draw the energy ledger of all particles over time.
+
+    Kinetic and potential energy and both losses are stacked; energy at release plus belt work is a
+    line. The line runs along the top of the stack but for the residual, which the title states.
+    """
+    t = recording.knots["t"]
+    times = np.linspace(t.min(), t.max(), count)
+    if recording.count == 1:
+        times = track_times(recording, float(t.min()), float(t.max()), count)
+    times = np.append(times, _beyond(times))
+    books = energies(recording, times)
+    supplied = books["start"] + books["belt_work"]
+    factor, unit = style.scaled(float(np.abs(supplied).max()), "J")
+    names = ("kinetic", "potential", "restitution_loss", "friction_loss")
+    ax.stackplot(
+        times,
+        [factor * books[name] for name in names],
+        colors=[style.ENERGY[name] for name in names],
+        labels=[style.ENERGY_LABEL[name] for name in names],
+        linewidth=0.0,
+    )
+    ax.plot(
+        times,
+        factor * supplied,
+        color=style.INK,
+        linewidth=1.6,
+        linestyle=(0, (4, 1.5)),
+        label="at release + belt work",
+        gid="supplied",
+    )
+    residual = float(books["residual"][-1])
+    style.dress(
+        ax, "time, s", f"energy, {unit}", f"Energy ledger: residual {style.scientific(residual, 'J')}"
+    )
+    ax.set_xlim(times[0], times[-1])
+    ax.set_ylim(bottom=min(0.0, factor * float(supplied.min())))
+    return ax

@@ -1,0 +1,110 @@
+"""Times and parts of a recording that are worth drawing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import floor, log10
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chutelab.recording import Kind, Recording
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+Floats = NDArray[np.float64]
+
+CHUNK = 200_000
+"""Particle-times that one call of `energy_at` gets: some tens of MB."""
+
+
+def subset(recording: Recording, particles: Sequence[int] | NDArray[np.int64]) -> Recording:
+    """Return the recording of some particles only; its events are left out."""
+    tracks = [recording.track(int(i)) for i in particles]
+    offsets = np.concatenate([[0], np.cumsum([len(track) for track in tracks])]).astype(np.int64)
+    return replace(
+        recording,
+        knots=np.concatenate(tracks) if tracks else recording.knots[:0],
+        offsets=offsets,
+        ended=recording.ended[np.asarray(particles, dtype=np.int64)],
+        events=recording.events[:0],
+    )
+
+
+def spread(count: int, at_most: int) -> NDArray[np.int64]:
+    """Return up to `at_most` particle indices, evenly spread, particle 0 among them."""
+    return np.unique(np.linspace(0, count - 1, min(count, at_most)).astype(np.int64))
+
+
+def round_step(span: float, wanted: int) -> float:
+    """Return the step of 1, 2 or 5 times a power of ten that divides a span into about `wanted`.
+
+    >>> round_step(0.6, 10), round_step(3.0, 10)
+    (0.05, 0.2)
+    """
+    exact = span / wanted
+    power = floor(log10(exact))
+    mantissa = exact / 10.0**power
+    # Geometric means are the borders between 1, 2, 5 and 10.
+    factor = 1 if mantissa < 2**0.5 else 2 if mantissa < 10**0.5 else 5 if mantissa < 50**0.5 else 10
+    return float(f"{factor}e{power}")
+
+
+def round_times(begin: float, end: float, step: float) -> Floats:
+    """Return the multiples of a step from `begin` to `end`, s."""
+    slack = 1e-9 * step
+    return step * np.arange(np.ceil((begin - slack) / step), np.floor((end + slack) / step) + 1.0)
+
+
+def action(recording: Recording) -> tuple[float, float]:
+    """Return when particle 0 begins to do something, and when it ends, s.
+
+    It begins at its separation, or at its release if it is not carried to one.
+    """
+    track = recording.track(0)
+    separation = recording.select(Kind.SEPARATION)
+    separation = separation[separation["particle"] == 0]
+    begin = separation["t"][0] if len(separation) else track["t"][0]
+    return float(begin), float(track["t"][-1])
+
+
+def track_times(recording: Recording, begin: float, end: float, count: int = 400) -> Floats:
+    """Return even times, joined by the knots of particle 0 and the moments just before them.
+
+    So a jump at an impact is drawn upright, not slanted.
+    """
+    knots = recording.track(0)["t"]
+    if len(knots) > count:
+        mine = recording.events["t"][recording.events["particle"] == 0]
+        knots = mine[:count]
+    knots = knots[(knots >= begin) & (knots <= end)]
+    before = np.nextafter(knots, -np.inf)
+    times = np.concatenate([np.linspace(begin, end, count), knots, before[before >= begin]])
+    return np.unique(times)
+
+
+def energies(recording: Recording, times: ArrayLike) -> dict[str, Floats]:
+    """Return `Recording.energy_at` with the energy at release, all potential energy above 0.
+
+    Returns
+    -------
+    dict of ndarray, shape (T,)
+        What `energy_at` gives, and ``start``, kinetic and potential energy at the release of all
+        particles released so far; J. Potential energy is counted from the lowest knot of the
+        recording, so that it can be stacked.
+    """
+    times = np.atleast_1d(np.asarray(times, dtype=np.float64))
+    size = max(1, CHUNK // max(recording.count, 1))
+    parts = [recording.energy_at(times[i : i + size]) for i in range(0, len(times), size)]
+    books = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    lowest = float(recording.knots["position"][:, 1].min()) if len(recording.knots) else 0.0
+    weight = recording.particle.mass * recording.gravity
+    first, _ = recording.ends()
+    order = np.argsort(first["t"], kind="stable")
+    at_release = np.concatenate([[0.0], np.cumsum(sum(recording.energies(first[order])))])
+    released = np.searchsorted(first["t"][order], times, side="right")
+    books["potential"] = books["potential"] - weight * lowest * released
+    books["start"] = at_release[released] - weight * lowest * released
+    return books

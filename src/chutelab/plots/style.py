@@ -1,0 +1,101 @@
+"""Colours, text sizes and units that every picture shares.
+
+The colours are those of Okabe and Ito (2008), "Color Universal Design": told apart by readers with
+any common colour blindness. Each stands for one thing in every panel.
+"""
+
+from __future__ import annotations
+
+from math import floor, isfinite, log10
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+INK = "#000000"
+MUTED = "#595959"
+GRID = "#E3E3E3"
+STEEL = "#8C8C8C"
+STEEL_LIGHT = "#E6E6E6"
+
+TRACK = "#0072B2"
+ANALYTIC = "#E69F00"
+BELT = "#009E73"
+STRIKE = "#D55E00"
+STREAM = "#56B4E9"
+
+VELOCITY = {"vx": "#0072B2", "vy": "#D55E00"}
+
+ENERGY = {
+    "start": "#BFBFBF",
+    "kinetic": "#E69F00",
+    "potential": "#56B4E9",
+    "belt_work": "#009E73",
+    "restitution_loss": "#D55E00",
+    "friction_loss": "#CC79A7",
+    "residual": "#000000",
+}
+ENERGY_LABEL = {
+    "start": "energy at release",
+    "kinetic": "kinetic",
+    "potential": "potential",
+    "belt_work": "belt work",
+    "restitution_loss": "restitution loss",
+    "friction_loss": "slip heat",
+    "residual": "residual (numerical error)",
+}
+
+SMALL, NORMAL, LARGE = 9.5, 10.5, 13.0
+"""Text sizes, pt; nothing is smaller, so that a projected picture stays readable."""
+
+_PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
+
+
+def scaled(largest: float, unit: str) -> tuple[float, str]:
+    """Return a factor and the prefixed unit that bring `largest` to between 1 and 1000.
+
+    >>> scaled(0.0202, "J")
+    (1000.0, 'mJ')
+    """
+    if not isfinite(largest) or largest == 0.0:
+        return 1.0, unit
+    power = min(max(3 * floor(log10(abs(largest)) / 3), -15), 6)
+    return float(f"1e{-power}"), _PREFIXES[power] + unit
+
+
+def quantity(value: float, unit: str) -> str:
+    """Return a value to three digits with a prefixed unit.
+
+    >>> quantity(0.0202, "J"), quantity(0.0, "J"), quantity(-1.5, "m/s")
+    ('20.2 mJ', '0 J', '−1.50 m/s')
+    """
+    if value == 0.0:
+        return f"0 {unit}"
+    factor, name = scaled(float(f"{value:.2e}"), unit)
+    shown = value * factor
+    if not 0.0995 < abs(shown) < 9995.0:
+        return f"{shown:.1e} {name}".replace("-", "−")
+    digits = max(0, 2 - floor(log10(float(f"{abs(shown):.2e}"))))
+    return f"{shown:.{digits}f} {name}".replace("-", "−")
+
+
+def dress(ax: Axes, x: str = "", y: str = "", title: str = "") -> Axes:
+    """Give axes the common look: light grid, two spines, readable text."""
+    ax.set_xlabel(x, fontsize=NORMAL)
+    ax.set_ylabel(y, fontsize=NORMAL)
+    ax.set_title(title, fontsize=NORMAL, loc="left", fontweight="bold")
+    ax.tick_params(labelsize=SMALL, color=MUTED)
+    ax.grid(visible=True, color=GRID, linewidth=0.6)
+    ax.set_axisbelow(True)
+    for side in ("top", "right"):
+        ax.spines[side].set_visible(False)
+    return ax
+
+
+def scientific(value: float, unit: str) -> str:
+    """Return a value that is read for its power of ten.
+
+    >>> scientific(-1.4e-17, "J"), scientific(0.0, "J")
+    ('−1e−17 J', '0 J')
+    """
+    return f"{value:.0e} {unit}".replace("-", "−").replace("e−0", "e−") if value else f"0 {unit}"

@@ -1,0 +1,143 @@
+"""Collecting knots, events and ledger entries while an engine runs.
+
+Engines hand over whole arrays in the order of time *per particle*; sorting happens once, at the end.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chutelab.recording import EVENT, KNOT, PARTICLES, Ints, Kind, Particle, Recording
+
+
+class Recorder:
+    """Grows by chunks; `finish` turns it into a frozen `Recording`.
+
+    Parameters
+    ----------
+    count : int
+        Number of particles N.
+    surfaces : tuple of str
+        Names of the surfaces, without ``"particles"``, which is added last.
+    """
+
+    def __init__(self, count: int, surfaces: tuple[str, ...]) -> None:
+        self.surfaces = (*surfaces, PARTICLES)
+        self.entries = np.zeros((count, 3))
+        self.by_surface = np.zeros((len(self.surfaces), 3))
+        self.ended = np.zeros(count, dtype=np.int8)
+        self.contacts = 0
+        self._knots: list[NDArray[Any]] = []
+        self._owners: list[Ints] = []
+        self._events: list[NDArray[Any]] = []
+
+    def knots(
+        self,
+        particle: ArrayLike,
+        t: ArrayLike,
+        position: ArrayLike,
+        velocity: ArrayLike,
+        omega: ArrayLike,
+    ) -> None:
+        """Add one knot for each of some particles, with the entries booked so far.
+
+        `particle` has shape (k,), and may name a particle more than once only in the order of time;
+        the other arguments broadcast against it.
+        """
+        owner = np.atleast_1d(np.asarray(particle, dtype=np.int64))
+        chunk = np.empty(len(owner), dtype=KNOT)
+        chunk["t"], chunk["position"], chunk["velocity"] = t, position, velocity
+        chunk["omega"], chunk["entries"] = omega, self.entries[owner]
+        self._knots.append(chunk)
+        self._owners.append(owner)
+
+    def book(
+        self,
+        particle: ArrayLike,
+        surface: ArrayLike,
+        belt_work: ArrayLike = 0.0,
+        restitution_loss: ArrayLike = 0.0,
+        friction_loss: ArrayLike = 0.0,
+    ) -> None:
+        """Book ledger entries (J) on particles (k,), each once, and on the surfaces they met."""
+        owner = np.atleast_1d(np.asarray(particle, dtype=np.int64))
+        entry = np.stack(
+            [np.broadcast_to(e, owner.shape) for e in (belt_work, restitution_loss, friction_loss)],
+            axis=-1,
+        )
+        np.add.at(self.entries, owner, entry)
+        np.add.at(self.by_surface, np.broadcast_to(surface, owner.shape), entry)
+
+    def events(
+        self,
+        kind: Kind | ArrayLike,
+        particle: ArrayLike,
+        t: ArrayLike,
+        position: ArrayLike,
+        velocity: ArrayLike,
+        omega: ArrayLike = 0.0,
+        *,
+        velocity_before: ArrayLike | None = None,
+        omega_before: ArrayLike | None = None,
+        surface: ArrayLike = -1,
+        other: ArrayLike = -1,
+        normal_impulse: ArrayLike = 0.0,
+        tangential_impulse: ArrayLike = 0.0,
+    ) -> None:
+        """Add one event for each of some particles (k,); the state is the one after the event."""
+        owner = np.atleast_1d(np.asarray(particle))
+        chunk = np.empty(len(owner), dtype=EVENT)
+        chunk["particle"], chunk["kind"], chunk["t"] = owner, kind, t
+        chunk["position"], chunk["velocity_after"], chunk["omega_after"] = position, velocity, omega
+        chunk["velocity_before"] = velocity if velocity_before is None else velocity_before
+        chunk["omega_before"] = omega if omega_before is None else omega_before
+        chunk["surface"], chunk["other"] = surface, other
+        chunk["normal_impulse"], chunk["tangential_impulse"] = normal_impulse, tangential_impulse
+        self._events.append(chunk)
+
+    def finish(
+        self,
+        *,
+        scene: str,
+        title: str,
+        engine: str,
+        particle: Particle,
+        gravity: float,
+        steps: int,
+        seconds: float,
+    ) -> Recording:
+        """Sort what was collected and freeze it."""
+        count = len(self.ended)
+        knots = np.concatenate(self._knots) if self._knots else np.empty(0, dtype=KNOT)
+        owners = np.concatenate(self._owners) if self._owners else np.empty(0, dtype=np.int64)
+        self._knots.clear()
+        sizes = np.bincount(owners, minlength=count)
+        # A track needs an interval: a lone knot is its own end.
+        lonely = np.flatnonzero(sizes[owners] == 1)
+        owners, knots = np.append(owners, owners[lonely]), np.append(knots, knots[lonely])
+        sizes[sizes == 1] = 2
+        knots = knots[np.argsort(owners, kind="stable")]
+        events = np.concatenate(self._events) if self._events else np.empty(0, dtype=EVENT)
+        self._events.clear()
+        events = events[np.argsort(events["t"], kind="stable")]
+        return Recording(
+            scene=scene,
+            title=title,
+            engine=engine,
+            particle=particle,
+            gravity=gravity,
+            surfaces=self.surfaces,
+            knots=knots,
+            offsets=np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64),
+            ended=self.ended.copy(),
+            events=events,
+            by_surface=self.by_surface.copy(),
+            steps=steps,
+            contacts=self.contacts,
+            seconds=seconds,
+        )
+
+

@@ -1,0 +1,52 @@
+"""Scene files: from TOML text to a frozen, validated `Scene`.
+
+- `errors`: a fault (key, value found, what is allowed) and the one message that lists them all.
+- `models`: the tables of a scene as frozen Pydantic models, with units and ranges; the defaults.
+- `rules`: what no table can judge alone: conflicts between tables.
+- `wording`: Pydantic's errors as faults, with the allowed values said in words.
+- `overrides`: ``KEY=VALUE`` texts, as ``--set`` takes them, laid over a scene.
+- `loading`: read, parse, override, validate.
+- `editor`: the JSON Schema, for editors that complete scene files.
+- `library`: the shipped scenes, found by name; the starter scene.
+"""
+
+from chutelab.scene.editor import schema
+from chutelab.scene.errors import MISSING, Fault, SceneError
+from chutelab.scene.library import About, about, find, shipped, template
+from chutelab.scene.loading import from_dict, load, parse, to_dict
+from chutelab.scene.models import (
+    RESERVED_NAMES,
+    Incoming,
+    Outgoing,
+    Particle,
+    Plate,
+    Run,
+    Scene,
+    Stream,
+    Surface,
+)
+
+__all__ = [
+    "MISSING",
+    "RESERVED_NAMES",
+    "About",
+    "Fault",
+    "Incoming",
+    "Outgoing",
+    "Particle",
+    "Plate",
+    "Run",
+    "Scene",
+    "SceneError",
+    "Stream",
+    "Surface",
+    "about",
+    "find",
+    "from_dict",
+    "load",
+    "parse",
+    "schema",
+    "shipped",
+    "template",
+    "to_dict",
+]

@@ -1,0 +1,160 @@
+"""A fault of a scene file, and the one error that lists all of them."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+_VALUE_WIDTH: Final = 48
+"""Longest value shown in a message, characters: one line of a terminal holds key and value."""
+
+_KEY_WIDTH: Final = 80
+_TEXT_WIDTH: Final = 400
+_LISTED: Final = 40
+"""Most faults spelled out in one message; `SceneError.faults` always holds all of them."""
+
+_BARE_KEY: Final = re.compile(r"[\w-]+")
+
+
+class _Missing:
+    def __repr__(self) -> str:
+        return "missing"
+
+    def __reduce__(self) -> str:
+        return "MISSING"
+
+
+MISSING: Final = _Missing()
+"""The value of a fault whose key is not there."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One thing wrong with a scene.
+
+    Parameters
+    ----------
+    key
+        Full path of the key, such as ``plate.angle_deg`` or ``surface[1].restitution``; a place in
+        the text (``line 3, column 5``) for a syntax error; empty if the whole file is at fault.
+    value
+        What was found there; `MISSING` if the key has to be there and is not; None if there is
+        nothing to show (TOML has no null).
+    allowed
+        What would be right, in words.
+    """
+
+    key: str
+    value: object
+    allowed: str
+
+    def __str__(self) -> str:
+        allowed = cut(self.allowed, _TEXT_WIDTH)
+        if not self.key:
+            return allowed
+        key = cut(self.key, _KEY_WIDTH)
+        if self.value is MISSING:
+            return f"{key} is missing: {allowed}"
+        if self.value is None:
+            return f"{key}: {allowed}"
+        return f"{key} = {shown(self.value)}: {allowed}"
+
+
+class SceneError(ValueError):
+    """A scene that cannot be used; its text lists every fault.
+
+    Parameters
+    ----------
+    source
+        The file, or a stand-in such as ``<scene>``.
+    faults
+        What is wrong, at least one.
+    hint
+        What to do next, if there is something better than mending each fault.
+    """
+
+    def __init__(self, source: str, faults: Sequence[Fault], hint: str = "") -> None:
+        super().__init__(source, faults, hint)
+        self.source = source
+        self.faults = list(faults)
+        self.hint = hint
+
+    def __str__(self) -> str:
+        source = cut(printable(self.source), 200)
+        if len(self.faults) == 1:
+            text = f"{source}: {self.faults[0]}"
+        else:
+            lines = [f"{source}: {len(self.faults)} faults"]
+            lines += [f"  {fault}" for fault in self.faults[:_LISTED]]
+            if len(self.faults) > _LISTED:
+                lines.append(f"  and {len(self.faults) - _LISTED} more")
+            text = "\n".join(lines)
+        return f"{text}\n{self.hint}" if self.hint else text
+
+
+def cut(text: str, width: int) -> str:
+    """Shorten a text to at most `width` characters, the last three of them dots."""
+    return text if len(text) <= width else text[: width - 3] + "..."
+
+
+def printable(text: str) -> str:
+    """Replace what a terminal would obey or cannot show by its escape."""
+    return "".join(
+        c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode("ascii")
+        for c in text
+    )
+
+
+def shown(value: object) -> str:
+    """Write a value as a scene file would, cut to one short line."""
+    return cut(_toml(value, depth=0), _VALUE_WIDTH)
+
+
+def _toml(value: object, depth: int) -> str:
+    match value:
+        case bool():
+            return "true" if value else "false"
+        case int() if value.bit_length() > 256:
+            # Python refuses to print integers of thousands of digits.
+            return f"a whole number of {value.bit_length()} bits"
+        case int() | float():
+            return repr(value)
+        case str():
+            return printable(json.dumps(cut(value, _VALUE_WIDTH), ensure_ascii=False))
+        case Mapping():
+            return "a table"
+        case list() | tuple():
+            if depth > 2:
+                return "[...]"
+            # Enough elements to fill the line, never the whole of a long list.
+            inner = [_toml(item, depth + 1) for item in value[:_VALUE_WIDTH]]
+            return f"[{', '.join(inner)}]"
+        case None:
+            return "nothing"
+    return printable(str(value))
+
+
+def joined(parts: Sequence[str | int]) -> str:
+    """Write a path of keys and indices: ``("surface", 1, "name")`` is ``surface[1].name``."""
+    text = ""
+    for part in parts:
+        if isinstance(part, int):
+            text += f"[{part}]"
+            continue
+        name = part if _BARE_KEY.fullmatch(part) else printable(json.dumps(part))
+        text += f".{name}" if text else name
+    return text
+
+
+def at_path(document: Any, parts: Sequence[str | int]) -> object:
+    """Follow a path of keys and indices; `MISSING` where it leads nowhere."""
+    found = document
+    for part in parts:
+        try:
+            found = found[part]
+        except (KeyError, IndexError, TypeError):
+            return MISSING
+    return found

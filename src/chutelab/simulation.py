@@ -1,0 +1,96 @@
+"""From a scene to a recording: choosing the engine."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+from chutelab.machine import build
+from chutelab.scene import Fault, SceneError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from chutelab.machine import Machine
+    from chutelab.recording import Recording
+    from chutelab.scene import Scene
+
+ENGINES = ("auto", "exact", "pymunk")
+
+
+def choose(machine: Machine, engine: str | None = None) -> str:
+    """Return the engine that will run: exact whenever particles do not interact.
+
+    Parameters
+    ----------
+    machine : Machine
+        The scene, resolved.
+    engine : {"auto", "exact", "pymunk"}, optional
+        Overrides the scene's ``run.engine``.
+
+    Raises
+    ------
+    ValueError
+        If there is no engine of that name.
+    """
+    wanted = machine.engine if engine is None else engine
+    if wanted not in ENGINES:
+        raise ValueError(f"engine = {wanted!r}: one of {', '.join(ENGINES)}")
+    if wanted != "auto":
+        return wanted
+    return "pymunk" if machine.interact else "exact"
+
+
+def simulate(
+    scene: Scene,
+    engine: str | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Recording:
+    """Run a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        From `chutelab.load`.
+    engine : {"auto", "exact", "pymunk"}, optional
+        Overrides the scene's ``run.engine``.
+    progress : callable, optional
+        Called now and then with the share of the run that is done, 0 to 1.
+
+    Returns
+    -------
+    Recording
+        The same scene, seed and engine give the same numbers to the last bit; only `seconds`, the
+        wall time from the validated scene to the recording, differs.
+
+    Raises
+    ------
+    SceneError
+        If the geometry contradicts itself, or the engine cannot run the scene.
+    """
+    begin = perf_counter()
+    machine = build(scene)
+    name = choose(machine, engine)
+    if name == "exact":
+        if machine.interact:
+            raise _refused(scene, "run.engine", "exact", "pymunk, because stream.interact = true")
+        from chutelab.exact import CornerError, run
+
+        try:
+            recording = run(machine, progress)
+        except CornerError as error:
+            raise _refused(scene, "run.engine", "exact", str(error)) from error
+    else:
+        if machine.particle.radius == 0.0:
+            raise _refused(
+                scene, "particle.radius", 0.0, "more than 0 with run.engine = \"pymunk\""
+            )
+        from chutelab.stepper import run as step
+
+        recording = step(machine, progress)
+    return replace(recording, seconds=perf_counter() - begin)
+
+
+def _refused(scene: Scene, key: str, value: object, allowed: str) -> SceneError:
+    return SceneError(scene.source, [Fault(key, value, allowed)])

@@ -6,14 +6,21 @@ to negative is a contact; the other one is a departure.
 
 from __future__ import annotations
 
+from math import comb
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
 
-BISECTIONS = 110
-"""Enough halvings to reach neighbouring doubles from any bracket met here (53 bits and a margin for
-roots far below the upper end)."""
+ITERATIONS = 120
+"""Bound on the refinements of a root: Newton's method takes about 8, a double root by halving up to
+this many."""
+
+BERNSTEIN = np.array(
+    [[comb(j, i) / comb(4, i) for i in range(5)] for j in range(5)], dtype=np.float64
+)
+"""Takes the coefficients of a quartic on [0, 1] to its Bernstein form, which bounds it."""
 
 
 def closing_time(gap: ArrayLike, rate: ArrayLike, acceleration: ArrayLike) -> Floats:
@@ -60,7 +67,7 @@ def first_descent(coefficients: Floats, until: Floats) -> Floats:
     """Return the first t in (0, until] where a polynomial of degree up to 4 becomes negative.
 
     The stationary points of each derivative split the time axis into pieces on which the next one
-    down is monotonic, so bisection cannot miss a root nor land on the wrong one. Touching zero
+    down is monotonic, so no root is missed or mistaken for another. Touching zero
     without crossing is not a contact.
 
     Parameters
@@ -75,19 +82,30 @@ def first_descent(coefficients: Floats, until: Floats) -> Floats:
     ndarray, (k,)
         inf where the polynomial stays non-negative.
     """
-    degree = len(coefficients) - 1
+    first = np.full(coefficients.shape[1], np.inf)
+    until = np.asarray(until, dtype=np.float64)
+    scaled = coefficients * until ** np.arange(5)[:, None]
+    # A polynomial lies above the smallest of its Bernstein coefficients.
+    open_ = np.flatnonzero((BERNSTEIN @ scaled < 0.0).any(axis=0))
+    if len(open_):
+        first[open_] = _isolate(coefficients[:, open_], until[open_])
+    return first
+
+
+def _isolate(coefficients: Floats, until: Floats) -> Floats:
     derivatives = [coefficients]
-    for _ in range(degree - 1):
+    for _ in range(3):
         powers = np.arange(1, len(derivatives[-1]))[:, None]
         derivatives.append(derivatives[-1][1:] * powers)
-    zero, until = np.zeros(coefficients.shape[1]), np.asarray(until, dtype=np.float64)
+    zero = np.zeros(coefficients.shape[1])
     knots = [zero, until]
     for derivative in reversed(derivatives[1:]):
-        knots = [zero, *(_bisect(derivative, a, b) for a, b in _pairs(knots)), until]
+        knots = [zero, *(_crossing(derivative, a, b) for a, b in _pairs(knots)), until]
     first = np.full(coefficients.shape[1], np.inf)
     for a, b in reversed(_pairs(knots)):
-        crosses = polynomial(coefficients, b) < 0.0
-        first = np.where(crosses, _bisect(coefficients, a, b), first)
+        falls = polynomial(coefficients, b) < 0.0
+        if falls.any():
+            first = np.where(falls, _crossing(coefficients, a, b), first)
     return first
 
 
@@ -103,19 +121,32 @@ def _pairs(knots: list[Floats]) -> list[tuple[Floats, Floats]]:
     return list(zip(knots[:-1], knots[1:], strict=True))
 
 
-def _bisect(coefficients: Floats, low: Floats, high: Floats) -> Floats:
-    """Return where a polynomial, monotonic on each [low, high], changes sign, or `high`."""
-    falls = polynomial(coefficients, high) < polynomial(coefficients, low)
-    sign = np.where(falls, 1.0, -1.0)
-    at_high = sign * polynomial(coefficients, high)
-    whole = at_high >= 0.0
-    low, high = low.copy(), high.copy()
-    end = high.copy()
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        if np.all((middle <= low) | (middle >= high)):
+def _crossing(coefficients: Floats, low: Floats, high: Floats) -> Floats:
+    """Return where a polynomial, monotonic on each [low, high], changes sign, or `high`.
+
+    Newton's method kept inside a shrinking bracket, halving where it would leave it.
+    """
+    sign = np.where(polynomial(coefficients, high) < polynomial(coefficients, low), 1.0, -1.0)
+    changes = (sign * polynomial(coefficients, high) < 0.0) & (
+        sign * polynomial(coefficients, low) > 0.0
+    )
+    out = np.where(sign * polynomial(coefficients, low) <= 0.0, low, high)
+    which = np.flatnonzero(changes)
+    if not len(which):
+        return out
+    c, low, high = sign[which] * coefficients[:, which], low[which], high[which]
+    slope = c[1:] * np.arange(1, len(c))[:, None]
+    t = 0.5 * (low + high)
+    for _ in range(ITERATIONS):
+        value, rate = polynomial(c, t), polynomial(slope, t)
+        low, high = np.where(value >= 0.0, t, low), np.where(value >= 0.0, high, t)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            newton = t - value / rate
+        inside = (newton > low) & (newton < high)
+        new = np.where(inside, newton, np.where(value == 0.0, t, 0.5 * (low + high)))
+        done = np.all(np.abs(new - t) <= 2.0**-53 * np.abs(t))
+        t = new
+        if done:
             break
-        above = sign * polynomial(coefficients, middle) >= 0.0
-        low = np.where(above, middle, low)
-        high = np.where(above, high, middle)
-    return np.where(whole, end, high)
+    out[which] = t
+    return out

@@ -9,10 +9,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
+    from pathlib import Path
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -149,6 +153,31 @@ class Recording:
     def count(self) -> int:
         """Number of particles."""
         return len(self.offsets) - 1
+
+    def save(self, path: str | Path) -> Path:
+        """Write an npz file, whole or not at all; `load` gives the recording back bit for bit."""
+        from chutelab.storage import save
+
+        return save(self, path)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Recording:
+        """Read what `save` wrote; a `chutelab.storage.RecordingError` says what is wrong."""
+        from chutelab.storage import load
+
+        return load(path)
+
+    def to_csv(
+        self,
+        folder: str | Path,
+        *,
+        step: float | None = None,
+        only: Collection[str] = ("events", "trajectory"),
+    ) -> list[Path]:
+        """Write events.csv and trajectory.csv into a folder; see `chutelab.storage.to_csv`."""
+        from chutelab.storage import to_csv
+
+        return to_csv(self, folder, step=step, only=only)
 
     def track(self, particle: int) -> NDArray[Any]:
         """Return the knots of one particle, shape (k,)."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
 from matplotlib.patches import Rectangle
 
 from chutelab.plots import style
 
 if TYPE_CHECKING:
+    import numpy as np
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
@@ -65,18 +65,14 @@ class Bars:
         ax.set_ylim(0.0, 1.06 * self.factor * max(heights) or 1.0)
         ax.set_xticks([0, 1], ["put in", "is now"], fontsize=style.SMALL)
         ax.tick_params(axis="x", length=0)
-        self.bars = [
-            {name: self._bar(ax, x, name) for name in SIGNS} for x in (-0.4, 0.6)
-        ]
+        self.bars = [{name: self._bar(ax, x, name) for name in SIGNS} for x in (-0.4, 0.6)]
         table.set_axis_off()
         table.set_xlim(0.0, 1.0)
         table.set_ylim(len(SIGNS), 0.0)
         self.values = {}
         for row, name in enumerate(SIGNS):
             table.add_patch(Rectangle((0.0, row + 0.2), 0.05, 0.6, color=style.ENERGY[name]))
-            table.text(
-                0.08, row + 0.5, style.ENERGY_LABEL[name], fontsize=style.SMALL, va="center"
-            )
+            table.text(0.08, row + 0.5, style.ENERGY_LABEL[name], fontsize=style.SMALL, va="center")
             self.values[name] = table.text(
                 1.0, row + 0.5, "", fontsize=style.SMALL, va="center", ha="right", animated=True
             )
@@ -99,7 +95,7 @@ class Bars:
             text.set_text(
                 style.scientific(now[name], "J")
                 if name == "residual"
-                else f"{self.factor * now[name] + 0.0:.1f}".replace("-", "−")
+                else f"{round(self.factor * now[name], 1) + 0.0:.1f}".replace("-", "−")
             )
 
     def _at(self, index: int) -> dict[str, float]:

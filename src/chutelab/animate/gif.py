@@ -12,19 +12,31 @@ from typing import TYPE_CHECKING
 import numpy as np
 from PIL import Image
 
-from chutelab.animate.film import film, frame_delay, slowness, span
+from chutelab.animate.moments import film, frame_delay, slowness, span
 from chutelab.animate.stage import VIEW, Stage
-from chutelab.plots.output import whole
-from chutelab.plots.scenery import machine_of, scene_of, window_of
+from chutelab.files import whole
+from chutelab.plots import style
+from chutelab.plots.scenery import machine_of, scene_of
+from chutelab.plots.window import window_of
 from chutelab.theory import predict
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from numpy.typing import NDArray
+
     from chutelab.recording import Recording
 
 COLOURS = 255
 """Of the palette: one index is left, for what does not change from frame to frame."""
+
+PURE = ("#FFFFFF", *sorted({*style.ENERGY.values(), style.TRACK, style.STREAM, style.ANALYTIC}))
+"""Colours that the palette holds unmixed."""
+
+NEXT_TO = 11
+"""Steps (of 255) in every channel within which a mixed colour gives way to a pure one: Pillow looks
+colours up by the corner of a cell, up to 3 steps away in each channel, so that one at less than
+twice that distance could be taken for it."""
 
 SAMPLES = 8
 """Frames that the palette is made from."""
@@ -119,8 +131,22 @@ def _frames(stage: Stage, palette: Image.Image) -> Iterator[Image.Image]:
         yield picture.quantize(palette=palette, dither=Image.Dither.NONE)
 
 
-def shared_palette(frames: list[np.ndarray]) -> Image.Image:
-    """Return an image whose palette suits all of the frames, (height, width, 3) each."""
-    return Image.fromarray(np.concatenate(frames)).quantize(
-        colors=COLOURS, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE
+def shared_palette(frames: list[NDArray[np.uint8]]) -> Image.Image:
+    """Return an image whose palette suits all of the frames, (height, width, 3) each.
+
+    White and the colours that stand for something are in it as they are; median cut, which mixes
+    neighbours, chooses the rest.
+    """
+    exact = np.array([_rgb(colour) for colour in PURE], dtype=np.uint8)
+    mixed = Image.fromarray(np.concatenate(frames)).quantize(
+        colors=COLOURS - len(exact), method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE
     )
+    rest = np.array(mixed.getpalette(), dtype=np.uint8).reshape(-1, 3)
+    apart = np.abs(rest[:, None].astype(int) - exact).max(axis=2).min(axis=1) > NEXT_TO
+    table = Image.new("P", (1, 1))
+    table.putpalette([*exact.ravel().tolist(), *rest[apart].ravel().tolist()])
+    return table
+
+
+def _rgb(colour: str) -> tuple[int, ...]:
+    return tuple(bytes.fromhex(colour.removeprefix("#")))

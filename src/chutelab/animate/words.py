@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from chutelab.plots.sampling import STRUCK
 from chutelab.plots.style import quantity
 from chutelab.recording import PARTICLES, Kind
 
@@ -15,13 +16,15 @@ if TYPE_CHECKING:
 
     from chutelab.recording import Recording
 
-STRUCK = (Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
-
 
 def surface_words(name: str) -> str:
     """Return how a surface is spoken of."""
-    named = {"incoming": "the incoming belt", "outgoing": "the outgoing belt", "plate": "the plate"}
-    return named.get(name, f"“{name}”")
+    return {
+        "incoming": "the incoming belt",
+        "outgoing": "the outgoing belt",
+        "plate": "the plate",
+        PARTICLES: "other particles",
+    }.get(name, f"“{name}”")
 
 
 def contact_normal(event: Any, mass: float) -> NDArray[np.float64]:
@@ -57,7 +60,7 @@ def sentence(recording: Recording, event: Any) -> str:
     if kind is Kind.SEPARATION:
         angle = degrees(atan2(*event["position"]))
         where = "at the top" if angle < 5e-4 else f"{angle:.1f}° past the top"
-        return f"leaves the drive pulley {where}, at {quantity(speed, 'm/s')}"
+        return f"leaves the drive pulley {where}, at {speed:.3g} m/s"
     on = surface_words(name)
     return {
         Kind.RELEASE: "is released",
@@ -71,15 +74,16 @@ def sentence(recording: Recording, event: Any) -> str:
 def _impact(recording: Recording, event: Any, kind: Kind, name: str) -> str:
     before = hypot(*event["velocity_before"])
     if kind is Kind.COLLISION:
-        # Of the two, the record keeps one as `particle` and the other as `other`.
-        partner = int(event["other"]) if event["particle"] == 0 else int(event["particle"])
-        return f"hits particle {partner} at {quantity(before, 'm/s')}"
+        # The event keeps the velocity of its `particle` only.
+        if event["particle"] != 0:
+            return f"is hit by particle {int(event['particle'])}"
+        return f"hits particle {int(event['other'])} at {before:.3g} m/s"
     verb = "lands on" if kind is Kind.LANDING else "strikes"
-    text = f"{verb} {surface_words(name)} at {quantity(before, 'm/s')}"
+    text = f"{verb} {surface_words(name)} at {before:.3g} m/s"
     normal = contact_normal(event, recording.particle.mass)
     if np.all(np.isfinite(normal)):
         into, off = (abs(float(event[v] @ normal)) for v in ("velocity_before", "velocity_after"))
-        text += f"; speed across it {quantity(into, 'm/s')} → {quantity(off, 'm/s')}"
+        text += f"; normal speed {into:.3g} m/s → {off:.3g} m/s"
     belt, restitution, friction = losses(recording, event)
     said = [
         f"{quantity(float(value), 'J')} {what}"

@@ -5,15 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from chutelab.exact.arcs import bounds
-from chutelab.exact.obstacles import NONE, Floats, Ints, dot
+from chutelab.exact.obstacles import Floats, Ints, dot
 from chutelab.exact.swarm import Mode, Swarm
 from chutelab.exact.touch import rest_on, settle_law, strike
 from chutelab.recording import Kind
 from chutelab.ride import STEP_ANGLE, Circle, Outcome, advance, normal_force
-
-ONTO = 1
-"""Order of contact of a ride that begins at the end of a face: no blow, the path goes on."""
-
 
 def ride_on(s: Swarm, who: Ints, circle: Ints) -> None:
     """Go on from the end of a face round a circle, or fly if it curves away too fast."""
@@ -99,6 +95,7 @@ def ride(s: Swarm, who: Ints) -> None:
     step = advance(state, s.stop[who] - s.age[who])
     outcome = np.where(lifted, Outcome.LIFT, step.outcome)
     go = np.flatnonzero(~lifted)
+    s.count_idle(who, np.where(lifted, 0.0, step.dt))
     s.age[who[go]] += step.dt[go]
     center = s.p[who] - rho[:, None] * c.normal
     _place(s, who[go], rho[go], step.phi[go], step.w[go], center[go])

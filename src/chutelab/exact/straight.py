@@ -47,7 +47,7 @@ def straight(s: Swarm, who: Ints) -> None:
     )
     outcome = np.argmin(times, axis=0)
     dt = times[outcome, np.arange(len(who))]
-    _watch(s, who, dt)
+    s.count_idle(who, dt)
 
     _slide_books(s, who[face], dt[face], acceleration[face], force[face])
     s.age[who] += dt
@@ -162,17 +162,3 @@ def _leave_face(s: Swarm, who: Ints) -> None:
     s.event(Kind.SEPARATION, who[off], o.surface[segment[off]])
     s.fly(who[off], segment[off], side[off], 2)
 
-
-IDLE_LIMIT = 2000
-"""Events in a row that take no time, in which a corner must have been left or come to rest."""
-
-
-def _watch(s: Swarm, who: Ints, dt: Floats) -> None:
-    """Raise, rather than hang, if events follow each other without time passing."""
-    s.idle[who] = np.where(dt > 0.0, 0, s.idle[who] + 1)
-    if s.idle[who].max(initial=0) > IDLE_LIMIT:
-        stuck = int(who[np.argmax(s.idle[who])])
-        raise RuntimeError(
-            f"exact engine: particle {stuck} makes no progress at t ="
-            f" {s.released[stuck] + s.age[stuck]:.6g} s, position {s.p[stuck].tolist()} m"
-        )

@@ -96,6 +96,16 @@ class Swarm:
         self.landed = np.zeros(count, dtype=bool)
         self.idle = np.zeros(count, dtype=np.int64)
 
+    def count_idle(self, who: Ints, dt: Floats) -> None:
+        """Count events in a row that take no time, and raise rather than hang if they never end."""
+        self.idle[who] = np.where(dt > 0.0, 0, self.idle[who] + 1)
+        if self.idle[who].max(initial=0) > 2 * COLLAPSE:
+            stuck = int(who[np.argmax(self.idle[who])])
+            raise RuntimeError(
+                f"exact engine: particle {stuck} makes no progress at t ="
+                f" {self.released[stuck] + self.age[stuck]:.6g} s, at {self.p[stuck].tolist()} m"
+            )
+
     def active(self, *modes: Mode) -> Ints:
         """Return the particles in one of the modes."""
         return np.flatnonzero(np.isin(self.mode, modes))
@@ -177,6 +187,10 @@ class Swarm:
         scale = np.abs(w) + np.abs(self.z[who]) + np.abs(contact.belt)
         return np.where(np.abs(slip) <= NO_SLIP * scale, 0.0, slip)
 
+
+COLLAPSE = 200
+"""Contacts in a row that take no time after which a particle has come to rest in its corner. An
+elastic particle leaves a wedge of angle β after π/β of them."""
 
 NO_SLIP = 1e-13
 """Share of the speeds involved below which a slip is rounding."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from chutelab.exact.arcs import bounds
 from chutelab.exact.obstacles import NONE, Floats, Ints, dot
-from chutelab.exact.swarm import Contact, Mode, Swarm, below
+from chutelab.exact.swarm import COLLAPSE, Contact, Mode, Swarm, below
 from chutelab.impact import impulses, limited
 from chutelab.recording import Kind
 
@@ -38,10 +38,17 @@ def strike(s: Swarm, who: Ints, obstacle: Ints, side: Ints) -> None:
     if s.machine.until == "landed":
         s.finish(who[landing], "landed")
 
+    jammed = (s.idle[who] > COLLAPSE) & (s.mode[who] != Mode.DONE)
+    before = np.where(s.on[who] == NONE, s.left[who], s.on[who])
+    jammed &= (before != NONE) & (before != obstacle)
+    before_side = np.where(s.on[who] == NONE, s.left_side[who], s.side[who])
+    hold(
+        s, who[jammed], (before[jammed], before_side[jammed]), (obstacle[jammed], side[jammed])
+    )
     held = np.isin(s.mode[who], [Mode.FACE, Mode.ARC])
     held[held] = _still_on(s, who[held])
     rests = (_load(s, who, obstacle, c) > 0.0) & (rebound <= REST)
-    live = s.mode[who] != Mode.DONE
+    live = (s.mode[who] != Mode.DONE) & ~jammed
     slides, falls, flies = held & live, rests & ~held & live, ~rests & ~held & live
     _slide_past(s, who[slides], obstacle[slides], side[slides], rebound[slides])
     rest_on(s, who[falls], obstacle[falls], side[falls], rebound[falls])
@@ -114,7 +121,8 @@ def _slide_past(s: Swarm, who: Ints, obstacle: Ints, side: Ints, rebound: Floats
     pull, _ = face_pull(s, who)
     against = s.contact(who, other, other_side)
     stuck = (rebound[kept] <= REST) & (dot(pull, against.normal) < 0.0)
-    hold(s, who[stuck], other[stuck], other_side[stuck])
+    on = (s.on[who[stuck]], s.side[who[stuck]])
+    hold(s, who[stuck], on, (other[stuck], other_side[stuck]))
 
 
 def rest_on(s: Swarm, who: Ints, obstacle: Ints, side: Ints, rebound: Floats) -> None:
@@ -215,41 +223,60 @@ def face_pull(s: Swarm, who: Ints) -> tuple[Floats, Floats]:
     return (pull + force)[:, None] * c.tangent, force
 
 
-def hold(s: Swarm, who: Ints, other: Ints, other_side: Ints) -> None:
-    """Keep particles in the corner between the face they slide on and another obstacle.
+def hold(s: Swarm, who: Ints, on: tuple[Ints, Ints], other: tuple[Ints, Ints]) -> None:
+    """Bring particles to rest in the corner of two obstacles, each given with its side.
 
-    They rest; a moving surface under them goes on doing work, all of it heat. Where a surface is at
-    rest its friction is taken as zero: it dissipates nothing, and the balance of the two normal
-    forces needs none.
+    A moving surface under them goes on doing work, all of it heat. Where a surface is at rest its
+    friction is taken as zero: it dissipates nothing, and the balance of the two normal forces needs
+    none. Where friction pulls the particle in harder than any load can hold it (self-locking, as
+    with adhesion) a real drive would stall: the particle stays, and nothing more is booked. Where
+    gravity pulls out of the corner it falls, from rest.
     """
     if not len(who):
         return
-    a, b = s.contact(who, s.on[who], s.side[who]), s.contact(who, other, other_side)
+    a, b = s.contact(who, *on), s.contact(who, *other)
     moving = (a.belt != 0.0) | (b.belt != 0.0)
     if s.spins and moving.any():
         raise CornerError(
             "a spinning disk is held between two surfaces of which one moves; the exact engine"
             ' cannot follow that: run it with engine = "pymunk"'
         )
-    forces = [
-        c.normal + (np.sign(c.belt) * np.where(c.belt == 0.0, 0.0, c.friction))[:, None] * c.tangent
-        for c in (a, b)
-    ]
-    determinant = forces[0][:, 0] * forces[1][:, 1] - forces[0][:, 1] * forces[1][:, 0]
-    load_a = -s.gravity * forces[1][:, 0] / determinant
-    load_b = s.gravity * forces[0][:, 0] / determinant
-    time = s.stop[who] - s.age[who]
     kinetic = 0.5 * s.mass * (dot(s.v[who], s.v[who]) + 0.5 * s.z[who] ** 2)
     s.v[who], s.z[who] = 0.0, 0.0
     s.recorder.book(who, b.surface, 0.0, kinetic, 0.0)
     s.knots(who)
-    rest = ~moving & (s.machine.until == "settled")
+    loads, locked = _corner_loads(s, a, b)
+    stays = locked | np.all(loads >= 0.0, axis=0)
+    s.fly(who[~stays], other[0][~stays], other[1][~stays], 2)
+    rest = stays & ~moving & (s.machine.until == "settled")
     s.event(Kind.SETTLE, who[rest], a.surface[rest])
     s.finish(who[rest], "settled")
-    for c, load in ((a, load_a), (b, load_b)):
-        push = s.mass * np.where(c.belt == 0.0, 0.0, c.friction) * np.maximum(load, 0.0)
-        heat = np.where(rest, 0.0, push * np.abs(c.belt) * time)
+    waits = stays & ~rest
+    time = s.stop[who] - s.age[who]
+    for c, load in zip((a, b), loads, strict=True):
+        heat = np.where(waits & ~locked, s.mass * _grip(c) * np.abs(c.belt) * load * time, 0.0)
         s.recorder.book(who, c.surface, heat, 0.0, heat)
-    s.age[who[~rest]] = s.stop[who[~rest]]
-    s.knots(who[~rest])
-    s.finish(who[~rest], "time")
+    s.age[who[waits]] = s.stop[who[waits]]
+    s.knots(who[waits])
+    s.finish(who[waits], "time")
+
+
+def _grip(c: Contact) -> Floats:
+    """Friction coefficient of a surface that slides under a resting particle, 0 if it is at rest."""
+    return np.where((c.belt == 0.0) | np.isinf(c.friction), 0.0, c.friction)
+
+
+def _corner_loads(s: Swarm, a: Contact, b: Contact) -> tuple[Floats, NDArray[np.bool_]]:
+    """Return the two normal forces per mass, (2, k), that hold a particle, and where friction locks."""
+    first, second = (
+        c.normal + (np.sign(c.belt) * _grip(c))[:, None] * c.tangent for c in (a, b)
+    )
+    determinant = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        loads = s.gravity * np.stack([-second[:, 0], first[:, 0]]) / determinant
+    loads = np.where(np.isfinite(loads), loads, -1.0)
+    inwards = np.zeros(len(determinant), dtype=bool)
+    for c, against in ((a, b), (b, a)):
+        drawn = np.sign(c.belt) * dot(c.tangent, against.normal) < 0.0
+        inwards |= drawn & (np.isinf(c.friction) | (loads < 0.0).any(axis=0) & (c.friction > 0.0))
+    return loads, inwards

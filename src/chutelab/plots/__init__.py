@@ -3,11 +3,11 @@
 ===============  ==================================================================================
 `style`          colours, text sizes, units
 `sampling`       times and parts of a recording that are worth drawing; energies to stack
-`scenery`        the machine to scale, and the window in which something happens
+`window`         the part of the world in which something happens
+`scenery`        the machine to scale, with the names of its surfaces
 `analytic`       the analytic parabola as arcs of flight
 `panels`         tracks, parabola, residual, velocity, energy ledger
 `figure`         the overlay
-`output`         files written whole or not at all
 ===============  ==================================================================================
 
 Figures are drawn by Agg through `Figure` objects: no pyplot, no global state.
@@ -23,7 +23,8 @@ from chutelab.plots.panels import (
     draw_tracks,
     draw_velocity,
 )
-from chutelab.plots.scenery import Window, draw_scene, machine_of, window_of
+from chutelab.plots.scenery import draw_scene, machine_of
+from chutelab.plots.window import Window, window_of
 
 __all__ = [
     "Arc",

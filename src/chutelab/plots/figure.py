@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import shorten
 from typing import TYPE_CHECKING
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from chutelab.files import whole
 from chutelab.plots import style
-from chutelab.plots.output import whole
 from chutelab.plots.panels import (
     STREAM_TRACKS,
     analytic_of,
@@ -19,7 +20,8 @@ from chutelab.plots.panels import (
     draw_tracks,
     draw_velocity,
 )
-from chutelab.plots.scenery import draw_scene, machine_of, scene_of, window_of
+from chutelab.plots.scenery import draw_scene, machine_of, scene_of
+from chutelab.plots.window import window_of
 from chutelab.theory import predict
 
 if TYPE_CHECKING:
@@ -66,13 +68,11 @@ def overlay(
     grid = figure.add_gridspec(
         2, 1, height_ratios=(4.2, 1.0), left=0.06, right=0.56, top=0.88, bottom=0.08, hspace=0.28
     )
-    side = figure.add_gridspec(
-        2, 1, left=0.63, right=0.985, top=0.88, bottom=0.155, hspace=0.34
-    )
+    side = figure.add_gridspec(2, 1, left=0.63, right=0.985, top=0.88, bottom=0.155, hspace=0.34)
     parts, start = analytic_of(recording, prediction)
     view = figure.add_subplot(grid[0])
     _view(view, recording, parts)
-    draw_residual(figure.add_subplot(grid[1]), recording, parts, start, prediction.reason)
+    draw_residual(figure.add_subplot(grid[1]), recording, parts, start, str(prediction.reason))
     draw_velocity(figure.add_subplot(side[0]), recording, parts, start)
     books = draw_ledger(figure.add_subplot(side[1]), recording)
     figure.legend(
@@ -85,10 +85,10 @@ def overlay(
         handlelength=1.4,
         columnspacing=1.0,
     )
-    figure.text(0.06, 0.965, recording.title, fontsize=style.LARGE, fontweight="bold", va="center")
-    figure.text(
-        0.985, 0.965, _said(recording), fontsize=style.NORMAL, color=style.MUTED, ha="right", va="center"
-    )
+    title = shorten(recording.title, 80, placeholder=" …")
+    figure.text(0.06, 0.965, title, fontsize=style.LARGE, fontweight="bold", va="center")
+    engine = figure.text(0.985, 0.965, _said(recording), fontsize=style.NORMAL, color=style.MUTED)
+    engine.set(horizontalalignment="right", verticalalignment="center")
     if path is not None:
         save(figure, Path(path))
     return figure
@@ -113,7 +113,7 @@ def _view(ax: Axes, recording: Recording, parts: tuple[Arc, ...]) -> None:
 def _said(recording: Recording) -> str:
     if recording.count == 1:
         return f"engine {recording.engine}, one particle"
-    said = f"engine {recording.engine}, {recording.count} particles"
+    said = f"engine {recording.engine}, {recording.count:,} particles"
     if recording.count > STREAM_TRACKS:
         said += f", {STREAM_TRACKS} tracks drawn"
     return said

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from textwrap import fill
+from math import ceil, log10
+from textwrap import fill, shorten
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,10 +14,12 @@ from chutelab.plots.analytic import arcs, flight
 from chutelab.plots.sampling import (
     action,
     energies,
-    round_step,
     round_times,
+    strobe_step,
+    struck_by_nominal,
     subset,
     track_times,
+    upright,
 )
 from chutelab.plots.scenery import scene_of, shown_particles
 from chutelab.recording import Kind
@@ -31,9 +34,6 @@ if TYPE_CHECKING:
 
 STREAM_TRACKS = 60
 """Tracks of a stream that are drawn; more would be one blot."""
-
-STROBES = 10
-"""Strobe dots aimed at between separation and end."""
 
 ROUNDING = 2.0**-52
 """m; the spacing of floating-point numbers at 1 m."""
@@ -65,8 +65,7 @@ def draw_tracks(ax: Axes, recording: Recording) -> Axes:
     ax.plot(
         *position[:, 0].T, color=style.TRACK, linewidth=1.6, zorder=5.0, gid="track", label="track"
     )
-    since = action(recording)[0]
-    step = round_step(max(end - since, 1e-9), STROBES)
+    step = strobe_step(recording)
     dots, _ = nominal.at(round_times(begin, end, step))
     ax.plot(
         *dots[:, 0].T,
@@ -79,8 +78,7 @@ def draw_tracks(ax: Axes, recording: Recording) -> Axes:
         gid="strobe",
         label=f"every {step:g} s",
     )
-    struck = recording.select(Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
-    struck = struck[(struck["particle"] == 0) | (struck["other"] == 0)]
+    struck = struck_by_nominal(recording)
     if len(struck):
         where, _ = nominal.at(np.clip(struck["t"], begin, end))
         ax.plot(
@@ -103,7 +101,6 @@ def _draw_stream(ax: Axes, recording: Recording) -> None:
     if not len(chosen):
         return
     some = subset(recording, chosen)
-    times = np.linspace(some.knots["t"].min(), some.knots["t"].max(), 300)
     lines = []
     for i in range(len(chosen)):
         one = subset(some, [i])
@@ -140,7 +137,7 @@ def _times_of(parts: tuple[Arc, ...], each: int = 120) -> NDArray[np.float64]:
 
 
 def draw_residual(
-    ax: Axes, recording: Recording, parts: tuple[Arc, ...], start: float, reason: str | None = None
+    ax: Axes, recording: Recording, parts: tuple[Arc, ...], start: float, reason: str = ""
 ) -> Axes:
     """Draw the distance between simulated and analytic positions of particle 0, on a log scale.
 
@@ -149,9 +146,10 @@ def draw_residual(
     parts, start : tuple of Arc, float
         See `analytic_of`; without arcs the panel says so, and why.
     reason : str, optional
-        Why there is no analytic parabola.
+        Why there is no analytic parabola, or none to the end.
     """
-    style.dress(ax, "time since separation, s", "distance, m", "Simulated − analytic")
+    note = shorten(f"; then {reason}", 95, placeholder=" …") if reason else ""
+    style.dress(ax, f"time since separation, s{note}", "distance, m", "Simulated − analytic")
     if not parts:
         ax.set_axis_off()
         why = reason or "particle 0 does not separate from a pulley"
@@ -168,14 +166,31 @@ def draw_residual(
         return ax
     times = _times_of(parts)
     known, _ = flight(parts, times)
-    position, _ = subset(recording, [0]).at(start + times)
+    clock, end = start + times, float(recording.track(0)["t"][-1])
+    # A sum may pass the end by rounding, where there is no position any more.
+    clock = np.where(np.isclose(clock, end, rtol=1e-12, atol=0.0), end, clock)
+    position, _ = subset(recording, [0]).at(clock)
     distance = np.hypot(*(position[:, 0] - known).T)
-    largest = float(np.nanmax(distance, initial=0.0))
+    flying = np.isfinite(distance)
+    times, distance = times[flying], distance[flying]
+    largest = float(distance.max(initial=0.0))
     ax.set_yscale("log")
     ax.axhline(ROUNDING, color=style.MUTED, linewidth=1.0, linestyle=":")
-    ax.plot(times, np.maximum(distance, FLOOR), color=style.TRACK, linewidth=1.6, gid="residual")
-    ax.set_ylim(FLOOR, max(1e-14, 30.0 * largest))
-    ax.set_xlim(0.0, times[-1])
+    ax.plot(
+        times,
+        np.maximum(distance, FLOOR),
+        color=style.TRACK,
+        linestyle="none",
+        marker=".",
+        markersize=4.0,
+        gid="residual",
+    )
+    top = max(-14, ceil(log10(30.0 * largest))) if largest > 0.0 else -14
+    bottom = round(log10(FLOOR))
+    ax.set_ylim(FLOOR, 10.0**top)
+    ax.set_yticks([10.0**k for k in range(bottom, top + 1, (top - bottom + 3) // 4)])
+    ax.minorticks_off()
+    ax.set_xlim(0.0, parts[-1].end)
     ax.set_title(
         f"Simulated − analytic: at most {style.scientific(largest, 'm')}",
         fontsize=style.NORMAL,
@@ -225,7 +240,7 @@ def draw_velocity(
 
 def _beyond(times: NDArray[np.float64]) -> float:
     """Return a time a little after the end, so that a jump at the end can be seen."""
-    return float(times[-1] + 0.04 * (times[-1] - times[0]))
+    return float(times[-1] + (0.04 * (times[-1] - times[0]) or 1e-3))
 
 
 def draw_ledger(ax: Axes, recording: Recording, count: int = 240) -> Axes:
@@ -236,8 +251,8 @@ def draw_ledger(ax: Axes, recording: Recording, count: int = 240) -> Axes:
     """
     t = recording.knots["t"]
     times = np.linspace(t.min(), t.max(), count)
-    if recording.count == 1:
-        times = track_times(recording, float(t.min()), float(t.max()), count)
+    if len(recording.events) <= count:
+        times = upright(times, recording.events["t"])
     times = np.append(times, _beyond(times))
     books = energies(recording, times)
     supplied = books["start"] + books["belt_work"]
@@ -261,7 +276,10 @@ def draw_ledger(ax: Axes, recording: Recording, count: int = 240) -> Axes:
     )
     residual = float(books["residual"][-1])
     style.dress(
-        ax, "time, s", f"energy, {unit}", f"Energy ledger: residual {style.scientific(residual, 'J')}"
+        ax,
+        "time, s",
+        f"energy, {unit}",
+        f"Energy ledger: residual {style.scientific(residual, 'J')}",
     )
     ax.set_xlim(times[0], times[-1])
     ax.set_ylim(bottom=min(0.0, factor * float(supplied.min())))

@@ -4,17 +4,23 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import floor, log10
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.recording import Kind, Recording
+from chutelab.recording import REASONS, Kind, Recording
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 Floats = NDArray[np.float64]
+
+STRUCK = (Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
+"""Kinds of event in which something is hit."""
+
+STROBES = 10
+"""Strobe dots aimed at from separation to the last impact."""
 
 CHUNK = 200_000
 """Particle-times that one call of `energy_at` gets: some tens of MB."""
@@ -48,7 +54,8 @@ def round_step(span: float, wanted: int) -> float:
     power = floor(log10(exact))
     mantissa = exact / 10.0**power
     # Geometric means are the borders between 1, 2, 5 and 10.
-    factor = 1 if mantissa < 2**0.5 else 2 if mantissa < 10**0.5 else 5 if mantissa < 50**0.5 else 10
+    borders = ((1, 2**0.5), (2, 10**0.5), (5, 50**0.5), (10, 10.0))
+    factor = next(factor for factor, border in borders if mantissa <= border)
     return float(f"{factor}e{power}")
 
 
@@ -70,6 +77,20 @@ def action(recording: Recording) -> tuple[float, float]:
     return float(begin), float(track["t"][-1])
 
 
+def struck_by_nominal(recording: Recording) -> NDArray[Any]:
+    """Return the events in which particle 0 hits something or is hit."""
+    struck = recording.select(*STRUCK)
+    return np.asarray(struck[(struck["particle"] == 0) | (struck["other"] == 0)])
+
+
+def strobe_step(recording: Recording) -> float:
+    """Return the round time between strobe dots, s, made for the time until the last impact."""
+    begin, end = action(recording)
+    struck = struck_by_nominal(recording)["t"]
+    last = float(struck[-1]) if len(struck) and struck[-1] > begin else end
+    return round_step(max(last - begin, 1e-3), STROBES)
+
+
 def track_times(recording: Recording, begin: float, end: float, count: int = 400) -> Floats:
     """Return even times, joined by the knots of particle 0 and the moments just before them.
 
@@ -77,12 +98,15 @@ def track_times(recording: Recording, begin: float, end: float, count: int = 400
     """
     knots = recording.track(0)["t"]
     if len(knots) > count:
-        mine = recording.events["t"][recording.events["particle"] == 0]
-        knots = mine[:count]
-    knots = knots[(knots >= begin) & (knots <= end)]
-    before = np.nextafter(knots, -np.inf)
-    times = np.concatenate([np.linspace(begin, end, count), knots, before[before >= begin]])
-    return np.unique(times)
+        knots = recording.events["t"][recording.events["particle"] == 0][:count]
+    return upright(np.linspace(begin, end, count), knots)
+
+
+def upright(times: Floats, jumps: Floats) -> Floats:
+    """Return ascending times joined by jumps between the first and last, and just before each."""
+    jumps = jumps[(jumps >= times[0]) & (jumps <= times[-1])]
+    before = np.nextafter(jumps, -np.inf)
+    return np.unique(np.concatenate([times, jumps, before[before >= times[0]]]))
 
 
 def energies(recording: Recording, times: ArrayLike) -> dict[str, Floats]:
@@ -92,19 +116,31 @@ def energies(recording: Recording, times: ArrayLike) -> dict[str, Floats]:
     -------
     dict of ndarray, shape (T,)
         What `energy_at` gives, and ``start``, kinetic and potential energy at the release of all
-        particles released so far; J. Potential energy is counted from the lowest knot of the
-        recording, so that it can be stacked.
+        particles released so far; J. Potential energy is counted from the lowest point of the
+        particles that stay in the scene (of all, if it is negative otherwise): it can be stacked.
     """
     times = np.atleast_1d(np.asarray(times, dtype=np.float64))
     size = max(1, CHUNK // max(recording.count, 1))
     parts = [recording.energy_at(times[i : i + size]) for i in range(0, len(times), size)]
     books = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    lowest = float(recording.knots["position"][:, 1].min()) if len(recording.knots) else 0.0
-    weight = recording.particle.mass * recording.gravity
     first, _ = recording.ends()
     order = np.argsort(first["t"], kind="stable")
     at_release = np.concatenate([[0.0], np.cumsum(sum(recording.energies(first[order])))])
     released = np.searchsorted(first["t"][order], times, side="right")
-    books["potential"] = books["potential"] - weight * lowest * released
-    books["start"] = at_release[released] - weight * lowest * released
+    weight = released * recording.particle.mass * recording.gravity
+    for zero in _lowest(recording):
+        lifted = books["potential"] - weight * zero
+        if (lifted >= 0.0).all():
+            break
+    books["potential"] = np.maximum(lifted, 0.0)
+    books["start"] = at_release[released] - weight * zero
     return books
+
+
+def _lowest(recording: Recording) -> tuple[float, float]:
+    """Return the lowest knots (m) of the particles that stay in the scene, and of all."""
+    heights = recording.knots["position"][:, 1]
+    stays = recording.ended != REASONS.index("exit")
+    staying = heights[np.repeat(stays, np.diff(recording.offsets))]
+    lowest = float(heights.min(initial=np.inf))
+    return float(staying.min()) if len(staying) else lowest, lowest

@@ -1,9 +1,8 @@
-"""The machine drawn to scale: pulley, belts, plate and free surfaces, in a window of interest."""
+"""The machine drawn to scale: pulley, belts, plate and free surfaces, with their names."""
 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,12 +12,12 @@ from matplotlib.patheffects import withStroke
 from chutelab import scene as scenes
 from chutelab.machine import build
 from chutelab.plots import style
-from chutelab.plots.sampling import action, spread, subset, track_times
-from chutelab.recording import Kind
+from chutelab.plots.sampling import spread
+from chutelab.plots.window import Window, around
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.text import Text
+    from matplotlib.text import Annotation
     from numpy.typing import NDArray
 
     from chutelab.machine import Machine
@@ -28,62 +27,8 @@ if TYPE_CHECKING:
 HALO = [withStroke(linewidth=3.0, foreground="white")]
 """Keeps text readable where a line runs behind it."""
 
-NEARBY = 0.25
-"""Share of the action's size around it within which surfaces are shown."""
-
-
-@dataclass(frozen=True)
-class Window:
-    """The part of the world that is shown, m."""
-
-    left: float
-    right: float
-    bottom: float
-    top: float
-
-    @property
-    def width(self) -> float:
-        """Extent in x, m."""
-        return self.right - self.left
-
-    @property
-    def height(self) -> float:
-        """Extent in y, m."""
-        return self.top - self.bottom
-
-    def padded(self, left: float, right: float, bottom: float, top: float) -> Window:
-        """Return a window larger by shares of its own larger side."""
-        size = max(self.width, self.height)
-        return Window(
-            self.left - left * size,
-            self.right + right * size,
-            self.bottom - bottom * size,
-            self.top + top * size,
-        )
-
-    def fitted(self, aspect: float) -> Window:
-        """Return the smallest window of that width / height which holds this one, centred."""
-        width = max(self.width, aspect * self.height)
-        height = max(self.height, self.width / aspect)
-        x, y = 0.5 * (self.left + self.right), 0.5 * (self.bottom + self.top)
-        return Window(x - width / 2, x + width / 2, y - height / 2, y + height / 2)
-
-    def clip(
-        self, start: NDArray[np.float64], end: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-        """Return the ends of the part of a straight line inside, None if it stays outside."""
-        along = end - start
-        low, high = 0.0, 1.0
-        for axis, (lower, upper) in enumerate(
-            ((self.left, self.right), (self.bottom, self.top))
-        ):
-            if along[axis] == 0.0:
-                if not lower <= start[axis] <= upper:
-                    return None
-                continue
-            shares = sorted((bound - start[axis]) / along[axis] for bound in (lower, upper))
-            low, high = max(low, shares[0]), min(high, shares[1])
-        return (start + low * along, start + high * along) if low < high else None
+TWO_LINES = 32.0
+"""pt; height of two lines of small text."""
 
 
 def scene_of(recording: Recording) -> Scene:
@@ -96,62 +41,8 @@ def machine_of(recording: Recording) -> Machine:
     return build(scene_of(recording))
 
 
-def window_of(recording: Recording, machine: Machine) -> Window:
-    """Return the window in which something happens, with room for labels.
-
-    It holds particle 0 from separation (or release, without one) to its last event that is no
-    exit, nearly all events of the others, the pulley, and what lies near of the surfaces.
-    """
-    points = [_path(recording), _crowd(recording)]
-    if machine.pulley is not None:
-        corner = np.full(2, machine.pulley.radius)
-        points.append(np.array([-corner, corner]))
-    core = _around(np.concatenate(points))
-    near = core.padded(NEARBY, NEARBY, NEARBY, NEARBY)
-    shown = [
-        near.clip(start, end)
-        for start, end in zip(machine.segments.start, machine.segments.end, strict=True)
-    ]
-    ends = [np.array(part) for part in shown[_first_free(machine) :] if part is not None]
-    window = _around(np.concatenate([*points, *ends]))
-    has_plate = "plate" in machine.surfaces
-    return window.padded(0.12, 0.22 if has_plate else 0.06, 0.10, 0.12)
-
-
-def _first_free(machine: Machine) -> int:
-    """Index of the first segment after the incoming belt, which may be cut off anywhere."""
-    return 0 if machine.pulley is None else 1
-
-
-def _path(recording: Recording) -> NDArray[np.float64]:
-    begin, end = action(recording)
-    mine = recording.events[recording.events["particle"] == 0]
-    mine = mine[(mine["kind"] != Kind.EXIT) & (mine["kind"] != Kind.RELEASE)]
-    if len(mine) and mine["t"][-1] > begin:
-        end = float(mine["t"][-1])
-    position, _ = subset(recording, [0]).at(track_times(recording, begin, end))
-    return position[:, 0]
-
-
-def _crowd(recording: Recording) -> NDArray[np.float64]:
-    """Middle 96 % of where the events of the other particles are, as a box's two corners."""
-    events = recording.events
-    others = events[
-        (events["particle"] != 0) & ~np.isin(events["kind"], [int(Kind.RELEASE), int(Kind.EXIT)])
-    ]
-    if not len(others):
-        return np.empty((0, 2))
-    return np.asarray(np.quantile(others["position"], [0.02, 0.98], axis=0))
-
-
-def _around(points: NDArray[np.float64]) -> Window:
-    (left, bottom), (right, top) = points.min(axis=0), points.max(axis=0)
-    least = 0.01 * max(right - left, top - bottom) or 0.1
-    return Window(left, max(right, left + least), bottom, max(top, bottom + least))
-
-
 def show_window(ax: Axes, window: Window) -> Window:
-    """Set the limits of axes to a window at equal scales, filling the axes; return what is shown."""
+    """Set limits that hold a window at equal scales and fill the axes; return what is shown."""
     box = ax.get_window_extent()
     shown = window.fitted(box.width / box.height)
     ax.set_xlim(shown.left, shown.right)
@@ -176,7 +67,7 @@ def draw_scene(ax: Axes, machine: Machine, window: Window | None = None) -> Axes
         ends = np.concatenate([machine.segments.start, machine.segments.end])
         if machine.pulley is not None:
             ends = np.concatenate([ends, [[machine.pulley.radius, -machine.pulley.radius]]])
-        window = _around(ends).padded(0.1, 0.22, 0.1, 0.12)
+        window = around(ends).padded(0.1, 0.22, 0.1, 0.12)
     shown = show_window(ax, window)
     if machine.pulley is not None:
         _draw_pulley(ax, machine.pulley.radius)
@@ -197,7 +88,7 @@ def draw_scene(ax: Axes, machine: Machine, window: Window | None = None) -> Axes
         part = shown.clip(start, end)
         if part is not None and surface not in labelled:
             labelled.add(int(surface))
-            _label(ax, machine, i, name, part)
+            _label(ax, machine, i, part, shown)
     return ax
 
 
@@ -212,22 +103,27 @@ def _label(
     ax: Axes,
     machine: Machine,
     segment: int,
-    name: str,
     part: tuple[NDArray[np.float64], NDArray[np.float64]],
-) -> Text:
-    """Name a surface on the side where no particle is expected."""
+    shown: Window,
+) -> Annotation:
+    """Name a surface at its part that is shown, on the side where no particle is expected."""
+    name = machine.surfaces[machine.segments.surface[segment]]
     speed = float(machine.segments.speed[segment])
+    tangent = machine.segments.tangent[segment]
     low, high = sorted(part, key=lambda point: (point[1], point[0]))
     gap = 7.0
     if name == "plate":
-        sine, cosine = -machine.segments.tangent[segment][0], machine.segments.tangent[segment][1]
-        angle = float(np.degrees(np.arctan2(sine, cosine))) + 0.0  # no -0
+        angle = float(np.degrees(np.arctan2(-tangent[0], tangent[1]))) + 0.0  # no -0
         text = f"plate, {angle:.3g}°\nε = {machine.segments.restitution[segment]:.3g}"
         where, offset = high, (gap, 0.0)
+        # Two lines need room above where they begin.
+        room = TWO_LINES * ax.figure.dpi / 72.0 * shown.height / ax.get_window_extent().height
+        if angle > 0.0 and high[1] > shown.top - room:
+            where = low + (high - low) * max(0.0, shown.top - room - low[1]) / (high[1] - low[1])
         across, along = "left", "top" if angle <= 0.0 else "bottom"
     elif name == "incoming":
         text = f"incoming belt\n{_motion(speed)}"
-        where, offset = np.array([part[0][0], part[0][1]]), (4.0, -gap)
+        where, offset = np.array([shown.left, part[0][1]]), (4.0, -gap)
         across, along = "left", "top"
     elif name == "outgoing":
         text = f"outgoing belt, {_motion(speed)}"
@@ -235,9 +131,12 @@ def _label(
         across, along = "right", "top"
     else:
         text = name if speed == 0.0 else f"{name}, {_motion(speed)}"
-        where, offset = 0.5 * (low + high), (gap, -gap)
-        across, along = "left", "top"
-    return ax.annotate(
+        down = np.array([tangent[1], -tangent[0]])
+        down *= -1.0 if down[1] > 0.0 or (down[1] == 0.0 and down[0] < 0.0) else 1.0
+        where, offset = 0.5 * (low + high), (gap * down[0], gap * down[1])
+        across = "center" if abs(down[0]) < 0.2 else "right" if down[0] < 0.0 else "left"
+        along = "top" if down[1] < -0.2 else "center"
+    label = ax.annotate(
         text.replace("-", "−"),
         (float(where[0]), float(where[1])),
         xytext=offset,
@@ -249,6 +148,19 @@ def _label(
         path_effects=HALO,
         zorder=4.0,
     )
+    _keep_inside(ax, label)
+    return label
+
+
+def _keep_inside(ax: Axes, label: Annotation) -> None:
+    """Shift a name back over the edges of the axes."""
+    box, frame = label.get_window_extent(), ax.get_window_extent()
+    margin = 3.0
+    right = max(frame.x0 + margin - box.x0, 0.0) + min(frame.x1 - margin - box.x1, 0.0)
+    up = max(frame.y0 + margin - box.y0, 0.0) + min(frame.y1 - margin - box.y1, 0.0)
+    x, y = label.xyann
+    points = 72.0 / ax.figure.dpi
+    label.xyann = (x + right * points, y + up * points)
 
 
 def _motion(speed: float) -> str:

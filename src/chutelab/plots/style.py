@@ -42,7 +42,7 @@ ENERGY_LABEL = {
     "belt_work": "belt work",
     "restitution_loss": "restitution loss",
     "friction_loss": "slip heat",
-    "residual": "residual (numerical error)",
+    "residual": "residual (error)",
 }
 
 SMALL, NORMAL, LARGE = 9.5, 10.5, 13.0

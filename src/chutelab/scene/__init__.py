@@ -1,7 +1,8 @@
 """Scene files: from TOML text to a frozen, validated `Scene`.
 
 - `errors`: a fault (key, value found, what is allowed) and the one message that lists them all.
-- `models`: the tables of a scene as frozen Pydantic models, with units and ranges; the defaults.
+- `quantities`: what a key may hold: strict types, units, ranges.
+- `models`: the tables of a scene as frozen Pydantic models, with the defaults.
 - `rules`: what no table can judge alone: conflicts between tables.
 - `wording`: Pydantic's errors as faults, with the allowed values said in words.
 - `overrides`: ``KEY=VALUE`` texts, as ``--set`` takes them, laid over a scene.
@@ -15,7 +16,6 @@ from chutelab.scene.errors import MISSING, Fault, SceneError
 from chutelab.scene.library import About, about, find, shipped, template
 from chutelab.scene.loading import from_dict, load, parse, to_dict
 from chutelab.scene.models import (
-    RESERVED_NAMES,
     Incoming,
     Outgoing,
     Particle,
@@ -25,6 +25,7 @@ from chutelab.scene.models import (
     Stream,
     Surface,
 )
+from chutelab.scene.quantities import RESERVED_NAMES
 
 __all__ = [
     "MISSING",

@@ -144,7 +144,9 @@ def joined(parts: Sequence[str | int]) -> str:
         if isinstance(part, int):
             text += f"[{part}]"
             continue
-        name = part if _BARE_KEY.fullmatch(part) else printable(json.dumps(part))
+        name = (
+            part if _BARE_KEY.fullmatch(part) else printable(json.dumps(part, ensure_ascii=False))
+        )
         text += f".{name}" if text else name
     return text
 

@@ -60,9 +60,7 @@ def parse(text: str, source: str = "<scene>", overrides: Sequence[str] = ()) -> 
     except (ValueError, RecursionError):
         # tomllib passes on what Python itself refuses: dates out of the calendar, integers of
         # thousands of digits, arrays nested a thousand deep.
-        fault = Fault(
-            "", None, "not TOML that can be read: a value is too large or nested too deep"
-        )
+        fault = Fault("", None, "not TOML to be read: a value is too large or nested too deep")
         raise SceneError(source, [fault]) from None
     return from_dict(document, source, overrides)
 

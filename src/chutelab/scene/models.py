@@ -1,94 +1,34 @@
 """The tables of a scene file as frozen Pydantic models, with their units, ranges and defaults.
 
-Attributes mirror the TOML keys. Angles are degrees here (``_deg``) and nowhere else. Numbers are
-strict: a TOML integer will do for a float, but neither a boolean nor a string; NaN and infinity
-are refused. Every quantity has an upper bound, so that a slip of the keyboard is refused instead of
-overflowing, or of filling the memory, far from its cause.
+Attributes mirror the TOML keys. Angles are degrees here (``_deg``) and nowhere else.
 """
 
 from __future__ import annotations
 
-import re
-from itertools import pairwise
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Literal, Self
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Field,
-    PrivateAttr,
-    WithJsonSchema,
-    model_validator,
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
+
+from chutelab.scene.quantities import (
+    LARGEST,
+    MOST_PARTICLES,
+    MOST_SURFACES,
+    Coordinate,
+    Duration,
+    Friction,
+    Name,
+    Number,
+    Point,
+    Polyline,
+    Switch,
+    Text,
+    Whole,
+    described,
+    pair_friction,
+    pair_restitution,
+    size,
 )
-
 from chutelab.scene.rules import ConflictError, Look, conflicts, surface_conflicts
-
-RESERVED_NAMES: Final = ("incoming", "plate", "outgoing", "particles")
-"""Names in ledgers and events that a free surface may not take."""
-
-NAME: Final = r"""^[^\s.=\[\]"']{1,40}$"""
-"""A free surface's name, such that an override can name it in a path."""
-
-LARGEST: Final = 1e6
-"""Bound on every dimensional quantity, SI: far beyond any chute, far from overflow in v⁴."""
-
-MOST_PARTICLES: Final = 10_000_000
-"""Their knots alone would be gigabytes beyond this."""
-
-MOST_SURFACES: Final = 1_000
-MOST_POINTS: Final = 10_000
-
-
-def _distinct(points: tuple[Point, ...]) -> tuple[Point, ...]:
-    for first, second in pairwise(points):
-        if first == second:
-            raise ValueError(f"consecutive points must differ, [{first[0]}, {first[1]}] repeats")
-    return points
-
-
-def _free(name: str) -> str:
-    if not re.fullmatch(NAME, name):
-        raise ValueError("must be 1 to 40 characters without spaces, dots, =, brackets or quotes")
-    if name in RESERVED_NAMES:
-        raise ValueError(f"must not be one of the reserved names {', '.join(RESERVED_NAMES)}")
-    return name
-
-
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Whole = Annotated[int, Field(strict=True)]
-Switch = Annotated[bool, Field(strict=True)]
-Text = Annotated[str, Field(strict=True)]
-Name = Annotated[Text, AfterValidator(_free), WithJsonSchema({"type": "string", "pattern": NAME})]
-Coordinate = Annotated[Number, Field(ge=-LARGEST, le=LARGEST)]
-Point = tuple[Coordinate, Coordinate]
-Polyline = Annotated[
-    tuple[Point, ...], Field(min_length=2, max_length=MOST_POINTS), AfterValidator(_distinct)
-]
-Friction = Annotated[Number, Field(ge=0.0, le=LARGEST)]
-Duration = Annotated[Number, Field(gt=0.0, le=LARGEST)]
-
-
-def _key(default: Any, what: str, unit: str = "", **limits: Any) -> Any:
-    """Describe one key: its default, its definition in a sentence, its unit and its range."""
-    return Field(
-        default,
-        description=f"{what}, {unit}." if unit else f"{what}.",
-        json_schema_extra={"x-unit": unit} if unit else None,
-        **limits,
-    )
-
-
-def _size(default: Any, what: str) -> Any:
-    return _key(default, what, "m", gt=0.0, le=LARGEST)
-
-
-def _restitution(default: float, pair: str) -> Any:
-    return _key(default, f"Coefficient of restitution of the pair {pair}", ge=0.0, le=1.0)
-
-
-def _friction(default: float, pair: str) -> Any:
-    return _key(default, f"Coulomb coefficient of friction µ of the pair {pair}")
 
 
 class Table(BaseModel):
@@ -105,43 +45,43 @@ class Table(BaseModel):
 class Particle(Table):
     """The particles, all alike: disks, or mass points with radius 0."""
 
-    radius: Number = _key(0.004, "Radius r; 0 is a mass point", "m", ge=0.0, le=LARGEST)
-    mass: Number = _key(0.008, "Mass m", "kg", gt=0.0, le=LARGEST)
-    spin: Switch = _key(False, "true: a free disk, I = m r²/2; false: never turns")
+    radius: Number = described(0.004, "Radius r; 0 is a mass point", "m", ge=0.0, le=LARGEST)
+    mass: Number = described(0.008, "Mass m", "kg", gt=0.0, le=LARGEST)
+    spin: Switch = described(False, "true: a free disk, I = m r²/2; false: never turns")
 
 
 class Incoming(Table):
     """The incoming conveyor and its drive pulley, whose axis is the origin."""
 
-    speed: Number = _key(..., "Belt speed v0", "m/s", ge=0.0, le=LARGEST)
-    pulley_radius: Number = _size(..., "Radius R of the drive pulley, with the belt")
-    length: Number = _size(1.0, "Length of belt before the pulley's axis")
-    friction: Literal["adhesion"] | Friction = _key(
+    speed: Number = described(..., "Belt speed v0", "m/s", ge=0.0, le=LARGEST)
+    pulley_radius: Number = size(..., "Radius R of the drive pulley, with the belt")
+    length: Number = size(1.0, "Length of belt before the pulley's axis")
+    friction: Literal["adhesion"] | Friction = described(
         "adhesion",
         'Grip of belt and pulley on a particle: "adhesion" (no slip until separation) or a Coulomb '
         "coefficient µ",
     )
-    restitution: Number = _restitution(0.0, "particle-belt")
+    restitution: Number = pair_restitution(0.0, "particle-belt")
 
 
 class Plate(Table):
     """The damping plate."""
 
-    distance: Number = _size(..., "d_okr, from the pulley's leading edge x = R to the pivot")
-    angle_deg: Number = _key(
+    distance: Number = size(..., "d_okr, from the pulley's leading edge x = R to the pivot")
+    angle_deg: Number = described(
         0.0,
         "Angle α from the vertical; positive leans the top back toward the incoming conveyor",
         "degrees",
         gt=-90.0,
         lt=90.0,
     )
-    pivot_height: Number = _key(
+    pivot_height: Number = described(
         None, "Height y of the pivot; default: the pulley's radius", "m", ge=-LARGEST, le=LARGEST
     )
-    above: Number = _key(
+    above: Number = described(
         0.3, "Length of plate above the pivot, along the plate", "m", ge=0.0, le=LARGEST
     )
-    below: Number | None = _key(
+    below: Number | None = described(
         None,
         "Length of plate below the pivot; default: down to max(0.05 m, 3 r) above the outgoing "
         "belt, 2.0 m without [outgoing]",
@@ -149,30 +89,30 @@ class Plate(Table):
         ge=0.0,
         le=LARGEST,
     )
-    restitution: Number = _restitution(0.5, "particle-plate")
-    friction: Friction = _friction(0.0, "particle-plate")
+    restitution: Number = pair_restitution(0.5, "particle-plate")
+    friction: Friction = pair_friction(0.0, "particle-plate")
 
 
 class Outgoing(Table):
     """The outgoing conveyor's belt."""
 
-    speed: Number = _key(
+    speed: Number = described(
         None,
         "Belt speed v_dop, may be negative; default: the incoming belt's",
         "m/s",
         ge=-LARGEST,
         le=LARGEST,
     )
-    drop: Number = _size(..., "Fall to the belt, measured as drop_from says")
-    drop_from: Literal["impact", "top"] = _key(
+    drop: Number = size(..., "Fall to the belt, measured as drop_from says")
+    drop_from: Literal["impact", "top"] = described(
         "impact",
         '"impact": drop is d2, the fall of a particle\'s centre from plate impact to landing; '
         '"top": drop is d3, from the top of the pulley (y = R) down to the belt surface',
     )
-    start: Coordinate = _key(-2.0, "World x where the belt begins; it reaches forward", "m")
-    length: Number = _size(6.0, "Length of the belt")
-    restitution: Number = _restitution(0.0, "particle-belt")
-    friction: Friction = _friction(0.5, "particle-belt")
+    start: Coordinate = described(-2.0, "World x where the belt begins; it reaches forward", "m")
+    length: Number = size(6.0, "Length of the belt")
+    restitution: Number = pair_restitution(0.0, "particle-belt")
+    friction: Friction = pair_friction(0.5, "particle-belt")
 
 
 class Surface(Table):
@@ -186,13 +126,15 @@ class Surface(Table):
         json_schema_extra={"oneOf": [{"required": ["from", "to"]}, {"required": ["points"]}]}
     )
 
-    name: Name = _key(..., "Unique name, for events and the ledger")
-    from_: Point | None = Field(None, alias="from", description="First end [x, y], m.")
-    to: Point | None = _key(None, "Second end [x, y]", "m")
-    points: Polyline = _key(None, "Instead of from and to: a polyline [[x, y], ...]", "m")
-    restitution: Number = _restitution(0.3, "particle-surface")
-    friction: Friction = _friction(0.4, "particle-surface")
-    speed: Number = _key(
+    name: Name = described(..., "Unique name, for events and the ledger")
+    from_: Point | None = Field(
+        None, alias="from", description="First end [x, y] (m).", json_schema_extra={"x-unit": "m"}
+    )
+    to: Point | None = described(None, "Second end [x, y]", "m")
+    points: Polyline = described(None, "Instead of from and to: a polyline [[x, y], ...]", "m")
+    restitution: Number = pair_restitution(0.3, "particle-surface")
+    friction: Friction = pair_friction(0.4, "particle-surface")
+    speed: Number = described(
         0.0,
         "Speed along from -> to; a belt when not 0",
         "m/s",
@@ -217,48 +159,50 @@ class Surface(Table):
 class Stream(Table):
     """The stream of particles: how many, when, where and how fast they are released."""
 
-    count: Whole = _key(1, "Number of particles", ge=1, le=MOST_PARTICLES)
-    rate: Number = _key(
+    count: Whole = described(1, "Number of particles", ge=1, le=MOST_PARTICLES)
+    rate: Number = described(
         200.0, "Particles per second; particle i is released at i / rate", "1/s", ge=1e-6, le=1e9
     )
-    bed_height: Number = _key(
+    bed_height: Number = described(
         0.0,
         "Centres spread uniformly over this height above the lowest layer",
         "m",
         ge=0.0,
         le=LARGEST,
     )
-    speed_spread: Number = _key(
+    speed_spread: Number = described(
         0.0, "Uniform half-width around the release speed", "m/s", ge=0.0, le=LARGEST
     )
-    seed: Whole = _key(0, "Seed of the random draws", ge=0, le=2**63 - 1)
-    at: Point | None = _key(
+    seed: Whole = described(0, "Seed of the random draws", ge=0, le=2**63 - 1)
+    at: Point | None = described(
         None,
         "Release point [x, y] of the lowest layer; default: on the incoming belt's start",
         "m",
     )
-    velocity: Point | None = _key(
+    velocity: Point | None = described(
         None, "Release velocity [vx, vy]; default: the incoming belt's", "m/s"
     )
-    interact: Switch = _key(False, "Particle-particle contacts")
-    restitution: Number = _restitution(0.5, "particle-particle")
-    friction: Friction = _friction(0.3, "particle-particle")
+    interact: Switch = described(False, "Particle-particle contacts")
+    restitution: Number = pair_restitution(0.5, "particle-particle")
+    friction: Friction = pair_friction(0.3, "particle-particle")
 
 
 class Run(Table):
     """How the scene is simulated, and until when."""
 
-    engine: Literal["auto", "exact", "pymunk"] = _key(
+    engine: Literal["auto", "exact", "pymunk"] = described(
         "auto", '"auto" takes exact where particles do not interact, else pymunk'
     )
-    until: Literal["landed", "settled"] | Duration = _key(
+    until: Literal["landed", "settled"] | Duration = described(
         None,
         'Ending: "landed", "settled" or a number of seconds; default: "landed" with [outgoing], '
         'else "settled"',
         "s",
     )
-    max_time: Duration = _key(30.0, "Bound on every ending, counted from the last release", "s")
-    dt: Number = _key(0.001, "Longest step of the pymunk engine", "s", ge=1e-7, le=0.1)
+    max_time: Duration = described(
+        30.0, "Bound on every ending, counted from the last release", "s"
+    )
+    dt: Number = described(0.001, "Longest step of the pymunk engine", "s", ge=1e-7, le=0.1)
 
 
 class Scene(Table):
@@ -270,8 +214,8 @@ class Scene(Table):
         If built directly from bad values; `chutelab.scene.from_dict` says it in words.
     """
 
-    title: Text = _key("Untitled scene", "What the scene is called", max_length=200)
-    gravity: Number = _key(9.81, "Gravity g, downward", "m/s²", ge=0.0, le=LARGEST)
+    title: Text = described("Untitled scene", "What the scene is called", max_length=200)
+    gravity: Number = described(9.81, "Gravity g, downward", "m/s²", ge=0.0, le=LARGEST)
     particle: Particle = Field(default_factory=Particle)
     incoming: Incoming | None = None
     plate: Plate | None = None
@@ -299,6 +243,10 @@ class Scene(Table):
     def source(self) -> str:
         """The file the scene was read from, or ``<scene>``; for messages."""
         return self._source
+
+    def __eq__(self, other: object) -> bool:
+        # The same machine from another file is the same scene.
+        return self.__dict__ == other.__dict__ if isinstance(other, Scene) else NotImplemented
 
     @model_validator(mode="after")
     def _judge_and_fill(self) -> Self:

@@ -84,9 +84,10 @@ def conflicts(look: Look) -> Iterator[Fault]:
 
 
 def _tables(look: Look) -> Iterator[Fault]:
-    for table in ("plate", "outgoing"):
-        if look.has(table) and not look.has("incoming"):
-            yield Fault("incoming", MISSING, f"[{table}] needs the table [incoming]")
+    needy = [f"[{table}]" for table in ("plate", "outgoing") if look.has(table)]
+    if needy and not look.has("incoming"):
+        need = "needs" if len(needy) == 1 else "need"
+        yield Fault("incoming", MISSING, f"{' and '.join(needy)} {need} the table [incoming]")
     if look("plate", "above") == 0.0 and look("plate", "below") == 0.0:
         yield Fault("plate.above", 0.0, "a plate needs a length; plate.below is 0 too")
     if look("outgoing", "drop_from") == "impact" and not look.has("plate"):

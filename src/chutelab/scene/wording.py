@@ -14,7 +14,8 @@ from annotated_types import Ge, Gt, Le, Lt, MaxLen
 from pydantic.fields import FieldInfo
 
 from chutelab.scene.errors import MISSING, Fault, at_path, joined
-from chutelab.scene.models import MOST_POINTS, MOST_SURFACES, Point, Scene, Surface, Table
+from chutelab.scene.models import Scene, Surface, Table
+from chutelab.scene.quantities import MOST_POINTS, MOST_SURFACES, Point
 from chutelab.scene.rules import ConflictError
 
 if TYPE_CHECKING:

@@ -138,9 +138,7 @@ def corner_times(flight: Flight, points: Floats, radius: float, horizon: float) 
             low, high = marks[max(inside[0] - 1, 0)], marks[inside[0]]
             for _ in range(HALVINGS):
                 middle = 0.5 * (low + high)
-                low, high = (
-                    (low, middle) if np.polyval(quartic, middle) < 0.0 else (middle, high)
-                )
+                low, high = (low, middle) if np.polyval(quartic, middle) < 0.0 else (middle, high)
             first[index] = high
     return first
 

@@ -1,40 +1,32 @@
 """`predict`: the theory's answer for a scene, or the reason why it has none.
 
-`transfer` supplies the numbers for an unbounded plate and belt; here the finite machine is laid
-over them: what is touched before the plate, whether the plate is there, what is touched between
-rebound and landing, whether the belt is there.
+The finite machine is laid over the numbers of `transfer`: what is touched before the plate, whether
+the plate is there, what is touched between rebound and landing, whether the belt is there.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chutelab.theory.course import Course
 from chutelab.theory.obstacles import (
     Flight,
     Segments,
     corner_times,
-    face_times,
     first_in_flight,
     first_on_arc,
 )
 from chutelab.theory.reasons import Reason
-from chutelab.theory.transfer import STAGES, Rebound, Transfer, transfer
+from chutelab.theory.results import Transfer, cut, unanswered
 
 if TYPE_CHECKING:
-    from chutelab.scene import Incoming, Plate, Scene
+    from chutelab.scene import Scene
+    from chutelab.theory.transfer import Rebound
 
-LEAST_CLEARANCE = 0.05
-"""m of the default plate's lower end above the outgoing belt, for particles below 17 mm."""
-
-RADII_CLEARANCE = 3.0
-"""The same in particle radii, for larger ones."""
-
-REACH_WITHOUT_BELT = 2.0
-"""m of the default plate below its pivot where there is no outgoing belt."""
+ON_BELT = 1e-12
+"""m; a release this close to the riding height differs from it by the rounding of a sum only."""
 
 
 def predict(scene: Scene, rebound: Rebound = "corrected") -> Transfer:
@@ -63,8 +55,8 @@ def predict(scene: Scene, rebound: Rebound = "corrected") -> Transfer:
     """
     fault = _outside(scene)
     if fault:
-        return _cut(_nothing(), "separation", Reason.OUTSIDE.because(fault))
-    return _Course(scene, rebound).answer()
+        return cut(unanswered(), "separation", Reason.OUTSIDE.because(fault))
+    return _answer(Course(scene, rebound))
 
 
 def _outside(scene: Scene) -> str:
@@ -73,10 +65,11 @@ def _outside(scene: Scene) -> str:
         return "there is no incoming conveyor"
     if scene.plate is None:
         return "there is no damping plate"
-    ride_height = scene.incoming.pulley_radius + scene.particle.radius
     at, velocity = scene.stream.at, scene.stream.velocity
-    if at is not None and not (-scene.incoming.length <= at[0] <= 0.0 and at[1] == ride_height):
-        return "the release point stream.at is not on the incoming belt"
+    if at is not None:
+        above = at[1] - scene.incoming.pulley_radius - scene.particle.radius
+        if abs(above) > ON_BELT or not -scene.incoming.length <= at[0] <= 0.0:
+            return "the release point stream.at is not on the incoming belt"
     if velocity is not None and tuple(velocity) != (scene.incoming.speed, 0.0):
         return "the release velocity stream.velocity is not the incoming belt's"
     if scene.stream.interact and scene.stream.count > 1:
@@ -84,140 +77,117 @@ def _outside(scene: Scene) -> str:
     return ""
 
 
-def _nothing() -> Transfer:
-    names = [name for stage in STAGES.values() for name in stage]
-    return Transfer(reason=np.array(""), **dict.fromkeys(names, np.array(np.nan)))
+def _answer(course: Course) -> Transfer:
+    """Lay the finite machine over the numbers, in the order of events."""
+    found = course.found
+    if np.isnan(found.phi1):
+        return found
+    if course.scene.outgoing is not None and course.belt_height is None:
+        # Nothing places the belt, nor the plate's lower end: there is no machine to look at.
+        return cut(found, "separation", str(found.reason))
+    low, high = course.plate_reach
+    if high <= low:
+        return cut(found, "impact", Reason.OUTSIDE.because("the plate has no length"))
+    trouble = _on_the_ride(course) or _before_the_plate(course)
+    if trouble is None and course.scene.outgoing is None and np.isfinite(found.v2r):
+        trouble = cut(found, "landing", Reason.OUTSIDE.because("there is no outgoing conveyor"))
+    if trouble is None and Reason.of(found.reason) in (None, Reason.MISSES):
+        trouble = _after_the_rebound(course)
+    return trouble or found
 
 
-def _cut(found: Transfer, stage: str, reason: str) -> Transfer:
-    """Blank a stage and all later ones, and say why."""
-    order = list(STAGES)
-    lost = [name for later in order[order.index(stage) :] for name in STAGES[later]]
-    return replace(found, reason=np.array(reason), **dict.fromkeys(lost, np.array(np.nan)))
+def _on_the_ride(course: Course) -> Transfer | None:
+    obstacles = Segments.of(course.lines)
+    at, radius = course.scene.stream.at, course.radius
+    start = np.array([-course.belt.length if at is None else at[0], course.ride_radius])
+    index = obstacles.overlapped(start, radius)
+    if index < 0:
+        straight = Flight(start, np.array([1.0, 0.0]), 0.0)
+        index = first_in_flight(straight, obstacles, radius, float(-start[0]))[1]
+    if index < 0:
+        last = float(course.found.phi1)
+        index = first_on_arc(course.ride_radius, last, obstacles, radius)[1]
+    if index < 0:
+        return None
+    what = f"{obstacles.names[index]}: it is in the way of the ride"
+    return cut(course.found, "separation", Reason.EARLY.because(what))
 
 
-class _Course:
-    """Particle 0 on its way through one scene that has an incoming belt and a plate."""
+def _before_the_plate(course: Course) -> Transfer | None:
+    found, radius, flight = course.found, course.radius, course.separation
+    low, high = course.plate_reach
+    foot = float((course.impact - course.pivot) @ course.up)
+    hit = low <= foot <= high  # false for NaN: the line is not met
+    plate = Segments.of(course.lines[:1])
+    obstacles = Segments.of(course.lines[1:] if hit else course.lines)
+    horizon = float(found.t2) if hit else _horizon(flight, plate, radius)
+    index = first_in_flight(flight, obstacles, radius, horizon)[1]
+    # What is in the way of a flight that misses the plate anyway does not matter.
+    stopped = hit or np.isfinite(first_in_flight(flight, plate, radius, horizon)[0])
+    if stopped and index >= 0:
+        name = obstacles.names[index]
+        how = "its end or its back is touched" if name == "plate" else "it is touched first"
+        return cut(found, "impact", Reason.EARLY.because(f"{name}: {how}"))
+    if hit:
+        return None
+    if np.isnan(foot):
+        return cut(found, "impact", str(found.reason))
+    where = f"{foot - high:.4g} m above" if foot > high else f"{low - foot:.4g} m below"
+    what = f"the plate's line is met {where} the end of the plate"
+    return cut(found, "impact", Reason.NO_IMPACT.because(what))
 
-    def __init__(self, scene: Scene, rebound: Rebound) -> None:
-        assert scene.incoming is not None
-        assert scene.plate is not None
-        self.scene = scene
-        self.rebound = rebound
-        self.belt: Incoming = scene.incoming
-        self.plate: Plate = scene.plate
-        self.radius = scene.particle.radius
-        self.ride_radius = self.belt.pulley_radius + self.radius
-        self.angle = float(np.radians(self.plate.angle_deg))
-        self.up = np.array([-np.sin(self.angle), np.cos(self.angle)])
-        self.normal = np.array([-np.cos(self.angle), -np.sin(self.angle)])
-        self.pivot = np.array(
-            [self.belt.pulley_radius + self.plate.distance, self.plate.pivot_height]
-        )
 
-    @cached_property
-    def found(self) -> Transfer:
-        """What the equations say about unbounded plate and belt."""
-        out = self.scene.outgoing
-        if out is None:
-            return self._transfer(drop=0.0, belt_speed=0.0)
-        if out.drop_from == "impact":
-            return self._transfer(drop=out.drop, belt_speed=out.speed)
-        impact = self._transfer(drop=0.0, belt_speed=out.speed)
-        # Eq. (16) solved for d2; a belt above the impact is `answer`'s to refuse
-        sunk = self.ride_radius * (1.0 - np.cos(impact.phi1)) + impact.y2
-        return self._transfer(drop=max(float(out.drop - sunk), 0.0), belt_speed=out.speed)
+def _horizon(flight: Flight, targets: Segments, radius: float) -> float:
+    """Return a time after which the flight is past all targets."""
+    if flight.gravity > 0.0:
+        return flight.time_below(float(targets.points[:, 1].min()) - radius)
+    apart = targets.points - flight.position
+    reach = float(np.hypot(apart[:, 0], apart[:, 1]).max()) + 2.0 * radius
+    speed = float(np.hypot(*flight.velocity))
+    return reach / speed if speed > 0.0 else 0.0
 
-    def _transfer(self, **outgoing: float) -> Transfer:
-        scene = self.scene
-        grip = self.belt.friction
-        return transfer(
-            speed=self.belt.speed,
-            pulley_radius=self.belt.pulley_radius,
-            distance=self.plate.distance,
-            angle=self.angle,
-            pivot_height=self.plate.pivot_height,
-            restitution=self.plate.restitution,
-            particle_radius=self.radius,
-            mass=scene.particle.mass,
-            gravity=scene.gravity,
-            friction=np.inf if grip == "adhesion" else float(grip),
-            spin=scene.particle.spin,
-            plate_friction=self.plate.friction,
-            interval=1.0 / scene.stream.rate,
-            rebound=self.rebound,
-            unbounded_plate=False,
-            **outgoing,
-        )
 
-    @cached_property
-    def separation(self) -> Flight:
-        """The flight from the pulley."""
-        phi, speed = self.found.phi1, self.found.v1
-        ahead, outward = np.array([np.cos(phi), -np.sin(phi)]), np.array([np.sin(phi), np.cos(phi)])
-        return Flight(self.ride_radius * outward, speed * ahead, self.scene.gravity)
+def _after_the_rebound(course: Course) -> Transfer | None:
+    found, radius, out = course.found, course.radius, course.scene.outgoing
+    height = course.belt_height
+    assert out is not None
+    assert height is not None
+    if course.impact[1] - radius < height:
+        return cut(found, "landing", Reason.MISSES.because("the plate is met below the belt"))
+    lands = bool(np.isfinite(found.t3))
+    flight, top = course.rebounded, course.belt.pulley_radius
+    around = Segments.of([("pulley", (-top, -top), (top, top)), *course.lines])
+    horizon = float(found.t3) if lands else _horizon(flight, around, radius)
+    solid = Segments.of([("incoming", (-course.belt.length, top), (0.0, top)), *course.lines[2:]])
+    time, index = first_in_flight(flight, solid, radius, horizon)
+    time, name = min(
+        (time, solid.names[index]),
+        (_plate_again(course, horizon), "plate"),
+        (corner_times(flight, np.zeros((1, 2)), course.ride_radius, horizon)[0], "pulley"),
+    )
+    # The outgoing belt is not among them: no part of it, ends included, is met above its level.
+    if np.isfinite(time):
+        what = f"{name}: {time:.4g} s after the rebound"
+        return cut(found, "landing", Reason.SECOND.because(what))
+    x = float(course.impact[0] - found.x3)
+    if lands and not out.start <= x <= out.start + out.length:
+        what = f"it comes down at x = {x:.4g} m, off the belt"
+        return cut(found, "landing", Reason.MISSES.because(what))
+    return None
 
-    @cached_property
-    def impact(self) -> np.ndarray[Any, np.dtype[np.float64]]:
-        """World position of the centre on the plate's line, (2,); NaN if it never gets there."""
-        return self.separation.position + [self.found.x2, -self.found.y2]
 
-    @property
-    def belt_height(self) -> float | None:
-        """World y of the outgoing belt; None if there is none or nothing to measure it from."""
-        out = self.scene.outgoing
-        if out is None:
-            return None
-        if out.drop_from == "top":
-            return self.belt.pulley_radius - out.drop
-        height = float(self.impact[1] - out.drop - self.radius)
-        return height if np.isfinite(height) else None
-
-    @cached_property
-    def plate_reach(self) -> tuple[float, float]:
-        """Ends of the plate, measured upwards from the pivot along it, m."""
-        below, height = self.plate.below, self.belt_height
-        if below is None:
-            below = REACH_WITHOUT_BELT
-            if height is not None:
-                lowest = height + max(LEAST_CLEARANCE, RADII_CLEARANCE * self.radius)
-                below = max((self.pivot[1] - lowest) / np.cos(self.angle), 0.0)
-        return -below, self.plate.above
-
-    @cached_property
-    def lines(self) -> list[tuple[str, Any, Any]]:
-        """Plate, outgoing belt and free surfaces, in this order."""
-        low, high = self.plate_reach
-        lines: list[tuple[str, Any, Any]] = [
-            ("plate", self.pivot + low * self.up, self.pivot + high * self.up)
-        ]
-        out, height = self.scene.outgoing, self.belt_height
-        if out is not None and height is not None:
-            lines.append(("outgoing", (out.start, height), (out.start + out.length, height)))
-        for free in self.scene.surface:
-            lines += [(free.name, *pair) for pair in zip(free.points, free.points[1:], strict=False)]
-        return lines
-
-    def answer(self) -> Transfer:
-        """Lay the finite machine over the numbers, in the order of events."""
-        found = self.found
-        if np.isnan(self.separation.position[0]) and Reason.of(found.reason) is Reason.OUTSIDE:
-            return found
-        return (
-            self._on_the_ride() or self._before_the_plate() or self._after_the_rebound() or found
-        )
-
-    def _on_the_ride(self) -> Transfer | None:
-        obstacles = Segments.of(self.lines)
-        at = self.scene.stream.at
-        start = np.array([-self.belt.length if at is None else at[0], self.ride_radius])
-        index = obstacles.overlapped(start, self.radius)
-        if index < 0:
-            straight = Flight(start, np.array([1.0, 0.0]), 0.0)
-            index = first_in_flight(straight, obstacles, self.radius, -start[0])[1]
-        if index < 0:
-            index = first_on_arc(self.ride_radius, self.phi1, obstacles, self.radius)[1]
-        if index < 0:
-            return None
-        what = f"{obstacles.names[index]}: it is in the way of the ride"
-        return _cut(self.found, "separation", Reason.EARLY.because(what))
+def _plate_again(course: Course, horizon: float) -> float:
+    """Return when the plate is touched again, inf if not before `horizon`."""
+    flight = course.rebounded
+    pressing = -flight.gravity * np.sin(course.angle)
+    if pressing <= 0.0:
+        return np.inf
+    low, high = course.plate_reach
+    face = np.inf
+    away = flight.velocity @ course.normal
+    if 2.0 * away < pressing * horizon:
+        again = 2.0 * away / pressing
+        foot = float((flight.at(np.array(again)) - course.pivot) @ course.up)
+        face = float(again) if low <= foot <= high else np.inf
+    clipped = corner_times(flight, Segments.of(course.lines[:1]).points, course.radius, horizon)
+    return float(min(face, clipped.min()))

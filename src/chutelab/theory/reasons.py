@@ -17,12 +17,13 @@ class Reason(StrEnum):
         The named surface is touched during the ride or in the first flight, and that contact is not
         the impact on the struck face of the plate. It is the first one after the release.
     NO_IMPACT
-        Neither the ride nor the free flight from the pulley ever touches the plate.
+        Neither the ride nor the free flight from the pulley ever touches the plate; where the
+        impact on its unbounded line should place the outgoing belt, there is no such impact.
     SECOND
         After the rebound, and before the landing, the named surface is the first to be touched.
     MISSES
-        After the rebound the named fall does not end on the upper face of the finite belt, and
-        nothing else is touched on the way down to its level.
+        After the rebound the fall does not end on the upper face of the finite belt, and nothing
+        is touched on the way down to its level. Below that, the disk may still clip the belt's end.
     """
 
     OUTSIDE = "outside the model"

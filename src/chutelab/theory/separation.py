@@ -8,6 +8,7 @@ on the pulley, w' = 2 µ w - 3 sin φ.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -117,9 +118,7 @@ class _Slip:
         self.cos_onset = np.cos(self.onset)
         self.fallen = 2.0 * tangent**2 / (1.0 + tangent**2)  # 1 - cos φ at the onset
         # w at the onset, sin φ / µ or sin φ / 3µ, in a form that is right for µ = 0 too.
-        self.pressed = (
-            np.where(spin, 7.0 / 3.0, 1.0) * 2.0 * short / (base * (1.0 + tangent**2))
-        )
+        self.pressed = np.where(spin, 7.0 / 3.0, 1.0) * 2.0 * short / (base * (1.0 + tangent**2))
         turn = np.where(spin, 14.0, 2.0)
         self.swell = (1.0 - turn * friction**2) * self.pressed - 3.0 * self.cos_onset
         # With endless grip it would leave at cos φ = k; slip makes it faster, so it leaves earlier.
@@ -163,11 +162,12 @@ class _Slip:
         rolled = -4.0 / 3.0 * self.fallen / (risen + np.sqrt(self.start))
         edges = np.append(0.0, 0.5 ** np.arange(PANELS, -1, -1))
         total = np.zeros_like(root)
-        for low, high in zip(edges[:-1], edges[1:], strict=True):
+        for low, high in pairwise(edges):
             for node, weight in zip(NODES, WEIGHTS, strict=True):
                 x = root * (0.5 * (low + high) + 0.5 * (high - low) * node)
                 w = self.normal(x)
                 u = np.cos(self.onset + x) - w
                 share = np.divide(w, np.sqrt(u), out=np.zeros_like(w), where=u > 0.0)
                 total += 0.5 * (high - low) * weight * share
-        return rolled - 2.0 * self.friction * root * total
+        spun: Floats = rolled - 2.0 * self.friction * root * total
+        return spun

@@ -1,107 +1,22 @@
 """The paper's equations (2) to (16) in closed form, vectorised, with their generalisations.
 
 Any plate angle, finite particles, friction and spin; the printed Eq. (9) beside the right one.
-Stages follow the particle: separation, flight, rebound, fall, what the belt pays. Each is computed
-in the world frame (x forward, y up) and reported in the paper's symbols.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from chutelab.theory.reasons import Reason
-from chutelab.theory.separation import Separation, separation
+from chutelab.theory.stages import Given, Stages
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
-    Floats = NDArray[np.float64]
-    Bools = NDArray[np.bool_]
+    from chutelab.theory.results import Transfer
 
 Rebound = Literal["corrected", "as-printed"]
-
-
-@dataclass(frozen=True, eq=False)
-class Transfer:
-    """One transfer from belt to belt, or many: read-only arrays of one shape, SI units, radians.
-
-    NaN where there is no answer; `reason` then says why, see `chutelab.theory.Reason`. Stages
-    that were reached before the trouble keep their values.
-
-    Attributes
-    ----------
-    phi1, v1 : ndarray
-        Angle from the top of the pulley and speed at separation, Eqs. (1), (2).
-    omega1 : ndarray
-        Angular velocity from there on, rad/s, counter-clockwise; 0 unless a free disk slipped or
-        rolled.
-    t2, x2, y2 : ndarray
-        Flight time to the plate; distance forward and *down* from the separation point,
-        Eqs. (3)-(5).
-    v2, v2x, v2y : ndarray
-        Speed at the plate, forward and *down* components, Eq. (6).
-    phi2 : ndarray
-        Angle between the plate and the velocity before the impact, Eq. (7).
-    phi2r, v2r, omega2 : ndarray
-        The same angle, speed and angular velocity after it (the paper's φ2', v2'), Eqs. (8), (9).
-    t3, x3, y3 : ndarray
-        Time from impact to landing; distance *back* from the impact point, and fall, Eqs. (10)-(12).
-    v3, v3x, v3y : ndarray
-        Speed at landing, components *back* (world v_x = -v3x) and down, Eq. (13).
-    d3 : ndarray
-        Height of the transfer, Eq. (16).
-    dEk, P : ndarray
-        Energy (J) and power (W) as the paper has them, Eqs. (14), (15). The sign of v3x is lost.
-    belt_work, slip_heat : ndarray
-        What the outgoing belt's drive pays until the particle no longer slips, and the part of it
-        that becomes heat, J.
-    reason : ndarray of str
-        Empty where all is well.
-    """
-
-    phi1: Floats
-    t2: Floats
-    x2: Floats
-    y2: Floats
-    v1: Floats
-    v2: Floats
-    v2x: Floats
-    v2y: Floats
-    phi2: Floats
-    phi2r: Floats
-    v2r: Floats
-    t3: Floats
-    x3: Floats
-    y3: Floats
-    v3x: Floats
-    v3y: Floats
-    v3: Floats
-    d3: Floats
-    dEk: Floats
-    P: Floats
-    belt_work: Floats
-    slip_heat: Floats
-    omega1: Floats
-    omega2: Floats
-    reason: NDArray[np.str_]
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            array = np.array(getattr(self, field.name))
-            array.flags.writeable = False
-            object.__setattr__(self, field.name, array)
-
-
-STAGES = {
-    "separation": ("phi1", "v1", "omega1"),
-    "impact": ("t2", "x2", "y2", "v2", "v2x", "v2y", "phi2"),
-    "rebound": ("phi2r", "v2r", "omega2"),
-    "landing": ("t3", "x3", "y3", "v3", "v3x", "v3y", "d3", "dEk", "P", "belt_work", "slip_heat"),
-}
-"""Quantities by the stage that yields them, in the order of events."""
 
 
 def transfer(
@@ -158,8 +73,8 @@ def transfer(
     rebound : {"corrected", "as-printed"}
         Which Eq. (9). The printed one is defined for α = 0 without plate friction only.
     unbounded_plate : bool
-        False: do not object when the rebound meets the plate's line again, as it must for α < 0;
-        for callers who know where the plate ends.
+        False: do not object when ride or rebound meet the plate's line elsewhere, as a rebound must
+        for α < 0; for callers who know where the plate ends.
 
     Returns
     -------
@@ -203,204 +118,16 @@ def transfer(
         interval=np.nan if interval is None else interval,
     )
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        stages = _Stages(given, timed=interval is not None)
+        stages = Stages(given, timed=interval is not None)
         stages.separate()
-        stages.fly()
+        stages.fly(unbounded_plate=unbounded_plate)
         stages.rebound(as_printed=rebound == "as-printed")
         stages.fall(unbounded_plate=unbounded_plate)
         return stages.transfer()
 
 
-@dataclass(frozen=True, eq=False)
-class _Given:
-    """The parameters of `transfer`, broadcast and flattened to (N,), and the shape to restore."""
-
-    shape: tuple[int, ...]
-    speed: Floats
-    pulley_radius: Floats
-    distance: Floats
-    angle: Floats
-    pivot_height: Floats
-    restitution: Floats
-    drop: Floats
-    belt_speed: Floats
-    particle_radius: Floats
-    mass: Floats
-    gravity: Floats
-    friction: Floats
-    spin: Bools
-    plate_friction: Floats
-    interval: Floats
-
-
-def _broadcast(*, spin: ArrayLike, **numbers: ArrayLike) -> _Given:
+def _broadcast(*, spin: ArrayLike, **numbers: ArrayLike) -> Given:
     arrays = [np.asarray(value, dtype=np.float64) for value in numbers.values()]
     whole = np.broadcast_arrays(np.asarray(spin, dtype=np.bool_), *arrays)
     flat = dict(zip(numbers, (array.ravel() for array in whole[1:]), strict=True))
-    return _Given(shape=whole[0].shape, spin=whole[0].ravel(), **flat)
-
-
-class _Stages:
-    """Results as they come in, and why they stop coming, for each of N transfers."""
-
-    def __init__(self, given: _Given, *, timed: bool) -> None:
-        self.given = given
-        self.timed = timed
-        self.values: dict[str, Floats] = {}
-        self.reason = np.full(given.speed.shape, "", dtype=object)
-
-    def fail(self, where: Bools, reason: str) -> None:
-        """State a reason where there is none yet."""
-        self.reason[where & (self.reason == "")] = reason
-
-    def require(self, what: str, holds: Bools) -> None:
-        """Object to parameters; NaN never holds."""
-        self.fail(~holds, Reason.OUTSIDE.because(f"{what} is required"))
-
-    def keep(self, **values: Floats) -> None:
-        """Store results of a stage where nothing has gone wrong up to now."""
-        fine = self.reason == ""
-        self.values |= {name: np.where(fine, value, np.nan) for name, value in values.items()}
-
-    def separate(self) -> None:
-        """Ride the belt and the pulley."""
-        p = self.given
-        self.require("0 < speed < inf", (p.speed > 0.0) & (p.speed < np.inf))
-        self.require(
-            "0 < pulley_radius < inf", (p.pulley_radius > 0.0) & (p.pulley_radius < np.inf)
-        )
-        self.require(
-            "0 <= particle_radius < inf", (p.particle_radius >= 0.0) & (p.particle_radius < np.inf)
-        )
-        self.require("particle_radius > 0 with spin", ~p.spin | (p.particle_radius > 0.0))
-        self.require("0 <= gravity < inf", (p.gravity >= 0.0) & (p.gravity < np.inf))
-        self.require("friction >= 0", p.friction >= 0.0)
-        self.ride_radius = p.pulley_radius + p.particle_radius
-        self.left = left = separation(
-            speed=p.speed,
-            ride_radius=self.ride_radius,
-            gravity=p.gravity,
-            friction=p.friction,
-            spin=p.spin,
-        )
-        self.keep(phi1=left.phi1, v1=left.v1, omega1=self._turning(left.rim))
-
-    def _turning(self, rim: Floats) -> Floats:
-        return np.where(self.given.spin, rim / self.given.particle_radius, 0.0)
-
-    def fly(self) -> None:
-        """Fly to the plate: the gap between disk and plate's line is a quadratic in time."""
-        p, left = self.given, self.left
-        self.require("|angle| < π/2", np.abs(p.angle) < 0.5 * np.pi)
-        self.require("finite distance and pivot_height", np.isfinite(p.distance + p.pivot_height))
-        cos, sin = np.cos(p.angle), np.sin(p.angle)
-        to_pivot = (p.pulley_radius + p.distance) * cos + p.pivot_height * sin - p.particle_radius
-        # The gap on the pulley is least where the centre's radius is square to the plate.
-        closest = np.clip(0.5 * np.pi - p.angle, 0.0, left.phi1)
-        early = to_pivot < self.ride_radius * np.sin(closest + p.angle)
-        early &= self.reason == ""
-        self.fail(early, Reason.EARLY.because("plate: its line is reached during the ride"))
-        for name in STAGES["separation"]:
-            self.values[name] = np.where(early, np.nan, self.values[name])
-        gap = to_pivot - self.ride_radius * (left.sin * cos + left.cos * sin)
-        closing = left.v1 * (left.cos * cos - left.sin * sin)
-        discriminant = closing**2 - 2.0 * p.gravity * sin * gap
-        self.fail(closing <= 0.0, Reason.NO_IMPACT.because("the velocity points off the plate"))
-        self.fail(
-            discriminant <= 0.0,
-            Reason.NO_IMPACT.because("the flight turns away before it reaches the plate's line"),
-        )
-        self.normal = np.sqrt(discriminant)
-        t2 = 2.0 * gap / (closing + self.normal)  # Eq. (5)
-        x2 = left.v1 * t2 * left.cos  # Eq. (3)
-        y2 = 0.5 * p.gravity * t2**2 + left.v1 * t2 * left.sin  # Eq. (4)
-        v2x = left.v1 * left.cos
-        v2y = left.v1 * left.sin + p.gravity * t2
-        self.tangential = v2x * sin + v2y * cos
-        self.keep(
-            t2=t2,
-            x2=x2,
-            y2=y2,
-            v2x=v2x,
-            v2y=v2y,
-            v2=np.hypot(v2x, v2y),  # Eq. (6)
-            phi2=np.arctan2(self.normal, self.tangential),  # Eq. (7)
-        )
-
-    def rebound(self, *, as_printed: bool) -> None:
-        """Leave the plate: normal and tangential (down the plate) velocity, and the rim's."""
-        p = self.given
-        self.require("0 <= restitution <= 1", (p.restitution >= 0.0) & (p.restitution <= 1.0))
-        self.require("plate_friction >= 0", p.plate_friction >= 0.0)
-        if as_printed:
-            self.require(
-                "plate_friction = 0 and angle = 0 for Eq. (9) as printed",
-                (p.plate_friction == 0.0) & (p.angle == 0.0),
-            )
-            v2r = np.hypot(self.normal, p.restitution * self.tangential)  # Eq. (9) as printed
-            phi2r = np.arctan2(p.restitution * self.normal, self.tangential)  # Eq. (8)
-            self.away, self.down = v2r * np.sin(phi2r), v2r * np.cos(phi2r)
-            self.rim = self.left.rim
-        else:
-            # Coulomb: the impulse that stops the slip, or as much of it as friction can give.
-            slip = self.tangential - self.left.rim
-            limit = p.plate_friction * (1.0 + p.restitution) * self.normal
-            impulse = np.clip(slip * np.where(p.spin, 1.0 / 3.0, 1.0), -limit, limit)
-            self.down = self.tangential - impulse
-            self.rim = self.left.rim + np.where(p.spin, 2.0 * impulse, 0.0)
-            self.away = p.restitution * self.normal
-            v2r = np.hypot(self.away, self.down)  # Eq. (9) corrected
-            phi2r = np.arctan2(self.away, self.down)  # Eq. (8)
-        self.keep(phi2r=phi2r, v2r=v2r, omega2=self._turning(self.rim))
-
-    def fall(self, *, unbounded_plate: bool) -> None:
-        """Fall on the outgoing belt, and be taken along by it."""
-        p, left = self.given, self.left
-        self.require("0 <= drop < inf", (p.drop >= 0.0) & (p.drop < np.inf))
-        self.require("finite belt_speed", np.isfinite(p.belt_speed))
-        self.require("0 < mass < inf", (p.mass > 0.0) & (p.mass < np.inf))
-        if self.timed:
-            self.require("interval > 0", p.interval > 0.0)
-        cos, sin = np.cos(p.angle), np.sin(p.angle)
-        v3x = self.away * cos - self.down * sin
-        sinking = self.away * sin + self.down * cos
-        v3y = np.sqrt(sinking**2 + 2.0 * p.gravity * p.drop)
-        # Eq. (12), the root that does not cancel for either sign of b
-        t3 = np.where(
-            sinking >= 0.0, 2.0 * p.drop / (sinking + v3y), (v3y - sinking) / p.gravity
-        )
-        t3 = np.where((p.drop == 0.0) & (sinking >= 0.0), 0.0, t3)
-        self.fail(
-            ~np.isfinite(t3), Reason.MISSES.because("without gravity it never comes down to it")
-        )
-        if unbounded_plate:
-            pressing = -p.gravity * sin
-            self.fail(
-                (pressing > 0.0) & (2.0 * self.away < pressing * t3),
-                Reason.SECOND.because("plate: its line is met again before the landing"),
-            )
-        dEk = 0.5 * p.mass * (v3x**2 + p.belt_speed**2)  # noqa: N806 - Eq. (14)
-        slip = p.belt_speed + v3x - self.rim
-        carried = np.where(p.spin, p.mass / 3.0, p.mass)  # effective mass at the contact point
-        lost_height = left.sin**2 / (1.0 + left.cos)  # 1 - cos φ1
-        self.keep(
-            t3=t3,
-            x3=v3x * t3,  # Eq. (10)
-            y3=p.drop,  # Eq. (11), solved for t3
-            v3x=v3x,
-            v3y=v3y,
-            v3=np.hypot(v3x, v3y),  # Eq. (13)
-            d3=self.ride_radius * lost_height + self.values["y2"] + p.drop,  # Eq. (16)
-            dEk=dEk,
-            P=dEk / p.interval,  # Eq. (15)
-            belt_work=carried * p.belt_speed * slip,
-            slip_heat=0.5 * carried * slip**2,
-        )
-
-    def transfer(self) -> Transfer:
-        """Return the results in the parameters' shape."""
-        shape = self.given.shape
-        reason = self.reason.astype(np.str_).reshape(shape)
-        return Transfer(
-            reason=reason, **{name: value.reshape(shape) for name, value in self.values.items()}
-        )
+    return Given(shape=whole[0].shape, spin=whole[0].ravel(), **flat)

@@ -8,32 +8,32 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chutelab.animate.words import STRUCK, sentence
-from chutelab.plots.sampling import action, subset
+from chutelab.animate.words import sentence
+from chutelab.plots.sampling import STRUCK, action, subset
 from chutelab.recording import Kind
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from chutelab.plots.scenery import Window
+    from chutelab.plots.window import Window
     from chutelab.recording import Recording
 
-RUNNING = 6.0
+RUNNING = 5.8
 """s; the longest the motion of a film takes on the screen by default, holds not counted."""
 
 LIVES = 3.0
 """A stream is filmed for at most this many times what particle 0 takes."""
 
-HOLDS = 6
+HOLDS = 4
 """Impacts that the film stops at; more would be a slide show."""
 
 WORTH = 0.05
 """Share of the largest impulse that an impact needs for the film to stop at it."""
 
-HOLD_TOTAL, HOLD_SHORTEST, HOLD_LONGEST = 360, 60, 130
-"""Hundredths of a second: all holds together, and the bounds of one."""
+HOLD_TOTAL, HOLD_LONGEST = 300, 130
+"""Hundredths of a second: all holds together at most, and one of them."""
 
-TAIL = 150
+TAIL = 120
 """Hundredths of a second that the last picture stays."""
 
 
@@ -87,13 +87,11 @@ def film(
         # A step that almost coincides with a stop would be a stumble.
         times = times[np.abs(times[:, None] - stops).min(axis=1) > 0.5 * step]
     times = np.unique(np.concatenate([[begin], times, stops, [end]]))
-    hold = int(np.clip(HOLD_TOTAL // max(len(stops), 1), HOLD_SHORTEST, HOLD_LONGEST))
+    hold = min(HOLD_TOTAL // max(len(stops), 1), HOLD_LONGEST)
     delays = np.where(np.isin(times, stops), hold, delay)
     delays[-1] = max(delays[-1], TAIL)
     words = _words(recording, mine, held, times)
-    return tuple(
-        Moment(float(t), int(d), w) for t, d, w in zip(times, delays, words, strict=True)
-    )
+    return tuple(Moment(float(t), int(d), w) for t, d, w in zip(times, delays, words, strict=True))
 
 
 def frame_delay(fps: int) -> int:
@@ -132,7 +130,7 @@ def slowness(length: float) -> float:
     """Return the round factor that shows `length` seconds in at most `RUNNING`, but not by much.
 
     >>> slowness(0.6), slowness(2.5), slowness(40.0)
-    (10.0, 2.0, 0.15)
+    (8.0, 2.0, 0.1)
     """
     if length <= 0.0:
         return 1.0
@@ -145,7 +143,7 @@ def slowness(length: float) -> float:
 def _events_of_nominal(recording: Recording, begin: float, end: float) -> NDArray[Any]:
     events = recording.events
     mine = (events["particle"] == 0) | (events["other"] == 0)
-    return events[mine & (events["t"] >= begin) & (events["t"] <= end)]
+    return np.asarray(events[mine & (events["t"] >= begin) & (events["t"] <= end)])
 
 
 def _held(mine: NDArray[Any]) -> NDArray[np.int64]:
@@ -156,7 +154,7 @@ def _held(mine: NDArray[Any]) -> NDArray[np.int64]:
     impulse = np.abs(mine["normal_impulse"][struck])
     struck = struck[impulse >= WORTH * impulse.max()]
     _, first = np.unique(mine["t"][struck], return_index=True)
-    return struck[first][:HOLDS]
+    return np.asarray(struck[first][:HOLDS])
 
 
 def _words(
@@ -169,7 +167,8 @@ def _words(
     struck = np.isin(mine["kind"], [int(kind) for kind in STRUCK])
     told = ~struck & (mine["kind"] != Kind.RELEASE)
     told[held] = True
-    lines = [""]
+    rides = np.any(mine["kind"] == Kind.SEPARATION)
+    lines = ["rides the incoming belt" if rides else ""]
     when = [-np.inf]
     for i in np.flatnonzero(told):
         lines.append(f"t = {mine['t'][i]:.3f} s: {sentence(recording, mine[i])}")

@@ -12,11 +12,12 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def whole(path: Path) -> Iterator[Path]:
+def whole(path: str | Path) -> Iterator[Path]:
     """Give a path to write to; it becomes `path` at the end, or is removed after an exception.
 
     It lies in the same directory, so that the last step is one atomic rename.
     """
+    path = Path(path)
     with tempfile.TemporaryDirectory(prefix=f".{path.name}-", dir=path.parent) as folder:
         unfinished = Path(folder) / path.name
         yield unfinished

@@ -1,0 +1,140 @@
+"""The three answers to one scene: exact against theory, pymunk against exact, and how far apart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite, sin
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chutelab.compare import compare
+from chutelab.recording import Kind
+from chutelab.simulation import simulate
+from chutelab.theory import predict
+
+if TYPE_CHECKING:
+    from chutelab.recording import Recording
+    from chutelab.scene import Scene
+
+CLOSED_FORM = 1e-12
+"""Relative error allowed to the exact engine: some hundred roundings of a double."""
+
+GRAZING = 1e-3
+"""|v_n| / v2 at the plate below which the time of impact loses digits, as 1 over that number."""
+
+NEAR_CRITICAL = 1e-6
+"""|1 - v0² / (g Rc)| below which the angle of separation loses digits likewise."""
+
+STEPS = 3.0
+"""Steps' worth of way allowed to the pymunk engine, which sees each contact up to a step late."""
+
+LEAST_RADIUS = 0.002
+"""m; smaller disks are beyond what a space in SI units resolves."""
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """One quantity in two answers.
+
+    Attributes
+    ----------
+    pair : str
+        Which two.
+    quantity : str
+        What is compared, with its unit; or why nothing is.
+    difference : float or None
+        None if one of the two has no such quantity.
+    tolerance : float or None
+        What it must not exceed; None where no bound is promised.
+    """
+
+    pair: str
+    quantity: str
+    difference: float | None
+    tolerance: float | None
+
+    @property
+    def holds(self) -> bool:
+        """Whether the promise, if there is one, is kept."""
+        return self.tolerance is None or (
+            self.difference is not None and self.difference <= self.tolerance
+        )
+
+
+def agreement(scene: Scene) -> tuple[Agreement, ...]:
+    """Run a scene with both engines and compare particle 0, with the theory and with each other.
+
+    Raises
+    ------
+    SceneError
+        If the exact engine cannot run it.
+    """
+    exact = simulate(scene, engine="exact")
+    return _with_theory(scene, exact), *_with_pymunk(scene, exact)
+
+
+def _with_theory(scene: Scene, exact: Recording) -> Agreement:
+    pair, compared = "exact, theory", compare(exact)
+    if compared.max is None:
+        return Agreement(pair, compared.reason, None, None)
+    return Agreement(pair, "largest relative error", compared.max, CLOSED_FORM / _condition(scene))
+
+
+def _condition(scene: Scene) -> float:
+    """Return by what the rounding errors of a scene have to be divided, 1 for most."""
+    found, belt = predict(scene), scene.incoming
+    worst = 1.0
+    if isfinite(float(found.phi2)) and abs(sin(float(found.phi2))) < GRAZING:
+        worst = abs(sin(float(found.phi2)))
+    if belt is not None and scene.gravity > 0.0:
+        ride = belt.pulley_radius + scene.particle.radius
+        critical = abs(1.0 - belt.speed**2 / (scene.gravity * ride))
+        if critical < NEAR_CRITICAL:
+            worst = min(worst, critical)
+    return max(worst, float(np.finfo(float).eps))
+
+
+def _with_pymunk(scene: Scene, exact: Recording) -> tuple[Agreement, ...]:
+    pair = "pymunk, exact"
+    if scene.particle.radius == 0.0:
+        return (Agreement(pair, "pymunk has no mass points", None, None),)
+    stepped = simulate(scene, engine="pymunk")
+    from chutelab.stepper import HALF_THICKNESS
+
+    speed = float(np.hypot(*exact.track(0)["velocity"].T).max())
+    way: float | None = STEPS * speed * scene.run.dt
+    if (
+        scene.particle.radius < LEAST_RADIUS
+        or speed * scene.run.dt >= scene.particle.radius + HALF_THICKNESS
+        # A grip that slips is stepped, and converges too slowly for a bound.
+        or (scene.incoming is not None and scene.incoming.friction != "adhesion")
+    ):
+        way = None
+    ways = [_contacts(stepped), _contacts(exact)]
+    if ways[0] != ways[1]:
+        met, instead = (", ".join(names) or "nothing" for names in ways)
+        return (Agreement(pair, f"it meets {met} instead of {instead}", None, way),)
+    rows = []
+    for kind, what in ((Kind.IMPACT, "place of the impact, m"), (Kind.LANDING, "landing, m")):
+        mine, other = _first(stepped, kind), _first(exact, kind)
+        if mine is not None and other is not None:
+            apart = float(np.hypot(*(mine["position"] - other["position"])))
+            rows.append(Agreement(pair, what, apart, way))
+    return tuple(rows) or (Agreement(pair, "they touch nothing", None, None),)
+
+
+def _first(recording: Recording, kind: Kind) -> Any | None:
+    """Return the first event of a kind of particle 0, None if there is none."""
+    events = recording.select(kind)
+    own = events[events["particle"] == 0]
+    return own[0] if len(own) else None
+
+
+def _contacts(recording: Recording) -> list[str]:
+    """Return the names of the surfaces that particle 0 meets, up to its landing."""
+    own = recording.events[recording.events["particle"] == 0]
+    met = own[np.isin(own["kind"], [Kind.IMPACT, Kind.LANDING])]
+    landed = np.flatnonzero(met["kind"] == Kind.LANDING)
+    met = met[: landed[0] + 1] if landed.size else met
+    return [recording.surfaces[surface] for surface in met["surface"]]

@@ -1,0 +1,31 @@
+"""The command line: parse, call the library, print.
+
+===============  ==================================================================================
+`program`        the command ``chutelab`` itself, and what becomes of errors
+`running`        ``run`` and ``check``
+`recordings`     ``show``
+`paper`          ``tables``
+`scenes`         ``scenes``, ``schema`` and ``new``
+`verifying`      ``verify``
+`parameters`     what several commands take: scenes, overrides, output
+`output`         the files of ``--out``, all of them or none
+`report`         summaries as tables for people
+`console`        text and JSON on standard output
+`progress`       a bar on standard error for what takes longer than a second
+===============  ==================================================================================
+
+Modules that take long to import are imported inside the commands that need them, so that
+``chutelab --help`` answers at once.
+"""
+
+from chutelab.cli.paper import tables
+from chutelab.cli.program import main
+from chutelab.cli.recordings import show
+from chutelab.cli.running import check, run
+from chutelab.cli.scenes import new, scenes, schema
+from chutelab.cli.verifying import verify
+
+for _command in (run, check, show, tables, verify, scenes, schema, new):
+    main.add_command(_command)
+
+__all__ = ["main"]

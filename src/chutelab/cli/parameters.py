@@ -1,0 +1,105 @@
+"""Arguments and options that several commands take, and how a shell completes them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.shell_completion import CompletionItem
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+
+KINDS = {
+    "png": ("overlay.png",),
+    "gif": ("lesson.gif",),
+    "csv": ("events.csv", "trajectory.csv"),
+    "npz": ("recording.npz",),
+    "json": ("summary.json",),
+}
+"""What ``--only`` takes, and the files it stands for."""
+
+
+def complete_scene(
+    _ctx: click.Context, _parameter: click.Parameter, incomplete: str
+) -> list[CompletionItem]:
+    """Offer the shipped scenes that begin so, and files."""
+    from chutelab.scene import about
+
+    names = [
+        CompletionItem(scene.name, help=scene.title)
+        for scene in about()
+        if scene.name.startswith(incomplete)
+    ]
+    return [*names, CompletionItem(incomplete, type="file")]
+
+
+def complete_kinds(
+    _ctx: click.Context, _parameter: click.Parameter, incomplete: str
+) -> list[CompletionItem]:
+    """Offer `KINDS` after the last comma."""
+    before, comma, begun = incomplete.rpartition(",")
+    return [CompletionItem(f"{before}{comma}{kind}") for kind in KINDS if kind.startswith(begun)]
+
+
+def _kinds(
+    _ctx: click.Context, _parameter: click.Parameter, value: str | None
+) -> tuple[str, ...] | None:
+    if value is None:
+        return None
+    asked = {kind.strip().lower() for kind in value.split(",")}
+    if asked - KINDS.keys():
+        raise click.BadParameter(f"{value!r}: choose from {','.join(KINDS)}")
+    return tuple(kind for kind in KINDS if kind in asked)
+
+
+def _folder(_ctx: click.Context, _parameter: click.Parameter, value: str | None) -> Path | None:
+    if value == "":
+        raise click.BadParameter("the name of a folder is empty")
+    return None if value is None else Path(value)
+
+
+set_option = click.option(
+    "--set",
+    "overrides",
+    metavar="KEY=VALUE",
+    multiple=True,
+    help="Change a key of the scene, such as plate.angle_deg=20. May be repeated.",
+)
+
+
+def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--out``, ``--only``, ``--json`` and ``--quiet``."""
+    options: tuple[Decorator, ...] = (
+        click.option(
+            "--out",
+            metavar="DIR",
+            type=click.Path(),
+            callback=_folder,
+            help="Write pictures, tables and the recording into this folder.",
+        ),
+        click.option(
+            "--only",
+            metavar="KINDS",
+            callback=_kinds,
+            shell_complete=complete_kinds,
+            help=f"With --out: only some of {','.join(KINDS)}.",
+        ),
+        click.option(
+            "--json", "as_json", is_flag=True, help="Print one JSON object instead of tables."
+        ),
+        click.option("--quiet", "-q", is_flag=True, help="Print no summary and no progress bar."),
+    )
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+def chosen(out: Path | None, only: tuple[str, ...] | None) -> tuple[str, ...]:
+    """Return the kinds of files to write; refuse ``--only`` where nothing is written."""
+    if out is None and only is not None:
+        raise click.UsageError("--only chooses among the files of --out DIR: give --out too.")
+    return tuple(KINDS) if only is None else only

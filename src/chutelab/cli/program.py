@@ -1,0 +1,102 @@
+"""The command ``chutelab``: its own options, and one place where errors become exit codes.
+
+0: done. 1: something failed that is not the user's to mend, or ``verify`` found a disagreement.
+2: what the user gave cannot be used. 130: interrupted with Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import io
+import sys
+from typing import Any
+
+import click
+
+INTERRUPTED = 130
+"""128 + SIGINT, as shells have it."""
+
+
+class RefusedError(click.ClickException):
+    """What the user gave cannot be used."""
+
+    exit_code = 2
+
+
+class Program(click.Group):
+    """A group of commands, listed in the order they were added, that never shows a traceback."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names of the commands in the order of help."""
+        return list(self.commands)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command; turn what goes wrong into a message and an exit code."""
+        for stream in (sys.stdout, sys.stderr):
+            # A title in Greek must not fail in a terminal that has no Greek.
+            if isinstance(stream, io.TextIOWrapper):
+                stream.reconfigure(errors="replace")
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            click.echo("\nInterrupted.", err=True)
+            ctx.exit(INTERRUPTED)
+        except (click.ClickException, click.exceptions.Exit, click.Abort, BrokenPipeError):
+            raise
+        except Exception as error:
+            if _is_refusal(error):
+                raise RefusedError(str(error)) from error
+            if ctx.params["debug"]:
+                raise
+            click.echo(_failure(error), err=True)
+            ctx.exit(1)
+
+
+def _is_refusal(error: Exception) -> bool:
+    if not isinstance(error, ValueError):
+        return False
+    from chutelab.scene import SceneError
+    from chutelab.storage import RecordingError
+
+    return isinstance(error, (SceneError, RecordingError))
+
+
+def _failure(error: Exception) -> str:
+    if isinstance(error, MemoryError):
+        return f"chutelab failed: not enough memory; fewer particles need less. ({error})"
+    if isinstance(error, OSError):
+        return f"chutelab failed: {error}"
+    said = " ".join(str(error).split()) or "no message"
+    return (
+        f"chutelab failed: {type(error).__name__}: {said}; please report it, with what"
+        " `chutelab --debug ...` prints for the same command"
+    )
+
+
+def _version(ctx: click.Context, _parameter: click.Parameter, asked: bool) -> None:
+    if asked and not ctx.resilient_parsing:
+        import chutelab
+
+        click.echo(f"chutelab {chutelab.__version__}")
+        ctx.exit()
+
+
+@click.group(
+    cls=Program,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="A first run: chutelab run perpendicular --out out",
+)
+@click.option(
+    "--debug", is_flag=True, envvar="CHUTELAB_DEBUG", help="Show the traceback of a failure."
+)
+@click.option(
+    "--version",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=_version,
+    help="Show the version and exit.",
+)
+def main(debug: bool) -> None:
+    """Simulate a belt, a damping plate and a second belt, and account for every joule."""
+    # `debug` is read where errors are caught, in `Program.invoke`.
+    del debug

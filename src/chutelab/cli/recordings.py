@@ -1,0 +1,56 @@
+"""``show``: what a saved recording holds, and its pictures once more."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from chutelab.cli.parameters import KINDS, chosen, output_options
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from chutelab.recording import Recording
+
+
+@click.command()
+@click.argument("recording", type=click.Path(path_type=Path))
+@output_options
+def show(
+    recording: Path,
+    out: Path | None,
+    only: tuple[str, ...] | None,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Print the summary of RECORDING, a recording.npz; with --out make its files again."""
+    from chutelab.cli.output import destination, write
+    from chutelab.recording import Recording
+
+    kinds = chosen(out, only)
+    loaded = Recording.load(recording)
+    with destination(out, kinds) as folder:
+        if folder is not None:
+            write(loaded, folder, kinds, quiet=quiet)
+    tell(loaded, out, kinds, as_json=as_json, quiet=quiet)
+
+
+def tell(
+    recording: Recording, out: Path | None, kinds: Sequence[str], *, as_json: bool, quiet: bool
+) -> None:
+    """Print a recording's summary and what was written, as JSON or as tables."""
+    from chutelab.cli import console
+
+    if as_json:
+        from chutelab.summary import summary
+
+        console.show_json(summary(recording))
+    elif not quiet:
+        from chutelab.cli.report import report
+
+        console.show(*report(recording))
+        if out is not None:
+            names = ", ".join(name for kind in kinds for name in KINDS[kind])
+            click.echo(f"wrote into {out}: {names}")

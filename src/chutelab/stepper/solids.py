@@ -1,0 +1,112 @@
+"""Surfaces with a thickness: what a particle can touch in a stepped world."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from chutelab.machine import Machine
+
+Floats = NDArray[np.float64]
+
+HALF_THICKNESS = 1e-3
+"""m; half the thickness that belts, plate and free surfaces get behind the struck face. A particle
+needs a step shorter than (r + this)/v not to pass through. Thicker would stop faster particles, but
+the ends, round with this radius, would stick out further."""
+
+GRIP = 1e6
+"""Coefficient of friction that stands for µ = ∞: finite, because pymunk multiplies it by 0."""
+
+
+@dataclass(frozen=True, eq=False)
+class Solids:
+    """Capsules: a line from a to b, and all within `reach` of it; the pulley, last, has a = b.
+
+    The struck face is flush with the surface of the machine: upper faces of the two belts, the left
+    face (seen upwards) of the plate, for free surfaces the face that looks to the nominal release
+    point (if that lies on their line: the upper, or left, one). Struck from behind a surface is met
+    2 `HALF_THICKNESS` too early, on an end up to one.
+
+    Attributes
+    ----------
+    a, b : ndarray, (K, 2)
+        Ends of the centre lines, m.
+    reach : ndarray, (K,)
+        Radius of the capsule, m.
+    tangent : ndarray, (K, 2)
+        Direction in which a belt runs; zero for the pulley.
+    speed, friction, restitution : ndarray, (K,)
+        Speed of the surface (m/s), pair values with a particle; µ = ∞ is `GRIP`.
+    surface : ndarray, (K,)
+        Index into `Machine.surfaces`.
+    pulley : int
+        Index of the pulley, -1 without one.
+    """
+
+    a: Floats
+    b: Floats
+    reach: Floats
+    tangent: Floats
+    speed: Floats
+    friction: Floats
+    restitution: Floats
+    surface: NDArray[np.int64]
+    pulley: int
+
+    def belt(self, solid: NDArray[np.int64], normal: Floats) -> Floats:
+        """Speed of the surface along (n_y, -n_x) at contacts (M,) with outward normals (M, 2)."""
+        t = self.tangent[solid]
+        along = t[:, 0] * normal[:, 1] - t[:, 1] * normal[:, 0]
+        return self.speed[solid] * np.where(solid == self.pulley, 1.0, along)
+
+    def gaps(self, points: Floats, radius: float) -> Floats:
+        """Distances (P, K) between disks of a radius around points (P, 2) and the solids, m."""
+        line = self.b - self.a
+        square = np.maximum((line**2).sum(axis=1), 1e-300)
+        from_a = points[:, None, :] - self.a
+        share = np.clip((from_a * line).sum(axis=2) / square, 0.0, 1.0)
+        return np.asarray(
+            np.linalg.norm(from_a - share[..., None] * line, axis=2) - self.reach - radius
+        )
+
+
+def solids(machine: Machine) -> Solids:
+    """Give the surfaces of a machine their thickness, behind the struck face."""
+    seg = machine.segments
+    left = np.stack([-seg.tangent[:, 1], seg.tangent[:, 0]], axis=-1)
+    toward = (machine.releases.position[0] - seg.start) * left
+    side = toward.sum(axis=-1)
+    upper = np.where(left[:, 1] != 0.0, np.sign(left[:, 1]), -np.sign(left[:, 0]))
+    facing = np.where(np.abs(side) > 1e-9 * seg.length, np.sign(side), upper)
+    conveyor = [
+        machine.surfaces[s] in {"incoming", "outgoing", "plate"} for s in seg.surface.tolist()
+    ]
+    facing = np.where(conveyor, 1.0, facing)
+    behind = -HALF_THICKNESS * facing[:, None] * left
+    rows = [
+        seg.start + behind,
+        seg.end + behind,
+        np.full(len(seg.length), HALF_THICKNESS),
+        seg.tangent,
+        seg.speed,
+        np.minimum(seg.friction, GRIP),
+        seg.restitution,
+        seg.surface,
+    ]
+    pulley = machine.pulley
+    if pulley is not None:
+        last = [
+            np.zeros(2), np.zeros(2), pulley.radius, np.zeros(2), pulley.speed,
+            min(pulley.friction, GRIP), pulley.restitution, pulley.surface,
+        ]  # fmt: skip
+        rows = [np.concatenate([row, [end]]) for row, end in zip(rows, last, strict=True)]
+    *values, surface = rows
+    a, b, reach, tangent, speed, friction, restitution = values
+    return Solids(
+        a, b, reach, tangent, speed, friction, restitution,
+        surface.astype(np.int64), len(seg.length) if pulley is not None else -1,
+    )  # fmt: skip

@@ -1,0 +1,192 @@
+"""What the parts of the engine share while one world runs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chutelab.recording import Kind
+from chutelab.stepper.tracks import RESTING, Tracks
+from chutelab.stepper.world import World
+
+if TYPE_CHECKING:
+    from chutelab.machine import Machine
+    from chutelab.recorder import Recorder
+    from chutelab.stepper.solids import Solids
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+HOP = 10
+"""Steps; a stepped disk hops along a curve. A flight between two contacts with one surface that is
+shorter than this is no separation, and a contact shorter than this none to separate from."""
+
+
+class Run:
+    """One world, its particles and their books.
+
+    Attributes
+    ----------
+    dt : float
+        s, the step.
+    landed : ndarray of bool, (N,)
+        Has met the outgoing belt.
+    met : ndarray of bool, (N, K)
+        Has met a solid.
+    on, since, slipping : ndarray, (N,)
+        Surface of the present contact or -1, time it began (s), and whether it slips.
+    calm : ndarray, (N,)
+        Steps in a row without slip on a surface to settle on.
+    touching : ndarray
+        Keys, particle times (N + K) plus partner, of the contacts a step ago.
+    settles_on : ndarray of bool, (K,)
+        Solids at rest, and the outgoing belt.
+    """
+
+    def __init__(
+        self, machine: Machine, solids: Solids, recorder: Recorder, ids: Ints, dt: float
+    ) -> None:
+        count = len(ids)
+        self.machine, self.solids, self.recorder, self.ids = machine, solids, recorder, ids
+        self.dt = dt
+        self.world = World(machine, solids, count)
+        self.tracks = Tracks(machine, recorder, ids)
+        p = machine.particle
+        self.radius, self.mass = p.radius, p.mass
+        self.rolling_mass = (
+            1.0 / (1.0 / p.mass + p.radius**2 / p.inertia) if p.inertia > 0.0 else p.mass
+        )
+        self.gravity = np.array([0.0, -machine.gravity])
+        self.landed = np.zeros(count, dtype=bool)
+        self.met = np.zeros((count, max(len(solids.reach), 1)), dtype=bool)
+        self.on = np.full(count, -1, dtype=np.int64)
+        self.since = np.zeros(count)
+        self.slipping = np.zeros(count, dtype=bool)
+        self.calm = np.zeros(count, dtype=np.int64)
+        self.touching = np.empty(0, dtype=np.int64)
+        self._left = np.full(count, np.nan)
+        self._left_state = np.zeros((count, 5))
+        self.settles_on: NDArray[np.bool_] = (solids.speed == 0.0) | (
+            solids.surface == machine.landing
+        )
+
+    @property
+    def count(self) -> int:
+        """Number of particles in this world."""
+        return len(self.ids)
+
+    def keys(self, first: Ints, other: Ints) -> Ints:
+        """Name pairs by one number each."""
+        return np.asarray(first * (self.count + self.met.shape[1]) + other)
+
+    def begun(self, first: Ints, other: Ints) -> NDArray[np.bool_]:
+        """Tell which contacts were not there a step ago, (M,)."""
+        keys = self.keys(first, other)
+        if len(keys) == len(self.touching) and (keys == self.touching).all():
+            return np.zeros(len(keys), dtype=bool)
+        return np.isin(keys, self.touching, invert=True)
+
+    @property
+    def particles(self) -> int:
+        """Index of the surface under which contacts between particles are booked."""
+        return len(self.machine.surfaces)
+
+    def event(
+        self,
+        kind: Kind | ArrayLike,
+        who: Ints,
+        t: ArrayLike,
+        x: ArrayLike,
+        v: ArrayLike,
+        omega: ArrayLike,
+        surface: ArrayLike = -1,
+        other: ArrayLike = -1,
+        *,
+        velocity_before: ArrayLike | None = None,
+        omega_before: ArrayLike | None = None,
+        impulse: tuple[ArrayLike, ArrayLike] = (0.0, 0.0),
+    ) -> None:
+        """Write an event for each of some particles."""
+        if len(who):
+            self.recorder.events(
+                kind, self.ids[who], t, x, v, omega,
+                velocity_before=velocity_before, omega_before=omega_before, surface=surface,
+                other=other, normal_impulse=impulse[0], tangential_impulse=impulse[1],
+            )  # fmt: skip
+
+    def finish(self, who: Ints, reason: str) -> None:
+        """End tracks at their last knots and take the particles out."""
+        self.tell_separation(who)
+        self.tracks.finish(who, reason)
+        for particle in who.tolist():
+            self.world.remove(particle)
+
+    def lift(self, who: Ints, t: float) -> None:
+        """Let go what is in contact no more; whether it separated, its flight will tell."""
+        if not len(who):
+            return
+        curved = who[~np.isnan(self.tracks.curve[who, 0])]
+        self.tracks.lift(who, t, self.dt)
+        for particle in curved.tolist():
+            self.fly_on(np.array([particle]), t + self.dt)
+        parts = who[
+            (self.on[who] >= 0)
+            & np.isnan(self._left[who])
+            & (t - self.since[who] > (HOP - 0.5) * self.dt)
+        ]
+        k = self.tracks
+        self._left[parts] = t
+        self._left_state[parts] = np.column_stack([k.x[parts], k.v[parts], k.omega[parts]])
+
+    def fly_on(self, who: Ints, t: float) -> None:
+        """Move pymunk's bodies to where their flights are at t, half a step of velocity ahead."""
+        x, v = self.tracks.flight(who, t)
+        ahead = v + 0.5 * self.dt * self.gravity
+        for particle, place, velocity in zip(who.tolist(), x.tolist(), ahead.tolist(), strict=True):
+            self.world.place(
+                particle, tuple(place), tuple(velocity), float(self.tracks.omega[particle])
+            )
+
+    def follow(self, particle: int, normal: Floats) -> None:
+        """Lead a particle in contact with the pulley round it, unless it is to fly off.
+
+        Moved along the tangent it would lose the pulley and hop. It gets the chord instead, and
+        between move and solve half the centripetal change, so that the contact feels
+        g cos φ - v²/ρ.
+        """
+        k = self.tracks
+        w = k.w[particle]
+        along = np.array([normal[1], -normal[0]])
+        speed = float(w @ along)
+        rho = float(self.solids.reach[self.solids.pulley]) + self.radius
+        centripetal = speed * speed / rho
+        if centripetal >= self.machine.gravity * normal[1]:
+            return
+        turn = speed * self.dt / rho
+        ahead = np.cos(turn) * normal + np.sin(turn) * along
+        k.curve[particle] = normal
+        k.aim[particle] = w - 0.5 * self.dt * centripetal * normal
+        push = 0.5 * self.mass * centripetal * ahead
+        self.world.steer(particle, tuple(k.aim[particle].tolist()), tuple(push.tolist()))
+
+    def arrive(self, who: Ints, surface: Ints, t: float) -> None:
+        """Note contacts of particles with one surface each, -1 for several or another particle."""
+        same = surface == self.on[who]
+        hop = same & (t - self._left[who] < HOP * self.dt)
+        self._left[who[hop]] = np.nan
+        new = who[~hop & ~(same & (self.tracks.mode[who] == RESTING))]
+        self.tell_separation(new)
+        self.since[new] = t
+        self.slipping[new] = True
+        self.on[who] = surface
+
+    def tell_separation(self, who: Ints) -> None:
+        """Write the separations of flights that turned out to be none but hops."""
+        who = who[~np.isnan(self._left[who])]
+        s = self._left_state[who]
+        self.event(
+            Kind.SEPARATION, who, self._left[who], s[:, :2], s[:, 2:4], s[:, 4], self.on[who]
+        )
+        self._left[who] = np.nan

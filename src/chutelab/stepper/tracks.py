@@ -1,0 +1,171 @@
+"""What every particle is doing, and the knots of its track.
+
+A flight is its last knot and nothing else. A particle in contact moves by pymunk's steps; it gets a
+knot only where its track leaves the parabola that the last ones foretold, so memory grows with what
+happens, not with steps.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chutelab.ballistics import closing_time
+from chutelab.recording import REASONS
+
+if TYPE_CHECKING:
+    from chutelab.machine import Machine
+    from chutelab.recorder import Recorder
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+KNOT_POSITION = 1e-3
+"""Share of the radius by which a track in contact may deviate from the curve between its knots."""
+
+KNOT_SPEED = 1e-3
+"""m/s; the same for its velocity, and for that of its rim."""
+
+
+WAITING, CARRIED, FLYING, RESTING, DONE = range(5)
+"""What a particle is doing; RESTING means in contact at the last step, moving or not. Plain
+numbers: Python 3.11 looks up a member of an enumeration twenty times slower than a name."""
+
+
+class Tracks:
+    """State arrays of the particles in one world.
+
+    Attributes
+    ----------
+    mode : ndarray, (N,)
+        WAITING, CARRIED, FLYING, RESTING or DONE.
+    t, x, v, omega : ndarray, (N,) or (N, 2)
+        Last knot, s, m, m/s, rad/s.
+    at, w, spin : ndarray, (N, 2) or (N,)
+        Of particles in contact: position, velocity and ω as pymunk left them at the last step.
+    aim : ndarray, (N, 2)
+        Velocity that moves particles in contact in the next step: w, or, round a curve, the chord.
+    curve : ndarray, (N, 2)
+        Normal of the curve that a particle in contact follows, NaN without one.
+    exit : ndarray, (N,)
+        s; when a flight leaves the scene, inf if it never does.
+    """
+
+    def __init__(self, machine: Machine, recorder: Recorder, ids: Ints) -> None:
+        count = len(ids)
+        self.ids = ids
+        self._machine = machine
+        self._recorder = recorder
+        self._g = np.array([0.0, -machine.gravity])
+        self.mode = np.full(count, WAITING, dtype=np.int8)
+        self.t, self.omega, self.spin = np.zeros((3, count))
+        self.x, self.v, self.at, self.w, self.aim = np.zeros((5, count, 2))
+        self.curve = np.full((count, 2), np.nan)
+        self.exit = np.full(count, np.inf)
+        self._held = np.zeros(count, dtype=bool)
+        self._held_t, self._held_omega = np.zeros((2, count))
+        self._held_x, self._held_v = np.zeros((2, count, 2))
+        self._bend = np.zeros((count, 2))
+        self._bend_omega = np.zeros(count)
+        self._bend_known = np.zeros(count, dtype=bool)
+
+    def knot(self, who: Ints, t: ArrayLike, x: ArrayLike, v: ArrayLike, omega: ArrayLike) -> None:
+        """Write a knot for each of some particles; it becomes their last."""
+        if len(who):
+            self.t[who], self.x[who], self.v[who], self.omega[who] = t, x, v, omega
+            self._recorder.knots(
+                self.ids[who], self.t[who], self.x[who], self.v[who], self.omega[who]
+            )
+
+    def flight(self, who: Ints, t: float) -> tuple[Floats, Floats]:
+        """Return positions and velocities, (k, 2), of flying particles at a time."""
+        s = (t - self.t[who])[:, None]
+        return self.x[who] + s * (self.v[who] + 0.5 * s * self._g), self.v[who] + s * self._g
+
+    def fly(self, who: Ints) -> None:
+        """Let particles go from their last knots."""
+        self.mode[who] = FLYING
+        left, right, bottom, top = self._machine.exit_box
+        x, v = self.x[who], self.v[who]
+        # Beyond the floor already: at once, whatever way it moves.
+        times = [closing_time(np.maximum(x[:, 1] - bottom, 0.0), v[:, 1], -self._machine.gravity)]
+        if self._machine.gravity == 0.0:
+            times += [
+                closing_time(np.maximum(gap, 0.0), rate, 0.0)
+                for gap, rate in (
+                    (x[:, 0] - left, v[:, 0]),
+                    (right - x[:, 0], -v[:, 0]),
+                    (top - x[:, 1], -v[:, 1]),
+                )
+            ]
+        self.exit[who] = self.t[who] + np.min([np.where(t < 0.0, np.inf, t) for t in times], axis=0)
+
+    def rest(self, who: Ints) -> None:
+        """Keep particles in contact from their last knots on."""
+        self.mode[who], self.exit[who] = RESTING, np.inf
+        self._held[who] = self._bend_known[who] = False
+
+    def leave(self, who: Ints, x: ArrayLike, w: ArrayLike, omega: ArrayLike) -> None:
+        """Note the states in which pymunk leaves particles in contact."""
+        self.at[who], self.w[who], self.aim[who], self.spin[who] = x, w, w, omega
+        self.curve[who] = np.nan
+
+    def lift(self, who: Ints, t: float, dt: float) -> None:
+        """Let particles go that were in contact a step ago, at t, and are no more.
+
+        Off a curve they go along the tangent; only along it is w half a step of gravity ahead.
+        """
+        n = np.nan_to_num(self.curve[who])
+        lead = 0.5 * dt * (self._g - (n @ self._g)[:, None] * n)
+        self._write_held(who)
+        self.knot(who, t, self.at[who], self.w[who] - lead, self.spin[who])
+        self.fly(who)
+
+    def foretold(self, who: Ints, t: float, x: Floats, v: Floats, omega: Floats) -> None:
+        """Note a step in smooth contact; write the state before it where the curve deviates."""
+        if not len(who):
+            return
+        s = t - self.t[who]
+        new = who[~self._bend_known[who]]
+        if len(new):
+            self._bend[new] = ((v - self.v[who]) / s[:, None])[~self._bend_known[who]]
+            self._bend_omega[new] = ((omega - self.omega[who]) / s)[~self._bend_known[who]]
+            self._bend_known[new] = True
+        speed = s[:, None] * self._bend[who]
+        off_x = x - self.x[who] - s[:, None] * (self.v[who] + 0.5 * speed)
+        off_v = v - self.v[who] - speed
+        r = self._machine.particle.radius
+        off_rim = r * np.abs(omega - self.omega[who] - s * self._bend_omega[who])
+        off = (np.abs(off_x).max(axis=1) > KNOT_POSITION * r) | (
+            np.maximum(np.abs(off_v).max(axis=1), off_rim) > KNOT_SPEED
+        )
+        turn = np.flatnonzero(off & self._held[who])
+        if len(turn):
+            them = who[turn]
+            self._write_held(them)
+            step = t - self.t[them]
+            self._bend[them] = (v[turn] - self.v[them]) / step[:, None]
+            self._bend_omega[them] = (omega[turn] - self.omega[them]) / step
+
+    def hold(self, who: Ints, t: float, x: Floats, v: Floats, omega: Floats) -> None:
+        """Remember states as knots that may not be needed."""
+        self._held[who], self._held_t[who] = True, t
+        self._held_x[who], self._held_v[who], self._held_omega[who] = x, v, omega
+
+    def close(self, who: Ints) -> None:
+        """Write the last states of particles in contact, if they are not knots yet."""
+        self._write_held(who)
+
+    def finish(self, who: Ints, reason: str) -> None:
+        """End tracks at their last knots."""
+        self.mode[who], self.exit[who] = DONE, np.inf
+        self._recorder.ended[self.ids[who]] = REASONS.index(reason)
+
+    def _write_held(self, who: Ints) -> None:
+        them = who[self._held[who]]
+        self._held[them] = False
+        self.knot(
+            them, self._held_t[them], self._held_x[them], self._held_v[them], self._held_omega[them]
+        )

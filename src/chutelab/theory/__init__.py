@@ -1,0 +1,35 @@
+"""The oracle: the paper's model in closed form, sharing no code with the engines.
+
+V. Molnár et al., "Energy calculation model of an outgoing conveyor with application of a transfer
+chute with the damping plate", Mech. Sci. 7, 167-177, 2016, doi:10.5194/ms-7-167-2016.
+
+- `transfer`: Eqs. (2)-(16) and their generalisations, vectorised; plain numbers in, `Transfer` out.
+- `results`: `Transfer`, and which stage of the way yields which quantity.
+- `reasons`: `Reason`, why there is no answer.
+- `stages`: separate, fly, rebound, fall; one method each, the equations tagged.
+- `separation`: how the pulley is left: adhesion, slip at finite friction, a rolling disk.
+- `predict`: particle 0 of a scene, or the reason why the closed form does not hold for it.
+- `course`: a scene's numbers and its finite machine, for `predict`.
+- `obstacles`: first contacts of a disk with finite surfaces.
+- `tables`: the paper's tables beside what the equations give; `printed`: their digits.
+
+Only NumPy and `chutelab.scene` are imported.
+"""
+
+from chutelab.theory.predict import predict
+from chutelab.theory.reasons import Reason
+from chutelab.theory.results import STAGES, Transfer
+from chutelab.theory.tables import TABLES, Table, table
+from chutelab.theory.transfer import Rebound, transfer
+
+__all__ = [
+    "STAGES",
+    "TABLES",
+    "Reason",
+    "Rebound",
+    "Table",
+    "Transfer",
+    "predict",
+    "table",
+    "transfer",
+]

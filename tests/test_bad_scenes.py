@@ -1,0 +1,445 @@
+"""Scenes as they should not be: one readable message that names the file and every key at fault."""
+
+import math
+import re
+import tomllib
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from chutelab import scene as sc
+
+IN = "[incoming]\nspeed = 2\npulley_radius = 0.1\n"
+PLATE = "[plate]\ndistance = 0.5\n"
+OUT = "[outgoing]\ndrop = 0.5\n"
+FREE = "[stream]\nat = [0, 1]\nvelocity = [0, 0]\n"
+HOOD = '[[surface]]\nname = "hood"\nfrom = [0, 0]\nto = [1, 0]\n'
+BIG = "9" * 400
+
+# Text of the file, the keys at fault, and a word of what is allowed.
+BROKEN = {
+    # wrong types
+    "string for number": (IN.replace("2", '"2.0"'), ["incoming.speed"], "a number from 0"),
+    "boolean for number": (IN.replace("0.1", "true"), ["incoming.pulley_radius"], "a number > 0"),
+    "list for number": (IN + "[particle]\nmass = [1]", ["particle.mass"], "a number > 0"),
+    "date for number": (IN + "[particle]\nradius = 2020-01-01", ["particle.radius"], "a number"),
+    "table for number": (IN + "[run.dt]\nx = 1", ["run.dt"], "a number"),
+    "float for count": (IN + "[stream]\ncount = 1e4", ["stream.count"], "a whole number"),
+    "boolean for count": (IN + "[stream]\ncount = true", ["stream.count"], "a whole number"),
+    "number for switch": (IN + "[particle]\nspin = 1", ["particle.spin"], "true or false"),
+    "string for switch": (IN + '[stream]\ninteract = "no"', ["stream.interact"], "true or false"),
+    "number for title": ("title = 3\n" + IN, ["title"], "a string"),
+    "number for table": ("plate = 3\n" + IN, ["plate"], "a table"),
+    "list for table": ("run = []\n" + IN, ["run"], "a table"),
+    "table for surfaces": (IN + '[surface]\nname = "a"', ["surface"], "[[surface]]"),
+    "number for surface": ("surface = [1]\n" + IN, ["surface[0]"], "a table"),
+    "number for point": (FREE.replace("[0, 1]", "1"), ["stream.at"], "[x, y]"),
+    "text in point": (FREE.replace("[0, 1]", '[0, "1"]'), ["stream.at[1]"], "a number"),
+    "short point": (FREE.replace("[0, 1]", "[0]"), ["stream.at"], "[x, y]"),
+    "long point": (FREE.replace("[0, 1]", "[0, 1, 2]"), ["stream.at"], "[x, y]"),
+    # out of range
+    "negative radius": (IN + "[particle]\nradius = -1", ["particle.radius"], "from 0"),
+    "zero mass": (IN + "[particle]\nmass = 0", ["particle.mass"], "> 0"),
+    "negative gravity": ("gravity = -9.81\n" + IN, ["gravity"], "from 0"),
+    "negative speed": (IN.replace("2", "-2"), ["incoming.speed"], "from 0"),
+    "zero pulley": (IN.replace("0.1", "0"), ["incoming.pulley_radius"], "> 0"),
+    "restitution above 1": (IN + PLATE + "restitution = 1.1", ["plate.restitution"], "from 0 to 1"),
+    "negative friction": (IN + PLATE + "friction = -0.1", ["plate.friction"], "from 0"),
+    "plate on its side": (IN + PLATE + "angle_deg = 90", ["plate.angle_deg"], "< 90, in degrees"),
+    "plate overturned": (IN + PLATE + "angle_deg = -90", ["plate.angle_deg"], "> -90"),
+    "zero drop": (IN + PLATE + OUT.replace("0.5", "0"), ["outgoing.drop"], "> 0"),
+    "no particles": (IN + "[stream]\ncount = 0", ["stream.count"], "from 1"),
+    "huge count": (IN + "[stream]\ncount = 10_000_001", ["stream.count"], "to 10000000"),
+    "absurd count": (IN + f"[stream]\ncount = {BIG}", ["stream.count"], "to 10000000"),
+    "negative seed": (IN + "[stream]\nseed = -1", ["stream.seed"], "from 0"),
+    "zero rate": (IN + "[stream]\nrate = 0", ["stream.rate"], "a number from"),
+    "zero step": (IN + "[run]\ndt = 0.0", ["run.dt"], "a number from"),
+    "NaN": (IN + PLATE + "angle_deg = nan", ["plate.angle_deg"], "a number"),
+    "infinity": (IN.replace("2", "inf"), ["incoming.speed"], "a number"),
+    "overflow": (IN.replace("2", "1e999"), ["incoming.speed"], "a number"),
+    "NaN in point": (FREE.replace("[0, 1]", "[nan, 1]"), ["stream.at[0]"], "a number"),
+    "endless title": (f'title = "{BIG}"\n' + IN, ["title"], "at most 200 characters"),
+    # unknown words
+    "unknown engine": (IN + '[run]\nengine = "box2d"', ["run.engine"], '"exact" or "pymunk"'),
+    "unknown ending": (IN + '[run]\nuntil = "end"', ["run.until"], '"settled" or a number'),
+    "zero ending": (IN + "[run]\nuntil = 0", ["run.until"], "> 0"),
+    "unknown grip": (IN + 'friction = "glue"', ["incoming.friction"], '"adhesion" or a number'),
+    "unknown drop_from": (
+        IN + PLATE + OUT + 'drop_from = "here"',
+        ["outgoing.drop_from"],
+        '"impact" or "top"',
+    ),
+    # unknown keys
+    "misspelt key": (IN + PLATE + "angel_deg = 3", ["plate.angel_deg"], "plate.angle_deg?"),
+    "misspelt table": (IN.replace("incoming", "incomming"), ["incomming"], "incoming?"),
+    "key in wrong table": (IN + "drop = 3", ["incoming.drop"], "[outgoing]"),
+    "key outside its table": ("restitution = 0\n" + IN, ["restitution"], "[incoming]"),
+    "unheard-of key": (IN + "[run]\nqqq = 1", ["run.qqq"], "engine, until, max_time, dt"),
+    "key of a surface": (IN + HOOD + "colour = 1", ["surface[0].colour"], "points"),
+    "quoted key": (IN + '"a.b" = 1', ['incoming."a.b"'], "unknown key"),
+    # missing
+    "no speed": (IN.replace("speed = 2", ""), ["incoming.speed"], "is missing"),
+    "no distance": (IN + "[plate]", ["plate.distance"], "is missing"),
+    "no drop": (IN + PLATE + "[outgoing]", ["outgoing.drop"], "is missing"),
+    "plate alone": (FREE + PLATE, ["incoming"], "[plate]"),
+    "outgoing alone": (
+        FREE + OUT + 'drop_from = "top"',
+        ["incoming"],
+        "[outgoing] needs the table [incoming]",
+    ),
+    "no release": ("[stream]\ncount = 2", ["stream.at", "stream.velocity"], "[incoming]"),
+    # surfaces
+    "nameless": (FREE + HOOD.replace('name = "hood"', ""), ["surface[0].name"], "is missing"),
+    "reserved name": (FREE + HOOD.replace("hood", "plate"), ["surface[0].name"], "reserved"),
+    "name twice": (FREE + HOOD + HOOD, ["surface[1].name", "surface[0].name"], "unique"),
+    "name with a dot": (FREE + HOOD.replace("hood", "a.b"), ["surface[0].name"], "dots"),
+    "empty name": (FREE + HOOD.replace("hood", ""), ["surface[0].name"], "1 to 40"),
+    "no ends": (FREE + '[[surface]]\nname = "a"', ["surface[0].points"], "from and to"),
+    "one end": (FREE + HOOD.replace("to", "# to"), ["surface[0].to", "surface[0].from"], "missing"),
+    "other end": (FREE + HOOD.replace("from", "# "), ["surface[0].from"], "missing"),
+    "no extent": (FREE + HOOD.replace("[1, 0]", "[0, 0.0]"), ["surface[0].to"], "differ"),
+    "ends and points": (
+        FREE + HOOD + "points = [[0, 0], [1, 1]]",
+        ["surface[0].from", "surface[0].to", "surface[0].points"],
+        "not both",
+    ),
+    "one point": (
+        FREE + '[[surface]]\nname = "a"\npoints = [[0, 0]]',
+        ["surface[0].points"],
+        "2 to 10000 points",
+    ),
+    "point repeated": (
+        FREE + '[[surface]]\nname = "a"\npoints = [[0, 0], [1, 1], [1, 1.0]]',
+        ["surface[0].points"],
+        "[1.0, 1.0] repeats",
+    ),
+    "second surface": (
+        FREE + HOOD + HOOD.replace("hood", "b") + "restitution = 2",
+        ["surface[1].restitution"],
+        "from 0 to 1",
+    ),
+    # conflicts, naming both keys
+    "interact and exact": (
+        IN + '[stream]\ninteract = true\ncount = 2\n[run]\nengine = "exact"',
+        ["run.engine", "stream.interact", "stream.count = 2"],
+        "pymunk",
+    ),
+    "pymunk and points": (
+        IN + '[particle]\nradius = 0\n[run]\nengine = "pymunk"',
+        ["run.engine", "particle.radius"],
+        "disks",
+    ),
+    "interact and points": (
+        IN + "[particle]\nradius = 0\n[stream]\ninteract = true",
+        ["stream.interact", "particle.radius"],
+        "never meet",
+    ),
+    "spin and points": (
+        IN + "[particle]\nradius = 0.0\nspin = true",
+        ["particle.spin", "particle.radius"],
+        "cannot turn",
+    ),
+    "spread on adhesive belt": (
+        IN + "[stream]\nspeed_spread = 0.1",
+        ["stream.speed_spread", "incoming.friction"],
+        "Coulomb",
+    ),
+    "velocity on adhesive belt": (
+        IN + "[stream]\nvelocity = [1, 0]",
+        ["stream.velocity", "incoming.friction"],
+        "incoming.speed",
+    ),
+    "point on adhesive belt": (
+        IN + "[stream]\nat = [-0.5, 0.104]\nvelocity = [2, 0.1]",
+        ["stream.velocity", "incoming.friction"],
+        "Coulomb",
+    ),
+    "landed nowhere": (IN + '[run]\nuntil = "landed"', ["run.until"], "[outgoing]"),
+    "impact without plate": (IN + OUT, ["outgoing.drop_from"], 'outgoing.drop_from = "top"'),
+    "plate of no length": (
+        IN + PLATE + "above = 0\nbelow = 0",
+        ["plate.above", "plate.below"],
+        "length",
+    ),
+    # not TOML
+    "no value": (IN + "length = ", ["line 4, column 10"], "Invalid value"),
+    "unclosed": (IN + "length = [1,\n2", ["line 5, column 2"], "Unclosed array"),
+    "key twice": (IN + "speed = 3\n", ["line 4, column 10"], "Cannot overwrite a value"),
+    "prose": ("Dear students,\nthis is no scene", ["line 1, column 6"], "not TOML"),
+    "empty": ("", ["stream.at", "stream.velocity"], "chutelab new"),
+    "only a comment": ("# nothing\n", ["stream.at", "stream.velocity"], "chutelab new"),
+}
+
+
+def message(call, *arguments):
+    with pytest.raises(sc.SceneError) as caught:
+        call(*arguments)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_a_broken_file_is_refused_with_file_key_and_what_is_allowed(case, tmp_path):
+    text, keys, allowed = BROKEN[case]
+    file = tmp_path / "broken.toml"
+    file.write_text(text, encoding="utf-8")
+    said = message(sc.load, file)
+    assert said.startswith(f"{file}: ")
+    for key in keys:
+        assert key in said
+    assert allowed in said
+    lines = said.replace(str(file), "").splitlines()
+    assert len(lines) <= 1 + 3, "one fault brings no crowd of others with it"
+    assert max(map(len, lines)) < 190
+    assert list(tmp_path.iterdir()) == [file]
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "not a text file"),
+        (IN.encode("utf-16"), "not a text file"),
+        (b'title = "x"\ntitle2 = "\xe9t\xe9"\n', "line 2: not UTF-8 text (byte 0xe9)"),
+        (b"\xff\xfe\xfd", "line 1: not UTF-8 text"),
+        (b"# filler\n" * 200_000, "too large for a scene"),
+        (b"x = " + b"[" * 20_000, "nested too deep"),
+        (b"x = " + b"9" * 20_000, "too large"),
+        (b"x = 2020-13-45", "not TOML"),
+    ],
+)
+def test_rubbish_is_refused_with_the_file_and_the_reason(content, says, tmp_path):
+    file = tmp_path / "rubbish.toml"
+    file.write_bytes(content)
+    said = message(sc.load, file)
+    assert said.startswith(f"{file}: ")
+    assert says in said
+    assert len(said.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("perpendiculer", "no such file, and no shipped scene of this name; did you mean perp"),
+        ("scenes/inclined-30.toml", "did you mean inclined-"),
+        ("nothing-like-it", "there are belt-landing, free-fall, "),
+        ("", '"": no such file'),
+        ("nul\0byte", "nul\\x00byte: no such file"),
+        ("x" * 5000, "xxx...: no such file"),
+    ],
+)
+def test_a_scene_that_is_nowhere_is_answered_with_similar_names(name, says, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    said = message(sc.load, name)
+    assert says in said
+    assert len(said) < 500
+
+
+def test_a_directory_is_no_scene(tmp_path):
+    assert message(sc.load, tmp_path) == (
+        f"{tmp_path}: a directory; give a scene file, or the name of a shipped scene"
+    )
+
+
+def test_a_file_that_may_not_be_read_is_said_so(tmp_path, monkeypatch):
+    file = tmp_path / "locked.toml"
+    file.write_text(IN, encoding="utf-8")
+
+    def refuse(*_arguments):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("pathlib.Path.open", refuse)
+    assert message(sc.load, file) == f"{file}: cannot be read: Permission denied"
+
+
+def test_all_faults_of_a_file_come_in_one_message_conflicts_too():
+    text = (
+        "[incoming]\nspeed = -1\n"
+        "[plate]\ndistance = 'far'\nangel_deg = 20\n"
+        "[particle]\nradius = 0\nspin = true\n"
+        "[stream]\ncount = 0\ninteract = true\n"
+        '[[surface]]\nname = "a"\nfrom = [0, 0]\nrestitution = 2\n'
+        '[[surface]]\nname = "a"\npoints = [[0, 0], [1, nan]]\n'
+        '[run]\nuntil = "landed"\n'
+    )
+    with pytest.raises(sc.SceneError) as caught:
+        sc.parse(text, "all.toml")
+    faults = {fault.key: fault.value for fault in caught.value.faults}
+    assert faults == {
+        "incoming.speed": -1,
+        "incoming.pulley_radius": sc.MISSING,
+        "plate.distance": "far",
+        "plate.angel_deg": 20,
+        "surface[0].restitution": 2,
+        "surface[1].points[1][1]": pytest.approx(math.nan, nan_ok=True),
+        "stream.count": 0,
+        "run.until": "landed",
+        "particle.spin": True,
+        "stream.interact": True,
+        "surface[0].to": sc.MISSING,
+        "surface[1].name": "a",
+    }
+    lines = str(caught.value).splitlines()
+    assert lines[0] == "all.toml: 12 faults"
+    assert len(lines) == 13
+    assert all(any(key in line for line in lines) for key in faults)
+
+
+def test_a_key_at_fault_starts_no_quarrel_with_others():
+    text = IN + PLATE + "[particle]\nradius = 'small'\nspin = true\n[stream]\ninteract = true\n"
+    said = message(sc.parse, text)
+    assert said == ('<scene>: particle.radius = "small": must be a number from 0 to 1000000, in m')
+
+
+def test_a_coulomb_belt_takes_what_an_adhesive_one_refuses():
+    release = "[stream]\nspeed_spread = 0.1\nvelocity = [1, 0]\n"
+    sc.parse(IN + "friction = 0.5\n" + release)
+    # and so does the air above an adhesive one
+    sc.parse(IN + release + "at = [-0.5, 0.1041]\n")
+    sc.parse(IN + "[stream]\nvelocity = [2, 0]\nat = [-0.5, 0.104]\n")
+
+
+def test_interacting_alone_is_no_conflict():
+    sc.parse(IN + '[stream]\ninteract = true\n[run]\nengine = "exact"')
+
+
+def test_a_long_list_of_faults_and_a_long_value_are_cut_but_not_lost():
+    text = IN + "[run]\n" + "".join(f'zzz{i} = "{BIG}"\n' for i in range(100))
+    with pytest.raises(sc.SceneError) as caught:
+        sc.parse(text)
+    assert len(caught.value.faults) == 100
+    assert caught.value.faults[99].value == BIG
+    lines = str(caught.value).splitlines()
+    assert lines[-1] == "  and 60 more"
+    assert max(map(len, lines)) < 140
+
+
+def test_a_message_carries_no_terminal_commands():
+    said = message(sc.parse, '"\\u001b[31m" = "\\u001b[2J\\u009b"\n' + IN, "\x1b[1mfile.toml")
+    assert said.isprintable()
+    assert "\\x1b[1mfile.toml" in said
+
+
+@pytest.mark.parametrize(
+    ("override", "says"),
+    [
+        ("plate.angle_deg", "--set plate.angle_deg: must be KEY=VALUE"),
+        ("=3", "--set =3: must be KEY=VALUE"),
+        ("plate..angle_deg=3", "--set plate..angle_deg=3: must be KEY=VALUE"),
+        ("plate.angle_deg=steep", 'plate.angle_deg = "steep": must be a number'),
+        ("plate.angle_deg=95", "(from --set plate.angle_deg=95)"),
+        ("plate.angel=95", "did you mean plate.angle_deg? (from --set plate.angel=95)"),
+        ("plat.angle_deg=95", "did you mean plate? (from --set plat.angle_deg=95)"),
+        ("plate.below=nan", "(from --set plate.below=nan)"),
+        ("title.x=1", "--set title.x=1: title is no table"),
+        ("stream.at[0]=1", "--set stream.at[0]=1: stream.at is not there"),
+        ("plate[0]=1", "--set plate[0]=1: plate is no list"),
+        ("surface[1].speed=1", "--set surface[1].speed=1: surface has 1 entries"),
+        ("surface.hod.speed=1", "--set surface.hod.speed=1: no surface has the name hod; did you"),
+        ("surface.q.speed=1", "no surface has the name q; there are: hood"),
+        ("surface.hood.speed=x", 'surface[0].speed = "x": must be a number'),
+        ("gravity=1\nb = 2", 'gravity = "1\\nb = 2": must be a number'),
+        ("outgoing.speed=1", "outgoing.drop is missing"),
+        ("run.engine=exact,pymunk", "(from --set run.engine=exact,pymunk)"),
+    ],
+)
+def test_a_bad_override_is_named_as_it_was_given(override, says):
+    said = message(sc.parse, 'title = "T"\n' + IN + PLATE + HOOD, "x.toml", [override])
+    assert said.startswith("x.toml: ")
+    assert says in said
+
+
+def test_an_override_can_mend_a_fault():
+    assert sc.parse(IN.replace("2", "-2"), overrides=["incoming.speed=2"]).incoming is not None
+
+
+# Laws.
+
+GOOD = tomllib.loads(IN + PLATE + OUT + HOOD + "[stream]\ncount = 2\n[particle]\n[run]\n")
+KEYS = st.text(st.characters(codec="utf-8"), min_size=1, max_size=20)
+VALUES = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats()
+    | st.text(max_size=10)
+    | st.dates()
+    | st.sampled_from(["adhesion", "top", "impact", "exact", "pymunk", "settled", "landed"]),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(KEYS, inner, max_size=3),
+    max_leaves=6,
+)
+KNOWN = {
+    "": {"title", "gravity", *GOOD, "surface"},
+    "particle": {"radius", "mass", "spin"},
+    "incoming": {"speed", "pulley_radius", "length", "friction", "restitution"},
+    "plate": {
+        *("distance", "angle_deg", "pivot_height", "above", "below"),
+        "restitution",
+        "friction",
+    },
+    "outgoing": {*("speed", "drop", "drop_from", "start", "length"), "restitution", "friction"},
+    "stream": {
+        *("count", "rate", "bed_height", "speed_spread", "seed", "at", "velocity", "interact"),
+        *("restitution", "friction"),
+    },
+    "run": {"engine", "until", "max_time", "dt"},
+}
+
+
+def with_key(table, key, value):
+    document = {name: dict(content) for name, content in GOOD.items() if name != "surface"}
+    document["surface"] = [dict(surface) for surface in GOOD["surface"]]
+    (document[table] if table else document)[key] = value
+    return document
+
+
+@given(st.sampled_from(sorted(KNOWN)), KEYS, VALUES)
+def test_any_unknown_key_is_refused_by_its_full_path(table, key, value):
+    if key in KNOWN[table]:
+        key += "_"
+    with pytest.raises(sc.SceneError) as caught:
+        sc.from_dict(with_key(table, key, value))
+    (fault,) = caught.value.faults
+    assert fault.key.startswith(f"{table}." if table else "")
+    assert "unknown key" in fault.allowed
+    if re.fullmatch(r"\w+", key):
+        assert fault.key == (f"{table}.{key}" if table else key)
+
+
+def outcome(document, *arguments):
+    """The scene, or what was said against it."""
+    try:
+        return sc.from_dict(document, *arguments)
+    except sc.SceneError as error:
+        return str(error)
+
+
+@given(st.sampled_from([(table, key) for table in KNOWN for key in sorted(KNOWN[table])]), VALUES)
+def test_any_value_at_all_is_taken_or_refused_by_name(place, value):
+    table, key = place
+    result = outcome(with_key(table, key, value))
+    if isinstance(result, sc.Scene):
+        assert sc.from_dict(sc.to_dict(result)) == result
+    else:
+        # A conflict may be told at the other key; it then names this one.
+        assert (f"{table}.{key}" if table else key) in result
+
+
+@given(st.binary(max_size=200))
+def test_no_bytes_whatever_break_the_reader(tmp_path_factory, data):
+    file = tmp_path_factory.mktemp("any") / "any.toml"
+    file.write_bytes(data)
+    with pytest.raises(sc.SceneError):
+        sc.load(file)
+
+
+@given(st.lists(st.text(max_size=30) | KEYS.map(lambda key: f"plate.{key}=1"), max_size=3))
+def test_no_override_whatever_breaks_the_reader(overrides):
+    result = outcome(GOOD, "x.toml", overrides)
+    assert isinstance(result, sc.Scene) or result.startswith("x.toml: ")
+
+
+@given(st.sampled_from(["gravity", "particle.mass", "plate.angle_deg", "stream.rate", "run.dt"]))
+def test_nothing_that_is_no_finite_number_passes_for_one(path):
+    for value in ["nan", "inf", "-inf", "true", '"1.0"', "[1.0]", "1979-05-27"]:
+        said = message(sc.from_dict, GOOD, "x.toml", [f"{path}={value}"])
+        assert said.startswith(f"x.toml: {path} = {value}: must be a number")

@@ -1,0 +1,600 @@
+"""The command line: what it prints, what it writes, and how it ends."""
+
+import csv
+import json
+import os
+import re
+import subprocess
+import sys
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from PIL import Image
+
+import chutelab
+from chutelab import scene as sc
+from chutelab.cli import main, progress
+from test_bad_scenes import BROKEN
+
+SOURCES = str(Path(chutelab.__file__).parent.parent)
+FILES = [
+    "events.csv",
+    "lesson.gif",
+    "overlay.png",
+    "recording.npz",
+    "summary.json",
+    "trajectory.csv",
+]
+
+# The contract of section 4, copied by hand.
+KEYS = [
+    "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
+    "impact", "landing", "ended", "ledger", "theory", "theory_as_printed", "error",
+]  # fmt: skip
+THEORY = [
+    "phi1_deg", "t2", "x2", "y2", "v2", "phi2_deg", "phi2r_deg", "v2r", "t3", "x3", "y3", "v3x",
+    "v3y", "v3", "d3", "dEk", "P", "belt_work", "slip_heat", "reason",
+]  # fmt: skip
+ENTRIES = ["belt_work", "restitution_loss", "friction_loss"]
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path, monkeypatch):
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    monkeypatch.delenv("CHUTELAB_DEBUG", raising=False)
+
+
+def call(*arguments, code=0):
+    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
+    assert result.exit_code == code, result.output
+    assert "Traceback" not in result.output
+    return result
+
+
+def refused(*arguments):
+    """Call with something that cannot be used: nothing on standard output, nothing on disk."""
+    before = sorted(Path().rglob("*"))
+    result = call(*arguments, code=2)
+    assert result.stdout == ""
+    assert sorted(Path().rglob("*")) == before
+    return result.stderr
+
+
+def process(*arguments, **options):
+    environment = {**os.environ, "PYTHONPATH": SOURCES, **options.pop("env", {})}
+    return subprocess.Popen(
+        [sys.executable, "-m", "chutelab", *arguments],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment,
+        **options,
+    )
+
+
+# run: what it prints
+
+
+def test_a_run_prints_particle_0_beside_the_theory_the_ledger_and_the_endings():
+    result = call("run", "perpendicular")
+    text = result.stdout
+    assert result.stderr == ""
+    assert "Perpendicular damping plate, 2 m/s\nengine exact, 1 particle, 2 contacts" in text
+    assert "ended: 1 landed" in text
+    # x2 = d1 - r, t2 = x2 / v, y2 = g t2² / 2; half of the normal velocity comes back.
+    t2 = 0.596 / 2.0
+    y2 = 0.5 * 9.81 * t2**2
+    for symbol, value in [("x2", 0.596), ("t2", t2), ("y2", y2), ("v3x", 1.0), ("y3", 0.5)]:
+        line = next(line for line in text.splitlines() if line.startswith(f"{symbol} "))
+        simulated, theory, error = line.split()[-3:]
+        assert simulated == theory == f"{value:.6g}"
+        assert float(error) < 1e-14
+    # The plate takes ½ m v² (1 - ε²).
+    loss = 0.5 * 0.008 * 2.0**2 * (1.0 - 0.5**2)
+    assert re.search(rf"^plate +0 +{loss:g} +0$", text, re.MULTILINE)
+    assert re.search(r"^residual \S+e-1[6-9] J|^residual 0.0e\+00 J", text, re.MULTILINE)
+    assert list(Path().iterdir()) == [], "without --out nothing is written"
+
+
+def test_a_summary_fits_a_terminal_and_has_no_colours_in_a_pipe():
+    for arguments in (["run", "belt-landing"], ["tables"], ["scenes"]):
+        text = call(*arguments).stdout
+        assert max(map(len, text.splitlines())) <= 80
+        assert "\x1b" not in text
+
+
+def test_json_is_one_object_with_the_keys_of_the_contract_and_nothing_else():
+    result = call("run", "perpendicular", "--json")
+    assert result.stderr == ""
+    assert result.stdout.count("\n") == 1
+    found = json.loads(result.stdout)
+    assert list(found) == KEYS
+    assert (found["format"], found["engine"], found["particles"]) == (1, "exact", 1)
+    assert list(found["separation"]) == ["t", "x", "y", "vx", "vy"]
+    for event in ("impact", "landing"):
+        assert list(found[event]) == ["t", "x", "y", "vx", "vy", "vx_after", "vy_after"]
+    assert found["impact"]["vx"] == [2.0]
+    assert found["impact"]["vx_after"] == [-1.0]
+    assert found["landing"]["x"][0] == pytest.approx(0.596 - found["theory"]["x3"], rel=1e-15)
+    assert found["ended"] == {"t": found["landing"]["t"], "reason": ["landed"]}
+    books = found["ledger"]
+    assert list(books) == [
+        "kinetic", "potential", *ENTRIES, "residual", "turned_over", "by_surface",
+    ]  # fmt: skip
+    assert list(books["by_surface"]) == ["incoming", "plate", "outgoing", "particles"]
+    assert all(list(entries) == ENTRIES for entries in books["by_surface"].values())
+    assert list(found["theory"]) == THEORY
+    assert list(found["theory_as_printed"]) == THEORY
+    assert found["theory"]["reason"] is None
+    assert found["theory_as_printed"]["v2r"] < found["theory"]["v2r"]
+    errors = found["error"]
+    assert errors["max"] == max(value for name, value in errors.items() if name != "max") < 1e-14
+
+
+def test_json_says_null_where_there_is_no_answer():
+    found = json.loads(call("run", "free-fall", "--json").stdout)
+    assert found["separation"]["t"] == [None] * 5
+    assert found["impact"]["x"] == found["landing"]["vy_after"] == [None] * 5
+    assert found["ended"]["reason"] == ["settled"] * 5
+    assert found["theory_as_printed"] is None
+    assert found["theory"]["phi1_deg"] is None
+    assert found["theory"]["reason"] == "outside the model: there is no incoming conveyor"
+    assert found["error"] == {"max": None}
+    assert json.loads(call("run", "inclined-20", "--json").stdout)["theory_as_printed"] is None
+
+
+def test_where_the_closed_form_ends_the_summary_says_why():
+    text = call("run", "free-fall").stdout
+    assert "No closed form from here on: outside the model: there is no incoming" in text
+    assert "Particle 0" not in text
+    assert "ended: 5 settled" in text
+
+
+def test_quiet_prints_nothing():
+    result = call("run", "perpendicular", "--quiet", "--out", "out", "--only", "json")
+    assert result.output == ""
+    assert [path.name for path in Path("out").iterdir()] == ["summary.json"]
+
+
+def test_settings_change_the_run():
+    found = json.loads(call("run", "perpendicular", "--json", "--set", "plate.distance=0.3").stdout)
+    assert found["impact"]["x"] == [pytest.approx(0.396, rel=1e-15)]
+    arguments = ("run", "perpendicular", "--json", "--engine", "pymunk")
+    coarse = json.loads(call(*arguments).stdout)
+    fine = json.loads(call(*arguments, "--dt", "1e-4").stdout)
+    assert coarse["engine"] == fine["engine"] == "pymunk"
+    assert fine["steps"] > 5 * coarse["steps"]
+    # An option is the setting of its name.
+    settings = ["--set", "run.engine=pymunk", "--set", "run.dt=0.0001"]
+    again = json.loads(call("run", "perpendicular", "--json", *settings).stdout)
+    for result in (fine, again):
+        del result["seconds"]
+    assert again == fine
+
+
+# run: what it writes
+
+
+def test_a_run_writes_the_whole_set():
+    result = call("run", "perpendicular", "--out", "a/b/out", "--json")
+    found = json.loads(result.stdout)
+    assert list(found) == KEYS
+    out = Path("a/b/out")
+    assert sorted(path.name for path in out.iterdir()) == FILES
+    assert [path.name for path in Path().rglob(".*")] == [], "no unfinished files are left"
+
+    assert json.loads((out / "summary.json").read_text(encoding="utf-8")) == found
+    with Image.open(out / "overlay.png") as picture:
+        picture.load()
+        assert picture.format == "PNG"
+        assert picture.width >= 1000
+    with Image.open(out / "lesson.gif") as film:
+        assert film.format == "GIF"
+        assert film.n_frames > 20
+        assert film.info["loop"] == 0
+
+    recording = chutelab.Recording.load(out / "recording.npz")
+    assert recording.title == "Perpendicular damping plate, 2 m/s"
+    with (out / "events.csv").open(encoding="utf-8", newline="") as file:
+        events = list(csv.DictReader(file))
+    assert [event["kind"] for event in events] == ["release", "separation", "impact", "landing"]
+    assert float(events[2]["x"]) == found["impact"]["x"][0]
+    with (out / "trajectory.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    for row in (rows[7], rows[-1]):
+        (position,), (velocity,) = (at[0] for at in recording.at([float(row["t"])]))
+        assert [float(row[key]) for key in ("x", "y", "vx", "vy")] == [*position, *velocity]
+
+
+def test_a_run_says_what_it_wrote_and_only_chooses():
+    result = call("run", "perpendicular", "--out", "out", "--only", "json,csv")
+    assert "wrote into out: events.csv, trajectory.csv, summary.json\n" in result.stdout
+    expected = ["events.csv", "summary.json", "trajectory.csv"]
+    assert sorted(path.name for path in Path("out").iterdir()) == expected
+
+
+def test_a_second_run_replaces_its_own_files_and_leaves_others():
+    out = Path("out")
+    out.mkdir()
+    (out / "notes.txt").write_text("mine", encoding="utf-8")
+    (out / "summary.json").write_text("old", encoding="utf-8")
+    call("run", "perpendicular", "--out", "out", "--only", "json")
+    assert (out / "notes.txt").read_text(encoding="utf-8") == "mine"
+    assert list(json.loads((out / "summary.json").read_text(encoding="utf-8"))) == KEYS
+
+
+def test_a_destination_that_cannot_be_is_refused_before_the_run(monkeypatch):
+    def never(*_arguments, **_options):
+        raise AssertionError("the run began")
+
+    monkeypatch.setattr("chutelab.simulation.simulate", never)
+    Path("file").write_text("", encoding="utf-8")
+    assert "--out file: file is a file, not a folder" in refused("run", "slip", "--out", "file")
+    assert "file is a file" in refused("run", "slip", "--out", "file/inside/it")
+    assert "name of a folder is empty" in refused("run", "slip", "--out", "")
+    Path("out/overlay.png").mkdir(parents=True)
+    said = refused("run", "slip", "--out", "out")
+    assert f"{Path('out/overlay.png')} is a folder, not a file" in said
+    assert "File name too long" in refused("run", "slip", "--out", "x" * 1000)
+
+    def denied(*_arguments, **_options):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("tempfile.mkdtemp", denied)
+    said = refused("run", "slip", "--out", "new")
+    assert "--out new: cannot be written to: Permission denied" in said
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["--only", "png"], "give --out too"),
+        (["--out", "out", "--only", "png,jpg"], "choose from png,gif,csv,npz,json"),
+        (["--out", "out", "--only", ""], "choose from png,gif,csv,npz,json"),
+        (["--engine", "box2d"], "'box2d' is not one of"),
+        (["--dt", "soon"], "'soon' is not a valid float"),
+        (["--dt", "0"], "run.dt = 0.0: "),
+        (["--dt", "nan"], "run.dt = nan: "),
+        (["--set", "plate.angel_deg=3"], "plate.angle_deg?"),
+        (["--set", "plate.distance=-1"], "(from --set plate.distance=-1)"),
+        (["--set", "nonsense"], "must be KEY=VALUE"),
+        (["--set", "particle.radius=0", "--engine", "pymunk"], "particle.radius"),
+        (["--set", "stream.interact=true", "--set", "stream.count=2", "--engine", "exact"],
+         "stream.interact"),
+        (["--set", "plate.angle_deg=89", "--out", "out"], "outgoing.drop_from"),
+        (["--set", "plate.above=0", "--set", "plate.below=0.1", "--out", "out"], "plate.below"),
+        (["--frames", "3"], "No such option"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)  # fmt: skip
+def test_bad_options_are_refused(arguments, says):
+    assert says in refused("run", "perpendicular", *arguments)
+
+
+# what goes wrong
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_a_broken_scene_ends_with_2_and_names_file_and_key(case):
+    text, keys, _ = BROKEN[case]
+    Path("broken.toml").write_text(text, encoding="utf-8")
+    said = refused("run", "broken.toml", "--out", "out")
+    assert said.startswith("Error: broken.toml: ")
+    for key in keys:
+        assert key in said
+
+
+def test_the_broken_scenes_are_at_least_forty():
+    assert len(BROKEN) >= 40
+
+
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [
+        (b"", "The scene is empty"),
+        (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "not a text file"),
+        (b'title = "\xe9t\xe9"\n', "not UTF-8"),
+        (b"[incoming\nspeed = 2", "line 1, column 10"),
+        (b"x = " + b"[" * 20_000, "nested too deep"),
+    ],
+)
+def test_rubbish_ends_with_2_and_names_the_file(content, says):
+    Path("rubbish.toml").write_bytes(content)
+    for command in (["run", "--json"], ["run", "--out", "out"], ["check"]):
+        said = refused(*command, "rubbish.toml")
+        assert said.startswith("Error: rubbish.toml: ")
+        assert says in said
+
+
+def test_no_such_scene_and_a_folder_end_with_2():
+    assert "did you mean perpendicular" in refused("run", "perpendiculer")
+    Path("folder").mkdir()
+    assert "folder: a directory" in refused("run", "folder")
+    assert "Missing argument 'SCENE'" in refused("run")
+
+
+def test_ctrl_c_ends_with_130_and_leaves_nothing(monkeypatch):
+    def interrupted(*_arguments, **_options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("chutelab.simulation.simulate", interrupted)
+    result = call("run", "perpendicular", "--out", "out", code=130)
+    assert result.stdout == ""
+    assert result.stderr.strip() == "Interrupted."
+    assert list(Path().iterdir()) == []
+
+
+def test_a_failure_of_ours_ends_with_1_one_line_and_nothing_written(monkeypatch):
+    def broken(*_arguments, **_options):
+        raise ZeroDivisionError("two\nlines")
+
+    monkeypatch.setattr(sys.modules["chutelab.storage"], "to_csv", broken)
+    arguments = ("run", "perpendicular", "--out", "out", "--only", "csv,npz,json")
+    result = call(*arguments, code=1)
+    assert result.stdout == ""
+    assert result.stderr.startswith("chutelab failed: ZeroDivisionError: two lines; please report")
+    assert result.stderr.count("\n") == 1
+    assert list(Path().iterdir()) == []
+    for debugged in (
+        CliRunner().invoke(main, ["--debug", *arguments]),
+        CliRunner().invoke(main, arguments, env={"CHUTELAB_DEBUG": "1"}),
+    ):
+        assert isinstance(debugged.exception, ZeroDivisionError)
+
+
+def test_a_full_disk_is_refused_in_words(monkeypatch):
+    def full(*_arguments, **_options):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(sys.modules["chutelab.storage"], "save", full)
+    said = refused("run", "perpendicular", "--out", "out", "--only", "npz")
+    assert "--out out: cannot be written to: No space left on device" in said
+
+
+def test_too_little_memory_is_said_in_words(monkeypatch):
+    def huge(*_arguments, **_options):
+        raise MemoryError("Unable to allocate 9 TiB")
+
+    monkeypatch.setattr("chutelab.simulation.simulate", huge)
+    result = call("run", "perpendicular", code=1)
+    assert "not enough memory; fewer particles need less. (Unable to allocate" in result.stderr
+
+
+def test_a_reader_that_has_gone_is_no_reason_for_a_traceback():
+    with process("schema") as writer:
+        writer.stdout.close()
+        assert writer.stderr.read() == ""
+        assert writer.wait(timeout=60) == 1
+
+
+def test_a_terminal_without_greek_gets_question_marks():
+    Path("greek.toml").write_text(
+        'title = "Ω"\n[incoming]\nspeed = 2\npulley_radius = 0.1\n', encoding="utf-8"
+    )
+    with process("check", "greek.toml", env={"PYTHONIOENCODING": "latin-1:strict"}) as writer:
+        text, errors = writer.communicate(timeout=60)
+    assert (errors, writer.returncode) == ("", 0)
+    assert text.startswith("greek.toml: ?\n")
+
+
+# progress
+
+
+class Terminal(StringIO):
+    def isatty(self):
+        return True
+
+
+def test_a_bar_appears_on_standard_error_once_patience_is_over(monkeypatch, capsys):
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr(progress, "PATIENCE", 0.0)
+    monkeypatch.setattr(sys, "stderr", terminal := Terminal())
+    with progress.progress("simulating") as update:
+        assert update is not None
+        for share in np.linspace(0.0, 1.0, 50):
+            update(float(share))
+    assert "simulating" in terminal.getvalue()
+    assert capsys.readouterr().out == ""
+
+
+def test_what_is_over_soon_or_watched_by_nobody_gets_no_bar(monkeypatch):
+    monkeypatch.setattr(sys, "stderr", terminal := Terminal())
+    with progress.progress("simulating") as update:
+        assert update is not None
+        update(0.5)
+    with progress.progress("simulating", quiet=True) as update:
+        assert update is None
+    assert terminal.getvalue() == ""
+    monkeypatch.setattr(sys, "stderr", pipe := StringIO())
+    with progress.progress("simulating") as update:
+        assert update is None
+    assert pipe.getvalue() == ""
+
+
+# the other commands
+
+
+def test_check_says_what_would_be_built():
+    text = call("check", "perpendicular").stdout
+    assert text.startswith("perpendicular: Perpendicular damping plate, 2 m/s\n")
+    # The belt is d2 + r below the impact, the plate ends 0.05 m above the belt.
+    belt = 0.104 - 0.5 * 9.81 * 0.298**2 - 0.5 - 0.004
+    assert f"  outgoing: from (-2, {belt:.6g}) to (4, {belt:.6g}) m, moving at 2 m/s\n" in text
+    assert f"  plate: from (0.6, {belt + 0.05:.6g}) to (0.6, 0.4) m\n" in text
+    assert "  pulley: radius 0.1 m, axis at (0, 0)\n" in text
+    assert "  engine: exact, until landed, at most to t = 30 s\n" in text
+    assert "warning" not in text
+    assert "engine: pymunk, until settled" in call("check", "stream").stdout
+    assert "until t = 0.7 s" in call("check", "slip", "--set", "run.until=0.7").stdout
+
+
+def test_check_warns():
+    text = call(
+        "check", "perpendicular", "--set", "outgoing.drop=0.15", "--set", "outgoing.drop_from=top"
+    ).stdout
+    assert "  warning: outgoing: the belt (y = -0.05 m) lies above the bottom of the drive" in text
+
+
+def test_check_goes_through_all_scenes_before_it_refuses():
+    Path("bad.toml").write_text("[incoming]\nspeed = -1\n", encoding="utf-8")
+    result = call("check", "bad.toml", "slip", "nowhere", code=2)
+    assert result.stdout.startswith("slip: ")
+    assert "incoming.speed = -1" in result.stderr
+    assert "incoming.pulley_radius is missing" in result.stderr
+    assert "nowhere: no such file" in result.stderr
+
+
+def test_every_shipped_scene_can_be_built():
+    text = call("check", *sc.shipped()).stdout
+    assert text.count("  engine: ") == len(sc.shipped()) == 11
+
+
+def test_the_tables_agree_as_printed_and_mark_what_differs():
+    text = call("tables").stdout
+    assert re.findall(r"^Table (\d)", text, re.MULTILINE) == ["1", "3", "4", "5"]
+    assert text.count("\n0 of ") == 3
+    assert "Not reproducible" in text
+    assert text.count("*") == 4
+    first = call("tables", "1").stdout
+    assert call("tables", "1", "--as-printed").stdout == first
+    assert "*" not in first
+    assert re.search(r"^v0 = 2 m/s, R = 0.0500 m +0.550 0.550 +0.371 0.371 +0.137 0.137", first,
+                     re.MULTILINE)  # fmt: skip
+    corrected = call("tables", "1", "--corrected").stdout
+    assert corrected.count("*") == 22
+    assert "0.137 0.146*" in corrected
+    assert "0.548 0.420*" in corrected
+
+
+def test_the_tables_as_json():
+    found = json.loads(call("tables", "4", "--json").stdout)
+    (table,) = found["tables"]
+    assert (table["number"], table["cells"], table["differing"]) == (4, 66, 0)
+    assert table["rows"][0]["cells"][0]["printed"] == "0.87"
+    assert "'2' is not one of" in refused("tables", "2")
+
+
+def test_scenes_lists_names_titles_and_what_to_look_at():
+    text = call("scenes").stdout
+    found = json.loads(call("scenes", "--json").stdout)["scenes"]
+    assert [scene["name"] for scene in found] == list(sc.shipped())
+    for scene in found:
+        assert re.search(rf"^{scene['name']} +{re.escape(scene['title'][:30])}", text, re.MULTILINE)
+        assert scene["look"][0][:30] in text
+        assert len(scene["look"]) == 3
+
+
+def test_the_schema_is_json():
+    found = json.loads(call("schema").stdout)
+    assert found["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    assert {"incoming", "plate", "outgoing", "surface", "stream", "run"} <= set(found["properties"])
+
+
+def test_new_writes_a_scene_that_runs_and_overwrites_nothing():
+    result = call("new", "my.toml")
+    assert result.stdout == "wrote my.toml; run it with: chutelab run my.toml\n"
+    assert "ended: 1 landed" in call("run", "my.toml").stdout
+    text = Path("my.toml").read_text(encoding="utf-8")
+    assert call("new", "-").stdout == text
+    Path("my.toml").write_text("mine", encoding="utf-8")
+    assert "my.toml is there already; --force overwrites it" in refused("new", "my.toml")
+    assert Path("my.toml").read_text(encoding="utf-8") == "mine"
+    call("new", "my.toml", "--force")
+    assert Path("my.toml").read_text(encoding="utf-8") == text
+    call("new")
+    assert Path("scene.toml").read_text(encoding="utf-8") == text
+
+
+def test_new_says_why_it_cannot_write():
+    Path("folder").mkdir()
+    assert "folder is a folder" in refused("new", "folder")
+    assert "cannot be written: No such file" in refused("new", "nowhere/my.toml")
+
+
+def test_show_prints_the_summary_of_the_run_and_makes_its_files_again():
+    ran = call("run", "perpendicular", "--out", "out", "--only", "npz,json").stdout
+    shown = call("show", "out/recording.npz").stdout
+    assert shown == ran.replace("wrote into out: recording.npz, summary.json\n", "")
+    summary = json.loads(Path("out/summary.json").read_text(encoding="utf-8"))
+    assert json.loads(call("show", "out/recording.npz", "--json").stdout) == summary
+    call("show", "out/recording.npz", "--out", "again", "--only", "csv,json,npz")
+    assert json.loads(Path("again/summary.json").read_text(encoding="utf-8")) == summary
+    assert Path("again/trajectory.csv").read_text(encoding="utf-8").startswith("t,particle,x,y")
+
+
+def test_show_refuses_what_is_no_recording():
+    Path("rubbish.npz").write_bytes(b"PK\3\4 rubbish")
+    Path("empty.npz").write_bytes(b"")
+    np.savez("other.npz", a=np.zeros(3))
+    Path("folder").mkdir()
+    for name in ("rubbish.npz", "empty.npz", "other.npz", "folder", "nowhere.npz"):
+        said = refused("show", name, "--out", "out")
+        assert said.startswith(f"Error: {name}: ")
+        assert said.count("\n") == 1
+
+
+def test_verify_finds_the_three_answers_in_agreement():
+    text = call("verify", "perpendicular", "low-speed").stdout
+    rows = re.findall(r"(exact, theory|pymunk, exact) +(.+?) +(\S+) +(\S+)$", text, re.MULTILINE)
+    assert len(rows) == 6
+    assert all(float(row[2]) <= float(row[3]) for row in rows if row[3] != "-")
+    assert [row[3] for row in rows if row[0] == "exact, theory"] == ["1.0e-12"] * 2
+    assert text.endswith("all within the tolerance\n")
+
+
+def test_verify_ends_with_1_when_answers_differ(monkeypatch):
+    monkeypatch.setattr("chutelab.agreement.CLOSED_FORM", 0.0)
+    text = call("verify", "perpendicular", code=1).stdout
+    assert "FAILED" in text
+    assert text.endswith("1 outside the tolerance\n")
+
+
+def test_verify_says_what_cannot_be_compared():
+    Path("point.toml").write_text(
+        sc.shipped()["perpendicular"].read_text(encoding="utf-8") + "[particle]\nradius = 0\n",
+        encoding="utf-8",
+    )
+    assert "pymunk has no mass points" in call("verify", "point.toml").stdout
+    assert "nowhere: no such file" in refused("verify", "nowhere")
+
+
+# the command itself
+
+
+def test_help_lists_the_commands():
+    text = call("--help").stdout
+    commands = re.findall(r"^  ([a-z]+)  ", text.partition("Commands:")[2], re.MULTILINE)
+    assert commands == ["run", "check", "show", "tables", "verify", "scenes", "schema", "new"]
+    assert call("-h").stdout == text
+    for command in commands:
+        assert call(command, "--help").stdout.startswith(f"Usage: main {command} ")
+
+
+def test_the_version_is_the_packages():
+    assert call("--version").stdout == f"chutelab {chutelab.__version__}\n"
+
+
+def test_shells_complete_scenes_and_kinds():
+    def completed(*words):
+        env = {
+            "_CHUTELAB_COMPLETE": "bash_complete",
+            "COMP_WORDS": " ".join(["chutelab", *words]),
+            "COMP_CWORD": str(len(words)),
+        }
+        code = "from chutelab.cli import main; main(prog_name='chutelab')"
+        return subprocess.run(
+            [sys.executable, "-c", code],
+            env={**os.environ, "PYTHONPATH": SOURCES, **env},
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=60,
+        ).stdout.split()
+
+    expected = ["plain,perpendicular", "plain,perpendicular-fast", "file,perp"]
+    assert sorted(completed("run", "perp")) == sorted(expected)
+    assert completed("run", "slip", "--only", "png,c") == ["plain,png,csv"]

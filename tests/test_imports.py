@@ -1,0 +1,104 @@
+"""What gets loaded: text waits for no pictures, the exact engine for no pymunk."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import chutelab
+
+SOURCES = str(Path(chutelab.__file__).parent.parent)
+PICTURES = {"matplotlib", "imageio", "PIL"}
+EVERYTHING = PICTURES | {"numpy", "pydantic", "pymunk", "scipy", "rich", "click"}
+
+WATCH = """
+import json, sys
+from chutelab.cli import main
+try:
+    main(sys.argv[1:])
+except SystemExit as end:
+    assert end.code == 0, end.code
+loaded = sorted(name for name in {everything!r} if name in sys.modules)
+print("LOADED " + json.dumps(loaded), file=sys.stderr)
+"""
+
+
+def python(*arguments, cwd=None):
+    environment = {**os.environ, "PYTHONPATH": SOURCES}
+    return subprocess.run(
+        [sys.executable, *arguments],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+        env=environment,
+        cwd=cwd,
+    )
+
+
+def loaded_by(*arguments, cwd=None):
+    watch = WATCH.format(everything=sorted(EVERYTHING))
+    done = python("-c", watch, *arguments, cwd=cwd)
+    return set(json.loads(done.stderr.rpartition("LOADED ")[2]))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "needed"),
+    [
+        (["--help"], {"click"}),
+        (["--version"], {"click"}),
+        (["run", "--help"], {"click"}),
+        (["scenes", "--json"], {"click", "pydantic"}),
+        (["schema"], {"click", "pydantic"}),
+        (["new", "-"], {"click", "pydantic"}),
+        (["check", "perpendicular"], {"click", "pydantic", "numpy"}),
+        (["tables", "4", "--json"], {"click", "numpy"}),
+        (["run", "perpendicular", "--json"], {"click", "pydantic", "numpy"}),
+        (["run", "perpendicular", "--quiet"], {"click", "pydantic", "numpy"}),
+        (["run", "perpendicular"], {"click", "pydantic", "numpy", "rich"}),
+        (
+            ["run", "perpendicular", "--json", "--engine", "pymunk"],
+            {"click", "pydantic", "numpy", "pymunk"},
+        ),
+        (
+            ["run", "perpendicular", "--json", "--out", "out", "--only", "csv,npz,json"],
+            {"click", "pydantic", "numpy"},
+        ),
+    ],
+    ids=" ".join,
+)
+def test_a_command_loads_what_it_needs_and_nothing_else(arguments, needed, tmp_path):
+    assert loaded_by(*arguments, cwd=tmp_path) == needed
+
+
+def test_a_picture_loads_no_engine(tmp_path):
+    loaded = loaded_by("run", "perpendicular", "-q", "--out", "out", "--only", "png", cwd=tmp_path)
+    assert "matplotlib" in loaded
+    assert not loaded & {"pymunk", "scipy", "rich"}
+
+
+def test_importing_the_package_loads_nothing():
+    code = f"import sys, chutelab; print([n for n in {sorted(EVERYTHING)!r} if n in sys.modules])"
+    assert python("-c", code).stdout == "[]\n"
+
+
+@pytest.mark.parametrize(
+    "before", ["", "import chutelab.compare", "from chutelab.animate import film"]
+)
+def test_functions_win_over_modules_of_their_name_in_any_order(before):
+    code = (
+        f"{before}\nimport chutelab\n"
+        "print(chutelab.compare.__qualname__, chutelab.animate.__qualname__)"
+    )
+    assert python("-c", code).stdout == "compare animate\n"
+
+
+def test_the_package_offers_what_it_promises():
+    for name in chutelab.__all__:
+        assert getattr(chutelab, name) is not None
+        assert name in dir(chutelab)
+    with pytest.raises(AttributeError, match="no attribute 'belt'"):
+        chutelab.belt  # noqa: B018

@@ -1,0 +1,611 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+from math import acos, cos, hypot, sin, sqrt
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+from PIL import Image
+
+from chutelab import plots, scene, theory
+from chutelab.machine import build
+from chutelab.plots import sampling, style
+from chutelab.plots.scenery import scene_of
+from chutelab.plots.window import Window
+from chutelab.recorder import Recorder
+from chutelab.recording import Kind, Recording
+from chutelab.simulation import simulate
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.axes import Axes
+
+G, V, R, PARTICLE, EPS, DISTANCE, DROP, MASS, MU = 9.81, 2.0, 0.1, 0.004, 0.5, 0.5, 0.5, 0.008, 0.5
+BELT_TIME = 0.5
+TEXT = f"""
+title = "By hand"
+[incoming]
+speed = {V}
+pulley_radius = {R}
+[plate]
+distance = {DISTANCE}
+restitution = {EPS}
+[outgoing]
+drop = {DROP}
+friction = {MU}
+"""
+EXACT = ("perpendicular", "inclined-40", "inclined-60", "low-speed", "slip", "belt-landing")
+
+
+def t_impact() -> float:
+    return (R + DISTANCE - PARTICLE) / V
+
+
+def t_landing() -> float:
+    down = G * t_impact()
+    return t_impact() + (sqrt(down**2 + 2.0 * G * DROP) - down) / G
+
+
+def expected(since: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Position and velocity after leaving the top at V, plate at t_impact: v_x becomes -ε V."""
+    hit = R + DISTANCE - PARTICLE
+    after = since >= t_impact()
+    x = np.where(after, hit - EPS * V * (since - t_impact()), V * since)
+    y = R + PARTICLE - 0.5 * G * since**2
+    vx = np.where(after, -EPS * V, V)
+    return np.stack([x, y], axis=-1), np.stack([vx, -G * since], axis=-1)
+
+
+def by_hand(residual: float = 0.0, shift: float = 0.0) -> Recording:
+    """One particle: ride, separation at 0.5 s, plate, landing; optionally with planted errors.
+
+    `residual` J too few are booked as slip heat; the flight is `shift` m too high.
+    """
+    machine = build(scene.parse(TEXT))
+    recorder = Recorder(1, machine.surfaces)
+    start = np.array([-1.0, R + PARTICLE])
+    along = np.array([V, 0.0])
+    lifted = np.array([0.0, shift])
+
+    def knot(t: float, position: np.ndarray, velocity: np.ndarray) -> None:
+        recorder.knots([0], [t], position, velocity, 0.0)
+
+    knot(0.0, start, along)
+    recorder.events(Kind.RELEASE, [0], [0.0], start, along)
+    knot(BELT_TIME, np.array([0.0, R + PARTICLE]), along)
+    top = np.array([0.0, R + PARTICLE + shift])
+    knot(BELT_TIME, top, along)
+    recorder.events(Kind.SEPARATION, [0], [BELT_TIME], top, along, surface=0)
+    hit = np.array([R + DISTANCE - PARTICLE, R + PARTICLE - 0.5 * G * t_impact() ** 2 + shift])
+    before = np.array([V, -G * t_impact()])
+    after = np.array([-EPS * V, before[1]])
+    now = BELT_TIME + t_impact()
+    knot(now, hit, before)
+    recorder.book([0], [1], restitution_loss=0.5 * MASS * V**2 * (1.0 - EPS**2))
+    knot(now, hit, after)
+    recorder.events(
+        Kind.IMPACT, [0], [now], hit, after, velocity_before=before, surface=1,
+        normal_impulse=MASS * V * (1.0 + EPS),
+    )  # fmt: skip
+    place, down = (part[0] for part in expected(np.array([t_landing()])))
+    push = min(MU * MASS * abs(down[1]), MASS * (V - down[0]))
+    carried = np.array([down[0] + push / MASS, 0.0])
+    now = BELT_TIME + t_landing()
+    knot(now, place + lifted, down)
+    work, lost = push * V, 0.5 * MASS * down[1] ** 2
+    gained = 0.5 * MASS * (carried @ carried - down @ down)
+    recorder.book([0], [2], work, lost, work - lost - gained - residual)
+    knot(now, place + lifted, carried)
+    recorder.events(
+        Kind.LANDING, [0], [now], place + lifted, carried, velocity_before=down, surface=2,
+        normal_impulse=MASS * abs(down[1]), tangential_impulse=push,
+    )  # fmt: skip
+    recorder.ended[:] = 1
+    return recorder.finish(
+        scene=machine.scene, title="By hand", engine="exact", particle=machine.particle,
+        gravity=G, steps=3, seconds=0.0,
+    )  # fmt: skip
+
+
+def axes(width: float = 6.0, height: float = 4.0) -> Axes:
+    figure = Figure(figsize=(width, height))
+    FigureCanvasAgg(figure)
+    return figure.add_subplot()
+
+
+def line(ax: Axes, gid: str) -> np.ndarray:
+    (found,) = [one for one in ax.lines if one.get_gid() == gid]
+    return np.asarray(found.get_xydata())
+
+
+@pytest.fixture(scope="module")
+def runs() -> dict[str, Recording]:
+    names = (*EXACT, "free-fall")
+    return {name: simulate(scene.load(scene.find(name))) for name in names}
+
+
+# The analytic parabola
+
+
+@given(
+    v=st.floats(0.5, 4.0),
+    radius=st.floats(0.03, 0.3),
+    size=st.floats(0.0, 0.01),
+    distance=st.floats(0.2, 1.0),
+    restitution=st.floats(0.05, 1.0),
+)
+def test_arcs_are_the_parabolas_of_a_perpendicular_plate(
+    v: float, radius: float, size: float, distance: float, restitution: float
+) -> None:
+    text = (
+        f"[particle]\nradius = {size}\n[incoming]\nspeed = {v}\npulley_radius = {radius}\n"
+        f"[plate]\ndistance = {distance}\nrestitution = {restitution}\nbelow = 50.0\n"
+        "[outgoing]\ndrop = 0.5\nstart = -20.0\nlength = 40.0\n"
+    )
+    nominal = scene.parse(text)
+    found = theory.predict(nominal)
+    parts = plots.arcs(found, nominal)
+    rc = radius + size
+    phi = acos(min(1.0, v * v / (G * rc)))
+    if str(found.reason):
+        assert len(parts) < 2
+        return
+    t2 = (radius + distance - size - rc * sin(phi)) / (v * cos(phi))
+    down = v * sin(phi) + G * t2
+    t3 = (sqrt(down**2 + 2.0 * G * 0.5) - down) / G
+    first, second = parts
+    assert (first.begin, second.begin) == (0.0, first.end)
+    assert first.end == pytest.approx(t2, rel=1e-12)
+    assert second.end == pytest.approx(t2 + t3, rel=1e-12)
+    for share in (0.0, 0.3, 1.0):
+        t = share * first.end
+        (where,), (speed,) = first.at([t])
+        x, y = rc * sin(phi) + v * cos(phi) * t, rc * cos(phi) - v * sin(phi) * t - 0.5 * G * t * t
+        # Near vertical discharge t2 grows, and with it every rounding error.
+        assert where == pytest.approx([x, y], abs=1e-12 * (1.0 + abs(y) + down * t2))
+        assert speed == pytest.approx(
+            [v * cos(phi), -v * sin(phi) - G * t], abs=1e-11 * (1.0 + down)
+        )
+    (where,), (speed,) = second.at([second.begin])
+    assert where[0] == pytest.approx(radius + distance - size, abs=1e-12)
+    assert speed == pytest.approx([-restitution * v * cos(phi), -down], abs=1e-11 * (1.0 + down))
+
+
+def test_arcs_stop_where_the_theory_does() -> None:
+    no_belt = scene.parse(TEXT[: TEXT.index("[outgoing]")])
+    (only,) = plots.arcs(theory.predict(no_belt), no_belt)
+    assert only.end == pytest.approx(t_impact(), rel=1e-13)
+    falling = scene.load(scene.find("free-fall"))
+    assert plots.arcs(theory.predict(falling), falling) == ()
+
+
+def test_flight_is_nan_off_the_arcs_and_after_the_impact_at_it() -> None:
+    recording = by_hand()
+    parts, start = plots.analytic_of(recording, theory.predict(scene_of(recording)))
+    assert start == BELT_TIME
+    times = np.array([-1e-9, 0.0, 0.1, parts[0].end, parts[1].end + 1e-9])
+    position, velocity = plots.flight(parts, times)
+    where, speed = expected(times)
+    assert np.isnan(position[[0, 4]]).all()
+    assert position[1:4] == pytest.approx(where[1:4], abs=1e-14)
+    assert velocity[1:4] == pytest.approx(speed[1:4], abs=1e-13)
+
+
+def test_dashed_line_is_the_formula() -> None:
+    recording = by_hand()
+    parts, _ = plots.analytic_of(recording, theory.predict(scene_of(recording)))
+    ax = plots.draw_analytic(axes(), parts)
+    drawn = line(ax, "analytic")
+    since = np.where(
+        np.arange(len(drawn)) < 120,
+        drawn[:, 0] / V,
+        t_impact() + (R + DISTANCE - PARTICLE - drawn[:, 0]) / (EPS * V),
+    )
+    assert len(drawn) == 239
+    assert drawn[:, 1] == pytest.approx(expected(since)[0][:, 1], abs=1e-14)
+    assert ax.lines[0].is_dashed()
+
+
+# Tracks
+
+
+def test_track_strobe_and_impacts_are_where_the_particle_is() -> None:
+    ax = plots.draw_tracks(axes(), by_hand())
+    track = line(ax, "track")
+    flying = track[:, 0] > 1e-9
+    descending = np.cumsum(flying) > np.argmax(track[flying, 0]) + 1
+    since = np.where(
+        descending,
+        t_impact() + (R + DISTANCE - PARTICLE - track[:, 0]) / (EPS * V),
+        track[:, 0] / V,
+    )
+    assert track[flying, 1] == pytest.approx(expected(since)[0][flying, 1], abs=1e-14)
+    assert (track[~flying, 1] == R + PARTICLE).all()
+    assert track[0, 0] == -1.0
+    # 0.44 s of flight in about ten: every 0.05 s, of the recording's clock.
+    strobe = line(ax, "strobe")
+    times = 0.05 * np.arange(19)
+    riding = times <= BELT_TIME
+    assert strobe[riding, 0] == pytest.approx(-1.0 + V * times[riding], abs=1e-14)
+    assert strobe[~riding] == pytest.approx(expected(times[~riding] - BELT_TIME)[0], abs=1e-13)
+    assert {one.get_label() for one in ax.lines} >= {"every 0.05 s"}
+    hits, _ = expected(np.array([t_impact(), t_landing()]))
+    assert line(ax, "impacts") == pytest.approx(hits, abs=1e-14)
+
+
+def test_stream_tracks_are_thinned_and_those_of_the_particles() -> None:
+    text = TEXT + "[stream]\ncount = 130\nbed_height = 0.05\n"
+    recording = simulate(scene.parse(text))
+    ax = plots.draw_tracks(axes(), recording)
+    (stream,) = [one for one in ax.collections if one.get_gid() == "stream"]
+    segments = stream.get_segments()
+    assert len(segments) == 59  # and particle 0
+    chosen = sampling.spread(130, 60)[1:]
+    first = recording.knots["position"][recording.offsets[chosen]]
+    assert np.array([segment[0] for segment in segments]) == pytest.approx(first, abs=1e-15)
+    assert stream.get_alpha() < 0.5
+    assert len(line(ax, "track")) > 0
+
+
+@given(st.integers(1, 500), st.integers(1, 80))
+def test_spread_takes_the_first_and_no_more_than_asked_for(count: int, at_most: int) -> None:
+    chosen = sampling.spread(count, at_most)
+    assert chosen[0] == 0
+    assert len(chosen) == min(count, at_most)
+    assert chosen[-1] < count
+
+
+def test_subset_is_the_same_motion(runs: dict[str, Recording]) -> None:
+    recording = runs["free-fall"]
+    times = np.linspace(0.0, 2.0, 50)
+    some = sampling.subset(recording, [0, 3])
+    for mine, all_of_them in zip(some.at(times), recording.at(times), strict=True):
+        np.testing.assert_array_equal(mine, all_of_them[:, [0, 3]])
+
+
+# Residual
+
+
+def test_residual_is_the_distance_planted() -> None:
+    recording = by_hand(shift=1e-6)
+    parts, start = plots.analytic_of(recording, theory.predict(scene_of(recording)))
+    ax = plots.draw_residual(axes(), recording, parts, start)
+    residual = line(ax, "residual")
+    assert residual[:, 1] == pytest.approx(1e-6, rel=1e-8)
+    assert residual[0, 0] == 0.0
+    assert residual[-1, 0] == pytest.approx(t_landing(), rel=1e-13)
+    assert ax.get_yscale() == "log"
+    low, high = ax.get_ylim()
+    assert low == 1e-17
+    assert high > 1e-6
+    assert ax.get_title("left").endswith("at most 1e−6 m")
+
+
+def test_residual_of_an_exact_run_stays_on_a_sensible_axis(runs: dict[str, Recording]) -> None:
+    for name in EXACT:
+        recording = runs[name]
+        parts, start = plots.analytic_of(recording, theory.predict(scene_of(recording)))
+        ax = plots.draw_residual(axes(), recording, parts, start)
+        residual = line(ax, "residual")[:, 1]
+        low, high = ax.get_ylim()
+        assert (residual >= low).all(), name
+        assert residual.max() < 1e-13, name
+        assert 1e-14 <= high <= 1e-11, name
+        assert 3 <= len(ax.get_yticks()) <= 6
+
+
+def test_without_parabola_the_panel_says_why() -> None:
+    ax = plots.draw_residual(axes(), by_hand(), (), 0.0, "no impact: passes below")
+    assert [text.get_text() for text in ax.texts] == [
+        "no analytic parabola: no impact: passes below"
+    ]
+    assert not ax.lines
+
+
+# Velocity and ledger
+
+
+def test_velocity_lines_are_the_components() -> None:
+    recording = by_hand()
+    parts, start = plots.analytic_of(recording, theory.predict(scene_of(recording)))
+    ax = plots.draw_velocity(axes(), recording, parts, start)
+    for axis, name in enumerate(("vx", "vy")):
+        drawn = line(ax, name)
+        flight = (drawn[:, 0] >= BELT_TIME) & (drawn[:, 0] < BELT_TIME + t_landing())
+        close = np.abs(drawn[:, 0] - BELT_TIME - t_impact()) < 1e-12
+        known = expected(drawn[:, 0] - BELT_TIME)[1][:, axis]
+        assert drawn[flight & ~close, 1] == pytest.approx(known[flight & ~close], abs=1e-12)
+        dashed = line(ax, f"analytic {name}")
+        known = expected(dashed[:, 0] - BELT_TIME)[1][:, axis]
+        close = np.abs(dashed[:, 0] - BELT_TIME - t_impact()) < 1e-12
+        assert dashed[~close, 1] == pytest.approx(known[~close], abs=1e-12)
+    # Upright at the impact: both values at (nearly) one time.
+    vx = line(ax, "vx")
+    jump = np.flatnonzero(np.diff(vx[:, 1]) < -2.0)
+    assert len(jump) == 1
+    assert np.diff(vx[:, 0])[jump] < 1e-12
+
+
+def stack(ax: Axes) -> list[Any]:
+    return [one.get_paths()[0].vertices for one in ax.collections]
+
+
+def test_ledger_stack_reaches_the_line_and_both_are_the_energies() -> None:
+    ax = plots.draw_ledger(axes(), by_hand())
+    supplied = line(ax, "supplied")
+    assert "mJ" in ax.get_ylabel()
+    lowest = expected(np.array([t_landing()]))[0][0, 1]
+    at_release = 0.5 * MASS * V**2 + MASS * G * (R + PARTICLE - lowest)
+    speed = -G * t_landing()
+    work = V * min(MU * MASS * abs(speed), MASS * V * (1.0 + EPS))
+    assert supplied[0, 1] == pytest.approx(1e3 * at_release, rel=1e-12)
+    assert supplied[-1, 1] == pytest.approx(1e3 * (at_release + work), rel=1e-12)
+    top = stack(ax)[-1]
+    upper = {x: max(y for at, y in top if at == x) for x in top[:, 0]}
+    assert [upper[x] for x in supplied[:, 0]] == pytest.approx(supplied[:, 1], rel=1e-12)
+    kinetic = stack(ax)[0]
+    mid = supplied[:, 0][np.searchsorted(supplied[:, 0], BELT_TIME + 0.2)]
+    drawn = max(y for x, y in kinetic if x == mid)
+    assert drawn == pytest.approx(
+        1e3 * 0.5 * MASS * (V**2 + (G * (mid - BELT_TIME)) ** 2), rel=1e-12
+    )
+
+
+def test_ledger_shows_a_planted_residual() -> None:
+    ax = plots.draw_ledger(axes(), by_hand(residual=0.003))
+    assert ax.get_title("left") == "Energy ledger: residual −3e−3 J"
+    supplied, top = line(ax, "supplied"), stack(ax)[-1]
+    highest = max(y for x, y in top if x == supplied[-1, 0])
+    assert abs(highest - supplied[-1, 1]) == pytest.approx(3.0, rel=1e-9)
+
+
+def test_energies_do_not_depend_on_the_chunk(
+    runs: dict[str, Recording], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording = runs["free-fall"]
+    times = np.linspace(0.0, 2.0, 41)
+    whole = sampling.energies(recording, times)
+    monkeypatch.setattr(sampling, "CHUNK", 12)
+    for name, values in sampling.energies(recording, times).items():
+        np.testing.assert_array_equal(values, whole[name])
+    assert (whole["potential"] >= 0.0).all()
+    # Five particles, one every 0.25 s: the energy at release grows in steps.
+    assert len(np.unique(whole["start"])) == 5
+
+
+@given(st.floats(1e-6, 1e6), st.integers(1, 40))
+def test_round_step_is_round_and_close(span: float, wanted: int) -> None:
+    step = sampling.round_step(span, wanted)
+    assert f"{step:.0e}"[0] in "125"
+    assert float(f"{step:.0e}") == step
+    assert 0.6 < span / wanted / step < 1.6
+
+
+def test_round_times_are_multiples_within_the_bounds() -> None:
+    assert sampling.round_times(0.1, 0.3, 0.1) == pytest.approx([0.1, 0.2, 0.3], rel=1e-15)
+    assert sampling.round_times(0.11, 0.29, 0.1) == pytest.approx([0.2], rel=1e-15)
+
+
+# The scene
+
+
+def test_window_is_cropped_to_the_action_but_holds_it() -> None:
+    recording = by_hand()
+    machine = plots.machine_of(recording)
+    window = plots.window_of(recording, machine)
+    path = expected(np.linspace(0.0, t_landing(), 100))[0]
+    for x, y in [*path, (-R, -R), (R, R), (R + DISTANCE, R + 0.3)]:
+        assert window.left < x < window.right
+        assert window.bottom < y < window.top
+    assert window.left > -0.6  # of 1 m of belt
+    assert window.width < 1.3
+    assert window.height < 1.8
+
+
+def test_a_long_slide_does_not_make_all_else_small(runs: dict[str, Recording]) -> None:
+    recording = runs["belt-landing"]
+    window = plots.window_of(recording, plots.machine_of(recording))
+    assert window.width < 4.0
+    assert window.right > 1.2
+
+
+@given(
+    st.tuples(*[st.floats(-3.0, 3.0)] * 4),
+)
+def test_clipped_lines_are_those_parts_that_lie_inside(ends: tuple[float, ...]) -> None:
+    window = Window(-1.0, 1.5, -0.5, 1.0)
+    start, end = np.array(ends[:2]), np.array(ends[2:])
+    points = start + np.linspace(0.0, 1.0, 401)[:, None] * (end - start)
+    inside = (np.abs(points[:, 0] - 0.25) <= 1.25) & (np.abs(points[:, 1] - 0.25) <= 0.75)
+    part = window.clip(start, end)
+    if part is None:
+        assert inside.sum() <= 1 or (start == end).all()
+        return
+    middle = 0.5 * (part[0] + part[1])
+    assert np.abs(middle[0] - 0.25) <= 1.25 + 1e-12
+    assert np.abs(middle[1] - 0.25) <= 0.75 + 1e-12
+    spacing = hypot(*(end - start)) / 400
+    length = hypot(*(part[1] - part[0]))
+    assert length == pytest.approx((inside.sum() - 1) * spacing, abs=2.01 * spacing + 1e-12)
+
+
+@given(st.floats(0.2, 5.0))
+def test_fitted_window_has_the_aspect_and_holds_the_window(aspect: float) -> None:
+    window = Window(-1.0, 2.0, 0.0, 1.0)
+    fitted = window.fitted(aspect)
+    assert fitted.width / fitted.height == pytest.approx(aspect, rel=1e-12)
+    assert fitted.left <= -1.0 + 1e-12
+    assert fitted.top >= 1.0 - 1e-12
+    assert min(fitted.width - 3.0, fitted.height - 1.0) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_scene_is_drawn_to_scale_where_the_machine_has_it() -> None:
+    machine = build(scene.parse(TEXT))
+    ax = plots.draw_scene(axes(7.0, 3.0), machine)
+    plate = line(ax, "surface plate")
+    assert (plate[:, 0] == R + DISTANCE).all()
+    assert plate[1, 1] == pytest.approx(R + 0.3, abs=1e-15)
+    belt_y = expected(np.array([t_impact()]))[0][0, 1] - DROP - PARTICLE
+    assert line(ax, "surface outgoing")[:, 1] == pytest.approx(belt_y, abs=1e-14)
+    (pulley,) = ax.patches
+    assert pulley.get_radius() == R
+    ax.figure.canvas.draw()
+    (x0, y0), (x1, y1) = ax.transData.transform([(0.0, 0.0), (1.0, 1.0)])
+    assert x1 - x0 == pytest.approx(y1 - y0, rel=1e-9)
+
+
+def test_a_plate_leaning_back_reads_its_angle() -> None:
+    leaning = build(scene.parse(TEXT.replace("[outgoing]", "angle_deg = 10\n[outgoing]")))
+    labels = [text.get_text() for text in plots.draw_scene(axes(), leaning).texts]
+    assert "plate, 10°\nε = 0.5" in labels
+    assert "incoming belt\n2 m/s →" in labels
+    backward = build(scene.parse(TEXT.replace("drop", "speed = -1.5\ndrop")))
+    labels = [text.get_text() for text in plots.draw_scene(axes(), backward).texts]
+    assert "outgoing belt, 1.5 m/s ←" in labels
+    assert "plate, 0°\nε = 0.5" in labels
+
+
+def test_names_stay_inside_the_axes() -> None:
+    far = '[[surface]]\nname = "feeder"\nfrom = [-0.8, -0.2]\nto = [-0.2, -0.35]\nspeed = 0.5\n'
+    ax = axes()
+    plots.draw_scene(ax, build(scene.parse(TEXT + far)), Window(-0.45, 0.8, -0.9, 0.3))
+    frame = ax.get_window_extent()
+    assert "feeder, 0.5 m/s →" in [text.get_text() for text in ax.texts]
+    for text in ax.texts:
+        box = text.get_window_extent()
+        assert frame.x0 < box.x0, text
+        assert box.x1 < frame.x1, text
+        assert frame.y0 < box.y0, text
+        assert box.y1 < frame.y1, text
+
+
+# The figure
+
+
+def seen(figure: Figure) -> list[Text]:
+    """All texts that are drawn, tick labels outside the view left out."""
+    hidden = set()
+    for ax in figure.axes:
+        for axis in (ax.xaxis, ax.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            slack = 1e-9 * (high - low)
+            for minor in (False, True):
+                ticks = axis.get_ticklocs(minor=minor)
+                labels = axis.get_ticklabels(minor=minor)
+                hidden |= {
+                    label
+                    for tick, label in zip(ticks, labels, strict=False)
+                    if not low - slack <= tick <= high + slack or not ax.axison
+                }
+            if not ax.axison:
+                hidden.add(axis.label)
+    return [
+        text
+        for text in figure.findobj(Text)
+        if text.get_visible() and text.get_text().strip() and text not in hidden
+    ]
+
+
+@pytest.mark.parametrize("name", [*EXACT, "free-fall"])
+def test_no_text_is_cut_off_overlapping_or_small(name: str, runs: dict[str, Recording]) -> None:
+    figure = plots.overlay(runs[name])
+    figure.canvas.draw()
+    texts = seen(figure)
+    boxes = [text.get_window_extent() for text in texts]
+    for text, box in zip(texts, boxes, strict=True):
+        assert text.get_fontsize() >= 9.0 or "mathdefault" in text.get_text()
+        assert figure.bbox.x0 <= box.x0, text
+        assert box.x1 <= figure.bbox.x1, text
+        assert figure.bbox.y0 <= box.y0, text
+        assert box.y1 <= figure.bbox.y1, text
+    for i, box in enumerate(boxes):
+        for j in range(i):
+            overlap = min(box.x1, boxes[j].x1) - max(box.x0, boxes[j].x0)
+            above = min(box.y1, boxes[j].y1) - max(box.y0, boxes[j].y0)
+            assert min(overlap, above) < 1.5, (texts[i], texts[j])
+
+
+def test_overlay_holds_all_its_parts(tmp_path: Path) -> None:
+    figure = plots.overlay(by_hand(), path=tmp_path / "overlay.png")
+    gids = {one.get_gid() for ax in figure.axes for one in ax.lines}
+    assert gids >= {"track", "analytic", "strobe", "impacts", "residual", "vx", "vy", "supplied"}
+    assert [file.name for file in tmp_path.iterdir()] == ["overlay.png"]
+    with Image.open(tmp_path / "overlay.png") as image:
+        assert image.size == (1560, 912)
+
+
+def test_given_prediction_is_the_one_drawn() -> None:
+    recording = by_hand()
+    other = theory.predict(scene_of(recording))
+    slower = replace(other, t2=other.t2 * 2.0)
+    figure = plots.overlay(recording, slower)
+    residual = line(figure.axes[1], "residual")
+    assert residual[:, 1].max() > 0.1
+
+
+def test_failure_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "overlay.unknown"
+    path.write_text("old")
+    with pytest.raises(ValueError, match="unknown"):
+        plots.overlay(by_hand(), path=path)
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+    with pytest.raises(FileNotFoundError):
+        plots.overlay(by_hand(), path=tmp_path / "nowhere" / "overlay.png")
+
+
+def test_a_run_that_is_over_at_once_can_be_drawn() -> None:
+    machine = build(scene.parse(TEXT))
+    recorder = Recorder(1, machine.surfaces)
+    recorder.knots([0], [0.0], [-1.0, R + PARTICLE], [V, 0.0], 0.0)
+    recording = recorder.finish(
+        scene=machine.scene, title="", engine="exact", particle=machine.particle, gravity=G,
+        steps=0, seconds=0.0,
+    )  # fmt: skip
+    figure = plots.overlay(recording)
+    figure.canvas.draw()
+    assert (line(figure.axes[0], "track") == [-1.0, R + PARTICLE]).all()
+    assert figure.axes[3].get_title("left") == "Energy ledger: residual 0 J"
+
+
+def test_drawing_touches_neither_pyplot_nor_the_settings() -> None:
+    before = dict(mpl.rcParams)
+    plots.overlay(by_hand())
+    assert dict(mpl.rcParams) == before
+    code = "import sys, chutelab.plots, chutelab.animate; print('matplotlib.pyplot' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
+
+
+# Colours and figures
+
+OKABE_ITO = {
+    "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7",
+}  # fmt: skip
+
+
+def test_meaningful_colours_are_those_of_okabe_and_ito_and_differ() -> None:
+    energy = {name: colour for name, colour in style.ENERGY.items() if name != "start"}
+    assert set(energy.values()) <= OKABE_ITO
+    assert len(set(energy.values())) == len(energy)
+    assert {style.TRACK, style.ANALYTIC, style.BELT, style.STRIKE, style.STREAM} <= OKABE_ITO
+    assert min(style.SMALL, style.NORMAL, style.LARGE) >= 9.0
+
+
+@given(st.floats(1e-14, 1e8) | st.floats(-1e8, -1e-14))
+def test_quantities_read_back_to_three_digits(value: float) -> None:
+    number, unit = style.quantity(value, "J").replace("−", "-").split()
+    powers = {"fJ": -15, "pJ": -12, "nJ": -9, "µJ": -6, "mJ": -3, "J": 0, "kJ": 3, "MJ": 6}
+    assert float(number) * 10.0 ** powers[unit] == pytest.approx(
+        value, rel=0.051 if "e" in number else 0.0051
+    )

@@ -1,0 +1,436 @@
+"""Scenes as they should be: the contract's keys and defaults, files found by name, overrides."""
+
+import json
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+
+from chutelab import scene as sc
+
+CONVEYOR = """
+[incoming]
+speed = 2.0
+pulley_radius = 0.1
+"""
+
+MACHINE = """
+[incoming]
+speed = 3.0
+pulley_radius = 0.2
+[plate]
+distance = 0.5
+[outgoing]
+drop = 0.5
+"""
+
+HOOD = """
+[[surface]]
+name = "hood"
+from = [0.8, 0.5]
+to = [1.0, 0.1]
+[[surface]]
+name = "floor"
+points = [[-1, 0], [0, 0], [1, 0.5]]
+speed = 1
+"""
+
+# Design, section 3, copied by hand: what a scene has that names only what it must.
+CONTRACT = {
+    "title": "machine",
+    "gravity": 9.81,
+    "particle": {"radius": 0.004, "mass": 0.008, "spin": False},
+    "incoming": {
+        "speed": 3.0,
+        "pulley_radius": 0.2,
+        "length": 1.0,
+        "friction": "adhesion",
+        "restitution": 0.0,
+    },
+    "plate": {
+        "distance": 0.5,
+        "angle_deg": 0.0,
+        "pivot_height": 0.2,
+        "above": 0.3,
+        "below": None,
+        "restitution": 0.5,
+        "friction": 0.0,
+    },
+    "outgoing": {
+        "speed": 3.0,
+        "drop": 0.5,
+        "drop_from": "impact",
+        "start": -2.0,
+        "length": 6.0,
+        "restitution": 0.0,
+        "friction": 0.5,
+    },
+    "surface": (),
+    "stream": {
+        "count": 1,
+        "rate": 200.0,
+        "bed_height": 0.0,
+        "speed_spread": 0.0,
+        "seed": 0,
+        "at": None,
+        "velocity": None,
+        "interact": False,
+        "restitution": 0.5,
+        "friction": 0.3,
+    },
+    "run": {"engine": "auto", "until": "landed", "max_time": 30.0, "dt": 0.001},
+}
+
+
+def test_the_defaults_are_the_contract():
+    scene = sc.parse(MACHINE, "somewhere/machine.toml")
+    assert scene.model_dump() == CONTRACT
+    assert scene.source == "somewhere/machine.toml"
+
+
+def test_free_surfaces_have_the_contract_defaults_and_points():
+    hood, floor = sc.parse(CONVEYOR + HOOD).surface
+    assert hood.points == ((0.8, 0.5), (1.0, 0.1))
+    assert (hood.name, hood.restitution, hood.friction, hood.speed) == ("hood", 0.3, 0.4, 0.0)
+    assert floor.points == ((-1.0, 0.0), (0.0, 0.0), (1.0, 0.5))
+    assert floor.speed == 1.0
+
+
+def test_without_outgoing_belt_a_scene_runs_until_settled():
+    scene = sc.parse(CONVEYOR)
+    assert scene.run.until == "settled"
+    assert scene.plate is None
+    assert scene.outgoing is None
+    assert sc.parse(CONVEYOR, overrides=["run.until=2"]).run.until == 2.0
+
+
+def test_given_values_are_not_overwritten_by_dependent_defaults():
+    scene = sc.parse(MACHINE, overrides=["plate.pivot_height=0", "outgoing.speed=-1"])
+    assert scene.plate is not None
+    assert scene.outgoing is not None
+    assert scene.plate.pivot_height == 0.0
+    assert scene.outgoing.speed == -1.0
+
+
+def test_a_scene_taken_apart_and_changed_gets_its_dependent_defaults_anew():
+    document = sc.to_dict(sc.parse(MACHINE))
+    document["incoming"].update(speed=5, pulley_radius=0.3)
+    changed = sc.from_dict(document)
+    assert changed.plate is not None
+    assert changed.outgoing is not None
+    assert changed.outgoing.speed == 5.0
+    assert changed.plate.pivot_height == 0.3
+
+
+def test_scenes_are_frozen_all_the_way_down():
+    scene = sc.parse(MACHINE + HOOD)
+    for table, key in [(scene, "gravity"), (scene.plate, "distance"), (scene.surface[0], "speed")]:
+        with pytest.raises(ValidationError, match="frozen"):
+            setattr(table, key, 1.0)
+    assert hash(scene) == hash(sc.parse(MACHINE + HOOD))
+
+
+def test_scenes_are_equal_if_their_contents_are_wherever_they_come_from():
+    scene, same = sc.parse('title = "A"' + MACHINE), sc.parse('title = "A"' + MACHINE, "a.toml")
+    assert scene == same
+    assert scene != sc.parse('title = "A"' + MACHINE, overrides=["plate.restitution=0.6"])
+    assert scene != "A"
+
+
+def test_a_direct_call_judges_and_fills_as_a_file_does():
+    incoming = sc.Incoming(speed=2.0, pulley_radius=0.1)
+    plate = sc.Plate(distance=0.5)
+    scene = sc.Scene(incoming=incoming, plate=plate)
+    assert scene.plate is not None
+    assert scene.plate.pivot_height == 0.1
+    assert plate.pivot_height is None, "the caller's own table stays as it was"
+    with pytest.raises(ValidationError, match=r"\[plate\] needs the table \[incoming\]"):
+        sc.Scene(plate=plate)
+
+
+def test_the_title_is_the_files_name_unless_given(tmp_path):
+    file = tmp_path / "my chute.toml"
+    file.write_text(CONVEYOR, encoding="utf-8")
+    assert sc.load(file).title == "my chute"
+    file.write_text('title = "Given"\n' + CONVEYOR, encoding="utf-8")
+    assert sc.load(file).title == "Given"
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
+def test_windows_files_are_read(tmp_path, encoding):
+    file = tmp_path / "windows.toml"
+    text = 'title = "Skluz č. 1"\n' + CONVEYOR
+    file.write_bytes(text.replace("\n", "\r\n").encode(encoding))
+    assert sc.load(file).title == "Skluz č. 1"
+
+
+# Hypothesis: what goes in comes out.
+
+length = st.floats(1e-6, 1e6)
+share = st.floats(0.0, 1.0)
+coordinate = st.floats(-1e6, 1e6)
+point = st.tuples(coordinate, coordinate).map(list)
+
+
+@given(
+    st.fixed_dictionaries(
+        {
+            "gravity": st.floats(0.0, 1e6),
+            "particle": st.fixed_dictionaries({"radius": length, "mass": length}),
+            "incoming": st.fixed_dictionaries(
+                {"speed": st.floats(0.0, 1e6), "pulley_radius": length, "friction": share}
+            ),
+            "plate": st.fixed_dictionaries(
+                {"distance": length, "angle_deg": st.floats(-89.999, 89.999), "restitution": share}
+            ),
+            "outgoing": st.fixed_dictionaries({"drop": length, "speed": coordinate}),
+            "stream": st.fixed_dictionaries(
+                {
+                    "count": st.integers(1, 10_000_000),
+                    "rate": st.floats(1e-6, 1e9),
+                    "seed": st.integers(0, 2**63 - 1),
+                    "speed_spread": share,
+                    "at": point,
+                    "velocity": point,
+                }
+            ),
+            "run": st.fixed_dictionaries(
+                {"until": length | st.sampled_from(["landed", "settled"]), "dt": st.just(1e-4)}
+            ),
+        }
+    )
+)
+def test_any_value_in_range_comes_back_unchanged(document):
+    scene = sc.from_dict(document)
+    assert json.loads(json.dumps(sc.to_dict(scene))) == document
+    assert sc.from_dict(sc.to_dict(scene)) == scene
+    assert sc.from_dict(json.loads(scene.model_dump_json(by_alias=True))) == scene
+
+
+# The shipped scenes.
+
+SHIPPED = (
+    "belt-landing",
+    "free-fall",
+    "inclined-20",
+    "inclined-40",
+    "inclined-60",
+    "low-speed",
+    "perpendicular",
+    "perpendicular-fast",
+    "slip",
+    "stream",
+    "stream-independent",
+)
+
+
+def test_exactly_the_promised_scenes_are_shipped():
+    assert tuple(sorted(sc.shipped())) == SHIPPED
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_each_shipped_scene_has_a_title_and_three_lines_on_what_to_look_at(name):
+    (about,) = [about for about in sc.about() if about.name == name]
+    scene = sc.load(name)
+    assert scene.title == about.title
+    assert scene.title not in {name, "Untitled scene"}
+    assert len(about.look) == 3
+    assert all(30 < len(line) < 100 for line in about.look)
+    assert sc.from_dict(sc.to_dict(scene)) == scene
+
+
+@pytest.mark.parametrize("angle", [20.0, 40.0, 60.0])
+def test_the_inclined_scenes_are_the_papers_machine(angle):
+    scene = sc.load(f"inclined-{angle:.0f}")
+    assert scene.incoming is not None
+    assert scene.plate is not None
+    assert (scene.incoming.speed, scene.incoming.pulley_radius) == (2.0, 0.05)
+    assert scene.incoming.pulley_radius + scene.plate.distance == 0.1  # d1, m
+    assert (scene.plate.angle_deg, scene.plate.restitution) == (angle, 0.5)
+
+
+def test_the_other_scenes_are_what_their_names_say():
+    low, slip, landing = sc.load("low-speed"), sc.load("slip"), sc.load("belt-landing")
+    stream, free = sc.load("stream"), sc.load("free-fall")
+    independent = sc.load("stream-independent")
+    assert low.incoming is not None
+    assert slip.incoming is not None
+    # Below the critical speed, sqrt(g R), it rides round the pulley.
+    assert low.incoming.speed**2 < 9.81 * low.incoming.pulley_radius == 9.81 * 0.5
+    assert (slip.incoming.pulley_radius, slip.incoming.friction) == (0.5, 0.5)
+    assert landing.run.until == "settled"
+    assert (stream.stream.count, stream.stream.rate) == (200, 200.0)
+    assert (stream.stream.bed_height, stream.stream.interact) == (0.05, True)
+    assert stream.run.until == "settled"
+    assert (independent.stream.count, independent.stream.interact) == (10_000, False)
+    assert independent.run.until == "landed"
+    assert free.incoming is None
+    assert len(free.surface) >= 1
+
+
+def test_a_scene_is_found_by_name_from_anywhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shipped = sc.shipped()["perpendicular"]
+    assert sc.find("perpendicular") == sc.find("perpendicular.toml") == shipped
+    (tmp_path / "perpendicular").mkdir()
+    assert sc.find("perpendicular") == shipped, "a folder of that name is no scene"
+    own = tmp_path / "stream.toml"
+    own.write_text(CONVEYOR, encoding="utf-8")
+    assert sc.find("stream.toml") == Path("stream.toml"), "a file that is there wins"
+    assert sc.find("stream") == sc.shipped()["stream"]
+
+
+def test_scenes_of_an_installed_wheel_are_found_in_the_package(tmp_path):
+    package = Path(sc.__file__).parent
+    for source in package.glob("*.*"):
+        target = tmp_path / "chutelab" / "scene" / source.name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(source.read_bytes())
+    scenes = tmp_path / "chutelab" / "data" / "scenes"
+    scenes.mkdir(parents=True)
+    (scenes / "only.toml").write_text(CONVEYOR, encoding="utf-8")
+    code = "from chutelab import scene; print(list(scene.shipped()), scene.load('only').source)"
+    printed = _python(code, cwd=tmp_path, path=tmp_path)
+    assert printed == f"['only'] {scenes / 'only.toml'}"
+
+
+def test_the_starter_is_complete_and_valid_and_shows_the_defaults():
+    text = sc.template()
+    scene = sc.parse(text)
+    assert scene.outgoing is not None
+    # With what is commented out put in, it is still valid, and every key there is, is in it.
+    keys = re.compile(r"^# (?=[a-z_]+ = |\[\[surface)", re.MULTILINE)
+    everything = tomllib.loads(keys.sub("", text))
+    assert set(everything) == set(CONTRACT)
+    for table in ("particle", "incoming", "plate", "outgoing", "stream", "run"):
+        contract = CONTRACT[table]
+        assert isinstance(contract, dict)
+        assert set(everything[table]) == set(contract)
+    assert set(everything["surface"][0]) == {
+        *("name", "from", "to", "restitution", "friction", "speed")
+    }
+    assert sc.from_dict(everything).surface[0].name == "hood"
+    minimal = sc.parse(MACHINE, overrides=["incoming.speed=2", "incoming.pulley_radius=0.1"])
+    assert scene == sc.from_dict({**sc.to_dict(minimal), "title": scene.title})
+
+
+# Overrides.
+
+
+@pytest.mark.parametrize(
+    ("override", "path", "value"),
+    [
+        ("plate.angle_deg=20", ("plate", "angle_deg"), 20.0),
+        ("plate.angle_deg = -2.5e1", ("plate", "angle_deg"), -25.0),
+        ("incoming.friction=adhesion", ("incoming", "friction"), "adhesion"),
+        ('incoming.friction="adhesion"', ("incoming", "friction"), "adhesion"),
+        ("incoming.friction=0.5", ("incoming", "friction"), 0.5),
+        ("particle.spin=true", ("particle", "spin"), True),
+        ("stream.at=[0.5, 1]", ("stream", "at"), (0.5, 1.0)),
+        ("run.engine=pymunk", ("run", "engine"), "pymunk"),
+        ("run.until=2.5", ("run", "until"), 2.5),
+        ("title=Plate = wall, 2 m/s # 1", ("title",), "Plate = wall, 2 m/s # 1"),
+        ("title=", ("title",), ""),
+        ("gravity=0", ("gravity",), 0.0),
+        ("surface.hood.restitution=0.2", ("surface", 0, "restitution"), 0.2),
+        ("surface[1].speed=-1", ("surface", 1, "speed"), -1.0),
+        ("surface.floor.points[2][1]=9", ("surface", 1, "points", 2, 1), 9.0),
+        ("surface[0].name=cover", ("surface", 0, "name"), "cover"),
+    ],
+)
+def test_an_override_sets_its_key_and_no_other(override, path, value):
+    plain, changed = sc.parse(MACHINE + HOOD), sc.parse(MACHINE + HOOD, overrides=[override])
+
+    def leaves(tree, above=()):
+        if isinstance(tree, dict):
+            branches = tree.items()
+        elif isinstance(tree, tuple) and above[-1] not in ("at", "velocity"):
+            branches = enumerate(tree)
+        else:
+            return {above: tree}
+        return {k: v for key, branch in branches for k, v in leaves(branch, (*above, key)).items()}
+
+    expected = leaves(plain.model_dump()) | {path: value}
+    assert leaves(changed.model_dump()) == expected
+
+
+def test_the_last_of_several_overrides_wins_and_tables_are_made():
+    scene = sc.parse(CONVEYOR, overrides=["plate.distance=1", "plate.distance=2"])
+    assert scene.plate is not None
+    assert scene.plate.distance == 2.0
+    scene = sc.parse(CONVEYOR, overrides=["surface=[{name='a', from=[0, 0], to=[1, 1]}]"])
+    assert scene.surface[0].points == ((0.0, 0.0), (1.0, 1.0))
+
+
+def test_overrides_leave_the_callers_mapping_alone():
+    document = tomllib.loads(MACHINE + HOOD)
+    before = json.dumps(document)
+    sc.from_dict(document, overrides=["surface.hood.speed=3", "plate.angle_deg=3"])
+    assert json.dumps(document) == before
+
+
+# What editors and other programs see.
+
+
+def test_the_schema_describes_every_key_of_the_contract():
+    schema = sc.schema()
+    assert schema["title"] == "Chutelab scene"
+    assert schema["type"] == "object"
+    assert schema["additionalProperties"] is False
+    assert set(schema["properties"]) == set(CONTRACT)
+    assert schema["$schema"].startswith("https://json-schema.org/")
+    tables = {name.lower(): table for name, table in schema["$defs"].items()}
+    for name, keys in CONTRACT.items():
+        if isinstance(keys, dict):
+            assert set(tables[name]["properties"]) == set(keys)
+    assert set(tables["surface"]["properties"]) == {
+        *("name", "from", "to", "points", "restitution", "friction", "speed")
+    }
+    assert tables["incoming"]["required"] == ["speed", "pulley_radius"]
+    assert tables["plate"]["required"] == ["distance"]
+    for table in tables.values():
+        assert table["additionalProperties"] is False
+        for key in table["properties"].values():
+            assert key["description"].endswith(".")
+            unit = key.get("x-unit")
+            assert unit is None or key["description"].endswith(f" ({unit}).")
+
+
+def test_the_schema_knows_no_null_and_gives_the_ranges():
+    schema = sc.schema()
+    text = json.dumps(schema)
+    assert '"null"' not in text
+    assert ": null" not in text
+    plate = schema["$defs"]["Plate"]["properties"]
+    assert (plate["angle_deg"]["exclusiveMinimum"], plate["angle_deg"]["x-unit"]) == (
+        -90,
+        "degrees",
+    )
+    assert (plate["restitution"]["minimum"], plate["restitution"]["maximum"]) == (0, 1)
+    assert schema["$defs"]["Run"]["properties"]["engine"]["enum"] == ["auto", "exact", "pymunk"]
+
+
+def test_reading_a_scene_imports_nothing_heavy():
+    code = (
+        "import sys; from chutelab import scene; scene.load('perpendicular');"
+        "print(*({'matplotlib', 'imageio', 'pymunk', 'PIL'} & set(sys.modules)))"
+    )
+    assert _python(code) == ""
+
+
+def _python(code, cwd=None, path=Path(sc.__file__).parents[2]):
+    run = subprocess.run(
+        [sys.executable, "-c", code],
+        env={"PYTHONPATH": str(path), "PYTHONDONTWRITEBYTECODE": "1"},
+        cwd=cwd,
+        capture_output=True,
+        encoding="utf-8",
+        check=True,
+    )
+    return run.stdout.strip()

@@ -1,0 +1,455 @@
+"""The pymunk engine against formulas written here: flight, impacts, belts, piles, the ledger."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import acos, cos, hypot, radians, sin, sqrt
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from chutelab.ledger import ledger
+from chutelab.machine import build
+from chutelab.recording import REASONS, Kind
+from chutelab.scene import find, load, parse
+from chutelab.stepper import HALF_THICKNESS, run
+
+G, R, M = 9.81, 0.004, 0.008
+
+
+def simulated(text, *overrides):
+    return run(build(parse(text, overrides=overrides)))
+
+
+def shipped(name, *overrides):
+    return run(build(load(find(name), overrides)))
+
+
+def lone(at, velocity, until, *, surface="", spin=False, more=""):
+    return simulated(
+        f"""
+[particle]
+spin = {str(spin).lower()}
+[stream]
+at = [{at[0]}, {at[1]}]
+velocity = [{velocity[0]}, {velocity[1]}]
+{more}
+[run]
+until = {until}
+{surface}
+"""
+    )
+
+
+def floor(*, restitution=0.0, friction=0.0, speed=0.0, height=0.0):
+    return f"""
+[[surface]]
+name = "floor"
+from = [-20.0, {height}]
+to = [20.0, {height}]
+restitution = {restitution}
+friction = {friction}
+speed = {speed}
+"""
+
+
+def pair(velocities, *, restitution, friction=0.0, spin=False, offset=0.0, until=0.2):
+    """Two disks without gravity, the second released at 0.05 s where the first one comes to."""
+    machine = build(
+        parse(
+            f"""
+gravity = 0.0
+[particle]
+spin = {str(spin).lower()}
+[stream]
+count = 2
+rate = 20.0
+at = [0.0, 1.0]
+velocity = [1.0, 0.0]
+bed_height = 0.01
+interact = true
+restitution = {restitution}
+friction = {friction}
+[run]
+until = {until}
+"""
+        )
+    )
+    start = machine.releases
+    releases = replace(
+        start,
+        t=np.array([0.0, 0.05]),
+        position=np.array([[0.0, 1.0], [0.1, 1.0 + offset]]),
+        velocity=np.array(velocities, dtype=float),
+    )
+    return run(replace(machine, releases=releases))
+
+
+def relative_residual(recording):
+    return ledger(recording).relative_residual
+
+
+@settings(max_examples=40)
+@given(
+    vx=st.floats(-5.0, 5.0),
+    vy=st.floats(-5.0, 5.0),
+    end=st.floats(0.01, 1.0),
+)
+def test_free_flight_is_the_parabola(vx, vy, end):
+    recording = lone((0.3, 2.0), (vx, vy), end, surface=floor(height=-50.0))
+    last = recording.track(0)[-1]
+    scale = hypot(0.3, 2.0) + hypot(vx, vy) * end + G * end**2
+    x, y = 0.3 + vx * end, 2.0 + vy * end - 0.5 * G * end**2
+    assert hypot(last["position"][0] - x, last["position"][1] - y) <= 1e-12 * scale
+    assert abs(last["velocity"][1] - (vy - G * end)) <= 1e-12 * scale
+    assert len(recording.track(0)) == 2
+    assert relative_residual(recording) < 1e-12
+
+
+@settings(max_examples=40)
+@given(
+    restitution=st.floats(0.05, 1.0),
+    friction=st.floats(0.0, 1.5),
+    speed=st.floats(-3.0, 3.0),
+    vx=st.floats(-3.0, 3.0),
+    spin=st.booleans(),
+)
+def test_a_bounce_keeps_newtons_and_coulombs_laws(restitution, friction, speed, vx, spin):
+    fall = 0.2
+    recording = lone(
+        (0.0, R + fall),
+        (vx, 0.0),
+        0.25,
+        surface=floor(restitution=restitution, friction=friction, speed=speed),
+        spin=spin,
+    )
+    hit = recording.select(Kind.IMPACT)[0]
+    approach = sqrt(2.0 * G * fall)
+    slip = vx - speed
+    normal = M * (1.0 + restitution) * approach
+    stop = (M / 3.0 if spin else M) * slip
+    tangential = -np.clip(stop, -friction * normal, friction * normal)
+    assert hit["t"] == pytest.approx(approach / G, rel=1e-11)
+    assert hit["position"] == pytest.approx([vx * approach / G, R], abs=1e-11)
+    assert hit["normal_impulse"] == pytest.approx(normal, rel=1e-10)
+    assert hit["tangential_impulse"] == pytest.approx(tangential, abs=1e-10 * normal)
+    assert hit["velocity_after"] == pytest.approx(
+        [vx + tangential / M, restitution * approach], abs=1e-9
+    )
+    spun = tangential * R / (0.5 * M * R**2) if spin else 0.0
+    assert hit["omega_after"] == pytest.approx(spun, abs=1e-6)
+
+
+@settings(max_examples=40)
+@given(angle=st.floats(-170.0, 170.0), restitution=st.floats(0.1, 1.0), skew=st.floats(-60.0, 60.0))
+def test_the_struck_face_lies_on_the_surface_whatever_its_direction(angle, restitution, skew):
+    # A surface through the origin, struck from 0.1 m away without gravity.
+    t = np.array([cos(radians(angle)), sin(radians(angle))])
+    n = np.array([-t[1], t[0]])
+    course = -(cos(radians(skew)) * n + sin(radians(skew)) * t)
+    start = -0.1 * course
+    recording = simulated(
+        f"""
+gravity = 0.0
+[stream]
+at = [{start[0]}, {start[1]}]
+velocity = [{course[0]}, {course[1]}]
+[run]
+until = 0.15
+[[surface]]
+name = "wall"
+from = [{-t[0]}, {-t[1]}]
+to = [{t[0]}, {t[1]}]
+restitution = {restitution}
+friction = 0.0
+"""
+    )
+    hit = recording.select(Kind.IMPACT)[0]
+    assert hit["position"] @ n == pytest.approx(R, abs=1e-12)
+    assert hit["velocity_after"] @ n == pytest.approx(restitution * cos(radians(skew)), abs=1e-11)
+    assert hit["velocity_after"] @ t == pytest.approx(course @ t, abs=1e-11)
+
+
+@settings(max_examples=40)
+@given(u=st.floats(0.1, 3.0), v=st.floats(-3.0, 0.0), restitution=st.floats(0.0, 1.0))
+def test_equal_disks_head_on(u, v, restitution):
+    recording = pair([(u, 0.0), (v, 0.0)], restitution=restitution, until=1.5)
+    reach = 0.1 - 2.0 * R - 0.05 * u
+    if reach < 1e-3:  # they would meet before the second is there
+        return
+    (hit,) = recording.select(Kind.COLLISION)
+    assert hit["t"] == pytest.approx(0.05 + reach / (u - v), rel=1e-10)
+    first, second = (recording.track(i)[-1]["velocity"][0] for i in (0, 1))
+    assert first == pytest.approx(0.5 * ((u + v) - restitution * (u - v)), abs=1e-10)
+    assert second == pytest.approx(0.5 * ((u + v) + restitution * (u - v)), abs=1e-10)
+    books = ledger(recording).by_surface["particles"]
+    lost = 0.25 * M * (1.0 - restitution**2) * (u - v) ** 2
+    assert books["restitution_loss"] == pytest.approx(lost, abs=1e-12)
+    entries = [recording.track(i)[-1]["entries"][1] for i in (0, 1)]
+    assert entries[0] == entries[1]
+    assert relative_residual(recording) < 1e-12
+
+
+@settings(max_examples=40)
+@given(offset=st.floats(-1.8 * R, 1.8 * R), friction=st.floats(0.0, 2.0), spin=st.booleans())
+def test_oblique_disks_keep_momentum_and_turn(offset, friction, spin):
+    restitution = 0.7
+    recording = pair(
+        [(1.0, 0.0), (-1.0, 0.0)],
+        restitution=restitution,
+        friction=friction,
+        spin=spin,
+        offset=offset,
+    )
+    # Line of centres at the touch, from the first to the second.
+    c = np.array([sqrt(4.0 * R**2 - offset**2), offset]) / (2.0 * R)
+    t = np.array([-c[1], c[0]])
+    relative = np.array([2.0, 0.0])
+    push = 0.5 * M * (1.0 + restitution) * (relative @ c)
+    mass = 0.5 * M / 3.0 if spin else 0.5 * M
+    rub = np.clip(mass * (relative @ t), -friction * push, friction * push)
+    first = np.array([1.0, 0.0]) - (push * c + rub * t) / M
+    second = np.array([-1.0, 0.0]) + (push * c + rub * t) / M
+    ends = [recording.track(i)[-1] for i in (0, 1)]
+    assert ends[0]["velocity"] == pytest.approx(first, abs=1e-9)
+    assert ends[1]["velocity"] == pytest.approx(second, abs=1e-9)
+    spun = -rub * R / (0.5 * M * R**2) if spin else 0.0
+    assert [end["omega"] for end in ends] == pytest.approx([spun, spun], abs=1e-6)
+    assert relative_residual(recording) < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("spin", "speed", "work", "heat"),
+    # Section 5 of the model: m v_b (v_b - v_x), and a third of both for a free disk.
+    [
+        (False, 2.0, M * 2.0 * 2.0, 0.5 * M * 4.0),
+        (False, -1.0, M * 1.0 * 1.0, 0.5 * M * 1.0),
+        (True, 2.0, M * 2.0 * 2.0 / 3.0, M * 4.0 / 6.0),
+    ],
+)
+def test_a_belt_pays_for_the_speed_it_gives(spin, speed, work, heat):
+    recording = lone((0.0, R), (0.0, 0.0), 3.0, surface=floor(friction=0.3, speed=speed), spin=spin)
+    books = ledger(recording)
+    assert books.belt_work == pytest.approx(work, rel=1e-5)
+    assert books.friction_loss == pytest.approx(heat, rel=1e-5)
+    assert recording.track(0)[-1]["velocity"][0] == pytest.approx(
+        speed / 3.0 if spin else speed, rel=1e-9
+    )
+    assert books.relative_residual < 2e-5
+
+
+def test_a_slide_stops_where_friction_says():
+    # v² / (2 µ g), to a step's worth of way.
+    recording = lone((0.0, R), (1.0, 0.0), '"settled"', surface=floor(friction=0.2))
+    end = recording.track(0)[-1]
+    assert end["position"][0] == pytest.approx(1.0 / (2.0 * 0.2 * G), abs=2e-3)
+    assert end["position"][1] == pytest.approx(R, abs=1e-3 * R)
+    assert REASONS[recording.ended[0]] == "settled"
+    assert len(recording.track(0)) < 12
+
+
+def test_bounces_come_to_rest_in_the_time_of_the_closed_form():
+    fall, restitution = 0.1, 0.5
+    recording = lone(
+        (0.0, R + fall), (0.0, 0.0), '"settled"', surface=floor(restitution=restitution)
+    )
+    down = sqrt(2.0 * fall / G)
+    # Down once, then 2 ε^n times as long for every further bounce; a few steps of rest at the end.
+    total = down * (1.0 + 2.0 * restitution / (1.0 - restitution))
+    assert recording.track(0)[-1]["t"] == pytest.approx(total, abs=0.03)
+    assert ledger(recording).restitution_loss == pytest.approx(M * G * fall, rel=1e-4)
+
+
+def test_adhesion_lets_go_at_the_critical_angle():
+    recording = shipped("low-speed")
+    rho, v = 0.5 + R, 2.0
+    phi = acos(v**2 / (G * rho))
+    (away,) = recording.select(Kind.SEPARATION)
+    assert away["t"] == pytest.approx((1.0 + rho * phi) / v, rel=1e-14)
+    assert away["position"] == pytest.approx([rho * sin(phi), rho * cos(phi)], rel=1e-13)
+    assert away["velocity_after"] == pytest.approx([v * cos(phi), -v * sin(phi)], rel=1e-13)
+    # The belt brakes the fall round the pulley, and the ride between knots stays on the circle.
+    books = ledger(recording).by_surface["incoming"]
+    assert books["belt_work"] == pytest.approx(-M * G * rho * (1.0 - cos(phi)), rel=1e-12)
+    times = np.linspace(0.5, away["t"], 500)
+    position, _ = recording.at(times)
+    assert np.abs(np.hypot(*position[:, 0].T) / rho - 1.0).max() < 1e-9
+    # What follows is a flight from that very point.
+    hit = recording.select(Kind.IMPACT)[0]
+    fly = (hit["position"][0] - away["position"][0]) / (v * cos(phi))
+    assert hit["position"][1] == pytest.approx(
+        rho * cos(phi) - v * sin(phi) * fly - 0.5 * G * fly**2, abs=1e-11
+    )
+
+
+@pytest.mark.parametrize(
+    ("spin", "friction", "degrees"),
+    # The slip law, and a disk that rolls until it leaves: adhesion would say 36.0°.
+    [("false", "0.5", 22.913), ("true", "1e6", np.degrees(acos((3 * 4 / (G * 0.504) + 4) / 7)))],
+)
+def test_friction_lets_go_where_the_slip_law_says(spin, friction, degrees):
+    recording = shipped("slip", f"incoming.friction={friction}", f"particle.spin={spin}")
+    away = recording.first(recording.select(Kind.SEPARATION))[0]
+    # Two steps' worth of way: 2 dt v/ρ.
+    assert np.degrees(np.arctan2(*away["position"])) == pytest.approx(degrees, abs=0.47)
+
+
+@pytest.mark.parametrize("dt", [1e-3, 1e-4])
+def test_a_transfer_lands_where_the_parabolas_meet(dt):
+    recording = shipped("perpendicular", f"run.dt={dt}")
+    d, v = 0.6 - R, 2.0
+    t = d / v
+    (hit,), (land,) = (recording.select(k) for k in (Kind.IMPACT, Kind.LANDING))
+    assert hit["position"] == pytest.approx([d, 0.1 + R - 0.5 * G * t**2], abs=1e-11)
+    u = G * t
+    fall = (-u + sqrt(u**2 + 2.0 * G * 0.5)) / G
+    assert land["t"] == pytest.approx(0.5 + t + fall, abs=1e-11)
+    assert land["position"][0] == pytest.approx(d - 0.5 * v * fall, abs=1e-11)
+    assert REASONS[recording.ended[0]] == "landed"
+    assert recording.contacts == 2
+
+
+@pytest.mark.parametrize("name", ["perpendicular", "belt-landing", "slip", "free-fall", "stream"])
+def test_the_ledger_closes(name):
+    assert relative_residual(shipped(name)) < {"stream": 2e-4}.get(name, 1e-5)
+
+
+def test_a_wrong_end_velocity_moves_the_residual():
+    recording = shipped("perpendicular")
+    knots = recording.knots.copy()
+    knots["velocity"][-1, 0] += 1e-3
+    v = recording.knots["velocity"][-1, 0]
+    moved = ledger(replace(recording, knots=knots)).residual - ledger(recording).residual
+    assert moved == pytest.approx(0.5 * M * (2e-3 * v + 1e-6), rel=1e-9)
+
+
+def test_a_stream_meets_itself_and_settles():
+    recording = shipped("stream")
+    assert len(recording.select(Kind.COLLISION)) >= 100
+    assert recording.contacts >= len(recording.select(Kind.COLLISION))
+    assert {REASONS[i] for i in recording.ended} <= {"settled", "exit"}
+    assert np.count_nonzero(recording.ended == REASONS.index("settled")) > 150
+    books = ledger(recording).by_surface["particles"]
+    assert books["restitution_loss"] > 0.0
+    assert books["friction_loss"] > 0.0
+    assert np.all(np.diff(recording.events["t"]) >= 0.0)
+    for particle in range(recording.count):
+        assert np.all(np.diff(recording.track(particle)["t"]) >= 0.0)
+
+
+@pytest.mark.parametrize("name", ["stream", "belt-landing"])
+def test_two_runs_agree_to_the_bit(name):
+    few = ["stream.count=60"] if name == "stream" else []
+    a, b = shipped(name, *few), shipped(name, *few)
+    assert a.knots.tobytes() == b.knots.tobytes()
+    assert a.events.tobytes() == b.events.tobytes()
+    assert a.by_surface.tobytes() == b.by_surface.tobytes()
+    assert (a.steps, a.contacts) == (b.steps, b.contacts)
+
+
+def test_a_carried_particle_pushes_and_is_not_pushed():
+    # Dropped in the way of a carried one, which keeps its ride.
+    machine = build(load(find("stream"), ["stream.count=2", "stream.rate=1.0", "run.max_time=1.0"]))
+    start = machine.releases
+    releases = replace(
+        start,
+        t=np.array([0.0, 0.01]),
+        position=np.array([[-1.0, 0.104], [-0.9, 0.115]]),
+        velocity=np.array([[2.0, 0.0], [0.0, 0.0]]),
+        carried=np.array([True, False]),
+    )
+    recording = run(replace(machine, releases=releases))
+    away = recording.first(recording.select(Kind.SEPARATION, surface="incoming"))[0]
+    assert away["t"] == pytest.approx(0.5, rel=1e-14)
+    assert away["velocity_after"] == pytest.approx([2.0, 0.0])
+    assert len(recording.select(Kind.COLLISION)) >= 1
+    assert relative_residual(recording) < 1e-4
+
+
+def test_a_ride_ends_where_something_is_in_its_way():
+    recording = simulated(
+        """
+[incoming]
+speed = 1.0
+pulley_radius = 0.1
+[[surface]]
+name = "scraper"
+from = [-0.5, 0.2]
+to = [-0.5, 0.1]
+restitution = 0.5
+[run]
+until = 0.6
+"""
+    )
+    hit = recording.select(Kind.IMPACT, surface="scraper")[0]
+    assert hit["t"] == pytest.approx(0.5 - R, abs=2e-3)
+    assert hit["velocity_after"][0] == pytest.approx(-0.5, abs=1e-9)
+
+
+def test_what_misses_everything_leaves_a_metre_below():
+    recording = lone((30.0, 1.0), (0.0, 0.0), '"settled"', surface=floor())
+    (gone,) = recording.select(Kind.EXIT)
+    assert gone["position"][1] == pytest.approx(-1.0, abs=1e-12)
+    assert gone["t"] == pytest.approx(sqrt(2.0 * 2.0 / G), rel=1e-12)
+    assert REASONS[recording.ended[0]] == "exit"
+
+
+def test_independent_particles_pass_through_each_other():
+    together = shipped("stream", "stream.interact=false", "stream.count=3", "run.until=0.9")
+    assert not len(together.select(Kind.COLLISION))
+    alone = shipped("perpendicular", "run.until=0.9")
+    assert together.track(0).tobytes() == alone.track(0).tobytes()
+
+
+def test_a_pile_in_a_box_stays_in_it_and_gains_nothing():
+    recording = simulated(
+        """
+[stream]
+count = 30
+rate = 100.0
+at = [0.0, 0.05]
+velocity = [0.3, 0.0]
+bed_height = 0.1
+interact = true
+[run]
+until = 2.0
+[[surface]]
+name = "box"
+points = [[-0.05, 0.2], [-0.05, 0.0], [0.05, 0.0], [0.05, 0.2]]
+friction = 0.5
+restitution = 0.3
+"""
+    )
+    last = np.array([recording.track(i)[-1]["position"] for i in range(30)])
+    assert np.all(np.abs(last[:, 0]) < 0.05 - 0.9 * R)
+    assert np.all(last[:, 1] > 0.9 * R)
+    gaps = np.linalg.norm(last[:, None] - last, axis=2)[np.triu_indices(30, 1)]
+    assert gaps.min() > 1.9 * R
+    assert relative_residual(recording) < 5e-3
+
+
+def test_progress_rises_to_one_and_is_rare():
+    machine = build(load(find("belt-landing")))
+    shares = []
+    recording = run(machine, shares.append)
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    assert len(shares) <= 2 + recording.seconds / 0.05
+
+
+def test_a_mass_point_is_refused():
+    machine = build(load(find("perpendicular"), ["particle.radius=0.0"]))
+    with pytest.raises(ValueError, match=r"particle\.radius"):
+        run(machine)
+
+
+def test_a_surface_is_thick_enough_for_the_promised_speed():
+    # v dt just below r + half the thickness: met, not passed, wherever the step falls.
+    v = 0.95 * (R + HALF_THICKNESS) / 1e-3
+    for shift in np.linspace(0.0, v * 1e-3, 7):
+        recording = lone(
+            (0.0, 0.2 + shift), (0.0, -v), 0.1, surface=floor(restitution=1.0), more=""
+        )
+        assert len(recording.select(Kind.IMPACT)) == 1

@@ -560,6 +560,8 @@ def test_verify_says_what_cannot_be_compared():
     )
     assert "pymunk has no mass points" in call("verify", "point.toml").stdout
     assert "nowhere: no such file" in refused("verify", "nowhere")
+    # Of a stream, particle 0 alone.
+    assert "all within the tolerance" in call("verify", "stream", "free-fall").stdout
 
 
 # the command itself

@@ -295,6 +295,7 @@ def test_scenes_of_an_installed_wheel_are_found_in_the_package(tmp_path):
     scenes = tmp_path / "chutelab" / "data" / "scenes"
     scenes.mkdir(parents=True)
     (scenes / "only.toml").write_text(CONVEYOR, encoding="utf-8")
+    (tmp_path / "chutelab" / "__init__.py").write_text("", encoding="utf-8")
     code = "from chutelab import scene; print(list(scene.shipped()), scene.load('only').source)"
     printed = _python(code, cwd=tmp_path, path=tmp_path)
     assert printed == f"['only'] {scenes / 'only.toml'}"

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from chutelab import scene as scenes
 from chutelab.compare import compare
 from chutelab.recording import Kind
 from chutelab.simulation import simulate
@@ -63,15 +64,19 @@ class Agreement:
 
 
 def agreement(scene: Scene) -> tuple[Agreement, ...]:
-    """Run a scene with both engines and compare particle 0, with the theory and with each other.
+    """Run particle 0 of a scene, alone, with both engines; compare with theory and each other.
 
     Raises
     ------
     SceneError
-        If the exact engine cannot run it.
+        If an engine cannot run it.
     """
-    exact = simulate(scene, engine="exact")
-    return _with_theory(scene, exact), *_with_pymunk(scene, exact)
+    tables = scenes.to_dict(scene)
+    stream = {**tables.get("stream", {}), "count": 1, "interact": False}
+    run = {**tables.get("run", {}), "engine": "auto"}
+    alone = scenes.from_dict({**tables, "stream": stream, "run": run}, scene.source)
+    exact = simulate(alone, engine="exact")
+    return _with_theory(alone, exact), *_with_pymunk(alone, exact)
 
 
 def _with_theory(scene: Scene, exact: Recording) -> Agreement:
@@ -132,9 +137,9 @@ def _first(recording: Recording, kind: Kind) -> Any | None:
 
 
 def _contacts(recording: Recording) -> list[str]:
-    """Return the names of the surfaces that particle 0 meets, up to its landing."""
+    """Return the surfaces that particle 0 meets up to its landing, or the first without one."""
     own = recording.events[recording.events["particle"] == 0]
     met = own[np.isin(own["kind"], [Kind.IMPACT, Kind.LANDING])]
     landed = np.flatnonzero(met["kind"] == Kind.LANDING)
-    met = met[: landed[0] + 1] if landed.size else met
-    return [recording.surfaces[surface] for surface in met["surface"]]
+    last = landed[0] if landed.size else 0
+    return [recording.surfaces[surface] for surface in met["surface"][: last + 1]]

@@ -55,7 +55,7 @@ def closing_time(gap: ArrayLike, rate: ArrayLike, acceleration: ArrayLike) -> Fl
     closing = rate <= 0.0
     numerator = np.where(closing, 2.0 * gap, -(rate + root))
     denominator = np.where(closing, root - rate, acceleration)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         t = numerator / denominator
     # A line that opens, or a parabola that turns above zero, has no crossing.
     missing = (discriminant < 0.0) | (denominator == 0.0)

@@ -1,8 +1,8 @@
 """Simulated against theory, quantity by quantity, for particle 0.
 
-One error serves everywhere: |simulated - theory| / max(|theory|, scale), where the scale is what the
-quantity is measured by in its scene: d1 for lengths, v2 for speeds, t2 + t3 for times, 1 rad for
-angles, ½ m v2² for energies.
+One error serves everywhere: |simulated - theory| / max(|theory|, scale), where the scale is what
+the quantity is measured by in its scene: d1 for lengths, v2 for speeds, t2 + t3 for times, 1 rad
+for angles, ½ m v2² for energies.
 """
 
 from __future__ import annotations

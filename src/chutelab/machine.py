@@ -8,6 +8,7 @@ lower end of the plate.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from math import cos, inf, radians, sin
 from typing import TYPE_CHECKING, Literal
 
@@ -213,7 +214,7 @@ class _Builder:
         friction: float,
     ) -> None:
         self.names.append(name)
-        for (x0, y0), (x1, y1) in zip(points[:-1], points[1:], strict=True):
+        for (x0, y0), (x1, y1) in pairwise(points):
             self.rows.append((x0, y0, x1, y1, speed, restitution, friction))
             self.owner.append(len(self.names) - 1)
 

@@ -7,13 +7,14 @@ from math import cos, hypot, inf, radians, sin, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.ballistics import closing_time
 from chutelab.releases import on_belt, release_point, release_velocity
 from chutelab.ride import Circle, Outcome, advance, grip_slip, normal_force
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from chutelab.scene import Scene
 
 
@@ -44,7 +45,7 @@ def discharge(scene: Scene) -> Discharge | None:
 
 
 def _let_go(scene: Scene, rho: float) -> Discharge | None:
-    """cos φ1 = v²/(g ρ), at the top if that is 1 or more (design, section 5)."""
+    """Leave by adhesion where cos φ1 = v²/(g ρ), at the top if that is 1 or more (Eq. (2))."""
     assert scene.incoming is not None
     speed = scene.incoming.speed
     if speed == 0.0:

@@ -1,16 +1,21 @@
 """Collecting knots, events and ledger entries while an engine runs.
 
-Engines hand over whole arrays in the order of time *per particle*; sorting happens once, at the end.
+Engines hand over whole arrays in the order of time *per particle*; sorting happens once, at the
+end.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from chutelab.recording import EVENT, KNOT, PARTICLES, Ints, Kind, Particle, Recording
+from chutelab.recording import EVENT, KNOT, PARTICLES, Recording
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from chutelab.recording import Ints, Kind, Particle
 
 
 class Recorder:
@@ -139,5 +144,3 @@ class Recorder:
             contacts=self.contacts,
             seconds=seconds,
         )
-
-

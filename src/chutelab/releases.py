@@ -87,14 +87,20 @@ def draw(scene: Scene) -> Releases:
     spread = stream.speed_spread * rng.uniform(-1.0, 1.0, stream.count)
     spread[0] = 0.0
     speed = np.hypot(velocity[:, 0], velocity[:, 1])
-    forward = np.divide(velocity, speed[:, None], out=np.tile([1.0, 0.0], (stream.count, 1)),
-                        where=speed[:, None] > 0.0)
+    forward = np.divide(
+        velocity,
+        speed[:, None],
+        out=np.tile([1.0, 0.0], (stream.count, 1)),
+        where=speed[:, None] > 0.0,
+    )
     velocity += spread[:, None] * forward
     if stream.interact and stream.count > 1:
         _spread_apart(scene, t, height, velocity, rng)
     position = np.tile(np.array(release_point(scene), dtype=np.float64), (stream.count, 1))
     position[:, 1] += height
-    adheres = on_belt(scene) and scene.incoming is not None and scene.incoming.friction == "adhesion"
+    adheres = (
+        on_belt(scene) and scene.incoming is not None and scene.incoming.friction == "adhesion"
+    )
     return Releases(t, position, velocity, np.full(stream.count, adheres))
 
 
@@ -128,8 +134,8 @@ def _spread_apart(
                     Fault(
                         "stream.bed_height",
                         stream.bed_height,
-                        f"particle {i} finds no free place in the bed at stream.rate = {stream.rate}"
-                        " per second: raise stream.bed_height, lower stream.rate, or set"
+                        f"particle {i} finds no free place in the bed at stream.rate ="
+                        f" {stream.rate} per second: raise stream.bed_height, lower stream.rate, or set"
                         " stream.interact = false",
                     )
                 ],

@@ -83,9 +83,7 @@ def simulate(
             raise _refused(scene, "run.engine", "exact", str(error)) from error
     else:
         if machine.particle.radius == 0.0:
-            raise _refused(
-                scene, "particle.radius", 0.0, "more than 0 with run.engine = \"pymunk\""
-            )
+            raise _refused(scene, "particle.radius", 0.0, 'more than 0 with run.engine = "pymunk"')
         from chutelab.stepper import run as step
 
         recording = step(machine, progress)

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 import zipfile
+import zlib
 from dataclasses import asdict, fields
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from chutelab.files import whole
-from chutelab.recording import EVENT, KNOT, Kind, Particle, Recording
+from chutelab.recording import ENTRIES, EVENT, KNOT, REASONS, Kind, Particle, Recording
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
@@ -27,12 +29,24 @@ ARRAYS = {
     "by_surface": np.dtype("f8"),
 }
 
+DAMAGE = (
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    EOFError,
+    RuntimeError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+"""What NumPy, zipfile and json raise on files that are damaged or of another kind."""
+
 SAMPLES = 200
-"""Rows of trajectory.csv per particle where no interval is asked for."""
+"""Instants in trajectory.csv where no interval is asked for."""
 
 MOST_SAMPLES = 1_000_000
-"""Rows of trajectory.csv altogether where no interval is asked for: beyond it no spreadsheet opens
-the file, so many particles get fewer rows each."""
+"""Rows of trajectory.csv where no interval is asked for: beyond it no spreadsheet opens the file, so
+many particles get fewer instants."""
 
 
 class RecordingError(ValueError):
@@ -65,28 +79,51 @@ def load(path: str | Path) -> Recording:
     """
     path = Path(path)
     try:
-        with np.load(path, allow_pickle=False) as data:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
             about: dict[str, Any] = json.loads(str(data["about"]))
-            if about.pop("format", None) != FORMAT:
-                raise RecordingError(
-                    f"{path}: a recording of another version of chutelab; run its scene again"
-                )
-            arrays = {name: data[name] for name in ARRAYS}
-        if any(array.dtype != ARRAYS[name] for name, array in arrays.items()):
-            raise RecordingError(f"{path}: not a recording: its arrays are of another type")
-        about["particle"] = Particle(**about["particle"])
-        about["surfaces"] = tuple(about["surfaces"])
-        return Recording(**about, **arrays)
-    except RecordingError:
-        raise
+            version = about.pop("format", None)
+            arrays = {name: data[name] for name in ARRAYS} if version == FORMAT else {}
+        if not arrays:
+            recording = None
+        else:
+            about["particle"] = Particle(**about["particle"])
+            about["surfaces"] = tuple(about["surfaces"])
+            recording = Recording(**about, **arrays)
+            _check(recording)
     except FileNotFoundError:
         raise RecordingError(f"{path}: no such file") from None
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except (ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+    except DAMAGE as error:
         raise RecordingError(
             f"{path}: not a recording as `chutelab run --out` writes it (recording.npz)"
         ) from error
+    if recording is None:
+        raise RecordingError(
+            f"{path}: a recording of another version of chutelab; run its scene again"
+        )
+    return recording
+
+
+def _check(recording: Recording) -> None:
+    """Raise a ValueError if the arrays contradict each other: every index has to lead somewhere."""
+    offsets, events = recording.offsets, recording.events
+    sizes, surfaces = np.diff(offsets), len(recording.surfaces)
+    sound = (
+        all(getattr(recording, name).dtype == dtype for name, dtype in ARRAYS.items())
+        and recording.knots.ndim == events.ndim == offsets.ndim == 1
+        and offsets[0] == 0
+        and offsets[-1] == len(recording.knots)
+        and not np.any((sizes < 0) | (sizes == 1))
+        and recording.ended.shape == sizes.shape
+        and not np.any((recording.ended < 0) | (recording.ended >= len(REASONS)))
+        and recording.by_surface.shape == (surfaces, len(ENTRIES))
+        and not np.any((events["surface"] < -1) | (events["surface"] >= surfaces))
+        and not np.any((events["particle"] < 0) | (events["particle"] >= len(sizes)))
+        and not np.any((events["kind"] < 0) | (events["kind"] >= len(Kind)))
+    )
+    if not sound:
+        raise ValueError("the arrays do not fit together")
 
 
 def to_csv(
@@ -105,17 +142,17 @@ def to_csv(
     folder : path
         Existing directory.
     step : float, optional
-        Interval of the trajectory, s; by default about `SAMPLES` rows a particle.
+        Interval of the trajectory, s; by default `SAMPLES` instants, fewer for many particles.
     only : collection of str
         Which of the two.
 
     Raises
     ------
     ValueError
-        If `step` is not positive.
+        If `step` is not positive and finite.
     """
-    if step is not None and not step > 0.0:
-        raise ValueError(f"step = {step!r}: more than 0 s")
+    if step is not None and not 0.0 < step < inf:
+        raise ValueError(f"step = {step!r}: a finite number above 0 s")
     written = []
     for name, lines in (("events", _events), ("trajectory", _trajectory)):
         if name in only:

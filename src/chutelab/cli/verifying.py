@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 def verify(ctx: click.Context, scenes: tuple[str, ...]) -> None:
     """Compare theory, exact and pymunk on each SCENE (default: shipped ones of one particle).
 
-    Exit code 1 if two of them disagree by more than their tolerance.
+    Of a stream, particle 0 is taken alone. Exit code 1 if two of them disagree by more than their
+    tolerance.
     """
     from chutelab.agreement import agreement
     from chutelab.cli import console

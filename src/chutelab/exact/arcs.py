@@ -37,11 +37,16 @@ class Bounds:
     @classmethod
     def free(cls, count: int) -> Self:
         """No obstacle in any direction."""
-        nothing, side = np.full(count, NONE, dtype=np.int64), np.zeros(count, dtype=np.int64)
-        no = np.zeros(count, dtype=bool)
-        return cls(
-            np.full(count, -np.inf), nothing, side, no, np.full(count, np.inf), nothing, side, no
-        )
+
+        def nothing(limit: float) -> tuple[Floats, Ints, Ints, NDArray[np.bool_]]:
+            return (
+                np.full(count, limit),
+                np.full(count, NONE, dtype=np.int64),
+                np.zeros(count, dtype=np.int64),
+                np.zeros(count, dtype=bool),
+            )
+
+        return cls(*nothing(-np.inf), *nothing(np.inf))
 
     def narrow(
         self, phi: Floats, angle: Floats, closing: Floats, met: NDArray[np.bool_],
@@ -109,7 +114,7 @@ def bounds(
         # The gap to a circle grows with -cos(φ - tilt).
         apart = rows_of(obstacles.center, rows)[:, other] - center
         distance = np.hypot(apart[:, 0], apart[:, 1])
-        distinct = (circle != other) & (distance > 0.0)
+        distinct = (circle != other) & (distance > obstacles.touch)
         reach = rows_of(obstacles.rho, rows)[:, other]
         level = (rho**2 + distance**2 - reach**2) / np.where(distinct, 2.0 * rho * distance, 1.0)
         met = distinct & (np.abs(level) < 1.0)

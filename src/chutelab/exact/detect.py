@@ -15,7 +15,7 @@ FOOT = 1e-12
 through the joint of two segments by rounding."""
 
 PARALLEL = 1e-14
-"""Share of the speed below which a velocity along a surface has no component towards it."""
+"""Share of a speed or an acceleration along a surface below which it has no part towards it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,15 +76,13 @@ def first_contact(
     side = np.zeros(len(motion.rows), dtype=np.int64)
     if obstacles.segments:
         for sign in (1, -1):
-            t = _faces(motion, obstacles, radius, sign)
+            t = _faces(motion, obstacles, radius, sign, until)
             nearest = np.argmin(t, axis=1)
             t = t[np.arange(len(t)), nearest]
             sooner = t < time
             time = np.where(sooner, t, time)
             obstacle = np.where(sooner, nearest, obstacle)
             side = np.where(sooner, sign, side)
-    late = time > until
-    time, obstacle, side = np.where(late, np.inf, time), np.where(late, NONE, obstacle), side
     if obstacles.center.shape[1]:
         t, circle = _circles(motion, obstacles, np.minimum(time, until))
         sooner = t < time
@@ -94,8 +92,10 @@ def first_contact(
     return time, obstacle, side
 
 
-def _faces(motion: Motion, obstacles: Obstacles, radius: float, sign: int) -> Floats:
-    """Times to the faces on one side of all segments, (k, S)."""
+def _faces(
+    motion: Motion, obstacles: Obstacles, radius: float, sign: int, until: Floats
+) -> Floats:
+    """Times up to `until` to the faces on one side of all segments, (k, S); inf for later ones."""
     normal = sign * rows_of(obstacles.normal, motion.rows)
     start = rows_of(obstacles.start, motion.rows)
     p, v, a = (x[:, None] for x in (motion.position, motion.velocity, motion.acceleration))
@@ -109,9 +109,12 @@ def _faces(motion: Motion, obstacles: Obstacles, radius: float, sign: int) -> Fl
     gap = np.where(touching, 0.0, gap)
     along_face = touching & (np.abs(rate) <= PARALLEL * np.sqrt(dot(v, v)))
     rate = np.where(along_face & ~same, 0.0, rate)
+    unpressed = along_face & (np.abs(acceleration) <= PARALLEL * np.sqrt(dot(a, a)))
+    acceleration = np.where(unpressed, 0.0, acceleration)
     time = closing_time(gap, rate, acceleration)
     own = (motion.on[:, None] == columns) & (motion.on_side[:, None] == sign)
-    never = own | (leaving & ~same) | (same & (motion.order[:, None] > 1)) | (time < 0.0)
+    never = own | (leaving & ~same) | (same & (motion.order[:, None] > 1))
+    never |= (time < 0.0) | (time > until[:, None])
     time = np.where(never, np.inf, time)
     finite = np.where(np.isfinite(time), time, 0.0)[..., None]
     there = p + finite * (v + 0.5 * finite * a) - start

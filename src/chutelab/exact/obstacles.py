@@ -22,6 +22,9 @@ Ints = NDArray[np.int64]
 JOINT = 1e-12
 """Share of the scene's size within which two ends are one joint."""
 
+FOLDED = 1e-9
+"""Difference of two directions below which one segment lies on the other."""
+
 TOUCH_ULPS = 256.0
 """Rounding of a coordinate, in units of the last place of the scene's size: closer is touching."""
 
@@ -139,19 +142,19 @@ def pick(array: Floats, rows: Ints, column: Ints) -> Floats:
 def obstacles(machine: Machine) -> Obstacles:
     """Resolve a machine's surfaces into obstacles."""
     seg, r = machine.segments, machine.particle.radius
-    start = seg.start.reshape(-1, *seg.start.shape[-2:])
-    tangent = seg.tangent.reshape(-1, *seg.tangent.shape[-2:])
-    rows, count = start.shape[:2]
+    shared = seg.length.ndim == 1
 
     def wide(array: Floats) -> Floats:
-        return array.reshape(-1, count) if array.ndim > 1 else array[None]
+        return array[None] if shared else array
 
-    length, speed = wide(seg.length), wide(seg.speed)
+    start, tangent, length = wide(seg.start), wide(seg.tangent), wide(seg.length)
+    speed = wide(seg.speed)
+    rows, count = length.shape
     end = start + length[..., None] * tangent
     extent = [np.abs(start).max(initial=0.0), np.abs(end).max(initial=0.0)]
     extent.append(np.abs(machine.releases.position).max(initial=0.0))
     size = max(float(e) for e in extent)
-    follow = _joints(start[0], end[0], JOINT * max(size, 1e-300))
+    follow = _joints(start[0], end[0], tangent[0], JOINT * size)
 
     centers, caps = [], []
     end_circle = np.full((count, 2), NONE, dtype=np.int64)
@@ -164,8 +167,8 @@ def obstacles(machine: Machine) -> Obstacles:
                     continue
                 end_circle[s, side] = count + len(centers)
                 if partner != NONE:
-                    shared = 0 if follow[partner, 0] == s else 1
-                    end_circle[partner, shared] = end_circle[s, side]
+                    joined = 0 if follow[partner, 0] == s else 1
+                    end_circle[partner, joined] = end_circle[s, side]
                 centers.append(ends[:, s])
                 caps.append((s, partner))
     owner = [cap[0] for cap in caps]
@@ -208,16 +211,19 @@ def obstacles(machine: Machine) -> Obstacles:
     )
 
 
-def _joints(start: Floats, end: Floats, tolerance: float) -> Ints:
-    """Which segment goes on where another ends, (S, 2); the first one found wins."""
+def _joints(start: Floats, end: Floats, tangent: Floats, tolerance: float) -> Ints:
+    """Which segment goes on where another ends, (S, 2); the first one found wins.
+
+    Segments that lie on each other do not go on from each other.
+    """
     follow = np.full((len(start), 2), NONE, dtype=np.int64)
-    ends = np.stack([start, end], axis=1)
-    for s in range(len(start)):
-        for e in range(2):
-            for other in range(len(start)):
-                free = other != s and follow[s, e] == NONE
-                for f in range(2):
-                    apart = np.abs(ends[s, e] - ends[other, f]).max()
-                    if free and follow[other, f] in (NONE, s) and apart <= tolerance:
-                        follow[s, e], follow[other, f] = other, s
+    ends, outward = np.stack([start, end], axis=1), np.stack([-tangent, tangent], axis=1)
+    for s, e in np.ndindex(follow.shape):
+        for other, f in np.ndindex(follow.shape):
+            if other == s or follow[s, e] != NONE or follow[other, f] != NONE:
+                continue
+            apart = np.abs(ends[s, e] - ends[other, f]).max()
+            folded = np.abs(outward[s, e] - outward[other, f]).max() <= FOLDED
+            if apart <= tolerance and not folded:
+                follow[s, e], follow[other, f] = other, s
     return follow

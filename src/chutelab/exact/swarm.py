@@ -98,7 +98,8 @@ class Swarm:
 
     def count_idle(self, who: Ints, dt: Floats) -> None:
         """Count events in a row that take no time, and raise rather than hang if they never end."""
-        self.idle[who] = np.where(dt > 0.0, 0, self.idle[who] + 1)
+        rounding = 4.0 * np.finfo(np.float64).eps * self.age[who]
+        self.idle[who] = np.where(dt > rounding, 0, self.idle[who] + 1)
         if self.idle[who].max(initial=0) > 2 * COLLAPSE:
             stuck = int(who[np.argmax(self.idle[who])])
             raise RuntimeError(

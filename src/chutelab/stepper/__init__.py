@@ -8,7 +8,8 @@ the loop.
 
 Between contacts a flight is known in closed form from its last knot, and nothing is read from
 pymunk. Limits: the step is fixed, so a particle with v dt > r + `HALF_THICKNESS` may pass through a
-surface, and of two contacts within one step only the later geometry is seen.
+surface; bounces shorter than two steps count as rest; contacts that several bodies have within one
+step are resolved together, at its end.
 """
 
 from chutelab.stepper.engine import run

@@ -64,7 +64,7 @@ class Touch:
 
 def touch(
     offset: Vector, velocity: Vector, gravity: float, capsule: Capsule, longest: float
-) -> Touch | None:
+) -> Touch:
     """Follow a relative flight back to where the gap was zero.
 
     Parameters
@@ -80,8 +80,9 @@ def touch(
 
     Returns
     -------
-    Touch or None
-        None if the path does not lead back to a touch (they overlapped from the start).
+    Touch
+        At the end of the step if the path does not lead back to a touch: they overlapped from the
+        start, or part.
     """
     back = 0.0
     gap, normal, rounded = capsule.nearest(*offset)
@@ -98,8 +99,9 @@ def touch(
         gap, normal, rounded = capsule.nearest(x, y)
         if abs(back - before) <= 1e-15 * longest:
             break
-    if gap < -tolerance or gap > tolerance:
-        return None
+    if abs(gap) > tolerance:
+        back = 0.0
+        _, normal, rounded = capsule.nearest(*offset)
     return Touch(back, normal, 1.0 / capsule.reach if rounded else 0.0)
 
 

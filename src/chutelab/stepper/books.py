@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.recording import Kind
+from chutelab.stepper.strike import FAINT
 from chutelab.stepper.tracks import CARRIED, FLYING
 
 if TYPE_CHECKING:
@@ -33,6 +34,9 @@ lies still; the contact solver ends a slip within one step, to rounding."""
 
 STILL = 1e-3, 0.1
 """m/s and s: the same for a whole run of interacting particles."""
+
+IN_LINE = 1e-4
+"""Shortfall of a sum of unit normals that are to count as one: 0.8° between two."""
 
 SLIPS = 1e-3
 """m/s; slip above which a contact that held is said to slip."""
@@ -75,7 +79,7 @@ def settle_books(run: Run, contacts: Contacts, x: Floats, motion: Motion, t: flo
         return _dot(relative, n), _dot(relative, along) + rim - belt
 
     # Led round the pulley along a chord, a particle only seems to press outwards.
-    led = np.flatnonzero(~pairs & ~np.isnan(run.tracks.curve[i, 0]))
+    led = np.flatnonzero((run.tracks.aim[i] != run.tracks.w[i]).any(axis=1))
     motion.before[i[led]] -= _dot(motion.before[i[led]], n[led])[:, None] * n[led]
     mean = 0.5 * (motion.before + motion.after)
     normal_speed, slip = parts(mean, 0.5 * (motion.spin_before + motion.spin_after))
@@ -178,7 +182,7 @@ def _events(
     kind = np.where(pairs, Kind.COLLISION, Kind.IMPACT)
     s = np.flatnonzero(~pairs)
     solid = j[s] - run.count
-    told[s] |= (approach[s] > 0.0) & ~run.met[i[s], solid]
+    told[s] |= (approach[s] > FAINT * run.machine.gravity * run.dt) & ~run.met[i[s], solid]
     run.met[i[s], solid] = True
     landing = (run.solids.surface[solid] == run.machine.landing) & ~run.landed[i[s]]
     kind[s[landing]], told[s[landing]] = Kind.LANDING, True
@@ -210,14 +214,28 @@ def _surfaces(
     speed = np.abs(slip[rows])
     stops = run.slipping[alone] & (speed < SETTLED[0])
     starts = ~run.slipping[alone] & (speed > SLIPS)
-    for row in rows[contacts.other[rows] == run.count + run.solids.pulley].tolist():
-        run.follow(int(contacts.first[row]), contacts.normal[row])
+    _lie(run, contacts, uses)
     run.slipping[alone] = (run.slipping[alone] & ~stops) | starts
     for kind, these in ((Kind.STICK, alone[stops]), (Kind.SLIP, alone[starts])):
         run.event(
             kind, these, t, x[these], motion.after[these], motion.spin_after[these],
             surface[these],
         )  # fmt: skip
+
+
+def _lie(run: Run, contacts: Contacts, uses: Ints) -> None:
+    """Note the normals of surfaces that particles lie on, one or several in line; follow curves."""
+    solid = contacts.other >= run.count
+    i, n = contacts.first[solid], contacts.normal[solid]
+    total = np.zeros((run.count, 2))
+    np.add.at(total, i, n)
+    length = np.linalg.norm(total, axis=1)
+    in_line = (uses > 0) & (length > (1.0 - IN_LINE) * uses)
+    who = np.flatnonzero(in_line)
+    run.tracks.upon[who] = total[who] / length[who, None]
+    round_pulley = contacts.other[solid] == run.count + run.solids.pulley
+    for row in np.flatnonzero(round_pulley & in_line[i]).tolist():
+        run.follow(int(i[row]), n[row])
 
 
 def _calm(run: Run, contacts: Contacts, who: Ints, speed: Floats, motion: Motion) -> None:

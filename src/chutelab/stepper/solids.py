@@ -22,6 +22,11 @@ GRIP = 1e6
 """Coefficient of friction that stands for µ = ∞: finite, because pymunk multiplies it by 0."""
 
 
+SLOP = 1e-5
+"""Overlap, as a share of the radius, that pymunk leaves alone so that resting contacts persist. The
+pulley is smaller by as much: what lies a hair inside the belt must not feel it behind x = 0."""
+
+
 @dataclass(frozen=True, eq=False)
 class Solids:
     """Capsules: a line from a to b, and all within `reach` of it; the pulley, last, has a = b.
@@ -99,8 +104,9 @@ def solids(machine: Machine) -> Solids:
     ]
     pulley = machine.pulley
     if pulley is not None:
+        drum = pulley.radius - SLOP * machine.particle.radius
         last = [
-            np.zeros(2), np.zeros(2), pulley.radius, np.zeros(2), pulley.speed,
+            np.zeros(2), np.zeros(2), drum, np.zeros(2), pulley.speed,
             min(pulley.friction, GRIP), pulley.restitution, pulley.surface,
         ]  # fmt: skip
         rows = [np.concatenate([row, [end]]) for row, end in zip(rows, last, strict=True)]

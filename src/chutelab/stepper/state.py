@@ -127,10 +127,9 @@ class Run:
         """Let go what is in contact no more; whether it separated, its flight will tell."""
         if not len(who):
             return
-        curved = who[~np.isnan(self.tracks.curve[who, 0])]
+        off_surface = who[self.tracks.upon[who].any(axis=1)]
         self.tracks.lift(who, t, self.dt)
-        for particle in curved.tolist():
-            self.fly_on(np.array([particle]), t + self.dt)
+        self.fly_on(off_surface, t + self.dt)
         parts = who[
             (self.on[who] >= 0)
             & np.isnan(self._left[who])
@@ -140,9 +139,10 @@ class Run:
         self._left[parts] = t
         self._left_state[parts] = np.column_stack([k.x[parts], k.v[parts], k.omega[parts]])
 
-    def fly_on(self, who: Ints, t: float) -> None:
+    def fly_on(self, who: Ints, t: float, shift: Floats | float = 0.0) -> None:
         """Move pymunk's bodies to where their flights are at t, half a step of velocity ahead."""
         x, v = self.tracks.flight(who, t)
+        x = x + shift
         ahead = v + 0.5 * self.dt * self.gravity
         for particle, place, velocity in zip(who.tolist(), x.tolist(), ahead.tolist(), strict=True):
             self.world.place(
@@ -166,10 +166,14 @@ class Run:
             return
         turn = speed * self.dt / rho
         ahead = np.cos(turn) * normal + np.sin(turn) * along
-        k.curve[particle] = normal
         k.aim[particle] = w - 0.5 * self.dt * centripetal * normal
         push = 0.5 * self.mass * centripetal * ahead
         self.world.steer(particle, tuple(k.aim[particle].tolist()), tuple(push.tolist()))
+
+    def hopped(self, particle: int, surface: int, t: float) -> bool:
+        """Tell whether a contact renews one with the same surface that ended a moment ago."""
+        since = t - float(self._left[particle])
+        return bool(surface == self.on[particle] and since < HOP * self.dt)
 
     def arrive(self, who: Ints, surface: Ints, t: float) -> None:
         """Note contacts of particles with one surface each, -1 for several or another particle."""

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from chutelab.recording import Kind
 from chutelab.stepper.blow import Capsule, Touch, shifted_impulse, touch
+from chutelab.stepper.solids import SLOP
 from chutelab.stepper.tracks import CARRIED, FLYING
-from chutelab.stepper.world import SLOP
 
 if TYPE_CHECKING:
     from chutelab.stepper.state import Run
@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+FAINT = 0.01
+"""Share of a step's worth of gravity below which even a first approach is no impact."""
 
 
 @dataclass
@@ -57,7 +60,8 @@ def strike(run: Run, contacts: Contacts, row: int, t: float, states: Floats) -> 
     k, i, j = run.tracks, int(contacts.first[row]), int(contacts.other[row])
     partner = _partner(run, j, t, contacts.normal[row], states)
     pair = np.array([i, j] if partner.flies else [i])
-    found = _found(run, partner, pair, contacts.normal[row], t)
+    found = _found(run, partner, pair, t)
+    undo = _undo(run, partner, pair, contacts.normal[row], t)
     at, normal = t - found.back, np.array(found.normal)
     along = np.array([normal[1], -normal[0]])
     x, v = k.flight(pair, at)
@@ -77,6 +81,10 @@ def strike(run: Run, contacts: Contacts, row: int, t: float, states: Floats) -> 
         # What would bounce for less than two steps does not bounce.
         j_n = max(j_n - m_n * rebound, 0.0)
         j_t = min(max(j_t, -partner.friction * j_n), partner.friction * j_n)
+    elif j_n == 0.0:
+        # They part already: half a step ago, where pymunk looks from, they did not.
+        run.fly_on(pair, t, undo)
+        return
     push = j_n * normal + j_t * along
 
     surface = run.particles if j < run.count else int(run.solids.surface[j - run.count])
@@ -96,7 +104,7 @@ def strike(run: Run, contacts: Contacts, row: int, t: float, states: Floats) -> 
     spun = spin + (run.radius * j_t / inertia if inertia > 0.0 else 0.0)
     k.knot(pair, at, x, v + np.array([push, -push])[: len(pair)] / run.mass, spun)
 
-    kind = _kind(run, i, j, -approach)
+    kind = None if stays and run.hopped(i, surface, at) else _kind(run, i, j, -approach)
     if kind is not None:
         run.event(
             kind, pair[:1], at, x[:1], k.v[pair[:1]], spun[:1], surface,
@@ -110,26 +118,25 @@ def strike(run: Run, contacts: Contacts, row: int, t: float, states: Floats) -> 
             run.finish(pair, "landed")
             return
     if stays:
-        _stay(run, i, found, t)
+        normal = _stay(run, i, partner, found, t, undo[0])
         if j - run.count == run.solids.pulley:
             run.follow(i, normal)
         run.arrive(pair, np.array([surface]), at)
         return
     k.fly(pair)
-    run.fly_on(pair, t)
+    run.fly_on(pair, t, undo)
     if kind is not None:
         run.tell_separation(pair)
         run.on[pair] = -1
 
 
-def _found(run: Run, partner: _Partner, pair: Ints, normal: Floats, t: float) -> Touch:
-    """Follow the flight back to the touch; without one it is the end of the step, as pymunk sees."""
+def _found(run: Run, partner: _Partner, pair: Ints, t: float) -> Touch:
+    """Follow the flight back to the touch."""
     x, v = (a[0] for a in run.tracks.flight(pair[:1], t))
     gravity = 0.0 if partner.flies else run.machine.gravity
     # Pymunk looks once a step; a body may have been put in within the step before.
     longest = min(t - float(run.tracks.t[pair].max()), 2.0 * run.dt)
-    found = touch(tuple(x - partner.x), tuple(v - partner.v), gravity, partner.capsule, longest)
-    return found or Touch(0.0, (float(normal[0]), float(normal[1])), 0.0)
+    return touch(tuple(x - partner.x), tuple(v - partner.v), gravity, partner.capsule, longest)
 
 
 def _partner(run: Run, j: int, t: float, normal: Floats, states: Floats) -> _Partner:
@@ -189,26 +196,47 @@ def _impulse(
 
 def _kind(run: Run, i: int, j: int, approach: float) -> Kind | None:
     """Name an impact; None if it only renews a contact that pymunk lost for a moment."""
-    real = approach > run.machine.gravity * run.dt
+    hop = run.machine.gravity * run.dt
+    real = approach > hop
     if j < run.count:
         return Kind.COLLISION if real else None
     solid = j - run.count
     landing = run.solids.surface[solid] == run.machine.landing and not run.landed[i]
-    first = approach > 0.0 and not run.met[i, solid]
+    first = approach > FAINT * hop and not run.met[i, solid]
     run.met[i, solid] = True
     if landing:
         return Kind.LANDING
     return Kind.IMPACT if real or first else None
 
 
-def _stay(run: Run, i: int, found: Touch, t: float) -> None:
-    """Let a particle glide along the face it fell on, a hair inside, so that pymunk sees it there."""
-    k, normal = run.tracks, np.array(found.normal)
-    v = k.v[i]
-    pull = run.gravity - float(run.gravity @ normal) * normal
-    x = k.x[i] + found.back * (v + 0.5 * found.back * pull) - 0.5 * SLOP * run.radius * normal
-    w = v + (found.back + 0.5 * run.dt) * pull
-    run.world.place(i, tuple(x.tolist()), tuple(w.tolist()), float(k.omega[i]))
-    who = np.array([i])
+def _undo(run: Run, partner: _Partner, pair: Ints, normal: Floats, t: float) -> Floats:
+    """Displacements (k, 2) that cancel how pymunk will part the bodies in its next step.
+
+    It still means the overlap it saw; seen at the touch there is none.
+    """
+    x = run.tracks.flight(pair[:1], t)[0][0] - partner.x
+    gap, _, _ = partner.capsule.nearest(float(x[0]), float(x[1]))
+    apart = run.world.parting(-gap, run.dt) * normal
+    return np.array([-0.5 * apart, 0.5 * apart]) if partner.flies else -apart[None]
+
+
+def _stay(run: Run, i: int, partner: _Partner, found: Touch, t: float, undo: Floats) -> Floats:
+    """Let a particle glide along the surface it fell on, a hair inside, so that pymunk sees it.
+
+    Return the normal where it is at t.
+    """
+    k, who, first = run.tracks, np.array([i]), np.array(found.normal)
+    pull = run.gravity - float(run.gravity @ first) * first
+    x = k.x[i] + found.back * (k.v[i] + 0.5 * found.back * pull)
+    w = k.v[i] + (found.back + 0.5 * run.dt) * pull
+    gap, normal, _ = partner.capsule.nearest(float(x[0]), float(x[1]))
+    n = np.array(normal)
+    x = x - (gap + 0.5 * SLOP * run.radius) * n
+    # Round a curve the velocity turns with it.
+    along = np.array([n[1], -n[0]])
+    w = float(w @ np.array([first[1], -first[0]])) * along
+    run.world.place(i, tuple((x + undo).tolist()), tuple(w.tolist()), float(k.omega[i]))
     k.rest(who)
     k.leave(who, x, w, k.omega[who])
+    k.upon[i] = n
+    return n

@@ -47,8 +47,9 @@ class Tracks:
         Of particles in contact: position, velocity and ω as pymunk left them at the last step.
     aim : ndarray, (N, 2)
         Velocity that moves particles in contact in the next step: w, or, round a curve, the chord.
-    curve : ndarray, (N, 2)
-        Normal of the curve that a particle in contact follows, NaN without one.
+    upon : ndarray, (N, 2)
+        Normal of the surface that a particle in contact lies on; 0 with another particle, or in a
+        corner.
     exit : ndarray, (N,)
         s; when a flight leaves the scene, inf if it never does.
     """
@@ -62,7 +63,7 @@ class Tracks:
         self.mode = np.full(count, WAITING, dtype=np.int8)
         self.t, self.omega, self.spin = np.zeros((3, count))
         self.x, self.v, self.at, self.w, self.aim = np.zeros((5, count, 2))
-        self.curve = np.full((count, 2), np.nan)
+        self.upon = np.zeros((count, 2))
         self.exit = np.full(count, np.inf)
         self._held = np.zeros(count, dtype=bool)
         self._held_t, self._held_omega = np.zeros((2, count))
@@ -110,14 +111,14 @@ class Tracks:
     def leave(self, who: Ints, x: ArrayLike, w: ArrayLike, omega: ArrayLike) -> None:
         """Note the states in which pymunk leaves particles in contact."""
         self.at[who], self.w[who], self.aim[who], self.spin[who] = x, w, w, omega
-        self.curve[who] = np.nan
+        self.upon[who] = 0.0
 
     def lift(self, who: Ints, t: float, dt: float) -> None:
         """Let particles go that were in contact a step ago, at t, and are no more.
 
-        Off a curve they go along the tangent; only along it is w half a step of gravity ahead.
+        Off a surface they go along the tangent; only along it is w half a step of gravity ahead.
         """
-        n = np.nan_to_num(self.curve[who])
+        n = self.upon[who]
         lead = 0.5 * dt * (self._g - (n @ self._g)[:, None] * n)
         self._write_held(who)
         self.knot(who, t, self.at[who], self.w[who] - lead, self.spin[who])

@@ -11,15 +11,13 @@ import pymunk
 from numpy.typing import NDArray
 from pymunk import batch
 
+from chutelab.stepper.solids import SLOP, Solids
+
 if TYPE_CHECKING:
     from chutelab.machine import Machine
-    from chutelab.stepper.solids import Solids
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-SLOP = 1e-5
-"""Overlap, as a share of the radius, that pymunk leaves alone so that resting contacts persist."""
 
 SMALLEST_SHARE = 1e-12
 """Pymunk multiplies the values of two shapes; a pair value of 0 becomes this, so that the others
@@ -168,6 +166,11 @@ class World:
         """Overwrite a velocity, and add a force (N) that acts in the next step, after the move."""
         body = self._bodies[particle]
         body.velocity, body.force = velocity, force
+
+    def parting(self, overlap: float, dt: float) -> float:
+        """Return how far (m) pymunk parts two bodies in the step after it saw them overlap."""
+        share = 1.0 - float(self._space.collision_bias**dt)
+        return share * max(0.0, overlap - float(self._space.collision_slop))
 
     def step(self, dt: float) -> None:
         """Advance by one step."""

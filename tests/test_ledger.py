@@ -1,0 +1,114 @@
+"""The books of a run: what they hold, that they close, and that errors show in them."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+
+import numpy as np
+import pytest
+
+from chutelab import exact, machine, scene
+from chutelab.ledger import Ledger, ledger
+from chutelab.recording import ENTRIES
+
+EXACT = [name for name in scene.shipped() if name != "stream"]
+G, R, M = 9.81, 0.004, 0.008
+
+
+def shipped(name, *overrides):
+    return exact.run(machine.build(scene.load(scene.find(name), overrides)))
+
+
+def energies(knots, particle):
+    """Kinetic and potential energy of knots, summed; y = 0 is the zero."""
+    kinetic = 0.5 * particle.mass * (knots["velocity"] ** 2).sum()
+    kinetic += 0.5 * particle.inertia * (knots["omega"] ** 2).sum()
+    return kinetic, particle.mass * G * knots["position"][:, 1].sum()
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_the_books_close_on_every_shipped_scene(name):
+    recording = shipped(name)
+    books = ledger(recording)
+    first, last = (np.array(list(knots)) for knots in zip(*tracks(recording), strict=True))
+    start, end = energies(first, recording.particle), energies(last, recording.particle)
+    assert books.kinetic == pytest.approx((start[0], end[0]), rel=1e-13)
+    assert books.potential == pytest.approx((start[1], end[1]), rel=1e-12, abs=1e-16)
+    brought = books.belt_work - books.restitution_loss - books.friction_loss
+    turned_over = books.kinetic[0] + abs(books.potential[1] - books.potential[0])
+    turned_over += sum(abs(getattr(books, entry)) for entry in ENTRIES)
+    assert books.turned_over == pytest.approx(turned_over, rel=1e-15)
+    assert sum(end) - sum(start) - brought == pytest.approx(books.residual, abs=1e-13 * turned_over)
+    assert abs(books.residual) <= 1e-14 * turned_over
+    assert books.relative_residual == abs(books.residual) / books.turned_over
+    assert books.turned_over > 0.0
+
+
+def tracks(recording):
+    return [(recording.track(i)[0], recording.track(i)[-1]) for i in range(recording.count)]
+
+
+@pytest.mark.parametrize("name", EXACT)
+def test_the_surfaces_make_up_the_total(name):
+    recording = shipped(name)
+    books = ledger(recording)
+    assert list(books.by_surface) == list(recording.surfaces)
+    assert list(books.by_surface)[-1] == "particles"
+    for entry in ENTRIES:
+        parts = [row[entry] for row in books.by_surface.values()]
+        assert sum(parts) == pytest.approx(getattr(books, entry), rel=1e-12, abs=1e-17)
+    assert set(books.by_surface["particles"].values()) == {0.0}
+
+
+def test_the_entries_are_what_the_impacts_and_the_ride_say():
+    """A particle let down round the pulley, onto a plate of ε = 0.5, onto a belt with µ = 0.5."""
+    recording = shipped("low-speed")
+    books = ledger(recording).by_surface
+    left, plate, landing = (recording.select(kind)[0] for kind in (1, 3, 4))
+    drop = 0.504 - left["position"][1]
+    assert books["incoming"]["belt_work"] == pytest.approx(-M * G * drop, rel=1e-13)
+    normal = plate["velocity_before"][0]
+    lost = 0.5 * M * normal**2 * (1.0 - 0.5**2)
+    assert books["plate"] == pytest.approx(
+        {"belt_work": 0.0, "restitution_loss": lost, "friction_loss": 0.0}, rel=1e-14
+    )
+    (vx, vy), belt = landing["velocity_before"], 2.0
+    pull = min(0.5 * M * abs(vy), M * abs(belt - vx))
+    assert books["outgoing"] == pytest.approx(
+        {
+            "belt_work": pull * belt,
+            "restitution_loss": 0.5 * M * vy**2,
+            "friction_loss": pull * (belt - vx) - 0.5 * pull**2 / M,
+        },
+        rel=1e-14,
+    )
+
+
+@pytest.mark.parametrize("spins", [False, True])
+def test_a_wrong_end_velocity_moves_the_residual_by_its_kinetic_energy(spins):
+    recording = shipped("perpendicular", f"particle.spin={str(spins).lower()}")
+    knots = recording.knots.copy()
+    velocity, omega = knots["velocity"][-1].copy(), knots["omega"][-1].copy()
+    knots["velocity"][-1] += (1e-3, -2e-3)
+    knots["omega"][-1] += 5.0
+    inertia = 0.5 * M * R**2 if spins else 0.0
+    change = 0.5 * M * ((knots["velocity"][-1] ** 2).sum() - (velocity**2).sum())
+    change += 0.5 * inertia * (knots["omega"][-1] ** 2 - omega**2)
+    true, false = ledger(recording), ledger(replace(recording, knots=knots))
+    assert abs(change) > 1e-7
+    assert false.residual - true.residual == pytest.approx(change, abs=1e-15 * true.turned_over)
+    same = {name for name in asdict(true) if getattr(true, name) == getattr(false, name)}
+    assert set(asdict(true)) - same == {"kinetic", "residual"}
+
+
+def test_a_wrong_entry_moves_the_residual_as_well():
+    recording = shipped("perpendicular")
+    knots = recording.knots.copy()
+    knots["entries"][-1] += (0.0, 0.0, 1e-3)
+    moved = ledger(replace(recording, knots=knots)).residual - ledger(recording).residual
+    assert moved == pytest.approx(1e-3, rel=1e-12)
+
+
+def test_nothing_turned_over_is_no_error():
+    empty = Ledger((0.0, 0.0), (1.0, 1.0), 0.0, 0.0, 0.0, 0.0, 0.0, {})
+    assert empty.relative_residual == 0.0

@@ -1,0 +1,287 @@
+"""Tracks between knots, the books at any time, and how a recording is collected."""
+
+from __future__ import annotations
+
+import tracemalloc
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from chutelab import exact, machine, scene
+from chutelab.ledger import ledger
+from chutelab.recorder import Recorder
+from chutelab.recording import ENTRIES, REASONS, Kind, Particle, tracks
+
+EPS = 2.0**-52
+G = 9.81
+M = 0.008
+EXACT = [name for name in scene.shipped() if name not in ("stream", "stream-independent")]
+
+
+@cache
+def shipped(name, *overrides):
+    return exact.run(machine.build(scene.load(scene.find(name), overrides)))
+
+
+def made(mapping):
+    return exact.run(machine.build(scene.from_dict(mapping)))
+
+
+def finish(recorder, *, gravity=G, inertia=0.0):
+    return recorder.finish(
+        scene="{}",
+        title="made by hand",
+        engine="exact",
+        particle=Particle(0.0, M, inertia),
+        gravity=gravity,
+        steps=0,
+        seconds=0.0,
+    )
+
+
+def parabola(p0, v0, s):
+    s = np.asarray(s)[:, None]
+    pull = np.array([0.0, -G])
+    return np.array(p0) + np.array(v0) * s + 0.5 * pull * s * s, np.array(v0) + pull * s
+
+
+def thrown(p0, v0, begin, end):
+    recorder = Recorder(1, ())
+    position, velocity = parabola(p0, v0, [0.0, end - begin])
+    recorder.knots([0, 0], [begin, end], position, velocity, 0.0)
+    return finish(recorder)
+
+
+coordinate = st.floats(-10.0, 10.0)
+
+
+@given(
+    p0=st.tuples(coordinate, coordinate),
+    v0=st.tuples(coordinate, coordinate),
+    begin=st.floats(0.0, 100.0),
+    duration=st.floats(0.01, 1000.0),
+)
+def test_two_knots_are_the_whole_parabola(p0, v0, begin, duration):
+    end = begin + duration
+    recording = thrown(p0, v0, begin, end)
+    times = np.clip(begin + np.linspace(0.0, 1.0, 41) * (end - begin), begin, end)
+    position, velocity = recording.at(times)
+    where, pace = parabola(p0, v0, times - begin)
+    span = end - begin
+    length = np.hypot(*p0) + np.hypot(*v0) * span + G * span**2
+    assert np.abs(position[:, 0] - where).max() <= 3.0 * EPS * length
+    assert np.abs(velocity[:, 0] - pace).max() <= 5.0 * EPS * length / span
+
+
+def test_a_track_begins_and_ends_with_its_knots_and_is_nowhere_else():
+    recording = thrown((0.3, 0.7), (1.1, 2.3), 0.1, 0.9)
+    begin, end = 0.1, 0.9
+    outside = [np.nextafter(begin, 0.0), np.nextafter(end, 1.0), -np.inf, np.inf, np.nan]
+    for values in recording.at(outside):
+        assert np.isnan(values).all()
+    position, velocity = recording.at([end, begin])
+    for row, knot in zip((0, 1), recording.knots[::-1], strict=True):
+        assert (position[row, 0] == knot["position"]).all()
+        assert (velocity[row, 0] == knot["velocity"]).all()
+
+
+def test_an_impact_is_two_knots_at_one_time_and_at_gives_the_state_after():
+    recording = shipped("perpendicular")
+    hit = recording.select(Kind.IMPACT, surface="plate")[0]
+    t = hit["t"]
+    assert np.count_nonzero(recording.track(0)["t"] == t) == 2
+    position, velocity = recording.at([np.nextafter(t, 0.0), t])
+    assert (position[1, 0] == hit["position"]).all()
+    assert (velocity[1, 0] == hit["velocity_after"]).all()
+    assert np.abs(velocity[0, 0] - hit["velocity_before"]).max() < 1e-14
+    assert hit["velocity_before"][0] > 0.0 > hit["velocity_after"][0]
+    landing = recording.select(Kind.LANDING)[0]
+    assert (recording.at([landing["t"]])[1][0, 0] == landing["velocity_after"]).all()
+
+
+def test_a_ride_round_the_pulley_stays_on_the_arc():
+    recording = shipped("low-speed")
+    rho, v0, start = 0.5 + 0.004, 2.0, 1.0
+    top = start / v0
+    left = recording.select(Kind.SEPARATION)[0]["t"]
+    times = np.linspace(top, left, 997)
+    position, velocity = recording.at(times)
+    phi = v0 * (times - top) / rho
+    arc = rho * np.stack([np.sin(phi), np.cos(phi)], axis=-1)
+    pace = v0 * np.stack([np.cos(phi), -np.sin(phi)], axis=-1)
+    assert np.abs(position[:, 0] - arc).max() < 1e-9 * rho
+    assert np.abs(velocity[:, 0] - pace).max() < 2e-7 * v0
+
+
+def crowd():
+    """Three particles: the second never released, the third later than the first."""
+    recorder = Recorder(3, ())
+    for particle, begin, end in ((2, 0.25, 1.0), (0, 0.0, 0.5)):
+        position, velocity = parabola((particle, 1.0), (1.0, 0.0), [0.0, end - begin])
+        recorder.knots([particle] * 2, [begin, end], position, velocity, 0.0)
+    return finish(recorder)
+
+
+def test_particles_keep_their_own_times_in_any_order():
+    times = np.array([0.75, 0.1, 0.3, 2.0])
+    position, velocity = crowd().at(times)
+    assert position.shape == velocity.shape == (4, 3, 2)
+    there = np.isfinite(position[..., 0])
+    assert there.tolist() == [[0, 0, 1], [1, 0, 0], [1, 0, 1], [0, 0, 0]]
+    assert (np.isfinite(velocity).all(axis=-1) == there).all()
+    assert position[0, 2] == pytest.approx([2.5, 1.0 - 0.5 * G * 0.25], abs=2.0 * EPS)
+    assert position[2, 0] == pytest.approx([0.3, 1.0 - 0.5 * G * 0.09], abs=2.0 * EPS)
+    assert crowd().at(0.1)[0].shape == (1, 3, 2)
+    assert crowd().at([])[0].shape == (0, 3, 2)
+
+
+def test_a_recording_cannot_be_changed():
+    recording = shipped("perpendicular")
+    for name in ("knots", "offsets", "ended", "events", "by_surface"):
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(recording, name)[0] = 0
+
+
+@pytest.mark.parametrize("name", [*EXACT, "stream-independent"])
+def test_the_books_add_up_at_any_time(name):
+    recording = shipped(name, "stream.count=300") if "stream" in name else shipped(name)
+    books, p = ledger(recording), recording.particle
+    first, last = recording.ends()
+    end = last["t"].max()
+    times = np.random.default_rng(1).uniform(0.0, 1.1 * end, 500)
+    now = recording.energy_at(times)
+    at_release = 0.5 * p.mass * (first["velocity"] ** 2).sum(axis=1)
+    at_release = at_release + 0.5 * p.inertia * first["omega"] ** 2
+    at_release = at_release + p.mass * recording.gravity * first["position"][:, 1]
+    start = (at_release * (times[:, None] >= first["t"])).sum(axis=1)
+    change = now["kinetic"] + now["potential"] - start
+    brought = now["belt_work"] - now["restitution_loss"] - now["friction_loss"] + now["residual"]
+    assert np.abs(change - brought).max() <= 3e-15 * books.turned_over
+    assert np.abs(now["residual"]).max() <= 3e-15 * books.turned_over
+    finally_ = {name: float(value[0]) for name, value in recording.energy_at([end]).items()}
+    for name in (*ENTRIES, "residual"):
+        assert finally_[name] == pytest.approx(getattr(books, name), abs=3e-15 * books.turned_over)
+    for name in ("kinetic", "potential"):
+        assert finally_[name] == pytest.approx(getattr(books, name)[1], rel=1e-13, abs=1e-16)
+
+
+@pytest.mark.parametrize("count", [1, 40])
+@pytest.mark.parametrize("belt", [0.0, -0.5])
+def test_a_slide_heats_quadratically_and_costs_the_belt_linearly(count, belt):
+    friction, fall, thrown_at, radius = 0.3, 0.2, 2.0, 0.004
+    recording = made(
+        {
+            "stream": {
+                "at": [0.0, radius + fall], "velocity": [thrown_at, 0.0],
+                "count": count, "rate": 100.0,
+            },
+            "surface": [
+                {
+                    "name": "floor", "from": [-5.0, 0.0], "to": [5.0, 0.0],
+                    "restitution": 0.0, "friction": friction, "speed": belt,
+                }
+            ],
+            "run": {"until": "settled"},
+        }
+    )  # fmt: skip
+    down, approach = np.sqrt(2.0 * fall / G), np.sqrt(2.0 * G * fall)
+    impulse = friction * M * approach
+    slip = thrown_at - friction * approach - belt
+    struck = impulse * (thrown_at - belt) - 0.5 * impulse**2 / M
+    times = np.linspace(0.0, 1.0, 301)
+    # since its impact, until no slip is left
+    s = np.clip(times[:, None] - np.arange(count) / 100.0 - down, 0.0, slip / (friction * G))
+    met = times[:, None] - np.arange(count) / 100.0 >= down
+    heat = met * (struck + M * friction * G * (slip * s - 0.5 * friction * G * s**2))
+    work = met * (impulse + M * friction * G * s) * -belt
+    now = recording.energy_at(times)
+    size = ledger(recording).turned_over
+    assert np.abs(now["friction_loss"] - heat.sum(axis=1)).max() < 1e-15 * size
+    assert np.abs(now["belt_work"] - work.sum(axis=1)).max() < 1e-15 * size
+
+
+def test_the_belt_lets_a_particle_down_and_nothing_rubs():
+    recording = shipped("low-speed")
+    rho, v0, top = 0.504, 2.0, 0.5
+    left = recording.select(Kind.SEPARATION)[0]["t"]
+    times = np.linspace(top, left, 500)
+    now = recording.energy_at(times)
+    phi = v0 * (times - top) / rho
+    assert np.abs(now["belt_work"] + M * G * rho * (1.0 - np.cos(phi))).max() < 2e-9 * M * G * rho
+    assert (now["friction_loss"] == 0.0).all()
+    assert (now["restitution_loss"] == 0.0).all()
+
+
+def test_blocks_change_nothing(monkeypatch):
+    recording = shipped("free-fall")
+    times = np.random.default_rng(2).uniform(-0.1, 4.0, 200)
+    whole = (*recording.at(times), *recording.energy_at(times).values())
+    monkeypatch.setattr(tracks, "CELLS", 17)
+    parts = (*recording.at(times), *recording.energy_at(times).values())
+    for one, other in zip(whole, parts, strict=True):
+        assert one.tobytes() == other.tobytes()
+
+
+def test_ten_thousand_particles_take_little_memory():
+    recording = shipped("stream-independent")
+    times = np.linspace(0.0, recording.knots["t"].max(), 200)
+    peaks = []
+    for ask in (recording.at, recording.energy_at):
+        tracemalloc.start()
+        ask(times)
+        peaks.append(tracemalloc.get_traced_memory()[1] / 1e6)
+        tracemalloc.stop()
+    answer = 2 * 200 * 10_000 * 2 * 8 / 1e6
+    assert peaks[0] < answer + 30.0
+    assert peaks[1] < 30.0
+
+
+def test_events_are_found_by_kind_and_surface():
+    recording = shipped("free-fall")
+    kinds = [Kind.IMPACT, Kind.SETTLE]
+    found = recording.select(*kinds, surface="ramp")
+    ramp = recording.surface_index("ramp")
+    wanted = [e for e in recording.events if e["kind"] in kinds and e["surface"] == ramp]
+    assert [e.tobytes() for e in found] == [e.tobytes() for e in wanted] != []
+    # releases are on no surface, which is not the surface of no such name
+    assert len(recording.select(surface="hood")) == 0 > recording.surface_index("hood")
+    first = recording.first(recording.select(Kind.IMPACT))
+    assert first["particle"].tolist() == [0, 1, 2, 3, 4]
+    for event in first:
+        own = recording.events[recording.events["particle"] == event["particle"]]
+        assert event["t"] == own["t"][own["kind"] == Kind.IMPACT].min()
+
+
+def test_the_recorder_keeps_the_order_it_is_given():
+    recorder = Recorder(3, ("floor",))
+    assert recorder.surfaces == ("floor", "particles")
+    recorder.knots([2, 0], [0.0, 1.0], [[2.0, 0.0], [0.0, 0.0]], [1.0, 0.0], 0.5)
+    recorder.book([2, 0], 0, 3.0, [1.0, 2.0], 0.5)
+    recorder.knots([2, 2, 0], [1.0, 1.0, 2.0], [[3.0, 0.0], [4.0, 0.0], [5.0, 0.0]], 0.0, 0.0)
+    recorder.knots([1], [7.0], [[6.0, 0.0]], 0.0, 0.0)
+    for kind, particle, t in ((Kind.IMPACT, 0, 1.0), (Kind.RELEASE, 2, 0.0), (Kind.STICK, 1, 1.0)):
+        recorder.events(kind, [particle], t, [[0.0, 0.0]], [[0.0, 0.0]])
+    recorder.ended[:] = REASONS.index("settled")
+    recording = finish(recorder)
+    assert recording.offsets.tolist() == [0, 2, 4, 7]
+    assert recording.track(0)["position"][:, 0].tolist() == [0.0, 5.0]
+    assert recording.track(2)["position"][:, 0].tolist() == [2.0, 3.0, 4.0]
+    assert recording.track(2)["entries"].tolist() == [[0, 0, 0], [3, 1, 0.5], [3, 1, 0.5]]
+    assert recording.by_surface.tolist() == [[6.0, 3.0, 1.0], [0.0, 0.0, 0.0]]
+    # a lone knot is its own end, so that every track has an interval
+    assert recording.track(1)["t"].tolist() == [7.0, 7.0]
+    assert recording.at([7.0])[0][0, 1].tolist() == [6.0, 0.0]
+    assert recording.events["t"].tolist() == [0.0, 1.0, 1.0]
+    assert recording.events["kind"].tolist() == [Kind.RELEASE, Kind.IMPACT, Kind.STICK]
+
+
+def test_a_turning_disk_carries_energy_of_rotation():
+    recorder = Recorder(1, ())
+    recorder.knots([0, 0], [0.0, 1.0], [[0.0, 0.0], [1.0, 0.0]], [1.0, 0.0], [2.0, 4.0])
+    now = finish(recorder, gravity=0.0, inertia=0.5).energy_at([0.0, 0.5, 1.0])
+    spin = 0.5 * 0.5 * np.array([2.0, 3.0, 4.0]) ** 2
+    assert now["kinetic"] == pytest.approx(0.5 * M + spin, rel=1e-15)
+    assert now["residual"] == pytest.approx(spin - spin[0], rel=1e-15)

@@ -1,0 +1,261 @@
+"""Recordings on disk: to the last bit, whole or not at all, and refused in words."""
+
+from __future__ import annotations
+
+import csv
+import json
+from dataclasses import fields, replace
+from functools import cache
+from io import StringIO
+
+import numpy as np
+import pytest
+
+from chutelab import scene, simulate, storage
+from chutelab.files import whole
+from chutelab.recording import Kind, Recording
+from chutelab.storage import RecordingError
+
+ARRAYS = ("knots", "offsets", "ended", "events", "by_surface")
+
+
+@cache
+def run(name="belt-landing", *overrides):
+    return simulate(scene.load(scene.find(name), overrides))
+
+
+def listing(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("name", "overrides"),
+    [
+        ("belt-landing", ()),
+        ("free-fall", ("particle.spin=true",)),
+        ("perpendicular", ("run.engine=pymunk", 'title="Größe µ, \\"quoted\\""')),
+        ("stream-independent", ("stream.count=100", "run.until=0.3")),
+    ],
+)
+def test_a_recording_comes_back_to_the_last_bit(tmp_path, name, overrides):
+    recording = run(name, *overrides)
+    path = tmp_path / "recording.npz"
+    assert recording.save(path) == path
+    back = Recording.load(path)
+    assert listing(tmp_path) == ["recording.npz"]
+    for field in fields(Recording):
+        mine, theirs = getattr(recording, field.name), getattr(back, field.name)
+        assert type(mine) is type(theirs)
+        if field.name in ARRAYS:
+            assert (mine.dtype, mine.shape) == (theirs.dtype, theirs.shape)
+            assert mine.tobytes() == theirs.tobytes()
+            assert not theirs.flags.writeable
+        else:
+            assert mine == theirs
+    assert back.seconds > 0.0
+
+
+def test_what_was_never_released_comes_back_too(tmp_path):
+    recording = run("stream-independent", "stream.count=50", "run.until=0.01")
+    released = np.diff(recording.offsets) > 0
+    assert released[0]
+    assert not released[-1]
+    back = Recording.load(recording.save(tmp_path / "some.npz"))
+    assert back.offsets.tobytes() == recording.offsets.tobytes()
+
+
+class Full(OSError):
+    pass
+
+
+@pytest.mark.parametrize("error", [Full, KeyboardInterrupt])
+def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch, error):
+    path = tmp_path / "recording.npz"
+    path.write_bytes(b"old")
+
+    def half(file, **_arrays):
+        file.write(b"half of it")
+        raise error
+
+    monkeypatch.setattr(np, "savez_compressed", half)
+    with pytest.raises(error):
+        run().save(path)
+    assert listing(tmp_path) == ["recording.npz"]
+    assert path.read_bytes() == b"old"
+
+
+def test_a_file_appears_only_when_it_is_whole(tmp_path):
+    path = tmp_path / "new.txt"
+    with whole(path) as unfinished:
+        unfinished.write_text("some")
+        assert not path.exists()
+        assert unfinished.parent.parent == tmp_path
+    assert path.read_text() == "some"
+    assert listing(tmp_path) == ["new.txt"]
+
+
+def altered(path, change_header=None, **arrays):
+    """Write a recording with another header or other arrays."""
+    with np.load(path) as data:
+        held = {name: data[name] for name in data.files}
+    if change_header is not None:
+        about = json.loads(str(held["about"]))
+        held["about"] = np.array(json.dumps(change_header(about)))
+    np.savez(path, **{**held, **arrays})
+
+
+def refused(path):
+    with pytest.raises(RecordingError) as raised:
+        storage.load(path)
+    text = str(raised.value)
+    assert str(path) in text
+    assert "\n" not in text
+    return text
+
+
+def test_another_version_is_refused(tmp_path):
+    path = run().save(tmp_path / "old.npz")
+    for version in (0, 2, "1", None):
+        altered(path, lambda about, version=version: {**about, "format": version})
+        assert "another version" in refused(path)
+
+
+def test_what_cannot_be_read_is_said(tmp_path):
+    assert "no such file" in refused(tmp_path / "nothing.npz")
+    assert "cannot be read" in refused(tmp_path)
+
+
+def test_other_files_are_no_recordings(tmp_path):
+    path = tmp_path / "other.npz"
+    for content in (b"", b"PK\x03\x04", b"title = 'a scene'\n", bytes(range(256)) * 40):
+        path.write_bytes(content)
+        assert "not a recording" in refused(path)
+    with path.open("wb") as file:
+        np.save(file, np.zeros(3))
+    assert "not a recording" in refused(path)
+    np.savez(path, about=np.array("3"), x=np.zeros(3))
+    assert "not a recording" in refused(path)
+    np.savez(path, x=np.array([{}], dtype=object))
+    assert "not a recording" in refused(path)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda about: [],
+        lambda about: {k: v for k, v in about.items() if k != "gravity"},
+        lambda about: {**about, "colour": "red"},
+        lambda about: {**about, "surfaces": ["plate"]},
+        lambda about: {**about, "particle": {"radius": 1.0}},
+    ],
+)
+def test_a_header_that_does_not_fit_is_refused(tmp_path, change):
+    path = run().save(tmp_path / "header.npz")
+    altered(path, change)
+    assert "not a recording" in refused(path)
+
+
+def test_arrays_that_do_not_fit_are_refused(tmp_path):
+    recording = run()
+    surface, kind, particle = (recording.events.copy() for _ in range(3))
+    surface["surface"][2], kind["kind"][2], particle["particle"][2] = 99, 9, 1
+    wrong = {
+        "knots": [recording.knots[:-1], recording.knots["t"].copy()],
+        "offsets": [recording.offsets + 1, np.array([0]), np.zeros(0, np.int64), np.zeros((1, 2))],
+        "ended": [np.zeros(2, np.int8), np.array([7], np.int8)],
+        "events": [surface, kind, particle],
+        "by_surface": [np.zeros((2, 3)), np.zeros((4, 3), np.float32)],
+    }
+    for name, choices in wrong.items():
+        for array in choices:
+            path = recording.save(tmp_path / "arrays.npz")
+            altered(path, **{name: array})
+            assert "not a recording" in refused(path), (name, array)
+
+
+def test_damage_anywhere_is_refused_or_harmless(tmp_path):
+    recording = run("free-fall", "stream.count=1")
+    path = recording.save(tmp_path / "damaged.npz")
+    good = path.read_bytes()
+    rng = np.random.default_rng(0)
+    outcomes = set()
+    for place in rng.integers(0, len(good), 250).tolist():
+        path.write_bytes(good[:place] + bytes([good[place] ^ 0xFF]) + good[place + 1 :])
+        try:
+            back = storage.load(path)
+        except RecordingError as error:
+            assert str(path) in str(error)  # noqa: PT017 - some damage is harmless
+            outcomes.add("refused")
+        else:
+            assert back.knots.tobytes() == recording.knots.tobytes()
+            assert back.events.tobytes() == recording.events.tobytes()
+        path.write_bytes(good[:place])
+        refused(path)
+    assert outcomes == {"refused"}
+
+
+def table(path):
+    text = path.read_text(encoding="utf-8")
+    assert text.endswith("\n")
+    return list(csv.reader(StringIO(text)))
+
+
+def test_events_csv_holds_every_event_digit_for_digit(tmp_path):
+    recording = run("free-fall", "particle.spin=true")
+    assert recording.to_csv(tmp_path, only=("events",)) == [tmp_path / "events.csv"]
+    assert listing(tmp_path) == ["events.csv"]
+    header, *rows = table(tmp_path / "events.csv")
+    assert header == [
+        "t", "particle", "other", "kind", "surface", "x", "y", "vx_before", "vy_before",
+        "vx_after", "vy_after", "omega_before", "omega_after", "normal_impulse",
+        "tangential_impulse",
+    ]  # fmt: skip
+    assert len(rows) == len(recording.events)
+    for row, e in zip(rows, recording.events, strict=True):
+        surface = recording.surfaces[e["surface"]] if e["surface"] >= 0 else ""
+        assert row[1:5] == [str(e["particle"]), "", Kind(e["kind"]).name.lower(), surface]
+        numbers = [
+            e["t"], *e["position"], *e["velocity_before"], *e["velocity_after"],
+            e["omega_before"], e["omega_after"], e["normal_impulse"], e["tangential_impulse"],
+        ]  # fmt: skip
+        assert [row[0], *row[5:]] == [repr(float(number)) for number in numbers]
+
+
+def test_a_collision_names_its_partner(tmp_path):
+    recording = run("free-fall")
+    events = recording.events.copy()
+    events["other"][3] = 4
+    replace(recording, events=events).to_csv(tmp_path)
+    assert [row[2] for row in table(tmp_path / "events.csv")[1:]][:5] == ["", "", "", "4", ""]
+
+
+@pytest.mark.parametrize("step", [None, 0.05, 1])
+def test_trajectory_csv_is_sampled_uniformly(tmp_path, step):
+    recording = run("free-fall")
+    recording.to_csv(tmp_path, step=step)
+    header, *rows = table(tmp_path / "trajectory.csv")
+    assert header == ["t", "particle", "x", "y", "vx", "vy"]
+    end = recording.knots["t"].max()
+    times = np.linspace(0.0, end, 200) if step is None else step * np.arange(int(end / step) + 1)
+    position, velocity = recording.at(times)
+    expected = [
+        [repr(float(x)) for x in (t, *position[n, i], *velocity[n, i])]
+        for n, t in enumerate(times)
+        for i in range(recording.count)
+        if np.isfinite(position[n, i, 0])
+    ]
+    assert [[row[0], *row[2:]] for row in rows] == expected
+    assert {row[1] for row in rows} == {str(i) for i in range(recording.count)}
+
+
+def test_many_particles_get_fewer_instants(tmp_path, monkeypatch):
+    monkeypatch.setattr(storage, "MOST_SAMPLES", 60)
+    run("free-fall").to_csv(tmp_path, only=["trajectory"])
+    assert len({row[0] for row in table(tmp_path / "trajectory.csv")[1:]}) == 12
+
+
+@pytest.mark.parametrize("step", [0.0, -0.1, float("nan"), float("inf")])
+def test_a_step_must_be_positive_and_finite(tmp_path, step):
+    with pytest.raises(ValueError, match="step"):
+        run().to_csv(tmp_path, step=step)
+    assert listing(tmp_path) == []

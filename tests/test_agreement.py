@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
+from itertools import groupby
 from math import cos, isfinite, radians, sin
 
 import numpy as np
-from hypothesis import HealthCheck, Phase, given, settings
+import pytest
+from hypothesis import HealthCheck, Phase, assume, given, settings
 from hypothesis import strategies as st
 
-from chutelab import exact, machine, scene, theory
+from chutelab import exact, machine, scene, stepper, theory
 from chutelab.compare import QUANTITIES, compare
 from chutelab.compare import scene_of as scene_from
 from chutelab.recording import Kind
@@ -28,15 +30,15 @@ draws = st.fixed_dictionaries(
 )
 
 
-def scene_of(draw, *, outgoing=True, max_time=30.0):
+def scene_of(draw, *, outgoing=True, max_time=30.0, dt=1e-3):
     return scene.from_dict(
         {
             "gravity": GRAVITY,
-            "run": {"max_time": max_time},
+            "run": {"max_time": max_time, "dt": dt},
             "particle": {"radius": draw["radius"]},
             "incoming": {"speed": draw["speed"], "pulley_radius": draw["pulley_radius"]},
             "plate": {
-                "distance": draw["distance"],
+                "distance": draw["distance"] + draw.get("shift", 0.0),
                 "angle_deg": draw["angle_deg"],
                 "restitution": draw["restitution"],
                 **({"below": draw["below"]} if "below" in draw else {}),
@@ -52,9 +54,21 @@ def contacts_of(recording):
     return [recording.surfaces[event["surface"]] for event in struck if event["particle"] == 0]
 
 
+def built_or_none(drawn):
+    try:
+        return machine.build(drawn)
+    except scene.SceneError:
+        return None
+
+
 def plate_normal(recording):
     alpha = radians(scene_from(recording).plate.angle_deg)
     return np.array([-cos(alpha), -sin(alpha)])
+
+
+def surfaces_met(recording):
+    """The surfaces in the order met; a run of bounces on one of them counts once."""
+    return [name for name, _ in groupby(contacts_of(recording))]
 
 
 def allowance(draw, found):
@@ -95,7 +109,6 @@ def confirm(reason, recording):
 
 def test_exact_agrees_with_the_closed_form_on_a_thousand_random_scenes():
     tally = Counter()
-    worst = {"error": 0.0, "share": 0.0}
 
     @settings(max_examples=1000, phases=[Phase.generate], suppress_health_check=list(HealthCheck))
     @given(draws)
@@ -107,12 +120,10 @@ def test_exact_agrees_with_the_closed_form_on_a_thousand_random_scenes():
         drawn = scene_of(draw, max_time=enough)
         reason = str(prediction.reason)
         tally["drawn"] += 1
-        try:
-            built = machine.build(drawn)
-        except scene.SceneError as refusal:
+        built = built_or_none(drawn)
+        if built is None:
             # The plate is missed, so there is nothing to hang the outgoing belt on.
             assert theory.Reason.of(reason) in (theory.Reason.NO_IMPACT, theory.Reason.EARLY)
-            assert "outgoing.drop_from" in str(refusal) or "plate." in str(refusal)
             alone = scene_of(draw, outgoing=False, max_time=enough)
             reason = str(theory.predict(alone).reason)
             if theory.Reason.of(reason) is not theory.Reason.OUTSIDE:
@@ -132,12 +143,44 @@ def test_exact_agrees_with_the_closed_form_on_a_thousand_random_scenes():
         vx, vy = hit["velocity_before"]
         alpha = radians(draw["angle_deg"])
         found = {"v2": compared.simulated["v2"], "normal": vx * cos(alpha) + vy * sin(alpha)}
-        bound = allowance(draw, found)
-        worst["share"] = max(worst["share"], compared.max / bound)
-        assert compared.max <= bound, (draw, compared.errors)
+        assert compared.max <= allowance(draw, found), (draw, compared.errors)
         tally["reached"] += 1
 
     one()
-    print(dict(tally), worst)
     assert tally["drawn"] >= 1000
     assert tally["reached"] >= 0.4 * tally["drawn"], tally
+
+
+stepped_draws = draws.map(lambda d: {**d, "radius": max(d["radius"], 0.002)})
+
+
+@pytest.mark.parametrize(("dt", "examples"), [(1e-3, 150), (1e-4, 15)])
+def test_pymunk_agrees_with_exact_to_the_way_of_three_steps(dt, examples):
+    tally = Counter()
+
+    @settings(
+        max_examples=examples, suppress_health_check=list(HealthCheck), phases=[Phase.generate]
+    )
+    @given(stepped_draws)
+    def one(draw):
+        drawn = scene_of(draw, max_time=3.0, dt=dt)
+        built = built_or_none(drawn)
+        assume(built is not None)
+        recording = exact.run(built)
+        track = recording.track(0)
+        way = 3.0 * dt * float(np.hypot(*track["velocity"].T).max())
+        assume(way / 3.0 < draw["radius"] + stepper.HALF_THICKNESS)
+        assume(surfaces_met(recording)[-1:] == ["outgoing"])
+        for shift in (-way, way):
+            moved = built_or_none(scene_of({**draw, "shift": shift}, max_time=3.0))
+            assume(moved is not None and surfaces_met(exact.run(moved)) == surfaces_met(recording))
+        stepped = stepper.run(built)
+        assert surfaces_met(stepped) == surfaces_met(recording)
+        for kind in (Kind.IMPACT, Kind.LANDING):
+            mine, its = recording.select(kind)[0], stepped.select(kind)[0]
+            apart = np.abs(mine["position"] - its["position"])
+            assert apart[1 if kind is Kind.IMPACT else 0] <= way, (draw, apart, way)
+        tally["compared"] += 1
+
+    one()
+    assert tally["compared"] >= 0.2 * examples

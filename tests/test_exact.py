@@ -286,9 +286,7 @@ def test_a_free_disk_rolls_then_slips_then_leaves(friction):
         return u0 + 4.0 / 3.0 * (1.0 - cos(f))
 
     end = acos((3.0 * u0 + 4.0) / 7.0)
-    onset = brentq(
-        lambda f: sin(f) - 3.0 * friction * (cos(f) - rolled(f)), 0.0, end, xtol=1e-15
-    )
+    onset = brentq(lambda f: sin(f) - 3.0 * friction * (cos(f) - rolled(f)), 0.0, end, xtol=1e-15)
     w = sqrt(G * ride * rolled(onset))
 
     def slipping(_, y):

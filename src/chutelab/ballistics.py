@@ -6,6 +6,7 @@ to negative is a contact; the other one is a departure.
 
 from __future__ import annotations
 
+import itertools
 from math import comb
 
 import numpy as np
@@ -111,14 +112,15 @@ def _isolate(coefficients: Floats, until: Floats) -> Floats:
 
 def polynomial(coefficients: Floats, t: ArrayLike) -> Floats:
     """Evaluate polynomials (constant term first along axis 0) at t by Horner's rule."""
-    value = np.zeros(np.broadcast_shapes(coefficients.shape[1:], np.shape(t)))
+    t = np.asarray(t, dtype=np.float64)
+    value = np.zeros(np.broadcast_shapes(coefficients.shape[1:], t.shape))
     for c in coefficients[::-1]:
         value = value * t + c
     return value
 
 
 def _pairs(knots: list[Floats]) -> list[tuple[Floats, Floats]]:
-    return list(zip(knots[:-1], knots[1:], strict=True))
+    return list(itertools.pairwise(knots))
 
 
 def _crossing(coefficients: Floats, low: Floats, high: Floats) -> Floats:

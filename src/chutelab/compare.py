@@ -90,9 +90,11 @@ def scales(scene: Scene, prediction: Transfer) -> dict[str, float]:
     """Return the scale of each kind of quantity in a scene; NaN where the theory has none."""
     v2, t2, t3 = (float(getattr(prediction, name)) for name in ("v2", "t2", "t3"))
     energy = 0.5 * scene.particle.mass * v2**2
-    has_plate = scene.incoming is not None and scene.plate is not None
+    d1 = nan
+    if scene.incoming is not None and scene.plate is not None:
+        d1 = scene.incoming.pulley_radius + scene.plate.distance
     return {
-        "length": scene.incoming.pulley_radius + scene.plate.distance if has_plate else nan,
+        "length": d1,
         "speed": v2,
         "time": t2 + t3 if isfinite(t3) else t2,
         "angle": 1.0,

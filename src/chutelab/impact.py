@@ -8,7 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 Floats = NDArray[np.float64]
 
 DISK_SHARE = 1.0 / 3.0
-"""m*/m of a free disk: an impulse at the rim of I = m r²/2 moves the contact point 3 times as much."""
+"""m*/m of a free disk: at its rim, with I = m r²/2, an impulse moves the contact point 3 times as
+much as it would a particle that does not turn."""
 
 
 def impulses(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -94,13 +95,14 @@ def draw(scene: Scene) -> Releases:
         where=speed[:, None] > 0.0,
     )
     velocity += spread[:, None] * forward
+    rides = on_belt(scene)
+    adheres = rides and scene.incoming is not None and scene.incoming.friction == "adhesion"
     if stream.interact and stream.count > 1:
-        _spread_apart(scene, t, height, velocity, rng)
+        fall = 0.0 if adheres else 0.5 * scene.gravity
+        floor = 0.0 if rides else -inf
+        _spread_apart(scene, t, height, velocity, fall, floor, rng)
     position = np.tile(np.array(release_point(scene), dtype=np.float64), (stream.count, 1))
     position[:, 1] += height
-    adheres = (
-        on_belt(scene) and scene.incoming is not None and scene.incoming.friction == "adhesion"
-    )
     return Releases(t, position, velocity, np.full(stream.count, adheres))
 
 
@@ -109,34 +111,30 @@ def _spread_apart(
     t: NDArray[np.float64],
     height: NDArray[np.float64],
     velocity: NDArray[np.float64],
+    fall: float,
+    floor: float,
     rng: np.random.Generator,
 ) -> None:
     """Redraw heights, in place, until no particle starts inside one released before it.
 
-    Earlier particles are taken to have moved on at their release velocity, and to have fallen
-    freely unless the belt carries them.
+    Earlier particles are taken to have moved on at their release velocity, and to have fallen by
+    ``fall`` (m/s²) times their age squared, but not below ``floor`` (m above the lowest layer).
     """
     stream, diameter = scene.stream, 2.0 * scene.particle.radius
-    fall = 0.0 if on_belt(scene) else 0.5 * scene.gravity
     for i in range(1, stream.count):
         age = t[i] - t[:i]
         dx = velocity[:i, 0] * age
         near = np.flatnonzero(np.abs(dx) < diameter)
         dy = height[near] + velocity[near, 1] * age[near] - fall * age[near] ** 2
+        dy = np.maximum(dy, floor)
         for _ in range(TRIES):
             if np.all(dx[near] ** 2 + (dy - height[i]) ** 2 >= diameter**2):
                 break
             height[i] = stream.bed_height * rng.random()
         else:
-            raise SceneError(
-                scene.source,
-                [
-                    Fault(
-                        "stream.bed_height",
-                        stream.bed_height,
-                        f"particle {i} finds no free place in the bed at stream.rate ="
-                        f" {stream.rate} per second: raise stream.bed_height, lower stream.rate, or set"
-                        " stream.interact = false",
-                    )
-                ],
+            allowed = (
+                f"particle {i} finds no free place in the bed at stream.rate = {stream.rate} per"
+                " second: raise stream.bed_height, lower stream.rate, or set"
+                " stream.interact = false"
             )
+            raise SceneError(scene.source, [Fault("stream.bed_height", stream.bed_height, allowed)])

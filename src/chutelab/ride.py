@@ -1,14 +1,14 @@
 """Contact with a turning circle: rolling, gripping or slipping round a pulley or a surface's end.
 
-The centre of the particle moves on a circle of radius ρ; φ is measured from the top, clockwise. With
-w the speed along the circle, z = r ω, N the normal and F the tangential force per mass,
+The centre of the particle moves on a circle of radius ρ; φ is measured from the top, clockwise.
+With w the speed along the circle, z = r ω, N the normal and F the tangential force per mass,
 
     φ' = w/ρ,   w' = g sin φ + F,   z' = 2 F (free disk) or 0,   N = g cos φ - w²/ρ,
 
-and F = stick · g sin φ + load · N: gripping without turning is stick = -1, rolling -1/3 (I = m r²/2),
-slipping load = -σ µ with σ the sign of the slip u = w + z - belt. Everything is expanded in a Taylor
-series in time, which holds for any mixture of turning back, spinning and slipping; a step is as long
-as a knot may be, so the series costs no extra steps.
+and F = stick · g sin φ + load · N: gripping without turning is stick = -1, rolling -1/3, with
+I = m r²/2; slipping is load = -σ µ, with σ the sign of the slip u = w + z - belt. Everything is
+expanded in a Taylor series in time, which holds for any mixture of turning back, spinning and
+slipping; a step is as long as a knot may be, so the series costs no extra steps.
 """
 
 from __future__ import annotations

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import zipfile
-import zlib
 from dataclasses import asdict, fields
 from math import inf
 from pathlib import Path
@@ -13,7 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from chutelab.files import whole
-from chutelab.recording import ENTRIES, EVENT, KNOT, REASONS, Kind, Particle, Recording
+from chutelab.recording import (
+    ENTRIES,
+    EVENT,
+    KNOT,
+    REASONS,
+    Kind,
+    Particle,
+    Recording,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable
@@ -29,24 +35,15 @@ ARRAYS = {
     "by_surface": np.dtype("f8"),
 }
 
-DAMAGE = (
-    ValueError,
-    LookupError,
-    TypeError,
-    AttributeError,
-    EOFError,
-    RuntimeError,
-    zipfile.BadZipFile,
-    zlib.error,
-)
-"""What NumPy, zipfile and json raise on files that are damaged or of another kind."""
+COLUMNS = ("t", "particle", "other", "kind", "surface")
+"""Fields of an event that events.csv begins with."""
 
 SAMPLES = 200
 """Instants in trajectory.csv where no interval is asked for."""
 
 MOST_SAMPLES = 1_000_000
-"""Rows of trajectory.csv where no interval is asked for: beyond it no spreadsheet opens the file, so
-many particles get fewer instants."""
+"""Rows of trajectory.csv where no interval is asked for: beyond it no spreadsheet opens the file,
+so many particles get fewer instants."""
 
 
 class RecordingError(ValueError):
@@ -83,9 +80,8 @@ def load(path: str | Path) -> Recording:
             about: dict[str, Any] = json.loads(str(data["about"]))
             version = about.pop("format", None)
             arrays = {name: data[name] for name in ARRAYS} if version == FORMAT else {}
-        if not arrays:
-            recording = None
-        else:
+        recording = None
+        if arrays:
             about["particle"] = Particle(**about["particle"])
             about["surfaces"] = tuple(about["surfaces"])
             recording = Recording(**about, **arrays)
@@ -94,7 +90,10 @@ def load(path: str | Path) -> Recording:
         raise RecordingError(f"{path}: no such file") from None
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except DAMAGE as error:
+    except MemoryError:
+        raise
+    except Exception as error:
+        # Damaged bytes come up as anything: from zipfile, zlib, tokenize, json, NumPy.
         raise RecordingError(
             f"{path}: not a recording as `chutelab run --out` writes it (recording.npz)"
         ) from error
@@ -174,7 +173,7 @@ def _events(recording: Recording, _step: float | None) -> Iterable[str]:
     scalars = ("omega_before", "omega_after", "normal_impulse", "tangential_impulse")
     numbers = [column for name in vectors for column in events[name].T.tolist()]
     numbers += [events[name].tolist() for name in scalars]
-    heads = zip(*(events[name].tolist() for name in EVENT.names[:5]), strict=True)
+    heads = zip(*(events[name].tolist() for name in COLUMNS), strict=True)
     for (t, particle, other, kind, surface), *row in zip(heads, *numbers, strict=True):
         partner = "" if other < 0 else str(other)
         yield ",".join(
@@ -189,11 +188,13 @@ def _trajectory(recording: Recording, step: float | None) -> Iterable[str]:
     begin, end = float(recording.knots["t"].min()), float(recording.knots["t"].max())
     if step is None:
         rows = max(2, min(SAMPLES, MOST_SAMPLES // recording.count))
-        times = np.linspace(begin, end, rows)
+        times = np.linspace(begin, end, rows).tolist()
     else:
-        times = begin + step * np.arange(int((end - begin) / step * (1.0 + 1e-12)) + 1)
+        # An end that is a whole number of steps away belongs to the table, rounding or not.
+        last = int((end - begin) / step * (1.0 + 1e-12))
+        times = (begin + step * n for n in range(last + 1))
     for t in times:
-        position, velocity = recording.at([t])
-        for i in np.flatnonzero(np.isfinite(position[0, :, 0])):
-            (x, y), (vx, vy) = position[0, i].tolist(), velocity[0, i].tolist()
-            yield f"{float(t)!r},{i},{x!r},{y!r},{vx!r},{vy!r}"
+        (position,), (velocity,) = recording.at([t])
+        for i in np.flatnonzero(np.isfinite(position[:, 0])).tolist():
+            (x, y), (vx, vy) = position[i].tolist(), velocity[i].tolist()
+            yield f"{t!r},{i},{x!r},{y!r},{vx!r},{vy!r}"

@@ -6,12 +6,13 @@ One round resolves the next event of all particles at once. There is no contact 
 - `detect`: the first contact of particles with constant acceleration.
 - `arcs`: what stops a ride round a circle.
 - `swarm`: the state of all particles, and how knots, events and books are written.
+- `corner`: rest between two obstacles.
 - `touch`: what a contact does: blows, rest, grip and slip.
 - `round`, `straight`: the two kinds of motion.
 - `engine`: the rounds.
 """
 
+from chutelab.exact.corner import CornerError
 from chutelab.exact.engine import run
-from chutelab.exact.touch import CornerError
 
 __all__ = ["CornerError", "run"]

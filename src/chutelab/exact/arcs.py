@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.exact.obstacles import NONE, Floats, Ints, Obstacles, dot, pick, rows_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 NOW = 1e-12
 """rad; an obstacle this close to the present angle is met now."""

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.ballistics import closing_time, first_descent
 from chutelab.exact.obstacles import NONE, Floats, Ints, Obstacles, dot, pick, rows_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 FOOT = 1e-12
 """Share of a segment's length by which its face reaches past its ends, so that no particle slips
@@ -92,10 +95,8 @@ def first_contact(
     return time, obstacle, side
 
 
-def _faces(
-    motion: Motion, obstacles: Obstacles, radius: float, sign: int, until: Floats
-) -> Floats:
-    """Times up to `until` to the faces on one side of all segments, (k, S); inf for later ones."""
+def _faces(motion: Motion, obstacles: Obstacles, radius: float, sign: int, until: Floats) -> Floats:
+    """Return the times to the faces on one side of all segments, (k, S); inf after `until`."""
     normal = sign * rows_of(obstacles.normal, motion.rows)
     start = rows_of(obstacles.start, motion.rows)
     p, v, a = (x[:, None] for x in (motion.position, motion.velocity, motion.acceleration))
@@ -182,11 +183,13 @@ def _near(motion: Motion, obstacles: Obstacles, until: Floats) -> NDArray[np.boo
     center = rows_of(obstacles.center, motion.rows)
     reach = (rows_of(obstacles.rho, motion.rows) - obstacles.touch)[..., None]
     near = np.all((low < center + reach) & (high > center - reach), axis=-1)
-    # A face that is left with the pull away from it hides its own two ends.
-    behind = np.where(motion.left_side == 0, NONE - 1, motion.left)
-    normal = motion.left_side[:, None] * pick(
-        obstacles.normal, motion.rows, np.clip(motion.left, 0, max(obstacles.segments - 1, 0))
-    ) if obstacles.segments else np.zeros_like(p)
-    hidden = (obstacles.cap_of[None, :, :] == behind[:, None, None]).any(axis=-1)
-    pulled_away = dot(a, normal) >= 0.0
-    return np.asarray(near & ~(hidden & pulled_away[:, None]))
+    # A face that is left with the pull away from it hides its own two ends, as does one slid on.
+    if not obstacles.segments:
+        return np.asarray(near)
+    left = np.where(motion.left < obstacles.segments, motion.left, NONE)
+    normal = motion.left_side[:, None] * pick(obstacles.normal, motion.rows, np.maximum(left, 0))
+    left = np.where(dot(a, normal) >= 0.0, left, NONE)
+    for face in (left, motion.on):
+        own = (obstacles.cap_of[None] == face[:, None, None]).any(axis=-1)
+        near &= ~(own & (face != NONE)[:, None])
+    return np.asarray(near)

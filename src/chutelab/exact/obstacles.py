@@ -1,7 +1,7 @@
 """The machine as the exact engine sees it: faces to meet, circles to meet, and how they join.
 
-A disk of radius r touches a segment's face when its centre is r away, and its end when the centre is
-on a circle of radius r about it. The pulley is one more circle, of radius R + r. Obstacles are
+A disk of radius r touches a segment's face when its centre is r away, and its end when the centre
+is on a circle of radius r about it. The pulley is one more circle, of radius R + r. Obstacles are
 numbered: segments first, then circles.
 """
 
@@ -85,7 +85,7 @@ class Obstacles:
     @property
     def segments(self) -> int:
         """Number of segments S."""
-        return self.start.shape[1]
+        return int(self.start.shape[1])
 
     def normal_at(self, rows: Ints, obstacle: Ints, side: Ints, position: Floats) -> Floats:
         """Contact normals, (k, 2), of particles touching an obstacle, pointing at the particle."""
@@ -156,7 +156,8 @@ def obstacles(machine: Machine) -> Obstacles:
     size = max(float(e) for e in extent)
     follow = _joints(start[0], end[0], tangent[0], JOINT * size)
 
-    centers, caps = [], []
+    centers: list[Floats] = []
+    caps: list[tuple[int, int]] = []
     end_circle = np.full((count, 2), NONE, dtype=np.int64)
     if r > 0.0:
         for s in range(count):

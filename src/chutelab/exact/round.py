@@ -11,6 +11,7 @@ from chutelab.exact.touch import rest_on, settle_law, strike
 from chutelab.recording import Kind
 from chutelab.ride import STEP_ANGLE, Circle, Outcome, advance, normal_force
 
+
 def ride_on(s: Swarm, who: Ints, circle: Ints) -> None:
     """Go on from the end of a face round a circle, or fly if it curves away too fast."""
     if not len(who):
@@ -47,7 +48,9 @@ def carry_round(s: Swarm, who: Ints) -> None:
     found = bounds(o, who, pulley, rho, np.zeros(len(who)), s.radius)
     struck = ~found.high_handover & (found.high < phi)
     end = np.where(struck, found.high, phi)
-    end = np.where(s.age[who] + end * rho / v > s.stop[who], (s.stop[who] - s.age[who]) * v / rho, end)
+    end = np.where(
+        s.age[who] + end * rho / v > s.stop[who], (s.stop[who] - s.age[who]) * v / rho, end
+    )
     start, done = s.age[who].copy(), np.zeros(len(who))
     rides = np.flatnonzero(end > 0.0)
     pieces = np.ceil(end / STEP_ANGLE).max(initial=0.0)
@@ -58,8 +61,11 @@ def carry_round(s: Swarm, who: Ints) -> None:
         # The belt lets the particle down: F v = -m g v sin φ, summed from the last knot.
         height = rho * np.cos(part)
         drop = np.where(n == 1, rho - height, done - height) if n > 1 else rho - height
-        s.recorder.book(who[rides], s.machine.pulley.surface if s.machine.pulley else 0,
-                        -s.mass * s.gravity * drop[rides])
+        s.recorder.book(
+            who[rides],
+            s.machine.pulley.surface if s.machine.pulley else 0,
+            -s.mass * s.gravity * drop[rides],
+        )
         done = height
         s.knots(who[rides])
     over = s.age[who] >= s.stop[who]
@@ -74,7 +80,6 @@ def carry_round(s: Swarm, who: Ints) -> None:
 
 def ride(s: Swarm, who: Ints) -> None:
     """Move riders on by one knot, or to the next event, and resolve it."""
-    o = s.obstacles
     circle = s.on[who]
     c = s.contact(who, circle, s.side[who])
     rho = _rho(s, who, circle)

@@ -1,4 +1,4 @@
-"""Flight, sliding on a face, being carried along the belt: constant acceleration to the next event."""
+"""Flight, sliding on a face, being carried along the belt: constant acceleration to an event."""
 
 from __future__ import annotations
 
@@ -29,7 +29,9 @@ def straight(s: Swarm, who: Ints) -> None:
     acceleration[face], force[face] = face_pull(s, who[face])
 
     times = np.full((5, len(who)), np.inf)
-    times[GRIP, face], times[END, face] = _grip_and_end(s, who[face], acceleration[face], force[face])
+    times[GRIP, face], times[END, face] = _grip_and_end(
+        s, who[face], acceleration[face], force[face]
+    )
     v = s.v[who[carried], 0]
     with np.errstate(divide="ignore"):
         times[END, carried] = np.where(v > 0.0, -s.p[who[carried], 0] / v, np.inf)
@@ -77,8 +79,10 @@ def straight(s: Swarm, who: Ints) -> None:
         strike(s, who[hit], obstacle[hit], side[hit])
 
 
-def _grip_and_end(s: Swarm, who: Ints, acceleration: Floats, force: Floats) -> tuple[Floats, Floats]:
-    """Times until the slip is used up and until the face ends."""
+def _grip_and_end(
+    s: Swarm, who: Ints, acceleration: Floats, force: Floats
+) -> tuple[Floats, Floats]:
+    """Return the times until the slip is used up and until the face ends."""
     c = s.contact(who, s.on[who], s.side[who])
     w, a = dot(s.v[who], c.tangent), dot(acceleration, c.tangent)
     slip = w + s.z[who] - c.belt
@@ -122,9 +126,7 @@ def _slide_books(s: Swarm, who: Ints, dt: Floats, acceleration: Floats, force: F
     start = dot(s.v[who], c.tangent) + s.z[who] - c.belt
     rate = dot(acceleration, c.tangent) + (2.0 * force if s.spins else 0.0)
     mean = np.where(gripping, 0.0, start + 0.5 * rate * dt)
-    s.recorder.book(
-        who, c.surface, s.mass * force * c.belt * dt, 0.0, -s.mass * force * mean * dt
-    )
+    s.recorder.book(who, c.surface, s.mass * force * c.belt * dt, 0.0, -s.mass * force * mean * dt)
 
 
 def _grip(s: Swarm, who: Ints) -> None:
@@ -161,4 +163,3 @@ def _leave_face(s: Swarm, who: Ints) -> None:
     off = ~smooth & (circle == NONE)
     s.event(Kind.SEPARATION, who[off], o.surface[segment[off]])
     s.fly(who[off], segment[off], side[off], 2)
-

@@ -7,7 +7,6 @@ from enum import IntEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from chutelab.exact.arcs import Bounds
 from chutelab.exact.obstacles import NONE, Floats, Ints, Obstacles, dot, obstacles
@@ -16,6 +15,8 @@ from chutelab.recorder import Recorder
 from chutelab.recording import REASONS, Kind
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
     from chutelab.machine import Machine
 
 
@@ -72,6 +73,8 @@ class Swarm:
         Where rides round circles end.
     stop : ndarray, (N,)
         Age at which the run is over.
+    idle, crawls : ndarray, (N,)
+        Events in a row that took no time, and that went slowly to and fro between two obstacles.
     """
 
     def __init__(self, machine: Machine) -> None:
@@ -94,7 +97,7 @@ class Swarm:
         self.bounds = Bounds.free(count)
         self.stop = machine.end_time - start.t
         self.landed = np.zeros(count, dtype=bool)
-        self.idle = np.zeros(count, dtype=np.int64)
+        self.idle, self.crawls = np.zeros((2, count), dtype=np.int64)
 
     def count_idle(self, who: Ints, dt: Floats) -> None:
         """Count events in a row that take no time, and raise rather than hang if they never end."""

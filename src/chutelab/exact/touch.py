@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.exact.arcs import bounds
+from chutelab.exact.corner import hold
 from chutelab.exact.obstacles import NONE, Floats, Ints, dot
 from chutelab.exact.swarm import COLLAPSE, Contact, Mode, Swarm, below
 from chutelab.impact import impulses, limited
 from chutelab.recording import Kind
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 NEGLIGIBLE = 1e-12
 """m/s; an approach this slow is a touch, not a blow."""
@@ -21,8 +25,11 @@ REST = 1e-9
 impulse in the time 2 u_n/(g_n (1 - ε)). At ε = 0.999 some 20,000 bounces come before."""
 
 
-class CornerError(RuntimeError):
-    """A spinning disk held between moving surfaces: beyond the exact engine."""
+CRAWL = 10.0 * REST
+"""m/s; a particle this slow that goes to and fro between two obstacles is coming to rest there."""
+
+OPPOSED = 1e-9
+"""Share of a pull along one surface that must press on another to hold a particle between them."""
 
 
 def strike(s: Swarm, who: Ints, obstacle: Ints, side: Ints) -> None:
@@ -38,13 +45,14 @@ def strike(s: Swarm, who: Ints, obstacle: Ints, side: Ints) -> None:
     if s.machine.until == "landed":
         s.finish(who[landing], "landed")
 
-    jammed = (s.idle[who] > COLLAPSE) & (s.mode[who] != Mode.DONE)
     before = np.where(s.on[who] == NONE, s.left[who], s.on[who])
-    jammed &= (before != NONE) & (before != obstacle)
+    between = (before != NONE) & (before != obstacle)
+    slow = between & (np.hypot(s.v[who, 0], s.v[who, 1]) <= CRAWL)
+    s.crawls[who] = np.where(slow, s.crawls[who] + 1, 0)
+    jammed = between & (s.mode[who] != Mode.DONE)
+    jammed &= (s.idle[who] > COLLAPSE) | (s.crawls[who] > COLLAPSE)
     before_side = np.where(s.on[who] == NONE, s.left_side[who], s.side[who])
-    hold(
-        s, who[jammed], (before[jammed], before_side[jammed]), (obstacle[jammed], side[jammed])
-    )
+    hold(s, who[jammed], (before[jammed], before_side[jammed]), (obstacle[jammed], side[jammed]))
     held = np.isin(s.mode[who], [Mode.FACE, Mode.ARC])
     held[held] = _still_on(s, who[held])
     rests = (_load(s, who, obstacle, c) > 0.0) & (rebound <= REST)
@@ -63,7 +71,9 @@ def _blow(
     """Change the velocities, book the energies, write events and knots."""
     real = approach > NEGLIGIBLE
     slip = s.slip_of(who, c)
-    normal, tangential = impulses(approach, slip, np.where(real, c.restitution, 0.0), c.friction, s.share)
+    normal, tangential = impulses(
+        approach, slip, np.where(real, c.restitution, 0.0), c.friction, s.share
+    )
     before, omega_before = s.v[who], s.omega(who)
     # The normal speed is set, not added to: ε |v_n| to the last bit.
     along = dot(before, c.tangent) + tangential
@@ -100,7 +110,7 @@ def _still_on(s: Swarm, who: Ints) -> NDArray[np.bool_]:
 
 
 def _load(s: Swarm, who: Ints, obstacle: Ints, c: Contact) -> Floats:
-    """Normal force per mass that would keep a particle on an obstacle, m/s²."""
+    """Return the normal force per mass that would keep a particle on an obstacle, m/s²."""
     load = s.weight_on(c.normal)
     circle = obstacle - s.obstacles.segments
     curved = circle >= 0
@@ -120,7 +130,8 @@ def _slide_past(s: Swarm, who: Ints, obstacle: Ints, side: Ints, rebound: Floats
     other, other_side = obstacle[kept], side[kept]
     pull, _ = face_pull(s, who)
     against = s.contact(who, other, other_side)
-    stuck = (rebound[kept] <= REST) & (dot(pull, against.normal) < 0.0)
+    pressed = dot(pull, against.normal) < -OPPOSED * np.sqrt(dot(pull, pull))
+    stuck = (rebound[kept] <= REST) & pressed
     on = (s.on[who[stuck]], s.side[who[stuck]])
     hold(s, who[stuck], on, (other[stuck], other_side[stuck]))
 
@@ -139,7 +150,7 @@ def rest_on(s: Swarm, who: Ints, obstacle: Ints, side: Ints, rebound: Floats) ->
 
 
 def _last_bounces(s: Swarm, who: Ints, obstacle: Ints, side: Ints, rebound: Floats) -> None:
-    """Sum the bounces after a rebound slower than `REST`: a geometric series in time and impulse."""
+    """Sum the bounces after a rebound slower than `REST`, geometric in time and impulse."""
     hops = (rebound > 0.0) & (obstacle < s.obstacles.segments)
     who, u = who[hops], rebound[hops]
     if not len(who):
@@ -183,8 +194,8 @@ def _ride(s: Swarm, who: Ints) -> None:
 def settle_law(s: Swarm, who: Ints) -> None:
     """Choose between gripping and slipping, and end tracks that have settled.
 
-    Without slip, friction must hold against gravity: m*/m |g_t| <= µ N. Where it cannot, slip starts
-    the way gravity pulls.
+    Without slip, friction must hold against gravity: m*/m |g_t| <= µ N. Where it cannot, slip
+    starts the way gravity pulls.
     """
     if not len(who):
         return
@@ -221,62 +232,3 @@ def face_pull(s: Swarm, who: Ints) -> tuple[Floats, Floats]:
     finite = np.where(np.isinf(c.friction) | gripping, 0.0, c.friction)
     force = np.where(gripping, -s.share * pull, -s.slip[who] * finite * load)
     return (pull + force)[:, None] * c.tangent, force
-
-
-def hold(s: Swarm, who: Ints, on: tuple[Ints, Ints], other: tuple[Ints, Ints]) -> None:
-    """Bring particles to rest in the corner of two obstacles, each given with its side.
-
-    A moving surface under them goes on doing work, all of it heat. Where a surface is at rest its
-    friction is taken as zero: it dissipates nothing, and the balance of the two normal forces needs
-    none. Where friction pulls the particle in harder than any load can hold it (self-locking, as
-    with adhesion) a real drive would stall: the particle stays, and nothing more is booked. Where
-    gravity pulls out of the corner it falls, from rest.
-    """
-    if not len(who):
-        return
-    a, b = s.contact(who, *on), s.contact(who, *other)
-    moving = (a.belt != 0.0) | (b.belt != 0.0)
-    if s.spins and moving.any():
-        raise CornerError(
-            "a spinning disk is held between two surfaces of which one moves; the exact engine"
-            ' cannot follow that: run it with engine = "pymunk"'
-        )
-    kinetic = 0.5 * s.mass * (dot(s.v[who], s.v[who]) + 0.5 * s.z[who] ** 2)
-    s.v[who], s.z[who] = 0.0, 0.0
-    s.recorder.book(who, b.surface, 0.0, kinetic, 0.0)
-    s.knots(who)
-    loads, locked = _corner_loads(s, a, b)
-    stays = locked | np.all(loads >= 0.0, axis=0)
-    s.fly(who[~stays], other[0][~stays], other[1][~stays], 2)
-    rest = stays & ~moving & (s.machine.until == "settled")
-    s.event(Kind.SETTLE, who[rest], a.surface[rest])
-    s.finish(who[rest], "settled")
-    waits = stays & ~rest
-    time = s.stop[who] - s.age[who]
-    for c, load in zip((a, b), loads, strict=True):
-        heat = np.where(waits & ~locked, s.mass * _grip(c) * np.abs(c.belt) * load * time, 0.0)
-        s.recorder.book(who, c.surface, heat, 0.0, heat)
-    s.age[who[waits]] = s.stop[who[waits]]
-    s.knots(who[waits])
-    s.finish(who[waits], "time")
-
-
-def _grip(c: Contact) -> Floats:
-    """Friction coefficient of a surface that slides under a resting particle, 0 if it is at rest."""
-    return np.where((c.belt == 0.0) | np.isinf(c.friction), 0.0, c.friction)
-
-
-def _corner_loads(s: Swarm, a: Contact, b: Contact) -> tuple[Floats, NDArray[np.bool_]]:
-    """Return the two normal forces per mass, (2, k), that hold a particle, and where friction locks."""
-    first, second = (
-        c.normal + (np.sign(c.belt) * _grip(c))[:, None] * c.tangent for c in (a, b)
-    )
-    determinant = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        loads = s.gravity * np.stack([-second[:, 0], first[:, 0]]) / determinant
-    loads = np.where(np.isfinite(loads), loads, -1.0)
-    inwards = np.zeros(len(determinant), dtype=bool)
-    for c, against in ((a, b), (b, a)):
-        drawn = np.sign(c.belt) * dot(c.tangent, against.normal) < 0.0
-        inwards |= drawn & (np.isinf(c.friction) | (loads < 0.0).any(axis=0) & (c.friction > 0.0))
-    return loads, inwards

@@ -1,171 +1,38 @@
-"""A scene resolved to world-frame arrays: what both engines take, and all they take.
+"""`build`: the geometry of a scene, settled once for the nominal particle.
 
-Geometry is settled here once, for the nominal particle (particle 0: no spread, lowest layer): where
-it meets the unbounded line of the plate, from that the height of the outgoing belt, from that the
-lower end of the plate.
+That is particle 0: no spread, lowest layer. Where it meets the unbounded line of the plate gives
+the height of the outgoing belt, and that the lower end of the plate.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
-from math import cos, inf, radians, sin
-from typing import TYPE_CHECKING, Literal
+from math import ceil, cos, inf, radians, sin
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chutelab.machine.parts import Machine, Pulley, Segments
 from chutelab.nominal import Discharge, discharge, plate_hit
 from chutelab.recording import Particle
-from chutelab.releases import Releases, draw
+from chutelab.releases import draw
 from chutelab.scene import Fault, SceneError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from chutelab.scene import Scene
 
-
-EXIT_MARGIN = 1.0
-"""m below the lowest surface, or outside the box of all without gravity, where a track ends."""
-
 REACH_WITHOUT_BELT = 2.0
 """m of plate below the pivot where there is no outgoing belt to stop short of."""
 
+CLEARANCE = 0.05
+"""m that the plate's lower end stays above the outgoing belt, at least."""
 
-@dataclass(frozen=True, eq=False)
-class Segments:
-    """Straight two-sided surfaces, world frame, SI units.
-
-    Arrays have shape (S,) or (S, 2); or (N, S) and (N, S, 2) where each particle has its own.
-
-    Attributes
-    ----------
-    start, tangent : ndarray, (..., S, 2)
-        First end, and unit vector towards the second.
-    length, speed, restitution, friction : ndarray, (..., S)
-        Length (m), speed of the surface along the tangent (m/s), pair values with a particle.
-    surface : ndarray, (S,)
-        Index of the surface a segment belongs to, into `Machine.surfaces`.
-    """
-
-    start: NDArray[np.float64]
-    tangent: NDArray[np.float64]
-    length: NDArray[np.float64]
-    speed: NDArray[np.float64]
-    restitution: NDArray[np.float64]
-    friction: NDArray[np.float64]
-    surface: NDArray[np.int64]
-
-    def __post_init__(self) -> None:
-        for array in vars(self).values():
-            array.flags.writeable = False
-
-    @property
-    def end(self) -> NDArray[np.float64]:
-        """Second end, (..., S, 2), m."""
-        return self.start + self.length[..., None] * self.tangent
-
-
-@dataclass(frozen=True)
-class Pulley:
-    """The drive pulley, axis at the origin, turning clockwise (its top moves forward).
-
-    The incoming belt is segment 0 of the machine and ends on its top.
-
-    Attributes
-    ----------
-    radius, speed : float
-        R (m), speed of the surface (m/s).
-    friction, restitution : float
-        Pair values; friction is inf with adhesion.
-    surface : int
-        Index into `Machine.surfaces`.
-    """
-
-    radius: float
-    speed: float
-    friction: float
-    restitution: float
-    surface: int
-
-
-@dataclass(frozen=True, eq=False)
-class Machine:
-    """Everything an engine needs to run.
-
-    Attributes
-    ----------
-    title, scene : str
-        Title and canonical JSON of the scene, passed on to the recording.
-    surfaces : tuple of str
-        Names; several segments, or a segment and the pulley, may share one.
-    gravity : float
-        m/s², pointing down.
-    particle : Particle
-        Radius, mass, inertia (0 unless it may spin).
-    segments : Segments
-        All straight surfaces; the incoming belt is the first if there is one.
-    pulley : Pulley or None
-        None without an incoming conveyor.
-    releases : Releases
-        Where, when and how fast each particle starts; which of them ride by adhesion.
-    landing : int
-        Surface index of the outgoing belt, -1 without one.
-    until : {"landed", "settled", "time"}
-        When a particle's track ends.
-    end_time : float
-        s; no track goes on after it.
-    dt : float
-        s; longest step of the pymunk engine.
-    interact : bool
-        Whether particles meet each other.
-    pair_restitution, pair_friction : float
-        Of two particles.
-    engine : {"auto", "exact", "pymunk"}
-        What the scene asks for.
-    warnings : tuple of str
-        What `chutelab check` tells about a machine that works but may surprise.
-    """
-
-    title: str
-    scene: str
-    surfaces: tuple[str, ...]
-    gravity: float
-    particle: Particle
-    segments: Segments
-    pulley: Pulley | None
-    releases: Releases
-    landing: int
-    until: Literal["landed", "settled", "time"]
-    end_time: float
-    dt: float
-    interact: bool
-    pair_restitution: float
-    pair_friction: float
-    engine: str
-    warnings: tuple[str, ...]
-
-    @property
-    def count(self) -> int:
-        """Number of particles."""
-        return len(self.releases.t)
-
-    @property
-    def exit_box(self) -> tuple[float, float, float, float]:
-        """Left, right, bottom and top (m) beyond which a particle has left the scene.
-
-        With gravity only the bottom is finite: what flies up comes back.
-        """
-        ends = np.concatenate([self.segments.start, self.segments.end], axis=-2).reshape(-1, 2)
-        if self.pulley is not None:
-            corner = np.full(2, self.pulley.radius)
-            ends = np.concatenate([ends, [-corner, corner]])
-        if not len(ends):
-            ends = self.releases.position
-        low, high = ends.min(axis=0) - EXIT_MARGIN, ends.max(axis=0) + EXIT_MARGIN
-        if self.gravity > 0.0:
-            return -inf, inf, float(low[1]), inf
-        return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+CLEARANCE_RADII = 3.0
+"""The same in radii: a disk that lies on the belt passes under the plate, with one to spare."""
 
 
 def build(scene: Scene) -> Machine:
@@ -208,7 +75,7 @@ class _Builder:
     def add(
         self,
         name: str,
-        points: list[tuple[float, float]] | tuple[tuple[float, float], ...],
+        points: Sequence[tuple[float, float]],
         speed: float,
         restitution: float,
         friction: float,
@@ -251,7 +118,7 @@ class _Builder:
         elif height is None:
             below = REACH_WITHOUT_BELT
         else:
-            below = max(0.0, (pivot[1] - height - max(0.05, 3.0 * r)) / cos(alpha))
+            below = max(0.0, (pivot[1] - height - max(CLEARANCE, CLEARANCE_RADII * r)) / cos(alpha))
         low, high = pivot - below * up, pivot + plate.above * up
         if below + plate.above <= 0.0:
             raise self._fault("plate.above", plate.above, "above + below must be more than 0 m")
@@ -283,10 +150,11 @@ class _Builder:
         if scene.outgoing is not None and scene.outgoing.drop_from == "impact":
             key = "plate.above" if along > 0 else "plate.below"
             value = scene.plate.above if along > 0 else below
+            enough = ceil(1e4 * abs(along)) / 1e4
             raise self._fault(
                 key,
                 value,
-                f"{where}, off the finite plate: lengthen it to at least {abs(along):.4g} m,"
+                f"{where}, off the finite plate: lengthen it to at least {enough:g} m,"
                 ' or set outgoing.drop_from = "top"',
             )
         self.warnings.append(f"plate: {where}, off the finite plate")
@@ -328,7 +196,7 @@ class _Builder:
             pulley = Pulley(belt.pulley_radius, belt.speed, grip, belt.restitution, 0)
         releases = draw(scene)
         bound = float(releases.t[-1]) + scene.run.max_time
-        timed = not isinstance(scene.run.until, str)
+        until = scene.run.until
         return Machine(
             title=scene.title,
             scene=scene.model_dump_json(by_alias=True),
@@ -347,8 +215,8 @@ class _Builder:
             pulley=pulley,
             releases=releases,
             landing=self.names.index("outgoing") if "outgoing" in self.names else -1,
-            until="time" if timed else scene.run.until,
-            end_time=min(bound, float(scene.run.until)) if timed else bound,
+            until=until if isinstance(until, str) else "time",
+            end_time=bound if isinstance(until, str) else min(bound, until),
             dt=scene.run.dt,
             interact=scene.stream.interact and scene.stream.count > 1,
             pair_restitution=scene.stream.restitution,

@@ -1,0 +1,10 @@
+"""A scene resolved to world-frame arrays: what both engines take, and all they take.
+
+- `parts`: `Machine`, its segments and its pulley.
+- `builder`: `build`, from a validated scene to a machine.
+"""
+
+from chutelab.machine.builder import build
+from chutelab.machine.parts import Machine, Pulley, Segments
+
+__all__ = ["Machine", "Pulley", "Segments", "build"]

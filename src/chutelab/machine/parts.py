@@ -1,0 +1,154 @@
+"""`Machine` and its parts: what both engines take, and all they take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from chutelab.recording import Particle
+    from chutelab.releases import Releases
+
+EXIT_MARGIN = 1.0
+"""m below the lowest surface, or outside the box of all without gravity, where a track ends."""
+
+
+@dataclass(frozen=True, eq=False)
+class Segments:
+    """Straight two-sided surfaces, world frame, SI units.
+
+    Arrays have shape (S,) or (S, 2); or (N, S) and (N, S, 2) where each particle has its own.
+
+    Attributes
+    ----------
+    start, tangent : ndarray, (..., S, 2)
+        First end, and unit vector towards the second.
+    length, speed, restitution, friction : ndarray, (..., S)
+        Length (m), speed of the surface along the tangent (m/s), pair values with a particle.
+    surface : ndarray, (S,)
+        Index of the surface a segment belongs to, into `Machine.surfaces`.
+    """
+
+    start: NDArray[np.float64]
+    tangent: NDArray[np.float64]
+    length: NDArray[np.float64]
+    speed: NDArray[np.float64]
+    restitution: NDArray[np.float64]
+    friction: NDArray[np.float64]
+    surface: NDArray[np.int64]
+
+    def __post_init__(self) -> None:
+        for array in vars(self).values():
+            array.flags.writeable = False
+
+    @property
+    def end(self) -> NDArray[np.float64]:
+        """Second end, (..., S, 2), m."""
+        return self.start + self.length[..., None] * self.tangent
+
+
+@dataclass(frozen=True)
+class Pulley:
+    """The drive pulley, axis at the origin, turning clockwise (its top moves forward).
+
+    The incoming belt is segment 0 of the machine and ends on its top.
+
+    Attributes
+    ----------
+    radius, speed : float
+        R (m), speed of the surface (m/s).
+    friction, restitution : float
+        Pair values; friction is inf with adhesion.
+    surface : int
+        Index into `Machine.surfaces`.
+    """
+
+    radius: float
+    speed: float
+    friction: float
+    restitution: float
+    surface: int
+
+
+@dataclass(frozen=True, eq=False)
+class Machine:
+    """Everything an engine needs to run.
+
+    Attributes
+    ----------
+    title, scene : str
+        Title and canonical JSON of the scene, passed on to the recording.
+    surfaces : tuple of str
+        Names; several segments, or a segment and the pulley, may share one.
+    gravity : float
+        m/s², pointing down.
+    particle : Particle
+        Radius, mass, inertia (0 unless it may spin).
+    segments : Segments
+        All straight surfaces; the incoming belt is the first if there is one.
+    pulley : Pulley or None
+        None without an incoming conveyor.
+    releases : Releases
+        Where, when and how fast each particle starts; which of them ride by adhesion.
+    landing : int
+        Surface index of the outgoing belt, -1 without one.
+    until : {"landed", "settled", "time"}
+        When a particle's track ends.
+    end_time : float
+        s; no track goes on after it.
+    dt : float
+        s; longest step of the pymunk engine.
+    interact : bool
+        Whether particles meet each other.
+    pair_restitution, pair_friction : float
+        Of two particles.
+    engine : {"auto", "exact", "pymunk"}
+        What the scene asks for.
+    warnings : tuple of str
+        What `chutelab check` tells about a machine that works but may surprise.
+    """
+
+    title: str
+    scene: str
+    surfaces: tuple[str, ...]
+    gravity: float
+    particle: Particle
+    segments: Segments
+    pulley: Pulley | None
+    releases: Releases
+    landing: int
+    until: Literal["landed", "settled", "time"]
+    end_time: float
+    dt: float
+    interact: bool
+    pair_restitution: float
+    pair_friction: float
+    engine: str
+    warnings: tuple[str, ...]
+
+    @property
+    def count(self) -> int:
+        """Number of particles."""
+        return len(self.releases.t)
+
+    @property
+    def exit_box(self) -> tuple[float, float, float, float]:
+        """Left, right, bottom and top (m) beyond which a particle has left the scene.
+
+        With gravity only the bottom is finite: what flies up comes back.
+        """
+        ends = np.concatenate([self.segments.start, self.segments.end], axis=-2).reshape(-1, 2)
+        if self.pulley is not None:
+            corner = np.full(2, self.pulley.radius)
+            ends = np.concatenate([ends, [-corner, corner]])
+        if not len(ends):
+            ends = self.releases.position
+        low, high = ends.min(axis=0) - EXIT_MARGIN, ends.max(axis=0) + EXIT_MARGIN
+        if self.gravity > 0.0:
+            return -inf, inf, float(low[1]), inf
+        return float(low[0]), float(high[0]), float(low[1]), float(high[1])

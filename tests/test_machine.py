@@ -1,0 +1,251 @@
+"""From a scene to surfaces, releases and the nominal particle, against formulas by hand."""
+
+from __future__ import annotations
+
+import re
+from math import cos, degrees, hypot, inf, radians, sin, sqrt
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from chutelab import exact, machine, nominal, scene
+from chutelab.recording import Kind
+
+G, R, GAP, V, DROP, r = 9.81, 0.1, 0.5, 2.0, 0.5, 0.004
+
+
+def built(source="<scene>", **tables):
+    """The machine of `perpendicular`, with keys changed, tables added, or dropped where None."""
+    mapping = {
+        "incoming": {"speed": V, "pulley_radius": R},
+        "plate": {"distance": GAP},
+        "outgoing": {"drop": DROP},
+    }
+    for name, keys in tables.items():
+        mapping[name] = {**mapping.get(name, {}), **keys} if isinstance(keys, dict) else keys
+    kept = {name: keys for name, keys in mapping.items() if keys is not None}
+    return machine.build(scene.from_dict(kept, source))
+
+
+def segment(found, name):
+    index = np.flatnonzero(found.segments.surface == found.surfaces.index(name))[0]
+    return found.segments.start[index], found.segments.end[index], index
+
+
+def impact(alpha, *, radius=r, pivot=R, speed=V, angle=0.0):
+    """Centre when it first is r in front of the plate's line, from separation at `angle`."""
+    rc, d = R + radius, R + GAP
+    x, y = rc * sin(angle), rc * cos(angle)
+    vx, vy = speed * cos(angle), -speed * sin(angle)
+    c, s = cos(alpha), sin(alpha)
+    gaps = [0.5 * G * s, -(vx * c + vy * s), (d - x) * c + (pivot - y) * s - radius]
+    roots = np.roots(gaps)
+    t = min(root.real for root in roots if abs(root.imag) == 0.0 and root.real > 0.0)
+    return np.array([x + vx * t, y + vy * t - 0.5 * G * t * t])
+
+
+@given(
+    alpha=st.floats(-50.0, 10.0),
+    radius=st.one_of(st.just(0.0), st.floats(1e-4, 0.03)),
+    speed=st.floats(1.5, 6.0),
+    pivot=st.floats(-0.1, 0.3),
+)
+def test_the_belt_hangs_from_the_impact_and_the_plate_stops_short_of_it(
+    alpha, radius, speed, pivot
+):
+    plate = {"angle_deg": alpha, "pivot_height": pivot, "above": 1.5}
+    found = built(particle={"radius": radius}, incoming={"speed": speed}, plate=plate)
+    angle = radians(alpha)
+    height = impact(angle, radius=radius, speed=speed, pivot=pivot)[1] - DROP - radius
+    start, end, _ = segment(found, "outgoing")
+    assert start == pytest.approx([-2.0, height], abs=1e-13)
+    assert end == pytest.approx([4.0, height], abs=1e-13)
+    low, high, index = segment(found, "plate")
+    up = np.array([-sin(angle), cos(angle)])
+    assert low[1] == pytest.approx(height + max(0.05, 3.0 * radius), abs=1e-13)
+    assert high == pytest.approx([R + GAP, pivot] + 1.5 * up, abs=1e-14)
+    assert (low - [R + GAP, pivot]) @ [cos(angle), sin(angle)] == pytest.approx(0.0, abs=1e-14)
+    tx, ty = found.segments.tangent[index]
+    assert (-ty, tx) == pytest.approx((-cos(angle), -sin(angle)), abs=1e-15)
+
+
+def test_a_belt_measured_from_the_top_needs_no_impact():
+    for plate in ({}, None, {"angle_deg": 80.0}):
+        start, _, _ = segment(built(plate=plate, outgoing={"drop_from": "top"}), "outgoing")
+        assert start[1] == R - DROP
+
+
+def test_a_belt_hangs_from_a_ride_round_the_pulley_too():
+    speed, rc = 0.8, R + r
+    phi = np.arccos(speed**2 / (G * rc))
+    start, _, _ = segment(built(incoming={"speed": speed}), "outgoing")
+    expected = impact(0.0, speed=speed, angle=phi)[1] - DROP - r
+    assert start[1] == pytest.approx(expected, abs=1e-14)
+
+
+def test_the_other_surfaces_stand_where_the_scene_says():
+    found = built(
+        particle={"spin": True},
+        incoming={"length": 1.5, "friction": 0.3, "restitution": 0.2},
+        outgoing={"speed": -1.0, "start": -0.5, "length": 2.0, "restitution": 0.1, "friction": 0.7},
+        surface=[
+            {
+                "name": "chute", "points": [[1.0, 0.0], [1.0, 3.0], [5.0, 0.0]],
+                "speed": 0.5, "restitution": 0.6, "friction": 0.8,
+            }
+        ],
+    )  # fmt: skip
+    assert found.surfaces == ("incoming", "plate", "outgoing", "chute")
+    assert found.segments.surface.tolist() == [0, 1, 2, 3, 3]
+    assert found.landing == 2
+    assert found.segments.start[[0, 3, 4]].tolist() == [[-1.5, R], [1.0, 0.0], [1.0, 3.0]]
+    assert found.segments.end[[0, 3, 4]].tolist() == [[0.0, R], [1.0, 3.0], [5.0, 0.0]]
+    assert found.segments.length[[0, 3, 4]].tolist() == [1.5, 3.0, 5.0]
+    assert found.segments.tangent[[0, 3, 4]].tolist() == [[1, 0], [0, 1], [0.8, -0.6]]
+    assert found.segments.speed.tolist() == [2.0, 0.0, -1.0, 0.5, 0.5]
+    assert found.segments.restitution.tolist() == [0.2, 0.5, 0.1, 0.6, 0.6]
+    assert found.segments.friction.tolist() == [0.3, 0.0, 0.7, 0.8, 0.8]
+    assert segment(found, "outgoing")[1][0] - segment(found, "outgoing")[0][0] == 2.0
+    assert found.pulley == machine.Pulley(R, V, 0.3, 0.2, 0)
+    assert built().pulley.friction == built().segments.friction[0] == inf
+    assert found.particle.inertia == 0.5 * 0.008 * r**2
+    assert built().particle.inertia == 0.0
+    with pytest.raises(ValueError, match="read-only"):
+        found.segments.start[0] = 0.0
+
+
+def test_plates_have_the_lengths_the_scene_says_or_two_metres():
+    assert segment(built(outgoing=None), "plate")[0][1] == pytest.approx(R - 2.0, abs=1e-15)
+    assert segment(built(plate={"below": 0.45}), "plate")[0][1] == pytest.approx(
+        R - 0.45, abs=1e-15
+    )
+    # a pivot under where the belt lets the plate end: nothing below it
+    low, high, _ = segment(
+        built(plate={"pivot_height": -1.0}, outgoing={"drop_from": "top"}), "plate"
+    )
+    assert (low[1], high[1]) == pytest.approx((-1.0, -0.7), abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("tables", "key", "words"),
+    [
+        ({"plate": {"angle_deg": 60.0}}, "outgoing.drop_from", "never meets"),
+        ({"incoming": {"speed": 0.0}}, "outgoing.drop_from", "never meets"),
+        ({"plate": {"below": 0.2}}, "plate.below", "0.4316 m below the pivot"),
+        ({"plate": {"pivot_height": -0.8}}, "plate.above", "0.4684 m above the pivot"),
+        (
+            {"plate": {"above": 0, "pivot_height": -1}, "outgoing": {"drop_from": "top"}},
+            "plate.above",
+            "more than 0",
+        ),
+    ],
+)
+def test_a_machine_that_contradicts_itself_is_refused(tables, key, words):
+    # the impact lies g (0.596 / 2)²/2 - r = 0.4316 m below the pulley's top
+    with pytest.raises(scene.SceneError, match=r"mine\.toml") as raised:
+        built("mine.toml", **tables)
+    assert [fault.key for fault in raised.value.faults] == [key]
+    assert key in str(raised.value)
+    assert words in str(raised.value)
+    if "outgoing" not in tables:
+        assert 'outgoing.drop_from = "top"' in str(raised.value)
+        # and that is what helps
+        assert built(**{**tables, "outgoing": {"drop_from": "top"}}).warnings
+
+
+@pytest.mark.parametrize("speed", [1.9, 2.0, 2.1, 2.2, 2.3])
+def test_the_advice_of_a_refusal_is_enough(speed):
+    with pytest.raises(scene.SceneError) as raised:
+        built(incoming={"speed": speed}, plate={"below": 0.1})
+    (length,) = re.findall(r"at least (\S+) m", str(raised.value))
+    start, _, _ = segment(built(incoming={"speed": speed}, plate={"below": float(length)}), "plate")
+    assert start[1] == pytest.approx(impact(0.0, speed=speed)[1], abs=1.001e-4)
+
+
+def test_a_flight_meets_a_leaning_plate_only_up_to_the_angle_of_the_formula():
+    # a point that leaves at the top, a pivot at y = R: tan α <= v² / (2 g d1)
+    limit = degrees(np.arctan(V**2 / (2.0 * G * (R + GAP))))
+    point = {"radius": 0.0}
+    plate = {"angle_deg": limit * (1.0 - 1e-9), "below": 5.0, "above": 5.0}
+    built(particle=point, plate=plate)
+    with pytest.raises(scene.SceneError, match="never meets"):
+        built(particle=point, plate={**plate, "angle_deg": limit * (1.0 + 1e-9)})
+
+
+def test_crossing_surfaces_are_warned_of():
+    assert built().warnings == ()
+    *_, high = built(outgoing={"drop_from": "top", "drop": 0.15}).warnings
+    assert high.startswith("outgoing: the belt (y = -0.05 m)")
+    leaning = {"angle_deg": -60.0, "distance": 0.02, "below": 1.0}
+    (through,) = built(plate=leaning, outgoing={"drop_from": "top"}).warnings
+    assert through.startswith("plate: it crosses the drive pulley")
+
+
+def test_the_scene_ends_a_metre_below_or_without_gravity_around_it():
+    found = built()
+    assert found.exit_box == (-inf, inf, segment(found, "outgoing")[0][1] - 1.0, inf)
+    left, right, bottom, top = built(gravity=0.0).exit_box
+    # without gravity the impact is at Rc and the belt 0.5 m + r lower
+    assert (left, right, top) == pytest.approx((-3.0, 5.0, 1.4), abs=1e-15)
+    assert bottom == pytest.approx(R - DROP - 1.0, abs=1e-15)
+    alone = machine.build(
+        scene.from_dict({"stream": {"at": [2.0, 3.0], "velocity": [0.0, 0.0]}, "gravity": 0.0})
+    )
+    assert alone.exit_box == (1.0, 3.0, 2.0, 4.0)
+
+
+def test_runs_end_in_time():
+    stream = {"count": 11, "rate": 5.0}
+    assert built(stream=stream, run={"max_time": 3.0}).end_time == 5.0
+    timed = built(stream=stream, run={"until": 1.25})
+    assert (timed.end_time, timed.until) == (1.25, "time")
+    assert built(run={"until": 100.0}).end_time == 30.0
+    assert built().until == "landed"
+    assert built(outgoing=None).until == "settled"
+
+
+def test_the_nominal_particle_lets_go_where_adhesion_says():
+    found = nominal.discharge(scene.load("low-speed"))
+    rho = 0.504
+    cosine = 4.0 / (G * rho)
+    sine = sqrt(1.0 - cosine**2)
+    assert found.position == pytest.approx((rho * sine, rho * cosine), abs=1e-15)
+    assert found.velocity == pytest.approx((2.0 * cosine, -2.0 * sine), abs=1e-15)
+    fast = nominal.discharge(scene.load("perpendicular"))
+    assert fast == nominal.Discharge((0.0, R + r), (V, 0.0))
+
+
+def test_the_nominal_particle_slips_before_it_leaves():
+    found = nominal.discharge(scene.load("slip"))
+    assert degrees(np.arctan2(*found.position)) == pytest.approx(22.913, abs=5e-4)
+    assert hypot(*found.velocity) == pytest.approx(2.1340, abs=5e-5)
+    # at u = cos φ the pulley presses no more
+    cosine = hypot(*found.velocity) ** 2 / (G * 0.504)
+    assert found.position == pytest.approx((0.504 * sqrt(1 - cosine**2), 0.504 * cosine), abs=1e-13)
+
+
+def test_a_rolling_disk_leaves_where_its_energy_says():
+    overrides = ["incoming.friction=1e6", "particle.spin=true", "outgoing.drop_from=top"]
+    found = nominal.discharge(scene.load("low-speed", overrides))
+    u0 = 4.0 / (G * 0.504)
+    assert found.position[1] / 0.504 == pytest.approx((3.0 * u0 + 4.0) / 7.0, abs=1e-6)
+
+
+def test_a_slow_release_is_drawn_along_the_belt():
+    changes = ["incoming.speed=9", "incoming.friction=0.4", "stream.velocity=[1.5, 0.0]"]
+    found = nominal.discharge(scene.load("perpendicular", changes))
+    assert found.position == (0.0, R + r)
+    assert found.velocity == pytest.approx((sqrt(1.5**2 + 2 * 0.4 * G * 1.0), 0.0), rel=1e-15)
+
+
+@pytest.mark.parametrize("name", ["perpendicular", "inclined-60", "low-speed", "slip"])
+def test_the_engine_takes_the_nominal_particle_the_same_way(name):
+    loaded = scene.load(name)
+    start = nominal.discharge(loaded)
+    recording = exact.run(machine.build(loaded))
+    left, hit = (recording.select(kind)[0] for kind in (Kind.SEPARATION, Kind.IMPACT))
+    assert left["position"] == pytest.approx(start.position, abs=1e-14)
+    assert left["velocity_after"] == pytest.approx(start.velocity, abs=1e-14)
+    assert hit["position"] == pytest.approx(nominal.plate_hit(loaded, start), abs=1e-14)

@@ -1,0 +1,126 @@
+"""The stream: when, where and how fast each particle starts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from chutelab import scene
+from chutelab.releases import draw
+
+G, RC, V = 9.81, 0.1 + 0.004, 2.0
+
+
+def drawn(*, incoming=None, particle=None, **stream):
+    belt = {"speed": V, "pulley_radius": 0.1, **(incoming or {})}
+    tables = {"incoming": belt, "particle": particle or {}, "stream": stream}
+    return draw(scene.from_dict(tables, "mine.toml"))
+
+
+def same(one, other):
+    return all(
+        a.tobytes() == b.tobytes()
+        for a, b in zip(vars(one).values(), vars(other).values(), strict=True)
+    )
+
+
+@given(count=st.integers(1, 400), rate=st.floats(1e-3, 1e6), seed=st.integers(0, 2**63 - 1))
+def test_particle_i_starts_at_i_over_the_rate_on_the_belt(count, rate, seed):
+    found = drawn(count=count, rate=rate, seed=seed, bed_height=0.05)
+    assert found.t.tolist() == [i / rate for i in range(count)]
+    assert found.position.shape == found.velocity.shape == (count, 2)
+    assert (found.position[:, 0] == -1.0).all()
+    assert (found.position[:, 1] >= RC).all()
+    assert (found.position[:, 1] <= RC + 0.05).all()
+    assert (found.velocity == [V, 0.0]).all()
+    assert found.carried.all()
+    # particle 0 is nominal
+    assert found.position[0].tolist() == [-1.0, RC]
+    with pytest.raises(ValueError, match="read-only"):
+        found.t[0] = 1.0
+
+
+def test_heights_and_speeds_are_spread_uniformly():
+    changes = {"count": 20_000, "bed_height": 0.05, "speed_spread": 0.5, "velocity": [3.0, 4.0]}
+    found = drawn(**changes, at=[0.0, 1.0])
+    height = (found.position[1:, 1] - 1.0) / 0.05
+    along = (found.velocity[1:] @ [0.6, 0.8] - 5.0) / 0.5
+    across = found.velocity @ [-0.8, 0.6]
+    # five standard errors of a uniform distribution's mean and variance
+    five = 5.0 / np.sqrt(20_000)
+    assert height.mean() == pytest.approx(0.5, abs=five * np.sqrt(1 / 12))
+    assert height.var() == pytest.approx(1 / 12, abs=five * np.sqrt(1 / 180))
+    assert along.mean() == pytest.approx(0.0, abs=five * np.sqrt(1 / 3))
+    assert along.var() == pytest.approx(1 / 3, abs=five * np.sqrt(4 / 45))
+    assert np.abs(along).max() <= 1.0 + 1e-14
+    assert np.abs(across).max() < 1e-14
+    assert found.velocity[0].tolist() == [3.0, 4.0]
+    assert not found.carried.any()
+
+
+def test_a_particle_let_go_from_rest_has_its_spread_forwards():
+    found = drawn(count=50, at=[0.0, 1.0], velocity=[0.0, 0.0], speed_spread=0.3)
+    assert (found.velocity[:, 1] == 0.0).all()
+    assert 0.0 < np.abs(found.velocity[1:, 0]).max() <= 0.3
+
+
+def test_the_seed_decides():
+    changes = {"count": 100, "bed_height": 0.1, "rate": 100.0}
+    for interact in (False, True):
+        one = drawn(**changes, interact=interact, seed=3)
+        assert same(one, drawn(**changes, interact=interact, seed=3))
+        assert not same(one, drawn(**changes, interact=interact, seed=4))
+
+
+@pytest.mark.parametrize(
+    ("changes", "carried"),
+    [
+        ({}, True),
+        ({"incoming": {"friction": 0.5}}, False),
+        ({"at": [-0.3, RC]}, True),
+        ({"at": [-0.3, RC + 1e-6], "velocity": [V, 0.0]}, False),
+        ({"at": [0.1, RC], "velocity": [V, 0.0]}, False),
+    ],
+)
+def test_only_what_starts_on_an_adhesive_belt_is_carried(changes, carried):
+    found = drawn(**changes)
+    assert found.carried.tolist() == [carried]
+    assert found.position.tolist() == [list(changes.get("at", [-1.0, RC]))]
+
+
+def gaps(found, fall, floor):
+    """Distances of every particle, at its release, from all released before it."""
+    for i in range(1, len(found.t)):
+        age = found.t[i] - found.t[:i, None]
+        there = found.position[:i] + found.velocity[:i] * age - [0.0, fall] * age**2
+        there[:, 1] = np.maximum(there[:, 1], floor)
+        yield np.hypot(*(there - found.position[i]).T).min()
+
+
+@settings(max_examples=25)
+@given(seed=st.integers(0, 1000), rate=st.floats(50.0, 2000.0), bed=st.floats(0.1, 0.2))
+@pytest.mark.parametrize("kind", ["carried", "slipping", "dropped"])
+def test_interacting_particles_never_start_inside_each_other(kind, seed, rate, bed):
+    stream = {"count": 60, "rate": rate, "bed_height": bed, "seed": seed, "interact": True}
+    fall, floor = 0.5 * G, -np.inf
+    if kind == "carried":
+        found, fall = drawn(**stream), 0.0
+    elif kind == "slipping":
+        found, floor = drawn(**stream, incoming={"friction": 0.5}), RC
+    else:
+        found = drawn(**stream, at=[0.0, 3.0], velocity=[1.5, 0.4])
+    assert min(gaps(found, fall, floor)) >= 0.008 * (1.0 - 1e-12)
+    assert found.position[0, 1] == found.position[:, 1].min()
+    assert np.ptp(found.position[:, 1]) <= bed
+
+
+def test_a_bed_with_no_room_is_refused():
+    # one every millimetre of belt, in a single layer, 8 mm across
+    with pytest.raises(scene.SceneError, match=r"mine\.toml") as raised:
+        drawn(count=20, rate=2000.0, interact=True)
+    assert [fault.key for fault in raised.value.faults] == ["stream.bed_height"]
+    for word in ("stream.bed_height = 0", "particle 1", "stream.rate = 2000", "stream.interact"):
+        assert word in str(raised.value)
+    assert drawn(count=20, rate=249.0, interact=True).position[:, 1].tolist() == [RC] * 20

@@ -1,0 +1,163 @@
+"""The JSON object of a run: the keys of the contract, numbers or null, nothing else."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from math import degrees
+
+import numpy as np
+import pytest
+
+from chutelab import scene, simulate, theory
+from chutelab.compare import compare
+from chutelab.ledger import ledger
+from chutelab.recording import REASONS, Kind
+from chutelab.summary import summary
+
+TOP = [
+    "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
+    "impact", "landing", "ended", "ledger", "theory", "theory_as_printed", "error",
+]  # fmt: skip
+BEFORE = ["t", "x", "y", "vx", "vy"]
+LEDGER = [
+    "kinetic", "potential", "belt_work", "restitution_loss", "friction_loss", "residual",
+    "turned_over", "by_surface",
+]  # fmt: skip
+THEORY = [
+    "phi1_deg", "t2", "x2", "y2", "v2", "phi2_deg", "phi2r_deg", "v2r", "t3", "x3", "y3", "v3x",
+    "v3y", "v3", "d3", "dEk", "P", "belt_work", "slip_heat", "reason",
+]  # fmt: skip
+
+
+@cache
+def run(name, *overrides):
+    return simulate(scene.load(scene.find(name), overrides))
+
+
+def printed(recording):
+    """The object as a reader of the JSON has it; NaN and infinities are refused."""
+    return json.loads(json.dumps(summary(recording), allow_nan=False))
+
+
+SHIPPED = [(name, ()) for name in scene.shipped() if "stream" not in name] + [
+    ("stream", ("stream.count=4", "run.until=0.9")),
+    ("stream-independent", ("stream.count=40", "run.until=0.9")),
+]
+
+
+@pytest.mark.parametrize(("name", "overrides"), SHIPPED)
+def test_the_keys_are_those_of_the_contract(name, overrides):
+    recording = run(name, *overrides)
+    found = printed(recording)
+    assert list(found) == TOP
+    assert list(found["separation"]) == BEFORE
+    assert list(found["impact"]) == list(found["landing"]) == [*BEFORE, "vx_after", "vy_after"]
+    assert list(found["ended"]) == ["t", "reason"]
+    assert list(found["ledger"]) == LEDGER
+    assert list(found["ledger"]["by_surface"]) == list(recording.surfaces)
+    for entries in found["ledger"]["by_surface"].values():
+        assert list(entries) == ["belt_work", "restitution_loss", "friction_loss"]
+    assert list(found["theory"]) == THEORY
+    assert found["error"].keys() - {"max"} == compare(recording).errors.keys()
+    assert found["format"] == 1
+    for key in ("separation", "impact", "landing", "ended"):
+        for column in found[key].values():
+            assert len(column) == found["particles"] == recording.count
+
+
+@pytest.mark.parametrize(("name", "overrides"), SHIPPED)
+def test_columns_hold_the_first_event_of_each_particle_or_null(name, overrides):
+    recording = run(name, *overrides)
+    found = printed(recording)
+    wanted = {
+        "separation": (Kind.SEPARATION, "incoming"),
+        "impact": (Kind.IMPACT, "plate"),
+        "landing": (Kind.LANDING, "outgoing"),
+    }
+    for key, (kind, surface) in wanted.items():
+        for particle in range(recording.count):
+            own = [
+                event
+                for event in recording.events
+                if event["particle"] == particle
+                and event["kind"] == kind
+                and recording.surfaces[event["surface"]] == surface
+            ]
+            row = [column[particle] for column in found[key].values()]
+            if not own:
+                assert row == [None] * len(row)
+                continue
+            event = own[0]
+            expected = [event["t"], *event["position"], *event["velocity_before"]]
+            expected += [] if key == "separation" else [*event["velocity_after"]]
+            assert row == expected
+    for particle in range(recording.count):
+        track = recording.track(particle)
+        assert found["ended"]["t"][particle] == (float(track["t"][-1]) if len(track) else None)
+        reason = found["ended"]["reason"][particle]
+        assert reason == REASONS[recording.ended[particle]]
+
+
+def test_numbers_are_those_of_recording_ledger_and_comparison():
+    recording = run("belt-landing")
+    found, books, compared = printed(recording), ledger(recording), compare(recording)
+    for key in ("engine", "seconds", "steps", "contacts"):
+        assert found[key] == getattr(recording, key)
+    assert found["scene"] == "Bouncing, sliding, carried off"
+    assert found["ledger"]["kinetic"] == list(books.kinetic)
+    assert found["ledger"]["potential"] == list(books.potential)
+    for key in LEDGER[2:]:
+        assert found["ledger"][key] == getattr(books, key)
+    assert found["error"] == {**compared.errors, "max": compared.max}
+    assert found["ended"]["reason"] == ["settled"]
+
+
+def test_theory_is_the_prediction_with_angles_in_degrees():
+    recording = run("low-speed")
+    found = printed(recording)["theory"]
+    predicted = theory.predict(scene.load("low-speed"))
+    for key in THEORY[:-1]:
+        value = float(getattr(predicted, key.removesuffix("_deg")))
+        assert found[key] == (degrees(value) if key.endswith("_deg") else value)
+    assert found["reason"] is None
+    assert found["phi1_deg"] == pytest.approx(degrees(np.arccos(4.0 / (9.81 * 0.504))), rel=1e-14)
+
+
+def test_where_theory_ends_it_says_null_and_why():
+    found = printed(run("free-fall"))
+    assert {found["theory"][key] for key in THEORY[:-1]} == {None}
+    assert "incoming" in found["theory"]["reason"]
+    assert found["error"] == {"max": None}
+    part = printed(run("perpendicular", "outgoing.start=2.0", "outgoing.drop_from=top"))
+    assert part["theory"]["v2r"] > 0.0
+    assert part["theory"]["t3"] is None
+    assert part["landing"]["t"] == [None]
+    assert part["ended"]["reason"] == ["exit"]
+
+
+def test_the_printed_equation_has_the_sine_and_cosine_the_wrong_way_round():
+    """Printed (9): v2' = v2 sqrt(sin²φ2 + ε² cos²φ2), φ2 measured from the plate."""
+    found = printed(run("perpendicular"))
+    right, as_printed = found["theory"], found["theory_as_printed"]
+    assert list(as_printed) == THEORY
+    sine, cosine = (f(np.radians(right["phi2_deg"])) for f in (np.sin, np.cos))
+    v2 = right["v2"]
+    assert right["v2r"] == pytest.approx(v2 * np.hypot(cosine, 0.5 * sine), rel=1e-14)
+    assert as_printed["v2r"] == pytest.approx(v2 * np.hypot(sine, 0.5 * cosine), rel=1e-14)
+    same = [key for key in THEORY if right[key] == as_printed[key]]
+    assert {"phi1_deg", "t2", "x2", "y2", "v2", "phi2_deg"} <= set(same)
+    assert "x3" not in same
+
+
+@pytest.mark.parametrize(
+    ("name", "override"),
+    [
+        ("perpendicular", "plate.friction=0.1"),
+        ("perpendicular", "plate.angle_deg=1e-9"),
+        ("inclined-20", "plate.friction=0"),
+        ("free-fall", "gravity=9.8"),
+    ],
+)
+def test_it_is_printed_for_a_frictionless_upright_plate_only(name, override):
+    assert printed(run(name, override))["theory_as_printed"] is None

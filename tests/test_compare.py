@@ -1,4 +1,4 @@
-"""Simulated against theory: every quantity worked out from the events, every error from its scale."""
+"""Simulated against theory: quantities from the events, errors from their scales."""
 
 from __future__ import annotations
 

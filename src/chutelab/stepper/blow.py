@@ -19,28 +19,30 @@ ROUNDS = 30
 
 @dataclass(frozen=True)
 class Capsule:
-    """A line from a to b and all within `reach` of it (the disk's radius included), m."""
+    """A line from a to b and all within `reach` of it (the disk's radius included), m.
+
+    Before the line, seen along the unit vector `out`, the gap keeps its sign beyond it; a = b and
+    out = 0 is a disk.
+    """
 
     a: Vector
     b: Vector
     reach: float
+    out: Vector = (0.0, 0.0)
 
     def nearest(self, x: float, y: float) -> tuple[float, Vector, bool]:
         """Return gap (m), outward normal, and whether the round end is what is nearest."""
         ux, uy = self.b[0] - self.a[0], self.b[1] - self.a[1]
         dx, dy = x - self.a[0], y - self.a[1]
-        square = ux * ux + uy * uy
-        share = (dx * ux + dy * uy) / square if square > 0.0 else 0.0
-        clipped = min(1.0, max(0.0, share))
-        dx, dy = dx - clipped * ux, dy - clipped * uy
+        square, along = ux * ux + uy * uy, dx * ux + dy * uy
+        if 0.0 < along < square:
+            return dx * self.out[0] + dy * self.out[1] - self.reach, self.out, False
+        if along > 0.0:
+            dx, dy = x - self.b[0], y - self.b[1]
         distance = hypot(dx, dy)
         if distance == 0.0:
-            return -self.reach, (0.0, 1.0), False
-        return (
-            distance - self.reach,
-            (dx / distance, dy / distance),
-            share != clipped or square == 0.0,
-        )
+            return -self.reach, (0.0, 1.0), True
+        return distance - self.reach, (dx / distance, dy / distance), True
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,7 @@ class Touch:
 
 def touch(
     offset: Vector, velocity: Vector, gravity: float, capsule: Capsule, longest: float
-) -> Touch:
+) -> Touch | None:
     """Follow a relative flight back to where the gap was zero.
 
     Parameters
@@ -80,9 +82,8 @@ def touch(
 
     Returns
     -------
-    Touch
-        At the end of the step if the path does not lead back to a touch: they overlapped from the
-        start, or part.
+    Touch or None
+        None if the path does not lead back to a touch: they overlapped from the start, or part.
     """
     back = 0.0
     gap, normal, rounded = capsule.nearest(*offset)
@@ -100,8 +101,7 @@ def touch(
         if abs(back - before) <= 1e-15 * longest:
             break
     if abs(gap) > tolerance:
-        back = 0.0
-        _, normal, rounded = capsule.nearest(*offset)
+        return None
     return Touch(back, normal, 1.0 / capsule.reach if rounded else 0.0)
 
 

@@ -233,9 +233,10 @@ def _lie(run: Run, contacts: Contacts, uses: Ints) -> None:
     in_line = (uses > 0) & (length > (1.0 - IN_LINE) * uses)
     who = np.flatnonzero(in_line)
     run.tracks.upon[who] = total[who] / length[who, None]
-    round_pulley = contacts.other[solid] == run.count + run.solids.pulley
-    for row in np.flatnonzero(round_pulley & in_line[i]).tolist():
-        run.follow(int(i[row]), n[row])
+    which = contacts.other[solid] - run.count
+    curved = in_line[i] & run.solids.rounded(which, run.tracks.at[i])
+    for row in np.flatnonzero(curved).tolist():
+        run.follow(int(i[row]), n[row], float(run.solids.reach[which[row]]) + run.radius)
 
 
 def _calm(run: Run, contacts: Contacts, who: Ints, speed: Floats, motion: Motion) -> None:

@@ -13,14 +13,16 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-HALF_THICKNESS = 1e-3
+HALF_THICKNESS = 2e-3
 """m; half the thickness that belts, plate and free surfaces get behind the struck face. A particle
-needs a step shorter than (r + this)/v not to pass through. Thicker would stop faster particles, but
-the ends, round with this radius, would stick out further."""
+needs a step shorter than (r + this)/v not to pass through; thicker would make the backs of surfaces
+stick out further."""
 
 GRIP = 1e6
 """Coefficient of friction that stands for µ = ∞: finite, because pymunk multiplies it by 0."""
 
+EDGE_ON = 1e-6
+"""Component of a contact normal across a slab below which the contact is with its end wall."""
 
 SLOP = 1e-5
 """Overlap, as a share of the radius, that pymunk leaves alone so that resting contacts persist. The
@@ -29,19 +31,21 @@ pulley is smaller by as much: what lies a hair inside the belt must not feel it 
 
 @dataclass(frozen=True, eq=False)
 class Solids:
-    """Capsules: a line from a to b, and all within `reach` of it; the pulley, last, has a = b.
+    """Slabs behind the lines from a to b; and, last, the pulley, a circle with a = b.
 
-    The struck face is flush with the surface of the machine: upper faces of the two belts, the left
-    face (seen upwards) of the plate, for free surfaces the face that looks to the nominal release
-    point (if that lies on their line: the upper, or left, one). Struck from behind a surface is met
-    2 `HALF_THICKNESS` too early, on an end up to one.
+    The struck face is the surface of the machine, with its true ends: upper faces of the two belts,
+    the left face (seen upwards) of the plate, for free surfaces the face that looks to the nominal
+    release point (if that lies on their line: the upper, or left, one). Struck from behind a surface
+    is met 2 `HALF_THICKNESS` too early.
 
     Attributes
     ----------
     a, b : ndarray, (K, 2)
-        Ends of the centre lines, m.
+        Ends of the struck faces, m; the axis of the pulley.
+    behind : ndarray, (K, 2)
+        From the struck face to the back, m; zero for the pulley.
     reach : ndarray, (K,)
-        Radius of the capsule, m.
+        Radius of the pulley, m; zero for slabs.
     tangent : ndarray, (K, 2)
         Direction in which a belt runs; zero for the pulley.
     speed, friction, restitution : ndarray, (K,)
@@ -54,6 +58,7 @@ class Solids:
 
     a: Floats
     b: Floats
+    behind: Floats
     reach: Floats
     tangent: Floats
     speed: Floats
@@ -68,8 +73,23 @@ class Solids:
         along = t[:, 0] * normal[:, 1] - t[:, 1] * normal[:, 0]
         return self.speed[solid] * np.where(solid == self.pulley, 1.0, along)
 
+    def face(
+        self, solid: int, normal: Floats
+    ) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:
+        """Return the ends and the outward normal of the side that a contact normal points from."""
+        a, b, behind = self.a[solid], self.b[solid], self.behind[solid]
+        out = -behind / (2.0 * HALF_THICKNESS)
+        facing = float(normal @ out)
+        if abs(facing) < EDGE_ON:
+            along = float(normal @ self.tangent[solid])
+            corner = b if along > 0.0 else a
+            a, b, out = corner, corner + behind, np.sign(along) * self.tangent[solid]
+        elif facing < 0.0:
+            a, b, out = a + behind, b + behind, -out
+        return tuple(a.tolist()), tuple(b.tolist()), tuple(out.tolist())
+
     def gaps(self, points: Floats, radius: float) -> Floats:
-        """Distances (P, K) between disks of a radius around points (P, 2) and the solids, m."""
+        """Distances (P, K) between disks of a radius around points (P, 2) and the faces, m."""
         line = self.b - self.a
         square = np.maximum((line**2).sum(axis=1), 1e-300)
         from_a = points[:, None, :] - self.a
@@ -77,6 +97,12 @@ class Solids:
         return np.asarray(
             np.linalg.norm(from_a - share[..., None] * line, axis=2) - self.reach - radius
         )
+
+    def rounded(self, solid: NDArray[np.int64], points: Floats) -> NDArray[np.bool_]:
+        """Tell where disks around points (M, 2) touch the pulley or the end of a face, (M,)."""
+        line = self.b[solid] - self.a[solid]
+        along = ((points - self.a[solid]) * line).sum(axis=1)
+        return np.asarray((along <= 0.0) | (along >= (line**2).sum(axis=1)))
 
 
 def solids(machine: Machine) -> Solids:
@@ -91,11 +117,11 @@ def solids(machine: Machine) -> Solids:
         machine.surfaces[s] in {"incoming", "outgoing", "plate"} for s in seg.surface.tolist()
     ]
     facing = np.where(conveyor, 1.0, facing)
-    behind = -HALF_THICKNESS * facing[:, None] * left
     rows = [
-        seg.start + behind,
-        seg.end + behind,
-        np.full(len(seg.length), HALF_THICKNESS),
+        seg.start,
+        seg.end,
+        -2.0 * HALF_THICKNESS * facing[:, None] * left,
+        np.zeros(len(seg.length)),
         seg.tangent,
         seg.speed,
         np.minimum(seg.friction, GRIP),
@@ -106,13 +132,13 @@ def solids(machine: Machine) -> Solids:
     if pulley is not None:
         drum = pulley.radius - SLOP * machine.particle.radius
         last = [
-            np.zeros(2), np.zeros(2), drum, np.zeros(2), pulley.speed,
+            np.zeros(2), np.zeros(2), np.zeros(2), drum, np.zeros(2), pulley.speed,
             min(pulley.friction, GRIP), pulley.restitution, pulley.surface,
         ]  # fmt: skip
         rows = [np.concatenate([row, [end]]) for row, end in zip(rows, last, strict=True)]
     *values, surface = rows
-    a, b, reach, tangent, speed, friction, restitution = values
+    a, b, behind, reach, tangent, speed, friction, restitution = values
     return Solids(
-        a, b, reach, tangent, speed, friction, restitution,
+        a, b, behind, reach, tangent, speed, friction, restitution,
         surface.astype(np.int64), len(seg.length) if pulley is not None else -1,
     )  # fmt: skip

@@ -149,10 +149,10 @@ class Run:
                 particle, tuple(place), tuple(velocity), float(self.tracks.omega[particle])
             )
 
-    def follow(self, particle: int, normal: Floats) -> None:
-        """Lead a particle in contact with the pulley round it, unless it is to fly off.
+    def follow(self, particle: int, normal: Floats, rho: float) -> None:
+        """Lead a particle round the pulley, or the end of a face, unless it is to fly off.
 
-        Moved along the tangent it would lose the pulley and hop. It gets the chord instead, and
+        Moved along the tangent it would lose the contact and hop. It gets the chord instead, and
         between move and solve half the centripetal change, so that the contact feels
         g cos φ - v²/ρ.
         """
@@ -160,7 +160,6 @@ class Run:
         w = k.w[particle]
         along = np.array([normal[1], -normal[0]])
         speed = float(w @ along)
-        rho = float(self.solids.reach[self.solids.pulley]) + self.radius
         centripetal = speed * speed / rho
         if centripetal >= self.machine.gravity * normal[1]:
             return

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.recording import Kind
-from chutelab.stepper.blow import Capsule, Touch, shifted_impulse, touch
+from chutelab.stepper.blow import Capsule, Touch, Vector, shifted_impulse, touch
 from chutelab.stepper.solids import SLOP
 from chutelab.stepper.tracks import CARRIED, FLYING
 
@@ -60,7 +60,7 @@ def strike(run: Run, contacts: Contacts, row: int, t: float, states: Floats) -> 
     k, i, j = run.tracks, int(contacts.first[row]), int(contacts.other[row])
     partner = _partner(run, j, t, contacts.normal[row], states)
     pair = np.array([i, j] if partner.flies else [i])
-    found = _found(run, partner, pair, t)
+    found = _found(run, partner, pair, contacts.normal[row], t)
     undo = _undo(run, partner, pair, contacts.normal[row], t)
     at, normal = t - found.back, np.array(found.normal)
     along = np.array([normal[1], -normal[0]])
@@ -119,8 +119,8 @@ def strike(run: Run, contacts: Contacts, row: int, t: float, states: Floats) -> 
             return
     if stays:
         normal = _stay(run, i, partner, found, t, undo[0])
-        if j - run.count == run.solids.pulley:
-            run.follow(i, normal)
+        if found.curvature > 0.0:
+            run.follow(i, normal, 1.0 / found.curvature)
         run.arrive(pair, np.array([surface]), at)
         return
     k.fly(pair)
@@ -130,13 +130,19 @@ def strike(run: Run, contacts: Contacts, row: int, t: float, states: Floats) -> 
         run.on[pair] = -1
 
 
-def _found(run: Run, partner: _Partner, pair: Ints, t: float) -> Touch:
-    """Follow the flight back to the touch."""
+def _found(run: Run, partner: _Partner, pair: Ints, normal: Floats, t: float) -> Touch:
+    """Follow the flight back to the touch; if that fails, take the end of the step as it is."""
     x, v = (a[0] for a in run.tracks.flight(pair[:1], t))
     gravity = 0.0 if partner.flies else run.machine.gravity
     # Pymunk looks once a step; a body may have been put in within the step before.
     longest = min(t - float(run.tracks.t[pair].max()), 2.0 * run.dt)
-    return touch(tuple(x - partner.x), tuple(v - partner.v), gravity, partner.capsule, longest)
+    offset: Vector = tuple((x - partner.x).tolist())
+    found = touch(offset, tuple((v - partner.v).tolist()), gravity, partner.capsule, longest)
+    if found is None:
+        rounded = partner.capsule.nearest(*offset)[2]
+        curvature = 1.0 / partner.capsule.reach if rounded else 0.0
+        found = Touch(0.0, (float(normal[0]), float(normal[1])), curvature)
+    return found
 
 
 def _partner(run: Run, j: int, t: float, normal: Floats, states: Floats) -> _Partner:
@@ -154,9 +160,9 @@ def _partner(run: Run, j: int, t: float, normal: Floats, states: Floats) -> _Par
             disk, x, v, omega, run.radius, 0.0, m.pair_friction, m.pair_restitution, flies, False
         )
     s, solid = run.solids, j - run.count
-    a, b = tuple(s.a[solid].tolist()), tuple(s.b[solid].tolist())
+    a, b, out = s.face(solid, normal)
     return _Partner(
-        Capsule(a, b, float(s.reach[solid]) + run.radius),
+        Capsule(a, b, float(s.reach[solid]) + run.radius, out),
         np.zeros(2), np.zeros(2), 0.0, 0.0,
         float(s.belt(np.array([solid]), normal[None])[0]),
         float(s.friction[solid]), float(s.restitution[solid]), False, True,

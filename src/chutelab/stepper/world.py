@@ -109,7 +109,9 @@ class World:
             body.angular_velocity = -speed / reach
             shape = pymunk.Circle(body, reach)
         else:
-            shape = pymunk.Segment(body, tuple(solids.a[k]), tuple(solids.b[k]), reach)
+            face = [tuple(solids.a[k].tolist()), tuple(solids.b[k].tolist())]
+            back = [tuple((end + solids.behind[k]).tolist()) for end in (solids.b[k], solids.a[k])]
+            shape = pymunk.Poly(body, [*face, *back])
             shape.surface_velocity = tuple(speed * solids.tangent[k])
         shape.elasticity = float(solids.restitution[k]) / self._restitution
         shape.friction = float(solids.friction[k]) / self._friction

@@ -108,7 +108,7 @@ def test_an_error_is_a_difference_over_the_larger_of_theory_and_scale(engine, na
     if engine == "exact":
         assert compared.max < 2e-13 if name == "slip" else compared.max < 5e-15
     else:
-        assert 1e-15 < compared.max < 0.03
+        assert compared.max < 0.03
 
 
 def test_a_wrong_event_shows_in_its_quantities_only():

@@ -123,6 +123,20 @@ def test_the_mirror_image_moves_as_the_mirror_image(soup):
     assert np.isnan(p).sum() == np.isnan(q).sum()
 
 
+@fuzz
+@given(soups(), st.integers(2, 6))
+def test_in_a_crowd_a_particle_does_what_it_does_alone(soup, count):
+    crowd = {
+        **soup,
+        "stream": {**soup["stream"], "count": count, "rate": 9.0, "bed_height": 0.5},
+        "run": {"until": 1.2},
+    }
+    _, together = run(crowd)
+    _, alone = run({**crowd, "stream": {**crowd["stream"], "count": 1}, "run": {"until": 1.2}})
+    assert together.track(0).tobytes() == alone.track(0).tobytes()
+    assert ledger(together).relative_residual <= 1e-12
+
+
 @pytest.mark.slow
 @settings(max_examples=3000, suppress_health_check=list(HealthCheck), phases=[Phase.generate])
 @given(soups())

@@ -133,6 +133,15 @@ def test_plates_have_the_lengths_the_scene_says_or_two_metres():
     [
         ({"plate": {"angle_deg": 60.0}}, "outgoing.drop_from", "never meets"),
         ({"incoming": {"speed": 0.0}}, "outgoing.drop_from", "never meets"),
+        # from behind the plate, over its top, and back onto the face
+        (
+            {
+                "plate": {"angle_deg": -30.0},
+                "stream": {"at": [0.8, 0.2], "velocity": [-2.0, 0.0]},
+            },
+            "outgoing.drop_from",
+            "never meets",
+        ),
         ({"plate": {"below": 0.2}}, "plate.below", "0.4316 m below the pivot"),
         ({"plate": {"pivot_height": -0.8}}, "plate.above", "0.4684 m above the pivot"),
         (
@@ -190,6 +199,8 @@ def test_the_scene_ends_a_metre_below_or_without_gravity_around_it():
     # without gravity the impact is at Rc and the belt 0.5 m + r lower
     assert (left, right, top) == pytest.approx((-3.0, 5.0, 1.4), abs=1e-15)
     assert bottom == pytest.approx(R - DROP - 1.0, abs=1e-15)
+    bare = built(gravity=0.0, plate=None, outgoing=None).exit_box
+    assert bare == pytest.approx((-2.0, R + 1.0, -R - 1.0, R + 1.0), abs=1e-15)
     alone = machine.build(
         scene.from_dict({"stream": {"at": [2.0, 3.0], "velocity": [0.0, 0.0]}, "gravity": 0.0})
     )

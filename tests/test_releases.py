@@ -100,15 +100,17 @@ def gaps(found, fall, floor):
 
 
 @settings(max_examples=25)
-@given(seed=st.integers(0, 1000), rate=st.floats(50.0, 2000.0), bed=st.floats(0.1, 0.2))
+@given(seed=st.integers(0, 1000), rate=st.floats(50.0, 1000.0), bed=st.floats(0.1, 0.2))
 @pytest.mark.parametrize("kind", ["carried", "slipping", "dropped"])
 def test_interacting_particles_never_start_inside_each_other(kind, seed, rate, bed):
-    stream = {"count": 60, "rate": rate, "bed_height": bed, "seed": seed, "interact": True}
+    stream = {"count": 100, "rate": rate, "bed_height": bed, "seed": seed, "interact": True}
     fall, floor = 0.5 * G, -np.inf
     if kind == "carried":
         found, fall = drawn(**stream), 0.0
     elif kind == "slipping":
-        found, floor = drawn(**stream, incoming={"friction": 0.5}), RC
+        # 5 mm apart, and 3 mm fallen where there is so much room above the belt
+        slow = {"velocity": [0.2, 0.0], "rate": 40.0, "bed_height": 0.014}
+        found, floor = drawn(**{**stream, **slow}, incoming={"friction": 0.5}), RC
     else:
         found = drawn(**stream, at=[0.0, 3.0], velocity=[1.5, 0.4])
     assert min(gaps(found, fall, floor)) >= 0.008 * (1.0 - 1e-12)

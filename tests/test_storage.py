@@ -87,6 +87,12 @@ def test_a_file_appears_only_when_it_is_whole(tmp_path):
         assert not path.exists()
         assert unfinished.parent.parent == tmp_path
     assert path.read_text() == "some"
+    # who has the old file open goes on reading it
+    with path.open() as reader:
+        with whole(path) as unfinished:
+            unfinished.write_text("more")
+        assert reader.read() == "some"
+    assert path.read_text() == "more"
     assert listing(tmp_path) == ["new.txt"]
 
 
@@ -157,11 +163,19 @@ def test_arrays_that_do_not_fit_are_refused(tmp_path):
     surface["surface"][2], kind["kind"][2], particle["particle"][2] = 99, 9, 1
     wrong = {
         "knots": [recording.knots[:-1], recording.knots["t"].copy()],
-        "offsets": [recording.offsets + 1, np.array([0]), np.zeros(0, np.int64), np.zeros((1, 2))],
+        "offsets": [
+            recording.offsets + 1,
+            np.array([1, len(recording.knots)]),
+            np.zeros(0, np.int64),
+            np.zeros((1, 2)),
+        ],
         "ended": [np.zeros(2, np.int8), np.array([7], np.int8)],
         "events": [surface, kind, particle],
         "by_surface": [np.zeros((2, 3)), np.zeros((4, 3), np.float32)],
     }
+    lone = {"knots": recording.knots[:1], "offsets": np.array([0, 1])}
+    altered(recording.save(tmp_path / "lone.npz"), **lone)
+    assert "not a recording" in refused(tmp_path / "lone.npz")
     for name, choices in wrong.items():
         for array in choices:
             path = recording.save(tmp_path / "arrays.npz")
@@ -242,6 +256,13 @@ def test_trajectory_csv_is_sampled_uniformly(tmp_path, step):
     ]
     assert [[row[0], *row[2:]] for row in rows] == expected
     assert {row[1] for row in rows} == {str(i) for i in range(recording.count)}
+
+
+def test_an_end_that_is_whole_steps_away_has_a_row(tmp_path):
+    assert 0.3 / 0.1 < 3.0 < 3.0 * 0.1 / 0.1
+    run("free-fall", "run.until=0.3").to_csv(tmp_path, step=0.1)
+    rows = [row for row in table(tmp_path / "trajectory.csv")[1:] if row[1] == "0"]
+    assert [float(row[0]) for row in rows] == [0.0, 0.1, 0.2, 0.3]
 
 
 def test_many_particles_get_fewer_instants(tmp_path, monkeypatch):

@@ -81,7 +81,10 @@ def compare(recording: Recording) -> Comparison:
 
 
 def relative_error(simulated: float, theory: float, scale: float) -> float:
-    """Return |simulated - theory| / max(|theory|, scale); 0 where nothing moves at all."""
+    """Return |simulated - theory| / max(|theory|, scale).
+
+    A scale of NaN counts as 0; where the theory is 0 as well, the difference itself is returned.
+    """
     size = max(abs(theory), scale if isfinite(scale) else 0.0)
     return abs(simulated - theory) / size if size > 0.0 else abs(simulated - theory)
 

@@ -16,7 +16,24 @@ from chutelab.recording import ENTRIES, Recording, balance
 class Ledger:
     """Energies of all particles together, J.
 
-    The start is each particle's release, the end its own end.
+    Attributes
+    ----------
+    kinetic, potential : tuple of float
+        At the start and at the end: each particle's release, and its own end. Rotation is part of
+        the kinetic energy; y = 0 is the zero of the potential energy.
+    belt_work : float
+        Tangential impulse times belt speed: what the drives pay.
+    restitution_loss : float
+        Normal part of the losses in impacts.
+    friction_loss : float
+        Slip heat.
+    residual : float
+        What the balance leaves over: the numerical error.
+    turned_over : float
+        Kinetic energy at the start + the sizes of the three entries + the size of the change of
+        potential energy.
+    by_surface : dict of dict of float
+        The three entries of each surface, and of ``"particles"``.
     """
 
     kinetic: tuple[float, float]
@@ -35,11 +52,7 @@ class Ledger:
 
 
 def ledger(recording: Recording) -> Ledger:
-    """Close the books of a recording.
-
-    "Energy turned over" is the kinetic energy at the start, plus the size of every entry, plus the
-    size of the change of potential energy.
-    """
+    """Close the books of a recording."""
     first, last = recording.ends()
     kinetic_first, potential_first = recording.energies(first)
     kinetic_last, potential_last = recording.energies(last)

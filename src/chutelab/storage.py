@@ -190,9 +190,9 @@ def _trajectory(recording: Recording, step: float | None) -> Iterable[str]:
         rows = max(2, min(SAMPLES, MOST_SAMPLES // recording.count))
         times = np.linspace(begin, end, rows).tolist()
     else:
-        # An end that is a whole number of steps away belongs to the table, rounding or not.
+        # An end that is a whole number of steps away belongs to the table, whatever rounding says.
         last = int((end - begin) / step * (1.0 + 1e-12))
-        times = (begin + step * n for n in range(last + 1))
+        times = [min(begin + step * n, end) for n in range(last + 1)]
     for t in times:
         (position,), (velocity,) = recording.at([t])
         for i in np.flatnonzero(np.isfinite(position[:, 0])).tolist():

@@ -22,7 +22,8 @@ NEGLIGIBLE = 1e-12
 
 REST = 1e-9
 """m/s; a rebound this slow is summed with all that would follow it: u_n (1 + ε)/(1 - ε) of normal
-impulse in the time 2 u_n/(g_n (1 - ε)). At ε = 0.999 some 20,000 bounces come before."""
+impulse in the time 2 u_n/(g_n (1 - ε)). At ε = 0.999 some 20,000 bounces come before.
+At ε = 1 such a rebound, 1e-19 m high, is taken for rest."""
 
 
 CRAWL = 10.0 * REST
@@ -157,7 +158,9 @@ def _last_bounces(s: Swarm, who: Ints, obstacle: Ints, side: Ints, rebound: Floa
         return
     c = s.contact(who, obstacle[hops], side[hops])
     weight, pull = s.weight_on(c.normal), s.weight_along(c.normal)
-    time = np.minimum(2.0 * u / (weight * (1.0 - c.restitution)), s.stop[who] - s.age[who])
+    # Without loss the series never ends; its motion is below what is resolved, so it is dropped.
+    lost = np.where(c.restitution < 1.0, 1.0 - c.restitution, np.inf)
+    time = np.minimum(2.0 * u / (weight * lost), s.stop[who] - s.age[who])
     w = dot(s.v[who], c.tangent)
     s.age[who] += time
     s.p[who] += (time * (w + 0.5 * pull * time))[:, None] * c.tangent

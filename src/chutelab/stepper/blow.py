@@ -56,7 +56,7 @@ class Touch:
     normal : tuple of float
         Unit normal towards the particle.
     curvature : float
-        1/m, of the path round the partner; 0 on a face.
+        1/m, of the partner's outline at the end of the step; 0 on a face.
     """
 
     back: float
@@ -87,6 +87,7 @@ def touch(
     """
     back = 0.0
     gap, normal, rounded = capsule.nearest(*offset)
+    curvature = 1.0 / capsule.reach if rounded else 0.0
     tolerance = 1e-9 * capsule.reach
     for _ in range(ROUNDS):
         vx, vy = velocity[0], velocity[1] + gravity * back
@@ -97,12 +98,12 @@ def touch(
         before, back = back, min(max(back + step, 0.0), longest)
         x = offset[0] - velocity[0] * back
         y = offset[1] - velocity[1] * back - 0.5 * gravity * back * back
-        gap, normal, rounded = capsule.nearest(x, y)
+        gap, normal, _ = capsule.nearest(x, y)
         if abs(back - before) <= 1e-15 * longest:
             break
     if abs(gap) > tolerance:
         return None
-    return Touch(back, normal, 1.0 / capsule.reach if rounded else 0.0)
+    return Touch(back, normal, curvature)
 
 
 def shifted_impulse(

@@ -35,8 +35,8 @@ class Solids:
 
     The struck face is the surface of the machine, with its true ends: upper faces of the two belts,
     the left face (seen upwards) of the plate, for free surfaces the face that looks to the nominal
-    release point (if that lies on their line: the upper, or left, one). Struck from behind a surface
-    is met 2 `HALF_THICKNESS` too early.
+    release point (if that lies on their line: the upper, or left, one). Struck from behind, a
+    surface is met 2 `HALF_THICKNESS` too early.
 
     Attributes
     ----------

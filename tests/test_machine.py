@@ -186,10 +186,15 @@ def test_a_flight_meets_a_leaning_plate_only_up_to_the_angle_of_the_formula():
 def test_crossing_surfaces_are_warned_of():
     assert built().warnings == ()
     *_, high = built(outgoing={"drop_from": "top", "drop": 0.15}).warnings
-    assert high.startswith("outgoing: the belt (y = -0.05 m)")
-    leaning = {"angle_deg": -60.0, "distance": 0.02, "below": 1.0}
+    assert high.startswith("outgoing: it crosses the drive pulley")
+    leaning = {"angle_deg": -60.0, "distance": 0.02, "below": 0.3}
     (through,) = built(plate=leaning, outgoing={"drop_from": "top"}).warnings
     assert through.startswith("plate: it crosses the drive pulley")
+    hood = {"name": "hood", "points": [[0.4, 0.0], [0.8, 0.0], [0.8, 0.3]]}
+    (crossed,) = built(surface=[hood]).warnings
+    assert crossed.startswith("hood: it crosses plate")
+    (meeting,) = (built(surface=[{**hood, "points": [[-0.5, R], [-0.5, 1.0]]}]).warnings,)
+    assert meeting == ()
 
 
 def test_the_scene_ends_a_metre_below_or_without_gravity_around_it():

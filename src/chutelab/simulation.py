@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from chutelab.recording import Recording
     from chutelab.scene import Scene
 
+    Progress = Callable[[float], None]
+
 ENGINES = ("auto", "exact", "pymunk")
 
 
@@ -45,7 +47,7 @@ def choose(machine: Machine, engine: str | None = None) -> str:
 def simulate(
     scene: Scene,
     engine: str | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Recording:
     """Run a scene.
 
@@ -54,7 +56,8 @@ def simulate(
     scene : Scene
         From `chutelab.load`.
     engine : {"auto", "exact", "pymunk"}, optional
-        Overrides the scene's ``run.engine``.
+        Overrides the scene's ``run.engine``. With auto, what the exact engine cannot follow (a
+        spinning disk between a moving surface and another) goes to pymunk.
     progress : callable, optional
         Called now and then with the share of the run that is done, 0 to 1.
 
@@ -72,22 +75,34 @@ def simulate(
     begin = perf_counter()
     machine = build(scene)
     name = choose(machine, engine)
-    if name == "exact":
-        if machine.interact:
-            raise _refused(scene, "run.engine", "exact", "pymunk, because stream.interact = true")
-        from chutelab.exact import CornerError, run
-
-        try:
-            recording = run(machine, progress)
-        except CornerError as error:
-            raise _refused(scene, "run.engine", "exact", str(error)) from error
-    else:
-        if machine.particle.radius == 0.0:
-            raise _refused(scene, "particle.radius", 0.0, 'more than 0 with run.engine = "pymunk"')
-        from chutelab.stepper import run as step
-
-        recording = step(machine, progress)
+    recording = _exact(scene, machine, engine, progress) if name == "exact" else None
+    if recording is None:
+        recording = _stepped(scene, machine, progress)
     return replace(recording, seconds=perf_counter() - begin)
+
+
+def _exact(
+    scene: Scene, machine: Machine, engine: str | None, progress: Progress | None
+) -> Recording | None:
+    """Run the exact engine; None if it meets what it cannot do, and another was not ruled out."""
+    if machine.interact:
+        raise _refused(scene, "run.engine", "exact", "pymunk, because stream.interact = true")
+    from chutelab.exact import CornerError, run
+
+    try:
+        return run(machine, progress)
+    except CornerError as error:
+        if "exact" in (engine, scene.run.engine):
+            raise _refused(scene, "run.engine", "exact", str(error)) from error
+        return None
+
+
+def _stepped(scene: Scene, machine: Machine, progress: Progress | None) -> Recording:
+    if machine.particle.radius == 0.0:
+        raise _refused(scene, "particle.radius", 0.0, 'more than 0 with run.engine = "pymunk"')
+    from chutelab.stepper import run
+
+    return run(machine, progress)
 
 
 def _refused(scene: Scene, key: str, value: object, allowed: str) -> SceneError:

@@ -1,6 +1,7 @@
 """A scene resolved to world-frame arrays: what both engines take, and all they take.
 
 - `parts`: `Machine`, its segments and its pulley.
+- `crossings`: what `chutelab check` says of surfaces that cross.
 - `builder`: `build`, from a validated scene to a machine.
 """
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chutelab.machine.crossings import crossings
 from chutelab.machine.parts import Machine, Pulley, Segments
 from chutelab.nominal import Discharge, discharge, plate_hit
 from chutelab.recording import Particle
@@ -125,7 +126,6 @@ class _Builder:
         # Upwards, so that the struck face (-cos α, -sin α) lies to the left of the tangent.
         self.add("plate", [tuple(low), tuple(high)], 0.0, plate.restitution, plate.friction)
         self._check_hit(hit, pivot, up, below)
-        self._warn_crossings(low, high, height)
         return height
 
     def _check_hit(
@@ -159,21 +159,6 @@ class _Builder:
             )
         self.warnings.append(f"plate: {where}, off the finite plate")
 
-    def _warn_crossings(
-        self, low: NDArray[np.float64], high: NDArray[np.float64], height: float | None
-    ) -> None:
-        assert self.scene.incoming is not None
-        radius = self.scene.incoming.pulley_radius
-        along = high - low
-        share = np.clip(-(low @ along) / (along @ along), 0.0, 1.0)
-        if np.hypot(*(low + share * along)) < radius:
-            self.warnings.append("plate: it crosses the drive pulley; the first contact wins")
-        if height is not None and height > -radius:
-            self.warnings.append(
-                f"outgoing: the belt (y = {height:.4g} m) lies above the bottom of the drive"
-                " pulley; surfaces cross, the first contact wins"
-            )
-
     def _fault(self, key: str, value: object, allowed: str) -> SceneError:
         return SceneError(self.scene.source, [Fault(key, value, allowed)])
 
@@ -194,6 +179,8 @@ class _Builder:
             belt = scene.incoming
             grip = inf if belt.friction == "adhesion" else float(belt.friction)
             pulley = Pulley(belt.pulley_radius, belt.speed, grip, belt.restitution, 0)
+        radius = pulley.radius if pulley is not None else None
+        warnings = self.warnings + crossings(self.names, rows[:, :4], self.owner, radius)
         releases = draw(scene)
         bound = float(releases.t[-1]) + scene.run.max_time
         until = scene.run.until
@@ -222,5 +209,5 @@ class _Builder:
             pair_restitution=scene.stream.restitution,
             pair_friction=scene.stream.friction,
             engine=scene.run.engine,
-            warnings=tuple(self.warnings),
+            warnings=tuple(warnings),
         )

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from chutelab.exact.arcs import bounds
-from chutelab.exact.obstacles import Floats, Ints, dot
+from chutelab.exact.obstacles import Floats, Ints, dot, pick
 from chutelab.exact.swarm import Mode, Swarm
-from chutelab.exact.touch import rest_on, settle_law, strike
+from chutelab.exact.touch import end_slip, rest_on, settle_law, strike
 from chutelab.recording import Kind
 from chutelab.ride import STEP_ANGLE, Circle, Outcome, advance, normal_force
 
@@ -18,7 +18,7 @@ def ride_on(s: Swarm, who: Ints, circle: Ints) -> None:
         return
     left, side, surface = s.on[who].copy(), s.side[who].copy(), s.obstacles.surface[s.on[who]]
     c = s.contact(who, circle, np.zeros_like(side))
-    rho = _rho(s, who, circle)
+    rho = pick(s.obstacles.rho, who, circle - s.obstacles.segments)
     w = dot(s.v[who], c.tangent)
     stays = s.weight_on(c.normal) - w**2 / rho > 0.0
     rest_on(s, who[stays], circle[stays], np.zeros_like(side[stays]), np.zeros(int(stays.sum())))
@@ -51,7 +51,7 @@ def carry_round(s: Swarm, who: Ints) -> None:
     end = np.where(
         s.age[who] + end * rho / v > s.stop[who], (s.stop[who] - s.age[who]) * v / rho, end
     )
-    start, done = s.age[who].copy(), np.zeros(len(who))
+    start, above = s.age[who].copy(), rho
     rides = np.flatnonzero(end > 0.0)
     pieces = np.ceil(end / STEP_ANGLE).max(initial=0.0)
     for n in range(1, int(pieces) + 1):
@@ -60,13 +60,9 @@ def carry_round(s: Swarm, who: Ints) -> None:
         s.age[who[rides]] = (start + rho * part / v)[rides]
         # The belt lets the particle down: F v = -m g v sin φ, summed from the last knot.
         height = rho * np.cos(part)
-        drop = np.where(n == 1, rho - height, done - height) if n > 1 else rho - height
-        s.recorder.book(
-            who[rides],
-            s.machine.pulley.surface if s.machine.pulley else 0,
-            -s.mass * s.gravity * drop[rides],
-        )
-        done = height
+        work = -s.mass * s.gravity * (above - height)
+        s.recorder.book(who[rides], o.surface[o.pulley], work[rides])
+        above = height
         s.knots(who[rides])
     over = s.age[who] >= s.stop[who]
     s.finish(who[over], "time")
@@ -82,7 +78,7 @@ def ride(s: Swarm, who: Ints) -> None:
     """Move riders on by one knot, or to the next event, and resolve it."""
     circle = s.on[who]
     c = s.contact(who, circle, s.side[who])
-    rho = _rho(s, who, circle)
+    rho = pick(s.obstacles.rho, who, circle - s.obstacles.segments)
     state = Circle(
         phi=np.arctan2(c.normal[:, 0], c.normal[:, 1]),
         w=dot(s.v[who], c.tangent),
@@ -123,7 +119,7 @@ def ride(s: Swarm, who: Ints) -> None:
     s.slip[who[onset]] = np.sign(np.sin(step.phi[onset]))
     s.event(Kind.SLIP, who[onset], c.surface[onset])
     grip = outcome == Outcome.GRIP
-    _end_slip(s, who[grip], step.phi[grip])
+    end_slip(s, who[grip])
     for name, code in (("low", Outcome.LOW), ("high", Outcome.HIGH)):
         at = outcome == code
         obstacle = getattr(s.bounds, f"{name}_obstacle")[who]
@@ -137,18 +133,6 @@ def ride(s: Swarm, who: Ints) -> None:
             strike(s, who[hit], obstacle[hit], side[hit])
 
 
-def _end_slip(s: Swarm, who: Ints, phi: Floats) -> None:
-    """Make the slip exactly zero, then see whether friction holds."""
-    if not len(who):
-        return
-    tangent = np.stack([np.cos(phi), -np.sin(phi)], axis=-1)
-    if s.spins:
-        s.z[who] = s.belt[who] - dot(s.v[who], tangent)
-    else:
-        s.v[who] = s.belt[who, None] * tangent
-    settle_law(s, who)
-
-
 def _place(
     s: Swarm, who: Ints, rho: Floats, phi: Floats, w: Floats, center: Floats | float = 0.0
 ) -> None:
@@ -156,8 +140,3 @@ def _place(
     sine, cosine = np.sin(phi), np.cos(phi)
     s.p[who] = center + rho[:, None] * np.stack([sine, cosine], axis=-1)
     s.v[who] = w[:, None] * np.stack([cosine, -sine], axis=-1)
-
-
-def _rho(s: Swarm, who: Ints, circle: Ints) -> Floats:
-    rho = s.obstacles.rho
-    return np.asarray(rho[0 if len(rho) == 1 else who, circle - s.obstacles.segments])

@@ -9,7 +9,7 @@ from chutelab.exact.detect import Motion, first_contact
 from chutelab.exact.obstacles import NONE, Floats, Ints, dot, pick
 from chutelab.exact.round import carry_round, ride_on
 from chutelab.exact.swarm import Mode, Swarm
-from chutelab.exact.touch import face_pull, settle_law, strike
+from chutelab.exact.touch import end_slip, face_pull, settle_law, strike
 from chutelab.recording import Kind
 
 CONTACT, GRIP, END, EXIT, STOP = range(5)
@@ -69,11 +69,9 @@ def straight(s: Swarm, who: Ints) -> None:
     out = who[outcome == EXIT]
     s.event(Kind.EXIT, out)
     s.finish(out, "exit")
-    ended = who[(outcome == END) & face]
-    _leave_face(s, ended)
+    _leave_face(s, who[(outcome == END) & face])
     carry_round(s, who[(outcome == END) & carried])
-    gripped = who[outcome == GRIP]
-    _grip(s, gripped)
+    end_slip(s, who[outcome == GRIP])
     hit = outcome == CONTACT
     if hit.any():
         strike(s, who[hit], obstacle[hit], side[hit])
@@ -127,18 +125,6 @@ def _slide_books(s: Swarm, who: Ints, dt: Floats, acceleration: Floats, force: F
     rate = dot(acceleration, c.tangent) + (2.0 * force if s.spins else 0.0)
     mean = np.where(gripping, 0.0, start + 0.5 * rate * dt)
     s.recorder.book(who, c.surface, s.mass * force * c.belt * dt, 0.0, -s.mass * force * mean * dt)
-
-
-def _grip(s: Swarm, who: Ints) -> None:
-    """End of slip: make it exactly zero, then see whether friction holds."""
-    if not len(who):
-        return
-    c = s.contact(who, s.on[who], s.side[who])
-    if s.spins:
-        s.z[who] = c.belt - dot(s.v[who], c.tangent)
-    else:
-        s.v[who] = c.belt[:, None] * c.tangent
-    settle_law(s, who)
 
 
 def _leave_face(s: Swarm, who: Ints) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from chutelab.exact.arcs import bounds
 from chutelab.exact.corner import hold
-from chutelab.exact.obstacles import NONE, Floats, Ints, dot
+from chutelab.exact.obstacles import NONE, Floats, Ints, dot, pick
 from chutelab.exact.swarm import COLLAPSE, Contact, Mode, Swarm, below
 from chutelab.impact import impulses, limited
 from chutelab.recording import Kind
@@ -46,14 +46,7 @@ def strike(s: Swarm, who: Ints, obstacle: Ints, side: Ints) -> None:
     if s.machine.until == "landed":
         s.finish(who[landing], "landed")
 
-    before = np.where(s.on[who] == NONE, s.left[who], s.on[who])
-    between = (before != NONE) & (before != obstacle)
-    slow = between & (np.hypot(s.v[who, 0], s.v[who, 1]) <= CRAWL)
-    s.crawls[who] = np.where(slow, s.crawls[who] + 1, 0)
-    jammed = between & (s.mode[who] != Mode.DONE)
-    jammed &= (s.idle[who] > COLLAPSE) | (s.crawls[who] > COLLAPSE)
-    before_side = np.where(s.on[who] == NONE, s.left_side[who], s.side[who])
-    hold(s, who[jammed], (before[jammed], before_side[jammed]), (obstacle[jammed], side[jammed]))
+    jammed = _stop_jammed(s, who, obstacle, side)
     held = np.isin(s.mode[who], [Mode.FACE, Mode.ARC])
     held[held] = _still_on(s, who[held])
     rests = (_load(s, who, obstacle, c) > 0.0) & (rebound <= REST)
@@ -64,6 +57,19 @@ def strike(s: Swarm, who: Ints, obstacle: Ints, side: Ints) -> None:
     leaves = flies & (s.on[who] != NONE)
     s.event(Kind.SEPARATION, who[leaves], s.obstacles.surface[s.on[who[leaves]]])
     s.fly(who[flies], obstacle[flies], side[flies], np.where(rebound[flies] > 0.0, 1, 2))
+
+
+def _stop_jammed(s: Swarm, who: Ints, obstacle: Ints, side: Ints) -> NDArray[np.bool_]:
+    """Bring to rest, and tell, who goes to and fro between two obstacles without getting on."""
+    free = s.on[who] == NONE
+    before = np.where(free, s.left[who], s.on[who])
+    before_side = np.where(free, s.left_side[who], s.side[who])
+    between = (before != NONE) & (before != obstacle) & (s.mode[who] != Mode.DONE)
+    slow = between & (np.hypot(s.v[who, 0], s.v[who, 1]) <= CRAWL)
+    s.crawls[who] = np.where(slow, s.crawls[who] + 1, 0)
+    jammed = between & ((s.idle[who] > COLLAPSE) | (s.crawls[who] > COLLAPSE))
+    hold(s, who[jammed], (before[jammed], before_side[jammed]), (obstacle[jammed], side[jammed]))
+    return np.asarray(jammed)
 
 
 def _blow(
@@ -115,7 +121,7 @@ def _load(s: Swarm, who: Ints, obstacle: Ints, c: Contact) -> Floats:
     load = s.weight_on(c.normal)
     circle = obstacle - s.obstacles.segments
     curved = circle >= 0
-    rho = s.obstacles.rho[0 if len(s.obstacles.rho) == 1 else who[curved], circle[curved]]
+    rho = pick(s.obstacles.rho, who[curved], circle[curved])
     load[curved] -= dot(s.v[who[curved]], c.tangent[curved]) ** 2 / rho
     return load
 
@@ -188,7 +194,7 @@ def _ride(s: Swarm, who: Ints) -> None:
     s.belt[who] = c.belt
     circle = s.on[who] - s.obstacles.segments
     phi = np.arctan2(c.normal[:, 0], c.normal[:, 1])
-    rho = s.obstacles.rho[0 if len(s.obstacles.rho) == 1 else who, circle]
+    rho = pick(s.obstacles.rho, who, circle)
     found = bounds(s.obstacles, who, circle, rho, phi, s.radius)
     for field in fields(found):
         getattr(s.bounds, field.name)[who] = getattr(found, field.name)
@@ -225,6 +231,19 @@ def settle_law(s: Swarm, who: Ints) -> None:
         lies = steady & ((belt == 0.0) | (c.surface == s.machine.landing))
         s.event(Kind.SETTLE, who[lies], c.surface[lies])
         s.finish(who[lies], "settled")
+
+
+def end_slip(s: Swarm, who: Ints) -> None:
+    """Make a slip that is used up exactly zero, then see whether friction holds."""
+    if not len(who):
+        return
+    c = s.contact(who, s.on[who], s.side[who])
+    belt = np.where(s.mode[who] == Mode.ARC, s.belt[who], c.belt)
+    if s.spins:
+        s.z[who] = belt - dot(s.v[who], c.tangent)
+    else:
+        s.v[who] = belt[:, None] * c.tangent
+    settle_law(s, who)
 
 
 def face_pull(s: Swarm, who: Ints) -> tuple[Floats, Floats]:

@@ -15,9 +15,11 @@ from chutelab.animate.gif import PURE, shared_palette
 from chutelab.animate.moments import Moment, film, slowness, span
 from chutelab.animate.stage import VIEW, Stage
 from chutelab.animate.words import contact_normal, sentence
+from chutelab.machine import build
 from chutelab.plots.sampling import energies
 from chutelab.plots.scenery import machine_of, scene_of
 from chutelab.plots.window import window_of
+from chutelab.recorder import Recorder
 from chutelab.recording import Kind, Recording
 from chutelab.simulation import simulate
 from test_plots import (
@@ -76,6 +78,20 @@ def filmed(recording: Recording) -> tuple[tuple[Moment, ...], float]:
     return film(recording, begin, end, fps=25, slow=slow), slow
 
 
+def told(*events: tuple[Kind, float, float, float]) -> Recording:
+    """Particle 0 with events of (kind, s, m/s along x, N s) on the incoming belt."""
+    machine = build(scene.parse(TEXT))
+    recorder = Recorder(1, machine.surfaces)
+    for kind, t, speed, push in events:
+        velocity = np.array([speed, 0.0])
+        recorder.knots([0], [t], np.zeros(2), velocity, 0.0)
+        recorder.events(kind, [0], [t], np.zeros(2), velocity, surface=0, normal_impulse=push)
+    return recorder.finish(
+        scene=machine.scene, title="Told", engine="exact", particle=machine.particle,
+        gravity=G, steps=0, seconds=0.0,
+    )  # fmt: skip
+
+
 # Which moments
 
 
@@ -99,6 +115,20 @@ def test_film_runs_evenly_and_holds_at_both_impacts(fps: int, delay: int) -> Non
     assert (np.diff(times) < 1.51 * step).all()
     moving = 0.01 * delay * (len(times) - 2)
     assert moving == pytest.approx(slow * (end - 0.4), abs=3.0 * 0.01 * delay)
+
+
+def test_film_holds_at_the_hardest_four_impacts_in_their_order() -> None:
+    pushes = [0.1, 1.0, 0.2, 0.8, 0.3, 0.9, 0.04, 0.7]
+    impacts = [(Kind.IMPACT, 0.1 * (i + 1), 1.0, push) for i, push in enumerate(pushes)]
+    shots = film(told((Kind.RELEASE, 0.0, 1.0, 0.0), *impacts), 0.0, 1.0, fps=25, slow=5.0)
+    held = [shot.t for shot in shots[:-1] if shot.delay != 4]
+    assert held == pytest.approx([0.2, 0.4, 0.6, 0.8], abs=1e-15)
+    assert {shot.delay for shot in shots[:-1]} == {4, 75}
+    # Of equally hard ones the first.
+    impacts = [(Kind.IMPACT, 0.1 * (i + 1), 1.0, 1.0) for i in range(6)]
+    shots = film(told((Kind.RELEASE, 0.0, 1.0, 0.0), *impacts), 0.0, 1.0, fps=25, slow=5.0)
+    held = [shot.t for shot in shots[:-1] if shot.delay != 4]
+    assert held == pytest.approx([0.1, 0.2, 0.3, 0.4], abs=1e-15)
 
 
 @pytest.mark.parametrize("fps", [30, 60, 0, -25, 100])
@@ -170,6 +200,24 @@ def test_words_tell_the_numbers_of_the_impacts() -> None:
     assert shots[0].words == "rides the incoming belt"
     between = [shot.words for shot in shots if BELT_TIME < shot.t < BELT_TIME + t_impact()]
     assert set(between) == {"t = 0.500 s: leaves the drive pulley at the top, at 2 m/s"}
+
+
+@pytest.mark.parametrize(("rode", "said"), [(2.0, False), (2.001, False), (2.1, True)])
+def test_a_stick_right_after_release_is_told_if_the_speed_changed(rode: float, said: bool) -> None:
+    release, stick = (Kind.RELEASE, 0.0, 2.0, 0.0), (Kind.STICK, 0.1, rode, 0.0)
+    recording = told(release, stick, (Kind.SEPARATION, 0.5, rode, 0.0))
+    shots = film(recording, 0.0, 1.0, fps=25, slow=5.0)
+    words = {shot.words for shot in shots if 0.15 < shot.t < 0.45}
+    assert words == {
+        f"t = 0.100 s: {sentence(recording, recording.events[1])}"
+        if said
+        else "rides the incoming belt"
+    }
+    # One that comes later is news at any speed.
+    recording = told(release, (Kind.SLIP, 0.05, 2.0, 0.0), stick, (Kind.SEPARATION, 0.5, 2.0, 0.0))
+    shots = film(recording, 0.0, 1.0, fps=25, slow=5.0)
+    words = {shot.words for shot in shots if 0.15 < shot.t < 0.45}
+    assert words == {f"t = 0.100 s: {sentence(recording, recording.events[2])}"}
 
 
 @given(st.floats(-3.1, 3.1), st.floats(0.1, 5.0), st.floats(-5.0, 5.0), st.floats(0.001, 10.0))

@@ -149,9 +149,11 @@ def test_json_says_null_where_there_is_no_answer():
 
 def test_where_the_closed_form_ends_the_summary_says_why():
     text = call("run", "free-fall").stdout
-    assert "No closed form from here on: outside the model: there is no incoming" in text
+    assert "\nNo closed form; outside the model: there is no incoming" in text
     assert "Particle 0" not in text
     assert "ended: 5 settled" in text
+    text = call("run", "perpendicular", "--set", "outgoing.length=0.1").stdout
+    assert "\nNo closed form from here on; misses the outgoing belt: " in text
 
 
 def test_quiet_prints_nothing():
@@ -217,6 +219,15 @@ def test_a_run_says_what_it_wrote_and_only_chooses():
     assert sorted(path.name for path in Path("out").iterdir()) == expected
 
 
+def test_only_may_be_repeated():
+    call("run", "perpendicular", "--out", "out", "--only", "json", "--only", "npz,csv")
+    expected = ["events.csv", "recording.npz", "summary.json", "trajectory.csv"]
+    assert sorted(path.name for path in Path("out").iterdir()) == expected
+    call("run", "perpendicular", "--out", "pictures", "--only", "png", "--only", "gif")
+    expected = ["lesson.gif", "overlay.png"]
+    assert sorted(path.name for path in Path("pictures").iterdir()) == expected
+
+
 def test_a_second_run_replaces_its_own_files_and_leaves_others():
     out = Path("out")
     out.mkdir()
@@ -258,13 +269,15 @@ def test_a_destination_that_cannot_be_is_refused_before_the_run(monkeypatch):
         (["--engine", "box2d"], "'box2d' is not one of"),
         (["--dt", "soon"], "'soon' is not a valid float"),
         (["--dt", "0"], "run.dt = 0.0: "),
+        (["--dt", "0"], "(from --dt 0)"),
+        (["--set", "run.dt=0"], "(from --set run.dt=0)"),
         (["--dt", "nan"], "run.dt = nan: "),
         (["--set", "plate.angel_deg=3"], "plate.angle_deg?"),
         (["--set", "plate.distance=-1"], "(from --set plate.distance=-1)"),
         (["--set", "nonsense"], "must be KEY=VALUE"),
         (["--set", "particle.radius=0", "--engine", "pymunk"], "particle.radius"),
         (["--set", "stream.interact=true", "--set", "stream.count=2", "--engine", "exact"],
-         "stream.interact"),
+         "(from --engine exact)"),
         (["--set", "plate.angle_deg=89", "--out", "out"], "outgoing.drop_from"),
         (["--set", "plate.above=0", "--set", "plate.below=0.1", "--out", "out"], "plate.below"),
         (["--frames", "3"], "No such option"),
@@ -436,7 +449,7 @@ def test_check_warns():
     text = call(
         "check", "perpendicular", "--set", "outgoing.drop=0.15", "--set", "outgoing.drop_from=top"
     ).stdout
-    assert "  warning: outgoing: the belt (y = -0.05 m) lies above the bottom of the drive" in text
+    assert "  warning: outgoing: it crosses the drive pulley; surfaces may cross" in text
 
 
 def test_check_goes_through_all_scenes_before_it_refuses():
@@ -468,6 +481,15 @@ def test_the_tables_agree_as_printed_and_mark_what_differs():
     assert corrected.count("*") == 22
     assert "0.137 0.146*" in corrected
     assert "0.548 0.420*" in corrected
+
+
+@pytest.mark.parametrize("number", [4, 5])
+def test_the_headings_of_the_heights_break_between_symbol_and_value(number):
+    lines = call("tables", str(number)).stdout.splitlines()
+    assert [line.split() for line in lines[3:5]] == [
+        ["d_okr", "="] * 6,
+        ["radius", *" m ".join(("0.5", "0.6", "0.7", "0.8", "0.9", "1")).split(), "m"],
+    ]
 
 
 def test_the_tables_as_json():
@@ -535,6 +557,19 @@ def test_show_refuses_what_is_no_recording():
         said = refused("show", name, "--out", "out")
         assert said.startswith(f"Error: {name}: ")
         assert said.count("\n") == 1
+
+
+def test_show_says_what_was_probably_meant():
+    said = refused("show", "perpendicular")
+    advice = "show takes a recording.npz; for a scene: chutelab run "
+    assert said == f"Error: perpendicular: no such file; {advice}perpendicular\n"
+    Path("mine.toml").write_text("", encoding="utf-8")
+    assert f"; {advice}mine.toml\n" in refused("show", "mine.toml")
+    Path("out").mkdir()
+    assert "did you mean" not in refused("show", "out")
+    Path("out/recording.npz").write_bytes(b"")
+    assert f"; did you mean {Path('out/recording.npz')}?\n" in refused("show", "out")
+    assert "chutelab run" not in refused("show", "nowhere.npz")
 
 
 def test_verify_finds_the_three_answers_in_agreement():

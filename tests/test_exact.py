@@ -200,6 +200,28 @@ def test_off_the_edge_of_a_table_slower_than_it_would_fly():
     assert parting["t"] == pytest.approx(0.5 / v + turn.t[-1], rel=1e-10)
 
 
+@pytest.mark.parametrize("nudge", [1e-3, 1e-7, 1e-12])
+def test_from_the_very_top_of_a_post_it_falls_as_slowly_as_it_must(nudge):
+    # On the post's end, off the top by almost nothing: φ'' = g/r sin φ.
+    r = 0.03
+    post = {"name": "post", "from": [0, 0], "to": [0, -1], "restitution": 0.0, "friction": 0.0}
+    recording = thrown([r * sin(nudge), r * cos(nudge)], [0.0, 0.0], post, until=5.0, radius=r)
+    parting = recording.select(Kind.SEPARATION)[0]
+    lift = acos(2.0 / 3.0 * cos(nudge))
+    assert np.arctan2(*parting["position"]) == pytest.approx(lift, abs=1e-12)
+    fall = solve_ivp(
+        lambda _, y: [y[1], G / r * sin(y[0])],
+        [0.0, 5.0],
+        [nudge, 0.0],
+        events=stop(lambda _, y: y[0] - lift),
+        method="DOP853",
+        rtol=1e-13,
+        atol=1e-20,
+    )
+    assert parting["t"] == pytest.approx(fall.t[-1], rel=1e-9 if nudge > 1e-10 else 1e-3)
+    assert ledger(recording).relative_residual < 1e-13
+
+
 def stop(function):
     function.terminal = True
     return function

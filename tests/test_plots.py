@@ -307,7 +307,7 @@ def test_residual_of_an_exact_run_stays_on_a_sensible_axis(runs: dict[str, Recor
 def test_without_parabola_the_panel_says_why() -> None:
     ax = plots.draw_residual(axes(), by_hand(), (), 0.0, "no impact: passes below")
     assert [text.get_text() for text in ax.texts] == [
-        "no analytic parabola: no impact: passes below"
+        "no analytic parabola; no impact: passes below"
     ]
     assert not ax.lines
 

@@ -32,6 +32,9 @@ STEP_ANGLE = 0.0244
 STEP_GROWTH = 0.5
 """Largest 2 µ Δφ of a step: slip grows like exp(2 µ φ)."""
 
+STEP_FALL = 0.4
+"""Longest step in units of sqrt(ρ/g), in which the fall from the top grows e-fold."""
+
 HALVINGS = 64
 """Bisections of a step for the time of an event, past the last bit."""
 
@@ -149,7 +152,10 @@ def _step_length(c: Circle) -> Floats:
     pull = np.where(held, 0.0, c.gravity * (np.abs(np.sin(c.phi)) + finite))
     pace = np.abs(c.w) + np.sqrt(2.0 * angle * c.rho * pull)
     with np.errstate(divide="ignore"):
-        return np.where(pace > 0.0, angle * c.rho / np.where(pace > 0.0, pace, 1.0), np.inf)
+        time = np.where(pace > 0.0, angle * c.rho / np.where(pace > 0.0, pace, 1.0), np.inf)
+        # Near the top the pull grows with the angle, as exp(t sqrt(g/ρ)).
+        falling = STEP_FALL * np.sqrt(c.rho / c.gravity)
+    return np.where(pull > 0.0, np.minimum(time, falling), time)
 
 
 def _series(c: Circle) -> Floats:

@@ -25,7 +25,7 @@ LIVES = 3.0
 """A stream is filmed for at most this many times what particle 0 takes."""
 
 HOLDS = 4
-"""Impacts that the film stops at; more would be a slide show."""
+"""Impacts that the film stops at, the hardest; more would be a slide show."""
 
 WORTH = 0.05
 """Share of the largest impulse that an impact needs for the film to stop at it."""
@@ -147,14 +147,16 @@ def _events_of_nominal(recording: Recording, begin: float, end: float) -> NDArra
 
 
 def _held(mine: NDArray[Any]) -> NDArray[np.int64]:
-    """Return the indices of the first impacts worth a hold, one for each time."""
+    """Return the indices of the hardest impacts worth a hold, in order, one for each time."""
     struck = np.flatnonzero(np.isin(mine["kind"], [int(kind) for kind in STRUCK]))
     if not len(struck):
         return struck
     impulse = np.abs(mine["normal_impulse"][struck])
     struck = struck[impulse >= WORTH * impulse.max()]
     _, first = np.unique(mine["t"][struck], return_index=True)
-    return np.asarray(struck[first][:HOLDS])
+    struck = struck[first]
+    hardest = np.argsort(-np.abs(mine["normal_impulse"][struck]), kind="stable")[:HOLDS]
+    return np.asarray(struck[np.sort(hardest)])
 
 
 def _words(
@@ -166,6 +168,10 @@ def _words(
     """Return the caption at each time: the last event that is held at, or is no impact."""
     struck = np.isin(mine["kind"], [int(kind) for kind in STRUCK])
     told = ~struck & (mine["kind"] != Kind.RELEASE)
+    if list(mine["kind"][:2]) == [Kind.RELEASE, Kind.STICK]:
+        # Released at the belt's speed, it never slipped.
+        released, rode = mine["velocity_after"][:2]
+        told[1] = not np.allclose(rode, released, rtol=1e-3, atol=1e-6)
     told[held] = True
     rides = np.any(mine["kind"] == Kind.SEPARATION)
     lines = ["rides the incoming belt" if rides else ""]

@@ -15,8 +15,10 @@ if TYPE_CHECKING:
 NUMBERS = (1, 3, 4, 5)
 
 
-@click.command()
-@click.argument("number", required=False, type=click.Choice([str(n) for n in NUMBERS]))
+@click.command(short_help="Compute the paper's tables anew, beside what is printed.")
+@click.argument(
+    "number", required=False, metavar="[NUMBER]", type=click.Choice([str(n) for n in NUMBERS])
+)
 @click.option(
     "--as-printed",
     "rebound",
@@ -54,11 +56,13 @@ def _shown(table: Table) -> list[RenderableType]:
     from chutelab.cli.report import plain_table, titled
 
     rows = [(row.label, *(_cell(cell) for cell in row.cells)) for row in table.rows]
-    drawn = plain_table(table.columns, width=max(len(text) for row in rows for text in row[1:]))
+    # Broken here, or the terminal breaks some of them elsewhere.
+    columns = [column.replace(" = ", " =\n") for column in table.columns]
+    drawn = plain_table(columns, width=max(len(text) for row in rows for text in row[1:]))
     for row in rows:
         drawn.add_row(*row)
     said = f"{table.differing} of {table.cells} cells differ in a printed digit."
-    head = f"{table.title}\n(printed, computed with Eq. (9) {table.rebound})"
+    head = f"{table.title}\n(printed, computed with Eq. (9) {table.rebound.replace('-', ' ')})"
     return [titled(head, drawn), Text("\n" + "\n".join([said, *table.notes]))]
 
 

@@ -46,13 +46,13 @@ def complete_kinds(
 
 
 def _kinds(
-    _ctx: click.Context, _parameter: click.Parameter, value: str | None
+    _ctx: click.Context, _parameter: click.Parameter, values: tuple[str, ...]
 ) -> tuple[str, ...] | None:
-    if value is None:
+    if not values:
         return None
-    asked = {kind.strip().lower() for kind in value.split(",")}
+    asked = {kind.strip().lower() for value in values for kind in value.split(",")}
     if asked - KINDS.keys():
-        raise click.BadParameter(f"{value!r}: choose from {','.join(KINDS)}")
+        raise click.BadParameter(f"{','.join(values)!r}: choose from {','.join(KINDS)}")
     return tuple(kind for kind in KINDS if kind in asked)
 
 
@@ -84,9 +84,10 @@ def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
         click.option(
             "--only",
             metavar="KINDS",
+            multiple=True,
             callback=_kinds,
             shell_complete=complete_kinds,
-            help=f"With --out: only some of {','.join(KINDS)}.",
+            help=f"With --out: only some of {','.join(KINDS)}. May be repeated.",
         ),
         click.option(
             "--json", "as_json", is_flag=True, help="Print one JSON object instead of tables."

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from chutelab.cli.parameters import KINDS, chosen, output_options
+from chutelab.cli.program import RefusedError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from chutelab.recording import Recording
 
 
-@click.command()
+@click.command(short_help="Print the summary of a recording.npz; make its files again.")
 @click.argument("recording", type=click.Path(path_type=Path))
 @output_options
 def show(
@@ -28,13 +29,29 @@ def show(
     """Print the summary of RECORDING, a recording.npz; with --out make its files again."""
     from chutelab.cli.output import destination, write
     from chutelab.recording import Recording
+    from chutelab.storage import RecordingError
 
     kinds = chosen(out, only)
-    loaded = Recording.load(recording)
+    try:
+        loaded = Recording.load(recording)
+    except RecordingError as error:
+        raise RefusedError(f"{error}{_advice(recording)}") from error
     with destination(out, kinds) as folder:
         if folder is not None:
             write(loaded, folder, kinds, quiet=quiet)
     tell(loaded, out, kinds, as_json=as_json, quiet=quiet)
+
+
+def _advice(given: Path) -> str:
+    """Say what was probably meant by what is no recording."""
+    from chutelab.scene import shipped
+
+    inside = given / KINDS["npz"][0]
+    if inside.is_file():
+        return f"; did you mean {inside}?"
+    if given.suffix == ".toml" or str(given) in shipped():
+        return f"; show takes a recording.npz; for a scene: chutelab run {given}"
+    return ""
 
 
 def tell(

@@ -58,7 +58,9 @@ def report(recording: Recording) -> list[RenderableType]:
     if any(isfinite(value) for value in (*compared.simulated.values(), *compared.theory.values())):
         parts.append(_quantities(compared))
     if compared.reason:
-        parts.append(Text(f"\nNo closed form from here on: {compared.reason}"))
+        begun = any(isfinite(value) for value in compared.theory.values())
+        ends = "No closed form from here on" if begun else "No closed form"
+        parts.append(Text(f"\n{ends}; {compared.reason}"))
     return [*parts, *_books(ledger(recording))]
 
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from chutelab.machine import Machine
 
 
-@click.command()
+@click.command(short_help="Simulate a scene and print a summary; write its files.")
 @click.argument("scene", shell_complete=complete_scene)
 @click.option(
     "--engine",
@@ -42,14 +42,15 @@ def run(
     from chutelab.cli.output import destination, write
     from chutelab.cli.progress import progress
     from chutelab.scene import load
+    from chutelab.scene.overrides import Setting
     from chutelab.simulation import simulate
 
     kinds = chosen(out, only)
     settings = list(overrides)
     if engine is not None:
-        settings.append(f"run.engine={engine}")
+        settings.append(Setting(f"run.engine={engine}", f"--engine {engine}"))
     if dt is not None:
-        settings.append(f"run.dt={dt}")
+        settings.append(Setting(f"run.dt={dt}", f"--dt {dt:.12g}"))
     loaded = load(scene, settings)
     with destination(out, kinds) as folder:
         with progress("simulating", quiet=quiet) as update:
@@ -59,7 +60,7 @@ def run(
     tell(recording, out, kinds, as_json=as_json, quiet=quiet)
 
 
-@click.command()
+@click.command(short_help="Say what would be built, or all that is wrong.")
 @click.argument(
     "scenes", metavar="SCENE...", nargs=-1, required=True, shell_complete=complete_scene
 )

@@ -31,7 +31,7 @@ def scenes(as_json: bool) -> None:
 
     from chutelab.cli.report import plain_table
 
-    table = plain_table(["scene", "what to look at"], texts=2)
+    table = plain_table(["scene", "what it shows"], texts=2)
     for scene in found:
         what = Text(scene.title, style="bold")
         what.append(f"\n{scene.look[0] if scene.look else ''}", style="not bold")
@@ -39,7 +39,7 @@ def scenes(as_json: bool) -> None:
     console.show(table)
 
 
-@click.command()
+@click.command(short_help="Print the JSON Schema of scene files, for editors.")
 def schema() -> None:
     """Print the JSON Schema of scene files, for editors that complete them."""
     from chutelab.scene import schema as schema_of_scenes
@@ -47,7 +47,7 @@ def schema() -> None:
     click.echo(json.dumps(schema_of_scenes(), indent=2))
 
 
-@click.command()
+@click.command(short_help="Write a complete, commented scene to start from.")
 @click.argument("path", default="scene.toml", type=click.Path(path_type=Path, allow_dash=True))
 @click.option("--force", is_flag=True, help="Overwrite a file that is there.")
 def new(path: Path, force: bool) -> None:

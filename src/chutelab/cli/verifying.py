@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from chutelab.agreement import Agreement
 
 
-@click.command()
+@click.command(short_help="Compare theory, exact and pymunk on scenes.")
 @click.argument("scenes", metavar="[SCENE]...", nargs=-1, shell_complete=complete_scene)
 @click.pass_context
 def verify(ctx: click.Context, scenes: tuple[str, ...]) -> None:

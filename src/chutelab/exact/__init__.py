@@ -2,7 +2,8 @@
 
 One round resolves the next event of all particles at once. There is no contact between particles.
 
-- `obstacles`: the machine's surfaces as faces and circles, and how they join.
+- `obstacles`: faces and circles to meet.
+- `layout`: a machine's surfaces as obstacles, and how they join.
 - `detect`: the first contact of particles with constant acceleration.
 - `arcs`: what stops a ride round a circle.
 - `swarm`: the state of all particles, and how knots, events and books are written.

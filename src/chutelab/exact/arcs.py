@@ -94,7 +94,7 @@ def bounds(
         tangent = rows_of(obstacles.tangent, rows)[:, segment]
         normal = rows_of(obstacles.normal, rows)[:, segment]
         length = rows_of(obstacles.length, rows)[:, segment]
-        owned = (obstacles.cap_of[circle] == segment).any(axis=-1) | (on_pulley & (segment == 0))
+        owned = obstacles.owns[circle, segment] | (on_pulley & (segment == 0))
         for side in (1, -1):
             # The gap to a face is ρ (cos(φ - tilt) - level).
             tilt = np.arctan2(side * normal[:, 0], side * normal[:, 1])

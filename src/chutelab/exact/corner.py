@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from chutelab.exact.swarm import Contact, Swarm
 
 
+WEIGHTLESS = 1e-9
+"""Share of the weight that a surface may seem to pull with, by rounding, where it holds nothing."""
+
+
 class CornerError(RuntimeError):
     """A spinning disk held between moving surfaces: beyond the exact engine."""
 
@@ -43,7 +47,7 @@ def hold(s: Swarm, who: Ints, on: tuple[Ints, Ints], other: tuple[Ints, Ints]) -
     s.recorder.book(who, b.surface, 0.0, kinetic, 0.0)
     s.knots(who)
     loads, locked = _corner_loads(s, a, b)
-    stays = locked | np.all(loads >= 0.0, axis=0)
+    stays = locked | np.all(loads >= -WEIGHTLESS * s.gravity, axis=0)
     s.fly(who[~stays], other[0][~stays], other[1][~stays], 2)
     rest = stays & ~moving & (s.machine.until == "settled")
     s.event(Kind.SETTLE, who[rest], a.surface[rest])
@@ -51,7 +55,9 @@ def hold(s: Swarm, who: Ints, on: tuple[Ints, Ints], other: tuple[Ints, Ints]) -
     waits = stays & ~rest
     time = s.stop[who] - s.age[who]
     for c, load in zip((a, b), loads, strict=True):
-        heat = np.where(waits & ~locked, s.mass * _grip(c) * np.abs(c.belt) * load * time, 0.0)
+        heat = np.where(
+            waits & ~locked, s.mass * _grip(c) * np.abs(c.belt) * np.maximum(load, 0.0) * time, 0.0
+        )
         s.recorder.book(who, c.surface, heat, 0.0, heat)
     s.age[who[waits]] = s.stop[who[waits]]
     s.knots(who[waits])
@@ -73,5 +79,8 @@ def _corner_loads(s: Swarm, a: Contact, b: Contact) -> tuple[Floats, NDArray[np.
     inwards = np.zeros(len(determinant), dtype=bool)
     for c, against in ((a, b), (b, a)):
         drawn = np.sign(c.belt) * dot(c.tangent, against.normal) < 0.0
-        inwards |= drawn & (np.isinf(c.friction) | (loads < 0.0).any(axis=0) & (c.friction > 0.0))
+        inwards |= drawn & (
+            np.isinf(c.friction)
+            | (loads < -WEIGHTLESS * s.gravity).any(axis=0) & (c.friction > 0.0)
+        )
     return loads, inwards

@@ -8,25 +8,12 @@ numbered: segments first, then circles.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from chutelab.machine import Machine
-
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-JOINT = 1e-12
-"""Share of the scene's size within which two ends are one joint."""
-
-FOLDED = 1e-9
-"""Difference of two directions below which one segment lies on the other."""
-
-TOUCH_ULPS = 256.0
-"""Rounding of a coordinate, in units of the last place of the scene's size: closer is touching."""
 
 NONE = -1
 
@@ -55,8 +42,8 @@ class Obstacles:
         Obstacle number of the circle at a segment's first and second end, or -1 for a point.
     follow : ndarray, (S, 2)
         Segment that shares the end, or -1.
-    cap_of : ndarray, (C, 2)
-        The one or two segments a circle is an end of; -1 for the pulley.
+    owns : ndarray of bool, (C, S)
+        Of which segments a circle is an end.
     pulley : int
         Obstacle number of the pulley, or -1.
     pulley_speed : float
@@ -77,7 +64,7 @@ class Obstacles:
     surface: Ints
     end_circle: Ints
     follow: Ints
-    cap_of: Ints
+    owns: NDArray[np.bool_]
     pulley: int
     pulley_speed: float
     touch: float
@@ -137,94 +124,3 @@ def rows_of(array: Floats, rows: Ints) -> Floats:
 def pick(array: Floats, rows: Ints, column: Ints) -> Floats:
     """Entry `column` of each particle's row, shape (k, ...)."""
     return array[np.zeros_like(rows) if len(array) == 1 else rows, column]
-
-
-def obstacles(machine: Machine) -> Obstacles:
-    """Resolve a machine's surfaces into obstacles."""
-    seg, r = machine.segments, machine.particle.radius
-    shared = seg.length.ndim == 1
-
-    def wide(array: Floats) -> Floats:
-        return array[None] if shared else array
-
-    start, tangent, length = wide(seg.start), wide(seg.tangent), wide(seg.length)
-    speed = wide(seg.speed)
-    rows, count = length.shape
-    end = start + length[..., None] * tangent
-    extent = [np.abs(start).max(initial=0.0), np.abs(end).max(initial=0.0)]
-    extent.append(np.abs(machine.releases.position).max(initial=0.0))
-    size = max(float(e) for e in extent)
-    follow = _joints(start[0], end[0], tangent[0], JOINT * size)
-
-    centers: list[Floats] = []
-    caps: list[tuple[int, int]] = []
-    end_circle = np.full((count, 2), NONE, dtype=np.int64)
-    if r > 0.0:
-        for s in range(count):
-            for side, ends in ((0, start), (1, end)):
-                partner = int(follow[s, side])
-                on_pulley = machine.pulley is not None and s == 0 and side == 1
-                if on_pulley or (partner != NONE and partner < s):
-                    continue
-                end_circle[s, side] = count + len(centers)
-                if partner != NONE:
-                    joined = 0 if follow[partner, 0] == s else 1
-                    end_circle[partner, joined] = end_circle[s, side]
-                centers.append(ends[:, s])
-                caps.append((s, partner))
-    owner = [cap[0] for cap in caps]
-    pulley = NONE
-    rho = [np.full(rows, r)] * len(centers)
-    surface = np.concatenate([seg.surface, seg.surface[owner]]).astype(np.int64)
-    belt = speed[..., None] * tangent
-    belt = np.concatenate([belt, belt[:, owner]], axis=1)
-    restitution, friction = wide(seg.restitution), wide(seg.friction)
-    restitution = np.concatenate([restitution, restitution[:, owner]], axis=1)
-    friction = np.concatenate([friction, friction[:, owner]], axis=1)
-    if machine.pulley is not None:
-        p = machine.pulley
-        pulley = count + len(centers)
-        end_circle[0, 1] = pulley
-        centers.append(np.zeros((rows, 2)))
-        caps.append((NONE, NONE))
-        rho = [*rho, np.full(rows, p.radius + r)]
-        surface = np.append(surface, p.surface)
-        belt = np.concatenate([belt, np.zeros((rows, 1, 2))], axis=1)
-        restitution = np.concatenate([restitution, np.full((rows, 1), p.restitution)], axis=1)
-        friction = np.concatenate([friction, np.full((rows, 1), p.friction)], axis=1)
-    return Obstacles(
-        start=start,
-        tangent=tangent,
-        normal=np.stack([-tangent[..., 1], tangent[..., 0]], axis=-1),
-        length=length,
-        center=np.stack(centers, axis=1) if centers else np.empty((rows, 0, 2)),
-        rho=np.stack(rho, axis=1) if rho else np.empty((rows, 0)),
-        belt=belt,
-        restitution=restitution,
-        friction=friction,
-        surface=surface,
-        end_circle=end_circle,
-        follow=follow,
-        cap_of=np.array(caps, dtype=np.int64).reshape(-1, 2),
-        pulley=pulley,
-        pulley_speed=machine.pulley.speed if machine.pulley is not None else 0.0,
-        touch=TOUCH_ULPS * float(np.finfo(np.float64).eps) * size,
-    )
-
-
-def _joints(start: Floats, end: Floats, tangent: Floats, tolerance: float) -> Ints:
-    """Which segment goes on where another ends, (S, 2); the first one found wins.
-
-    Segments that lie on each other do not go on from each other.
-    """
-    follow = np.full((len(start), 2), NONE, dtype=np.int64)
-    ends, outward = np.stack([start, end], axis=1), np.stack([-tangent, tangent], axis=1)
-    for s, e in np.ndindex(follow.shape):
-        for other, f in np.ndindex(follow.shape):
-            if other == s or follow[s, e] != NONE or follow[other, f] != NONE:
-                continue
-            apart = np.abs(ends[s, e] - ends[other, f]).max()
-            folded = np.abs(outward[s, e] - outward[other, f]).max() <= FOLDED
-            if apart <= tolerance and not folded:
-                follow[s, e], follow[other, f] = other, s
-    return follow

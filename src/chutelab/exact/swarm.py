@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chutelab.exact.arcs import Bounds
-from chutelab.exact.obstacles import NONE, Floats, Ints, Obstacles, dot, obstacles
+from chutelab.exact.layout import obstacles
+from chutelab.exact.obstacles import NONE, Floats, Ints, Obstacles, dot
 from chutelab.impact import DISK_SHARE
 from chutelab.recorder import Recorder
 from chutelab.recording import REASONS, Kind

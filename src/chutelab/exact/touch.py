@@ -26,11 +26,11 @@ impulse in the time 2 u_n/(g_n (1 - ε)). At ε = 0.999 some 20,000 bounces come
 At ε = 1 such a rebound, 1e-19 m high, is taken for rest."""
 
 
-CRAWL = 10.0 * REST
+CRAWL = 1000.0 * REST
 """m/s; a particle this slow that goes to and fro between two obstacles is coming to rest there."""
 
 OPPOSED = 1e-9
-"""Share of a pull along one surface that must press on another to hold a particle between them."""
+"""Sine of the angle at which two surfaces must meet to hold a particle between them."""
 
 
 def strike(s: Swarm, who: Ints, obstacle: Ints, side: Ints) -> None:
@@ -65,9 +65,13 @@ def _stop_jammed(s: Swarm, who: Ints, obstacle: Ints, side: Ints) -> NDArray[np.
     before = np.where(free, s.left[who], s.on[who])
     before_side = np.where(free, s.left_side[who], s.side[who])
     between = (before != NONE) & (before != obstacle) & (s.mode[who] != Mode.DONE)
-    slow = between & (np.hypot(s.v[who, 0], s.v[who, 1]) <= CRAWL)
-    s.crawls[who] = np.where(slow, s.crawls[who] + 1, 0)
+    slow = np.hypot(s.v[who, 0], s.v[who, 1]) <= CRAWL
+    s.crawls[who] = np.where(slow, s.crawls[who] + between, 0)
     jammed = between & ((s.idle[who] > COLLAPSE) | (s.crawls[who] > COLLAPSE))
+    # Faces that lie on each other make no corner.
+    one = s.contact(who[jammed], before[jammed], before_side[jammed]).normal
+    two = s.contact(who[jammed], obstacle[jammed], side[jammed]).normal
+    jammed[jammed] = np.abs(one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0]) > OPPOSED
     hold(s, who[jammed], (before[jammed], before_side[jammed]), (obstacle[jammed], side[jammed]))
     return np.asarray(jammed)
 

@@ -156,7 +156,7 @@ def draw_residual(
         ax.text(
             0.5,
             0.5,
-            fill(f"no analytic parabola: {why}", 60),
+            fill(f"no analytic parabola; {why}", 60),
             transform=ax.transAxes,
             fontsize=style.NORMAL,
             color=style.MUTED,

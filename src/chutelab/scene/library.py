@@ -26,7 +26,8 @@ class About:
 def shipped() -> dict[str, Path]:
     """Return the files of the shipped scenes by name, in alphabetical order."""
     folder = _folder()
-    return {path.stem: path for path in sorted(folder.glob("*.toml"))} if folder else {}
+    found = {path.stem: path for path in folder.glob("*.toml")} if folder else {}
+    return dict(sorted(found.items()))
 
 
 def about() -> list[About]:

@@ -111,10 +111,10 @@ def _plain(value: object) -> Any:
 
 def _traced(fault: Fault, given: Mapping[str, str]) -> Fault:
     """Add to a fault which override it came from, if one."""
-    for path, override in given.items():
+    for path, typed in given.items():
         inside = fault.key == path or fault.key.startswith((path + ".", path + "["))
         if inside or path.startswith(fault.key + "."):
-            return Fault(fault.key, fault.value, f"{fault.allowed} (from --set {override})")
+            return Fault(fault.key, fault.value, f"{fault.allowed} (from {typed})")
     return fault
 
 

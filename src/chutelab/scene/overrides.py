@@ -16,6 +16,18 @@ _SEGMENT: Final = re.compile(r"([^\s.=\[\]\"']+)((?:\[\d{1,9}\])*)")
 _FORM: Final = "must be KEY=VALUE, such as plate.angle_deg=20 or surface[0].speed=1"
 
 
+class Setting(str):
+    """A ``KEY=VALUE`` that an option of its own stands for; `typed` is what messages call it."""
+
+    __slots__ = ("typed",)
+    typed: str
+
+    def __new__(cls, override: str, typed: str) -> Setting:
+        setting = super().__new__(cls, override)
+        setting.typed = typed
+        return setting
+
+
 class _RefusedError(Exception):
     """Why an override cannot be laid over the scene."""
 
@@ -35,20 +47,21 @@ def apply(document: dict[str, Any], overrides: Sequence[str]) -> tuple[list[Faul
     Returns
     -------
     faults, given
-        Overrides that could not be laid over, and the text of each of the others by the full path
-        that it set.
+        Overrides that could not be laid over, and what was typed for each of the others by the full
+        path that it set.
     """
     faults: list[Fault] = []
     given: dict[str, str] = {}
     for override in overrides:
+        typed = override.typed if isinstance(override, Setting) else f"--set {override}"
         key, equals, text = override.partition("=")
         try:
             path = _resolve(document, _split(key.strip() if equals else ""))
             _put(document, path, value_of(text))
         except _RefusedError as refusal:
-            faults.append(Fault(f"--set {override}", None, str(refusal)))
+            faults.append(Fault(typed, None, str(refusal)))
         else:
-            given[joined(path)] = override
+            given[joined(path)] = typed
     return faults, given
 
 

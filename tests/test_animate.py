@@ -78,7 +78,7 @@ def filmed(recording: Recording) -> tuple[tuple[Moment, ...], float]:
     return film(recording, begin, end, fps=25, slow=slow), slow
 
 
-def told(*events: tuple[Kind, float, float, float]) -> Recording:
+def recorded(*events: tuple[Kind, float, float, float]) -> Recording:
     """Particle 0 with events of (kind, s, m/s along x, N s) on the incoming belt."""
     machine = build(scene.parse(TEXT))
     recorder = Recorder(1, machine.surfaces)
@@ -120,13 +120,13 @@ def test_film_runs_evenly_and_holds_at_both_impacts(fps: int, delay: int) -> Non
 def test_film_holds_at_the_hardest_four_impacts_in_their_order() -> None:
     pushes = [0.1, 1.0, 0.2, 0.8, 0.3, 0.9, 0.04, 0.7]
     impacts = [(Kind.IMPACT, 0.1 * (i + 1), 1.0, push) for i, push in enumerate(pushes)]
-    shots = film(told((Kind.RELEASE, 0.0, 1.0, 0.0), *impacts), 0.0, 1.0, fps=25, slow=5.0)
+    shots = film(recorded((Kind.RELEASE, 0.0, 1.0, 0.0), *impacts), 0.0, 1.0, fps=25, slow=5.0)
     held = [shot.t for shot in shots[:-1] if shot.delay != 4]
     assert held == pytest.approx([0.2, 0.4, 0.6, 0.8], abs=1e-15)
     assert {shot.delay for shot in shots[:-1]} == {4, 75}
     # Of equally hard ones the first.
     impacts = [(Kind.IMPACT, 0.1 * (i + 1), 1.0, 1.0) for i in range(6)]
-    shots = film(told((Kind.RELEASE, 0.0, 1.0, 0.0), *impacts), 0.0, 1.0, fps=25, slow=5.0)
+    shots = film(recorded((Kind.RELEASE, 0.0, 1.0, 0.0), *impacts), 0.0, 1.0, fps=25, slow=5.0)
     held = [shot.t for shot in shots[:-1] if shot.delay != 4]
     assert held == pytest.approx([0.1, 0.2, 0.3, 0.4], abs=1e-15)
 
@@ -205,7 +205,7 @@ def test_words_tell_the_numbers_of_the_impacts() -> None:
 @pytest.mark.parametrize(("rode", "said"), [(2.0, False), (2.001, False), (2.1, True)])
 def test_a_stick_right_after_release_is_told_if_the_speed_changed(rode: float, said: bool) -> None:
     release, stick = (Kind.RELEASE, 0.0, 2.0, 0.0), (Kind.STICK, 0.1, rode, 0.0)
-    recording = told(release, stick, (Kind.SEPARATION, 0.5, rode, 0.0))
+    recording = recorded(release, stick, (Kind.SEPARATION, 0.5, rode, 0.0))
     shots = film(recording, 0.0, 1.0, fps=25, slow=5.0)
     words = {shot.words for shot in shots if 0.15 < shot.t < 0.45}
     assert words == {
@@ -214,7 +214,9 @@ def test_a_stick_right_after_release_is_told_if_the_speed_changed(rode: float, s
         else "rides the incoming belt"
     }
     # One that comes later is news at any speed.
-    recording = told(release, (Kind.SLIP, 0.05, 2.0, 0.0), stick, (Kind.SEPARATION, 0.5, 2.0, 0.0))
+    recording = recorded(
+        release, (Kind.SLIP, 0.05, 2.0, 0.0), stick, (Kind.SEPARATION, 0.5, 2.0, 0.0)
+    )
     shots = film(recording, 0.0, 1.0, fps=25, slow=5.0)
     words = {shot.words for shot in shots if 0.15 < shot.t < 0.45}
     assert words == {f"t = 0.100 s: {sentence(recording, recording.events[2])}"}

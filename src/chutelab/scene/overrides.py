@@ -23,6 +23,7 @@ class Setting(str):
     typed: str
 
     def __new__(cls, override: str, typed: str) -> Setting:
+        """Keep what was typed beside the text."""
         setting = super().__new__(cls, override)
         setting.typed = typed
         return setting

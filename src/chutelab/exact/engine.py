@@ -48,8 +48,8 @@ def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Re
     _release(s)
     rounds = 0
     while True:
-        moving = s.active(Mode.FLIGHT, Mode.CARRIED, Mode.FACE)
-        riding = s.active(Mode.ARC)
+        moving = s.active(Mode.FLIGHT, Mode.FACE)
+        riding = s.active(Mode.ARC, Mode.ARC)
         if not len(moving) and not len(riding):
             break
         rounds += 1

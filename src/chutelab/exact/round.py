@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from chutelab.exact.arcs import bounds
+from chutelab.exact.arcs import Bounds, bounds
 from chutelab.exact.obstacles import Floats, Ints, dot, pick
 from chutelab.exact.swarm import Mode, Swarm
 from chutelab.exact.touch import end_slip, rest_on, settle_law, strike
@@ -45,7 +45,9 @@ def carry_round(s: Swarm, who: Ints) -> None:
         cosine = np.minimum(v**2 / (s.gravity * rho), 1.0) if s.gravity > 0.0 else np.ones(len(who))
     phi = np.arctan2(np.sqrt((1.0 - cosine) * (1.0 + cosine)), cosine)
     pulley = np.full(len(who), o.pulley - o.segments)
-    found = bounds(o, who, pulley, rho, np.zeros(len(who)), s.radius)
+    found = Bounds.free(len(who))
+    if phi.any():
+        found = bounds(o, who, pulley, rho, np.zeros(len(who)), s.radius)
     struck = ~found.high_handover & (found.high < phi)
     end = np.where(struck, found.high, phi)
     end = np.where(

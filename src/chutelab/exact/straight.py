@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from chutelab.ballistics import closing_time
@@ -11,6 +13,9 @@ from chutelab.exact.round import carry_round, ride_on
 from chutelab.exact.swarm import Mode, Swarm
 from chutelab.exact.touch import end_slip, face_pull, settle_law, strike
 from chutelab.recording import Kind
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 CONTACT, GRIP, END, EXIT, STOP = range(5)
 """What ends a stretch; earlier ones win ties."""
@@ -22,46 +27,14 @@ COLLINEAR = 1e-12
 def straight(s: Swarm, who: Ints) -> None:
     """Move particles on to their next event and resolve it."""
     face, carried = s.mode[who] == Mode.FACE, s.mode[who] == Mode.CARRIED
-    flying = s.mode[who] == Mode.FLIGHT
-    acceleration = np.zeros((len(who), 2))
-    acceleration[flying, 1] = -s.gravity
-    force = np.zeros(len(who))
-    acceleration[face], force[face] = face_pull(s, who[face])
-
-    times = np.full((5, len(who)), np.inf)
-    times[GRIP, face], times[END, face] = _grip_and_end(
-        s, who[face], acceleration[face], force[face]
-    )
-    v = s.v[who[carried], 0]
-    with np.errstate(divide="ignore"):
-        times[END, carried] = np.where(v > 0.0, -s.p[who[carried], 0] / v, np.inf)
-    times[EXIT, flying] = _exit(s, who[flying])
-    times[STOP] = s.stop[who] - s.age[who]
-    on = np.where(carried, 0, s.on[who])
-    motion = Motion(
-        who, s.p[who], s.v[who], acceleration,
-        np.where(carried, s.obstacles.pulley, s.left[who]),
-        s.left_side[who], np.where(carried, 4, s.order[who]),
-        on, np.where(carried, 1, s.side[who]),
-    )  # fmt: skip
-    times[CONTACT], obstacle, side = first_contact(
-        motion, s.obstacles, s.radius, times[1:].min(axis=0)
-    )
+    motion, force = _motion(s, who, face, carried)
+    times = _times(s, motion, face, carried, force)
+    until = times[GRIP:].min(axis=0)
+    times[CONTACT], obstacle, side = first_contact(motion, s.obstacles, s.radius, until)
     outcome = np.argmin(times, axis=0)
     dt = times[outcome, np.arange(len(who))]
     s.count_idle(who, dt)
-
-    _slide_books(s, who[face], dt[face], acceleration[face], force[face])
-    s.age[who] += dt
-    step = dt[:, None]
-    s.p[who] += step * (s.v[who] + 0.5 * step * acceleration)
-    s.v[who] += step * acceleration
-    if s.spins:
-        s.z[who] += 2.0 * force * dt
-    s.p[who[face]] = s.obstacles.snapped(
-        who[face], s.on[who[face]], s.side[who[face]], s.p[who[face]], s.radius
-    )
-    s.knots(who)
+    _move(s, motion, dt, face, force)
 
     stopped = outcome == STOP
     s.age[who[stopped]] = s.stop[who[stopped]]
@@ -75,6 +48,61 @@ def straight(s: Swarm, who: Ints) -> None:
     hit = outcome == CONTACT
     if hit.any():
         strike(s, who[hit], obstacle[hit], side[hit])
+
+
+def _motion(
+    s: Swarm, who: Ints, face: NDArray[np.bool_], carried: NDArray[np.bool_]
+) -> tuple[Motion, Floats]:
+    """Return how the particles move now, and the friction force per mass on faces, (k,)."""
+    acceleration, force = np.zeros((len(who), 2)), np.zeros(len(who))
+    acceleration[~face & ~carried, 1] = -s.gravity
+    if face.any():
+        acceleration[face], force[face] = face_pull(s, who[face])
+    left, order, on, side = s.left[who], s.order[who], s.on[who], s.side[who]
+    if carried.any():
+        # Held on the belt, whatever the height in the bed: neither belt nor pulley is met.
+        left, order = np.where(carried, s.obstacles.pulley, left), np.where(carried, 4, order)
+        on, side = np.where(carried, 0, on), np.where(carried, 1, side)
+    motion = Motion(who, s.p[who], s.v[who], acceleration, left, s.left_side[who], order, on, side)
+    return motion, force
+
+
+def _times(
+    s: Swarm, motion: Motion, face: NDArray[np.bool_], carried: NDArray[np.bool_], force: Floats
+) -> Floats:
+    """Return when each of the events would come, (5, k), but for contacts."""
+    who = motion.rows
+    times = np.full((5, len(who)), np.inf)
+    if face.any():
+        times[GRIP, face], times[END, face] = _grip_and_end(
+            s, who[face], motion.acceleration[face], force[face]
+        )
+    if carried.any():
+        v = motion.velocity[carried, 0]
+        with np.errstate(divide="ignore"):
+            times[END, carried] = np.where(v > 0.0, -motion.position[carried, 0] / v, np.inf)
+    flying = ~face & ~carried
+    if flying.any():
+        times[EXIT, flying] = _exit(s, who[flying])
+    times[STOP] = s.stop[who] - s.age[who]
+    return times
+
+
+def _move(s: Swarm, motion: Motion, dt: Floats, face: NDArray[np.bool_], force: Floats) -> None:
+    """Carry the state over a stretch, and book what friction did."""
+    who, step = motion.rows, dt[:, None]
+    sliding = who[face]
+    _slide_books(s, sliding, dt[face], motion.acceleration[face], force[face])
+    s.age[who] += dt
+    s.p[who] += step * (motion.velocity + 0.5 * step * motion.acceleration)
+    s.v[who] += step * motion.acceleration
+    if s.spins:
+        s.z[who] += 2.0 * force * dt
+    if len(sliding):
+        s.p[sliding] = s.obstacles.snapped(
+            sliding, s.on[sliding], s.side[sliding], s.p[sliding], s.radius
+        )
+    s.knots(who)
 
 
 def _grip_and_end(

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class Mode(IntEnum):
-    """How a particle moves now."""
+    """How a particle moves now; from `FACE` on it touches something."""
 
     DONE = 0
     FLIGHT = 1
@@ -111,9 +111,9 @@ class Swarm:
                 f" {self.released[stuck] + self.age[stuck]:.6g} s, at {self.p[stuck].tolist()} m"
             )
 
-    def active(self, *modes: Mode) -> Ints:
-        """Return the particles in one of the modes."""
-        return np.flatnonzero(np.isin(self.mode, modes))
+    def active(self, first: Mode, last: Mode) -> Ints:
+        """Return the particles in one of the modes from `first` to `last`."""
+        return np.flatnonzero((self.mode >= first) & (self.mode <= last))
 
     def omega(self, who: Ints) -> Floats:
         """Angular velocities, rad/s."""

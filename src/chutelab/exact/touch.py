@@ -47,8 +47,9 @@ def strike(s: Swarm, who: Ints, obstacle: Ints, side: Ints) -> None:
         s.finish(who[landing], "landed")
 
     jammed = _stop_jammed(s, who, obstacle, side)
-    held = np.isin(s.mode[who], [Mode.FACE, Mode.ARC])
-    held[held] = _still_on(s, who[held])
+    held = s.mode[who] >= Mode.FACE
+    if held.any():
+        held[held] = _still_on(s, who[held])
     rests = (_load(s, who, obstacle, c) > 0.0) & (rebound <= REST)
     live = (s.mode[who] != Mode.DONE) & ~jammed
     slides, falls, flies = held & live, rests & ~held & live, ~rests & ~held & live
@@ -68,6 +69,8 @@ def _stop_jammed(s: Swarm, who: Ints, obstacle: Ints, side: Ints) -> NDArray[np.
     slow = np.hypot(s.v[who, 0], s.v[who, 1]) <= CRAWL
     s.crawls[who] = np.where(slow, s.crawls[who] + between, 0)
     jammed = between & ((s.idle[who] > COLLAPSE) | (s.crawls[who] > COLLAPSE))
+    if not jammed.any():
+        return np.asarray(jammed)
     # Faces that lie on each other make no corner.
     one = s.contact(who[jammed], before[jammed], before_side[jammed]).normal
     two = s.contact(who[jammed], obstacle[jammed], side[jammed]).normal

@@ -17,6 +17,9 @@ FOOT = 1e-12
 """Share of a segment's length by which its face reaches past its ends, so that no particle slips
 through the joint of two segments by rounding."""
 
+SIDES = np.array([1, -1])[:, None, None]
+"""The two faces of a segment; the first wins ties."""
+
 GLANCING = 1e-3
 """Share of the speed towards a circle below which a Newton step would not improve the contact."""
 
@@ -77,18 +80,7 @@ def first_contact(
     time, obstacle, side
         inf and -1 where there is none; side is +1 or -1 for a face, 0 for a circle.
     """
-    time = np.full(len(motion.rows), np.inf)
-    obstacle = np.full(len(motion.rows), NONE, dtype=np.int64)
-    side = np.zeros(len(motion.rows), dtype=np.int64)
-    if obstacles.segments:
-        for sign in (1, -1):
-            t = _faces(motion, obstacles, radius, sign, until)
-            nearest = np.argmin(t, axis=1)
-            t = t[np.arange(len(t)), nearest]
-            sooner = t < time
-            time = np.where(sooner, t, time)
-            obstacle = np.where(sooner, nearest, obstacle)
-            side = np.where(sooner, sign, side)
+    time, obstacle, side = _faces(motion, obstacles, radius, until)
     if obstacles.center.shape[1]:
         t, circle = _circles(motion, obstacles, np.minimum(time, until))
         sooner = t < time
@@ -98,17 +90,23 @@ def first_contact(
     return time, obstacle, side
 
 
-def _faces(motion: Motion, obstacles: Obstacles, radius: float, sign: int, until: Floats) -> Floats:
-    """Return the times to the faces on one side of all segments, (k, S); inf after `until`."""
-    normal = sign * rows_of(obstacles.normal, motion.rows)
-    start = rows_of(obstacles.start, motion.rows)
+def _faces(
+    motion: Motion, obstacles: Obstacles, radius: float, until: Floats
+) -> tuple[Floats, Ints, Ints]:
+    """Return time, segment and side of the first face met up to `until`, (k,); inf, -1, 0 if none.
+
+    Works on arrays of shape (2, k, S): both faces of all segments.
+    """
+    count, segments = len(motion.rows), obstacles.segments
+    if not segments:
+        return np.full(count, np.inf), np.full(count, NONE), np.zeros(count, dtype=np.int64)
+    normal, start = rows_of(obstacles.normal, motion.rows), rows_of(obstacles.start, motion.rows)
     p, v, a = (x[:, None] for x in (motion.position, motion.velocity, motion.acceleration))
-    gap = dot(p - start, normal) - radius
-    rate, acceleration = dot(v, normal), np.broadcast_to(dot(a, normal), gap.shape)
-    rate = np.broadcast_to(rate, gap.shape)
-    columns = np.arange(obstacles.segments)
+    gap = SIDES * dot(p - start, normal) - radius
+    rate, acceleration = SIDES * dot(v, normal), SIDES * dot(a, normal)
+    columns = np.arange(segments)
     leaving = motion.left[:, None] == columns
-    same = leaving & (motion.left_side[:, None] == sign)
+    same = leaving & (motion.left_side[:, None] == SIDES)
     touching = (np.abs(gap) <= obstacles.touch) | same
     gap = np.where(touching, 0.0, gap)
     along_face = touching & (np.abs(rate) <= PARALLEL * np.sqrt(dot(v, v)))
@@ -116,11 +114,11 @@ def _faces(motion: Motion, obstacles: Obstacles, radius: float, sign: int, until
     unpressed = along_face & (np.abs(acceleration) <= PARALLEL * np.sqrt(dot(a, a)))
     acceleration = np.where(unpressed, 0.0, acceleration)
     time = closing_time(gap, rate, acceleration)
-    own = (motion.on[:, None] == columns) & (motion.on_side[:, None] == sign)
+    own = (motion.on[:, None] == columns) & (motion.on_side[:, None] == SIDES)
     never = own | (leaving & ~same) | (same & (motion.order[:, None] > 1))
     never |= (time < 0.0) | (time > until[:, None])
     time = np.where(never, np.inf, time)
-    finite = np.where(np.isfinite(time), time, 0.0)[..., None]
+    finite = np.where(never, 0.0, time)[..., None]
     there = p + finite * (v + 0.5 * finite * a) - start
     tangent = rows_of(obstacles.tangent, motion.rows)
     foot, pace = dot(there, tangent), dot(v, tangent)
@@ -129,7 +127,12 @@ def _faces(motion: Motion, obstacles: Obstacles, radius: float, sign: int, until
     over = (foot >= -reach) & (foot <= length + reach)
     # Grazing the end on the way out is not lying on the face.
     outward = ((foot <= reach) & (pace < 0.0)) | ((foot >= length - reach) & (pace > 0.0))
-    return np.where(over & ~(along_face & outward), time, np.inf)
+    time = np.where(over & ~(along_face & outward), time, np.inf)
+    nearest = np.argmin(time.transpose(1, 0, 2).reshape(count, -1), axis=1)
+    side, segment = np.divmod(nearest, segments)
+    first = time[side, np.arange(count), segment]
+    met = np.isfinite(first)
+    return first, np.where(met, segment, NONE), np.where(met, SIDES[side, 0, 0], 0)
 
 
 def _circles(motion: Motion, obstacles: Obstacles, until: Floats) -> tuple[Floats, Ints]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import acos, atan, cos, degrees, hypot, radians, sin, sqrt
 
 import numpy as np
@@ -14,6 +15,7 @@ from scipy.optimize import brentq
 from chutelab import exact, machine, scene
 from chutelab.ledger import ledger
 from chutelab.recording import Kind
+from chutelab.releases import Releases
 
 G = 9.81
 FLOOR = {"name": "floor", "from": [-50.0, 0.0], "to": [50.0, 0.0]}
@@ -373,6 +375,31 @@ def test_alone_or_in_a_crowd_a_particle_does_the_same_to_the_bit():
     }
     alone = {**document, "stream": {**document["stream"], "count": 1}}
     assert run(document).track(0).tobytes() == run(alone).track(0).tobytes()
+
+
+def test_particles_may_have_surfaces_of_their_own():
+    base = scene.to_dict(scene.load("low-speed"))
+    built = [
+        machine.build(scene.from_dict({**base, "plate": {**base["plate"], "angle_deg": angle}}))
+        for angle in (0.0, 10.0, -20.0)
+    ]
+    each = [m.segments for m in built]
+    rows = {
+        name: np.stack([getattr(s, name) for s in each])
+        for name in ("start", "tangent", "length", "speed", "restitution", "friction")
+    }
+    releases = [
+        np.concatenate([getattr(m.releases, name) for m in built])
+        for name in ("t", "position", "velocity", "carried")
+    ]
+    batch = replace(
+        built[0],
+        segments=machine.Segments(**rows, surface=each[0].surface.copy()),
+        releases=Releases(*releases),
+    )
+    together = exact.run(batch)
+    for n, alone in enumerate(built):
+        assert together.track(n).tobytes() == exact.run(alone).track(0).tobytes()
 
 
 def test_interacting_particles_are_refused():

@@ -183,3 +183,11 @@ def test_the_angle_at_separation_is_measured_from_the_top():
     left = first(recording, Kind.SEPARATION, "incoming")["position"]
     assert compare(recording).simulated["phi1"] == atan2(left[0], left[1])
     assert cos(compare(recording).simulated["phi1"]) == pytest.approx(4.0 / (9.81 * 0.504))
+
+
+def test_a_particle_that_never_stops_slipping_is_not_compared_with_one_that_does():
+    endless = ("outgoing.friction=0", "run.until=settled")
+    found = compare(simulate(scene.load("perpendicular", endless)))
+    assert "belt_work" not in found.errors
+    assert found.theory["belt_work"] > 0.0
+    assert found.max < 5e-15

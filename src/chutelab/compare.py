@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from chutelab import scene as scenes
 from chutelab.ledger import ledger
-from chutelab.recording import Kind
+from chutelab.recording import REASONS, Kind
 from chutelab.theory import predict
 
 if TYPE_CHECKING:
@@ -139,7 +139,8 @@ def observed(recording: Recording, scene: Scene) -> dict[str, float]:
         out["d3"] = top + recording.particle.radius - float(down["position"][1])
         out["dEk"] = 0.5 * mass * (vx**2 + scene.outgoing.speed**2)
         out["P"] = out["dEk"] * scene.stream.rate
-    if scene.run.until == "settled" and recording.count == 1:
+    # What the belt pays until there is no slip is known only of a particle that got there.
+    if recording.count == 1 and REASONS[recording.ended[0]] == "settled":
         entries = ledger(recording).by_surface.get("outgoing")
         if entries is not None:
             out["belt_work"], out["slip_heat"] = entries["belt_work"], entries["friction_loss"]

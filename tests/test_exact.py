@@ -268,6 +268,26 @@ def test_adhesion_lets_go_at_the_critical_angle_and_the_belt_takes_the_fall():
     assert ledger(recording).belt_work == pytest.approx(-0.008 * G * fall, rel=1e-13)
 
 
+@pytest.mark.parametrize("friction", [0.2, 0.5, 3.0, "adhesion"])
+def test_a_grip_ends_when_the_equation_of_motion_says(friction):
+    # Carried at v: φ' = v/ρ. It ends when g sin φ takes more friction than µ N, or N is used up.
+    v, ride = 2.0, 0.504
+
+    def load(f):
+        return G * cos(f) - v**2 / ride
+
+    if friction == "adhesion":
+        end, kind = (lambda _, y: load(y[0])), Kind.SEPARATION
+    else:
+        end, kind = (lambda _, y: friction * load(y[0]) - G * sin(y[0])), Kind.SLIP
+    turn = solve_ivp(
+        lambda _, y: [v / ride], [0.0, 2.0], [0.0], events=stop(end), rtol=1e-12, atol=1e-14
+    )
+    event = conveyor(speed=v, friction=friction).select(kind)[0]
+    assert np.arctan2(*event["position"]) == pytest.approx(turn.y[0, -1], abs=1e-12)
+    assert event["t"] - 1.0 / v == pytest.approx(turn.t[-1], abs=1e-12)
+
+
 @pytest.mark.parametrize("friction", [0.2, 0.5, 1.0, 3.0])
 def test_a_gripped_particle_slips_before_it_leaves(friction):
     v, ride = 2.0, 0.504

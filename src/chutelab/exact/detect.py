@@ -172,25 +172,28 @@ def _circles(motion: Motion, obstacles: Obstacles, until: Floats) -> tuple[Float
     t = np.where(now, 0.0, np.inf)
     if open_.any():
         found = first_descent(gap[:, open_], until[who[open_]])
-        # With the contact being left divided out, the polynomial is the better of the two.
-        apart = order[open_] == 0
-        polished = _polished(found, d[open_], v[open_], a[open_], rho[open_])
-        t[open_] = np.where(apart, polished, found)
+        t[open_] = _polished(found, d[open_], v[open_], a[open_], rho[open_], order[open_] == 0)
     best = np.argsort(t, kind="stable")[::-1]
     time[who[best]], nearest[who[best]] = t[best], circle[best]
     return time, np.where(np.isfinite(time), nearest, NONE)
 
 
-def _polished(t: Floats, d: Floats, v: Floats, a: Floats, rho: Floats) -> Floats:
-    """Improve contact times by one Newton step on the distance itself: less rounding."""
-    met = np.isfinite(t)
-    time = np.where(met, t, 0.0)[:, None]
+def _polished(
+    t: Floats, d: Floats, v: Floats, a: Floats, rho: Floats, apart: NDArray[np.bool_]
+) -> Floats:
+    """Improve contact times by one Newton step on the distance itself.
+
+    Its rounding does not grow with the flight, as the polynomial's does; but of a contact that is
+    being left (not `apart` before) the polynomial, divided by t, is better on ways below ρ.
+    """
+    time = np.where(np.isfinite(t), t, 0.0)[:, None]
     there, pace = d + time * (v + 0.5 * time * a), v + time * a
     distance = np.hypot(there[:, 0], there[:, 1])
     rate = dot(there, pace) / distance
-    steep = met & (rate < -GLANCING * np.sqrt(dot(pace, pace)))
-    correction = (distance - rho) / np.where(steep, rate, 1.0)
-    return np.where(steep, np.maximum(t - correction, 0.0), t)
+    steep = np.isfinite(t) & (rate < -GLANCING * np.sqrt(dot(pace, pace)))
+    better = steep & (apart | (-rate * time[:, 0] > rho))
+    correction = (distance - rho) / np.where(better, rate, 1.0)
+    return np.where(better, np.maximum(t - correction, 0.0), t)
 
 
 def _near(motion: Motion, obstacles: Obstacles, until: Floats) -> NDArray[np.bool_]:

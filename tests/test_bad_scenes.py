@@ -381,7 +381,7 @@ KNOWN = {
         *("count", "rate", "bed_height", "speed_spread", "seed", "at", "velocity", "interact"),
         *("restitution", "friction"),
     },
-    "run": {"engine", "until", "max_time", "dt"},
+    "run": {"engine", "until", "max_time", "dt", "align"},
 }
 
 

@@ -84,7 +84,7 @@ CONTRACT = {
         "restitution": 0.5,
         "friction": 0.3,
     },
-    "run": {"engine": "auto", "until": "landed", "max_time": 30.0, "dt": 0.001},
+    "run": {"engine": "auto", "until": "landed", "max_time": 30.0, "dt": 0.001, "align": True},
 }
 
 

@@ -205,6 +205,7 @@ class _Builder:
             until=until if isinstance(until, str) else "time",
             end_time=bound if isinstance(until, str) else min(bound, until),
             dt=scene.run.dt,
+            align=scene.run.align,
             interact=scene.stream.interact and scene.stream.count > 1,
             pair_restitution=scene.stream.restitution,
             pair_friction=scene.stream.friction,

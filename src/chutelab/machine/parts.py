@@ -103,6 +103,8 @@ class Machine:
         s; no track goes on after it.
     dt : float
         s; longest step of the pymunk engine.
+    align : bool
+        Whether its steps end at impacts.
     interact : bool
         Whether particles meet each other.
     pair_restitution, pair_friction : float
@@ -125,6 +127,7 @@ class Machine:
     until: Literal["landed", "settled", "time"]
     end_time: float
     dt: float
+    align: bool
     interact: bool
     pair_restitution: float
     pair_friction: float

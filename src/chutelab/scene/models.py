@@ -203,6 +203,9 @@ class Run(Table):
         30.0, "Bound on every ending, counted from the last release", "s"
     )
     dt: Number = described(0.001, "Longest step of the pymunk engine", "s", ge=1e-7, le=0.1)
+    align: bool = described(
+        True, "Whether steps of the pymunk engine end at impacts, or all last dt (for comparison)"
+    )
 
 
 class Scene(Table):

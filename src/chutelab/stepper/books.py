@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.recording import Kind
-from chutelab.stepper.strike import FAINT
+from chutelab.stepper.impacts import FAINT
 from chutelab.stepper.tracks import CARRIED, FLYING
 
 if TYPE_CHECKING:

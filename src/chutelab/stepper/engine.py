@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from math import ceil, inf
+from heapq import heapify, heappop, heappush
+from math import inf
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -11,11 +12,14 @@ from numpy.typing import NDArray
 
 from chutelab.recorder import Recorder
 from chutelab.recording import Kind
-from chutelab.stepper.books import SETTLED, STILL, Motion, settle_books
+from chutelab.stepper.books import SETTLED, STILL
 from chutelab.stepper.carriage import Carriage, carriage
+from chutelab.stepper.forecast import Forecast
+from chutelab.stepper.impacts import particle_partner, solid_partner, strike
+from chutelab.stepper.kick import kick
+from chutelab.stepper.outline import Outline
 from chutelab.stepper.solids import Solids, solids
 from chutelab.stepper.state import Run
-from chutelab.stepper.strike import lone, strike
 from chutelab.stepper.tracks import CARRIED, DONE, FLYING, RESTING, WAITING
 
 if TYPE_CHECKING:
@@ -23,7 +27,7 @@ if TYPE_CHECKING:
 
     from chutelab.machine import Machine
     from chutelab.recording import Recording
-    from chutelab.stepper.world import Contacts
+    from chutelab.stepper.clash import Clash
 
 Ints = NDArray[np.int64]
 
@@ -60,11 +64,18 @@ def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Re
     recorder = Recorder(machine.count, machine.surfaces)
     shapes = solids(machine)
     report = _Report(progress)
+    outline = Outline(
+        shapes,
+        machine.pulley.radius if machine.pulley is not None else 0.0,
+        machine.particle.radius,
+        machine.gravity,
+    )
+    clashes: dict[int, Clash] = {}
     everybody = np.arange(machine.count)
     groups = [everybody] if machine.interact else np.split(everybody, machine.count)
     steps = 0
     for done, ids in enumerate(groups):
-        loop = _Loop(machine, shapes, recorder, ids)
+        loop = _Loop(machine, shapes, outline, recorder, ids, clashes)
         report.done, report.part = done / len(groups), 1.0 / len(groups)
         steps += loop.run(report)
     report.last()
@@ -98,96 +109,116 @@ class _Report:
 
 
 class _Loop:
-    """Steps one world until its last particle has ended."""
+    """Runs one world until its last particle has ended."""
 
-    def __init__(self, machine: Machine, shapes: Solids, recorder: Recorder, ids: Ints) -> None:
+    def __init__(
+        self,
+        machine: Machine,
+        shapes: Solids,
+        outline: Outline,
+        recorder: Recorder,
+        ids: Ints,
+        clashes: dict[int, Clash],
+    ) -> None:
         self.machine = machine
         releases = machine.releases
-        self.release = releases.t[ids].copy()
+        self.release = releases.t[ids]
         self.rides: dict[int, Carriage] = {
             n: carriage(machine, shapes, int(i))
             for n, i in enumerate(ids.tolist())
             if releases.carried[i]
         }
-        self.separation = np.full(len(ids), inf)
-        for n, ride in self.rides.items():
-            self.separation[n] = ride.until
-        self.start = float(self.release[0])
+        start = float(self.release[0])
         if len(ids) == 1 and 0 in self.rides:
             # Nothing to step before it is let go.
-            self.start = min(self.rides[0].until, machine.end_time)
-        span = machine.end_time - self.start
-        self.steps = max(0, ceil(span / machine.dt - 1e-9))
-        # All steps alike: pymunk reports impulses wrongly where two steps differ in length.
-        self.run_state = Run(
-            machine, shapes, recorder, ids, span / self.steps if self.steps else machine.dt
-        )
-        self.agenda = -inf
+            start = min(self.rides[0].until, machine.end_time)
+        self.run_state = Run(machine, shapes, recorder, ids, start, machine.dt, clashes)
+        self.forecast = Forecast(self.run_state, outline)
+        self.agenda = [
+            (float(t), n, self._release) for n, t in enumerate(self.release) if t < machine.end_time
+        ]
+        heapify(self.agenda)
+        self.last, self.tick = start, inf
+        self.steps = 0
 
     def run(self, report: _Report) -> int:
-        """Step to the end; return the number of steps taken."""
-        r, taken = self.run_state, 0
-        self._schedule(self.start)
-        for n in range(1, self.steps + 1):
-            if (r.tracks.mode == DONE).all():
+        """Run to the end; return the number of steps of pymunk, of all and of pairs."""
+        r, end = self.run_state, self.machine.end_time
+        now = begin = self.agenda[0][0] if self.agenda else end
+        while True:
+            self._prepare(now)
+            impact, exit_ = self.forecast.next(), float(r.tracks.exit.min())
+            due = self.agenda[0][0] if self.agenda else inf
+            now = min(impact, exit_, due, self.tick)
+            if now > end or now == inf:
                 break
-            self._step(self.start + (n - 1) * r.dt, self.start + n * r.dt)
-            taken = n
-            if n % 32 == 0:
-                report(n / self.steps)
-        self._stop(self.start + taken * r.dt)
-        return taken
+            if now == due:
+                _, n, act = heappop(self.agenda)
+                act(n, now)
+            elif now == exit_:
+                self._exit(now)
+            elif now == impact:
+                self._impact(now)
+            else:
+                self._step(now)
+            if self.steps % 32 == 0:
+                report((now - begin) / (end - begin) if end > begin else 1.0)
+        self._stop()
+        return self.steps
 
-    def _step(self, t0: float, t: float) -> None:
-        r = self.run_state
-        self._carry(t0, t)
-        r.world.step(r.dt)
-        contacts = r.world.contacts()
-        touched = np.zeros(r.count, dtype=bool)
-        if contacts is not None:
-            touched[contacts.first] = True
-            touched[contacts.other[contacts.other < r.count]] = True
-        r.lift(np.flatnonzero((r.tracks.mode == RESTING) & ~touched), t0)
-        if contacts is None:
-            r.touching = np.empty(0, dtype=np.int64)
+    def _prepare(self, now: float) -> None:
+        """Foretell what new paths lead to; see whether pymunk has to step."""
+        r, mode = self.run_state, self.run_state.tracks.mode
+        flying, resting = (mode == FLYING).any(), (mode == RESTING).any()
+        if self.machine.align:
+            alive = resting or (flying and self.machine.interact and (mode == CARRIED).any())
         else:
-            self._resolve(contacts, t)
-            self._settle(t)
-        if t >= self.agenda or r.tracks.exit.min() <= t:
-            self._schedule(t)
+            alive = flying or resting
+        if not alive:
+            self.tick = inf
+        elif self.tick == inf:
+            self.tick = r.next_tick(now)
+            self.last = self.tick - r.dt
+            self._carry(now)
+        if self.machine.align:
+            self.forecast.refresh(now, self.tick)
+        r.fresh.clear()
 
-    def _resolve(self, contacts: Contacts, t: float) -> None:
-        """Hand the contacts of a step to those who know what to do with them."""
+    def _carry(self, now: float) -> None:
+        """Put carried particles on paths that agree with their rides now and at the next step."""
         r, k = self.run_state, self.run_state.tracks
-        x, v, spin = r.world.states()
-        carried = k.mode == CARRIED
-        first_carried = carried[contacts.first]
-        if first_carried.any():
-            contacts = contacts.turned(first_carried)
-        alone = lone(r, contacts)
-        keys = r.keys(contacts.first, contacts.other)
-        flying = np.flatnonzero(k.mode == FLYING)
-        before, spin_before = k.aim.copy(), k.spin.copy()
-        before[flying] = k.flight(flying, t)[1] - 0.5 * r.dt * r.gravity
-        before[carried], spin_before[flying] = v[carried], k.omega[flying]
-        spin_before[carried] = 0.0
-        motion = Motion(before, v, spin_before, spin)
-        states = np.concatenate([x, v], axis=1)
-        for row in np.flatnonzero(alone).tolist():
-            strike(r, contacts, row, t, states)
-        if not alone.all():
-            settle_books(r, contacts.take(~alone), x, motion, t)
-        r.touching = keys
+        span = self.tick - now
+        if not self.machine.interact or not 0.0 < span < inf:
+            return
+        for n in np.flatnonzero(k.mode == CARRIED).tolist():
+            x0, _ = self.rides[n].state(now)
+            x1, _ = self.rides[n].state(self.tick)
+            k.from_t[n], k.from_x[n] = now, x0
+            k.from_v[n] = (np.subtract(x1, x0)) / span - 0.5 * span * r.gravity
+            r.version[n] += 1
 
-    def _carry(self, t0: float, t: float) -> None:
-        """Lead carried bodies along their rides during a step."""
+    def _impact(self, t: float) -> None:
+        r, what = self.run_state, self.forecast.take()
+        self.steps += 1
+        if what.touch is not None:
+            partner = solid_partner(r, what.touch)
+        else:
+            partner = particle_partner(r, what.particle, what.other, t)
+        strike(r, what.particle, partner, t)
+
+    def _step(self, t: float) -> None:
         r = self.run_state
-        for n in np.flatnonzero(r.tracks.mode == CARRIED).tolist():
-            ride = self.rides[n]
-            if ride.x + ride.speed * (t - ride.t) > 0.0:
-                (x0, y0), _ = ride.state(t0)
-                (x1, y1), _ = ride.state(t)
-                r.world.place(n, (x0, y0), ((x1 - x0) / r.dt, (y1 - y0) / r.dt))
+        mode = r.tracks.mode
+        if not self.machine.align:
+            kick(r, mode == CARRIED, self.last, t)
+        elif (mode == RESTING).any():
+            kick(r, self.forecast.beside & (mode == CARRIED), self.last, t)
+        self.steps += 1
+        self._settle(t)
+        self.last, self.tick = t, t + r.dt
+        self._carry(t)
+        if self.machine.align:
+            self.forecast.window(t, self.tick)
 
     def _settle(self, t: float) -> None:
         """End what has settled."""
@@ -208,52 +239,41 @@ class _Loop:
         r.event(Kind.SETTLE, who, t, k.x[who], k.v[who], k.omega[who], r.on[who])
         r.finish(who, "settled")
 
-    def _schedule(self, t: float) -> None:
-        """Do what is due by t: releases, separations, exits."""
+    def _exit(self, t: float) -> None:
         r, k = self.run_state, self.run_state.tracks
         gone = np.flatnonzero(k.exit <= t)
-        if len(gone):
-            for n in gone.tolist():
-                one = np.array([n])
-                x, v = k.flight(one, float(k.exit[n]))
-                k.knot(one, k.exit[n], x, v, k.omega[n])
-            r.event(Kind.EXIT, gone, k.t[gone], k.x[gone], k.v[gone], k.omega[gone])
-            r.finish(gone, "exit")
-        end = self.machine.end_time
-        due = np.flatnonzero((k.mode == WAITING) & (self.release <= t) & (self.release < end))
-        for n in due.tolist():
-            self._release(n, t)
-        for n in np.flatnonzero((k.mode == CARRIED) & (self.separation <= t)).tolist():
-            self._separate(n, self.rides[n], t)
-        waiting, carried = k.mode == WAITING, k.mode == CARRIED
-        self.agenda = min(
-            float(self.release[waiting].min(initial=inf)),
-            float(self.separation[carried].min(initial=inf)),
-        )
+        x, v = k.flight(gone, t)
+        k.knot(gone, t, x, v, k.omega[gone])
+        r.event(Kind.EXIT, gone, t, x, v, k.omega[gone])
+        r.finish(gone, "exit")
 
     def _release(self, n: int, t: float) -> None:
         r, k, releases = self.run_state, self.run_state.tracks, self.machine.releases
         one, i = np.array([n]), int(self.run_state.ids[n])
         x, v = releases.position[i], releases.velocity[i]
-        k.knot(one, self.release[n], x, v, 0.0)
-        r.event(Kind.RELEASE, one, self.release[n], x, v, 0.0)
+        k.knot(one, t, x, v, 0.0)
+        r.event(Kind.RELEASE, one, t, x, v, 0.0)
         if n not in self.rides:
-            self._let_fly(n, t)
+            r.take_off(one, t)
             return
         k.mode[n] = CARRIED
         if self.rides[n].speed == 0.0 and self.machine.until == "settled" and r.count == 1:
             r.on[n] = 0
-            self._end_settled(one, float(self.release[n]))
-        elif self.rides[n].until > t:
-            place, velocity = self.rides[n].state(t)
-            r.world.add(n, place, velocity, carried=True)
+            self._end_settled(one, t)
+            return
+        if self.rides[n].until < self.machine.end_time:
+            heappush(self.agenda, (self.rides[n].until, n, self._separate))
+        self._carry(t)
+        r.changed(one)
 
-    def _separate(self, n: int, ride: Carriage, t: float) -> None:
+    def _separate(self, n: int, t: float) -> None:
         r, k, one = self.run_state, self.run_state.tracks, np.array([n])
-        self._close_ride(n, ride, ride.until)
+        self._close_ride(n, self.rides[n], t)
         r.event(Kind.SEPARATION, one, k.t[one], k.x[one], k.v[one], 0.0, 0)
-        r.world.remove(n)
-        self._let_fly(n, t)
+        if r.inside[n]:
+            r.world.remove(n)
+            r.inside[n] = False
+        r.take_off(one, t)
 
     def _close_ride(self, n: int, ride: Carriage, until: float) -> None:
         """Write the knots of a ride, and the work by which the belt lets the particle down."""
@@ -266,15 +286,7 @@ class _Loop:
             if time > k.t[n]:
                 k.knot(one, time, x, v, 0.0)
 
-    def _let_fly(self, n: int, t: float) -> None:
-        """Put a particle into the world where its flight from the last knot has it at t."""
-        r, k, one = self.run_state, self.run_state.tracks, np.array([n])
-        k.fly(one)
-        x, v = k.flight(one, t)
-        v = v + 0.5 * r.dt * r.gravity
-        r.world.add(n, tuple(x[0].tolist()), tuple(v[0].tolist()))
-
-    def _stop(self, t: float) -> None:
+    def _stop(self) -> None:
         """End what is left when the time is up."""
         r, k = self.run_state, self.run_state.tracks
         k.close(np.flatnonzero(k.mode == RESTING))

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from math import floor
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.recording import Kind
-from chutelab.stepper.tracks import RESTING, Tracks
+from chutelab.stepper.clash import Clash, Disk, Pair
+from chutelab.stepper.solids import SLOP
+from chutelab.stepper.tracks import CARRIED, RESTING, Tracks
 from chutelab.stepper.world import World
 
 if TYPE_CHECKING:
@@ -22,6 +25,10 @@ Ints = NDArray[np.int64]
 HOP = 10
 """Steps; a stepped disk hops along a curve. A flight between two contacts with one surface that is
 shorter than this is no separation, and a contact shorter than this none to separate from."""
+
+MOST_IMPACTS = 500
+"""Impacts of a particle within one step; whatever it meets then, it stays in contact with. A
+rattle between others as close as that is a contact for all that a step can see."""
 
 
 class Run:
@@ -43,15 +50,37 @@ class Run:
         Keys, particle times (N + K) plus partner, of the contacts a step ago.
     settles_on : ndarray of bool, (K,)
         Solids at rest, and the outgoing belt.
+    start : float
+        s, from where steps are counted.
+    inside : ndarray of bool, (N,)
+        Whether pymunk has a body for the particle.
+    version : ndarray, (N,)
+        Counts the paths of each particle; what was foretold of an older one is void.
+    fresh : list of int
+        Particles on new paths, of which nothing was foretold yet.
+    moved : ndarray of bool, (N,)
+        Whether pymunk's body has to be put on the path anew.
+    soft : float
+        m/s; the speed that gravity gives in a step: what approaches more slowly does not bounce.
+    bend : ndarray, (N,)
+        Curvature of the path along the solid a particle was laid on, 1/m.
     """
 
     def __init__(
-        self, machine: Machine, solids: Solids, recorder: Recorder, ids: Ints, dt: float
+        self,
+        machine: Machine,
+        solids: Solids,
+        recorder: Recorder,
+        ids: Ints,
+        start: float,
+        dt: float,
+        clashes: dict[int, Clash],
     ) -> None:
         count = len(ids)
         self.machine, self.solids, self.recorder, self.ids = machine, solids, recorder, ids
-        self.dt = dt
-        self.world = World(machine, solids, count)
+        self.start, self.dt = start, dt
+        self._clashes = clashes
+        self._world: World | None = None
         self.tracks = Tracks(machine, recorder, ids)
         p = machine.particle
         self.radius, self.mass = p.radius, p.mass
@@ -66,11 +95,26 @@ class Run:
         self.slipping = np.zeros(count, dtype=bool)
         self.calm = np.zeros(count, dtype=np.int64)
         self.touching = np.empty(0, dtype=np.int64)
+        self.inside = np.zeros(count, dtype=bool)
+        self.version = np.zeros(count, dtype=np.int64)
+        self.fresh: list[int] = []
+        self.moved = np.zeros(count, dtype=bool)
+        self.soft = machine.gravity * dt
+        self.bend = np.zeros(count)
+        self._impacts = np.zeros(count, dtype=np.int64)
+        self._impacts_until = np.full(count, np.nan)
         self._left = np.full(count, np.nan)
         self._left_state = np.zeros((count, 5))
         self.settles_on: NDArray[np.bool_] = (solids.speed == 0.0) | (
             solids.surface == machine.landing
         )
+
+    @property
+    def world(self) -> World:
+        """The Space for what is in contact, built when something is."""
+        if self._world is None:
+            self._world = World(self.machine, self.solids, self.count)
+        return self._world
 
     @property
     def count(self) -> int:
@@ -120,16 +164,81 @@ class Run:
         """End tracks at their last knots and take the particles out."""
         self.tell_separation(who)
         self.tracks.finish(who, reason)
-        for particle in who.tolist():
-            self.world.remove(particle)
+        self.version[who] += 1
+        if self.inside[who].any():
+            for particle in who[self.inside[who]].tolist():
+                self.world.remove(particle)
+            self.inside[who] = False
+
+    def next_tick(self, t: float) -> float:
+        """Return the time of the next step after t, s."""
+        n = floor((t - self.start) / self.dt * (1.0 + 1e-15)) + 1
+        tick = self.start + n * self.dt
+        return tick if tick > t else tick + self.dt
+
+    def crowded(self, who: Ints, t: float) -> bool:
+        """Count an impact; tell whether one of two has had too many since the last step."""
+        tick = self.next_tick(t)
+        self._impacts[who[self._impacts_until[who] != tick]] = 0
+        self._impacts_until[who] = tick
+        self._impacts[who] += 1
+        return bool((self._impacts[who] > MOST_IMPACTS).any())
+
+    def clash(self, particle: int, solid: int) -> Clash:
+        """Return where pymunk resolves impacts of particles with a solid or a particle."""
+        free = particle >= 0 and self.tracks.mode[particle] != CARRIED
+        key = solid if particle < 0 else -1 if free else -2
+        if key not in self._clashes:
+            p, s = self.machine.particle, self.solids
+            disk = Disk(p.mass, p.inertia, p.radius)
+            pair = Pair(self.machine.pair_restitution, self.machine.pair_friction)
+            if solid >= 0:
+                pair = Pair(float(s.restitution[solid]), float(s.friction[solid]))
+            self._clashes[key] = Clash(disk, disk if free else None, pair)
+        return self._clashes[key]
+
+    def grip(self, particle: int, solid: int) -> float:
+        """Return the coefficient of friction of a pair."""
+        if particle >= 0:
+            return self.machine.pair_friction
+        return float(self.solids.friction[solid])
+
+    def turned(self, push: float) -> float:
+        """Return the change of ω by a tangential impulse (N s), rad/s."""
+        inertia = self.machine.particle.inertia
+        return self.radius * push / inertia if inertia > 0.0 else 0.0
+
+    def lay(self, i: int, normal: Floats, curvature: float | None) -> None:
+        """Let a particle rest from its last knot on, a hair inside, so that pymunk sees it.
+
+        `curvature` (1/m) of the path along a solid; None for a particle.
+        """
+        k, who = self.tracks, np.array([i])
+        k.rest(who)
+        k.leave(who, k.x[who], k.v[who], k.omega[who])
+        k.from_t[i], k.from_x[i] = k.t[i], k.x[i] - 0.5 * SLOP * self.radius * normal
+        k.from_v[i] = k.v[i]
+        if curvature is not None:
+            k.upon[i], self.bend[i] = normal, curvature
+        self.changed(who)
+
+    def take_off(self, who: Ints, t: float) -> None:
+        """Let particles fly from their last knots."""
+        self.tracks.fly(who)
+        self.changed(who)
+
+    def changed(self, who: Ints) -> None:
+        """Note that particles are on new paths."""
+        self.version[who] += 1
+        self.moved[who] = True
+        self.fresh.extend(who.tolist())
 
     def lift(self, who: Ints, t: float) -> None:
         """Let go what is in contact no more; whether it separated, its flight will tell."""
         if not len(who):
             return
-        off_surface = who[self.tracks.upon[who].any(axis=1)]
         self.tracks.lift(who, t, self.dt)
-        self.fly_on(off_surface, t + self.dt)
+        self.changed(who)
         parts = who[
             (self.on[who] >= 0)
             & np.isnan(self._left[who])
@@ -138,16 +247,6 @@ class Run:
         k = self.tracks
         self._left[parts] = t
         self._left_state[parts] = np.column_stack([k.x[parts], k.v[parts], k.omega[parts]])
-
-    def fly_on(self, who: Ints, t: float, shift: Floats | float = 0.0) -> None:
-        """Move pymunk's bodies to where their flights are at t, half a step of velocity ahead."""
-        x, v = self.tracks.flight(who, t)
-        x = x + shift
-        ahead = v + 0.5 * self.dt * self.gravity
-        for particle, place, velocity in zip(who.tolist(), x.tolist(), ahead.tolist(), strict=True):
-            self.world.place(
-                particle, tuple(place), tuple(velocity), float(self.tracks.omega[particle])
-            )
 
     def follow(self, particle: int, normal: Floats, rho: float) -> None:
         """Lead a particle round the pulley, or the end of a face, unless it is to fly off.

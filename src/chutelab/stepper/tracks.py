@@ -1,8 +1,8 @@
-"""What every particle is doing, and the knots of its track.
+"""What every particle is doing, the path it is on, and the knots of its track.
 
-A flight is its last knot and nothing else. A particle in contact moves by pymunk's steps; it gets a
-knot only where its track leaves the parabola that the last ones foretold, so memory grows with what
-happens, not with steps.
+Between impulses every path is a parabola: of a flight from its last knot, of a particle in contact
+from pymunk's last step to the next. In contact it gets a knot only where its track leaves the
+parabola that the last ones foretold, so memory grows with what happens, not with steps.
 """
 
 from __future__ import annotations
@@ -43,6 +43,8 @@ class Tracks:
         WAITING, CARRIED, FLYING, RESTING or DONE.
     t, x, v, omega : ndarray, (N,) or (N, 2)
         Last knot, s, m, m/s, rad/s.
+    from_t, from_x, from_v : ndarray, (N,) or (N, 2)
+        Where the present path begins, s, m, m/s.
     at, w, spin : ndarray, (N, 2) or (N,)
         Of particles in contact: position, velocity and ω as pymunk left them at the last step.
     aim : ndarray, (N, 2)
@@ -63,6 +65,7 @@ class Tracks:
         self.mode = np.full(count, WAITING, dtype=np.int8)
         self.t, self.omega, self.spin = np.zeros((3, count))
         self.x, self.v, self.at, self.w, self.aim = np.zeros((5, count, 2))
+        self.from_t, self.from_x, self.from_v = np.zeros(count), *np.zeros((2, count, 2))
         self.upon = np.zeros((count, 2))
         self.exit = np.full(count, np.inf)
         self._held = np.zeros(count, dtype=bool)
@@ -80,14 +83,20 @@ class Tracks:
                 self.ids[who], self.t[who], self.x[who], self.v[who], self.omega[who]
             )
 
-    def flight(self, who: Ints, t: float) -> tuple[Floats, Floats]:
-        """Return positions and velocities, (k, 2), of flying particles at a time."""
-        s = (t - self.t[who])[:, None]
-        return self.x[who] + s * (self.v[who] + 0.5 * s * self._g), self.v[who] + s * self._g
+    def flight(self, who: Ints | slice, t: float) -> tuple[Floats, Floats]:
+        """Return positions and velocities, (k, 2), on the present paths at a time."""
+        s = (t - self.from_t[who])[:, None]
+        v = self.from_v[who]
+        return self.from_x[who] + s * (v + 0.5 * s * self._g), v + s * self._g
+
+    def turn(self, i: int) -> float:
+        """Return ω of a particle, rad/s."""
+        return float(self.spin[i] if self.mode[i] == RESTING else self.omega[i])
 
     def fly(self, who: Ints) -> None:
         """Let particles go from their last knots."""
         self.mode[who] = FLYING
+        self.from_t[who], self.from_x[who], self.from_v[who] = self.t[who], self.x[who], self.v[who]
         left, right, bottom, top = self._machine.exit_box
         x, v = self.x[who], self.v[who]
         # Beyond the floor already: at once, whatever way it moves.
@@ -113,11 +122,22 @@ class Tracks:
         self.at[who], self.w[who], self.aim[who], self.spin[who] = x, w, w, omega
         self.upon[who] = 0.0
 
+    def go_on(self, who: Ints, t: float, dt: float) -> None:
+        """Put particles in contact on the paths to the next step, dt later, from where they are.
+
+        Half a step of gravity is given back at once, the other half is lost until then: a hop.
+        """
+        self.from_t[who], self.from_x[who] = t, self.at[who]
+        self.from_v[who] = self.aim[who] - 0.5 * dt * self._g
+
     def lift(self, who: Ints, t: float, dt: float) -> None:
         """Let particles go that were in contact a step ago, at t, and are no more.
 
         Off a surface they go along the tangent; only along it is w half a step of gravity ahead.
         """
+        fresh = self.from_t[who] > t
+        self.fly(who[fresh])
+        who = who[~fresh]
         n = self.upon[who]
         lead = 0.5 * dt * (self._g - (n @ self._g)[:, None] * n)
         self._write_held(who)

@@ -119,15 +119,8 @@ class World:
         self._space.add(body, shape)
         return body
 
-    def add(
-        self,
-        particle: int,
-        position: tuple[float, float],
-        velocity: tuple[float, float],
-        *,
-        carried: bool = False,
-    ) -> None:
-        """Put a particle in, not turning; a carried one pushes but is not pushed."""
+    def add(self, particle: int, *, carried: bool = False) -> None:
+        """Put a particle in, to be placed; a carried one pushes but is not pushed."""
         p = self._machine.particle
         if carried:
             body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
@@ -140,7 +133,6 @@ class World:
             if carried
             else pymunk.ShapeFilter(categories=FREE)
         )
-        body.position, body.velocity = position, velocity
         self._space.add(body, shape)
         self._bodies[particle], self._shapes[particle] = body, shape
         self._stale = True
@@ -168,11 +160,6 @@ class World:
         """Overwrite a velocity, and add a force (N) that acts in the next step, after the move."""
         body = self._bodies[particle]
         body.velocity, body.force = velocity, force
-
-    def parting(self, overlap: float, dt: float) -> float:
-        """Return how far (m) pymunk parts two bodies in the step after it saw them overlap."""
-        share = 1.0 - float(self._space.collision_bias**dt)
-        return share * max(0.0, overlap - float(self._space.collision_slop))
 
     def step(self, dt: float) -> None:
         """Advance by one step."""

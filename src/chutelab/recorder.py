@@ -18,6 +18,44 @@ if TYPE_CHECKING:
     from chutelab.recording import Ints, Kind, Particle
 
 
+class StalledError(RuntimeError):
+    """A loop reached its bound: a particle goes on without getting on.
+
+    Parameters
+    ----------
+    particle : int
+        Which one.
+    t : float
+        When, s.
+    position : tuple of float
+        Where its centre is, m.
+    reason : str
+        What happened too often, and what to do about it; a half-sentence.
+    recording : Recording, optional
+        What was recorded until then. Tracks that were under way end at their last knots, with
+        reason ``"time"``.
+    """
+
+    def __init__(
+        self,
+        particle: int,
+        t: float,
+        position: tuple[float, float],
+        reason: str,
+        recording: Recording | None = None,
+    ) -> None:
+        super().__init__(particle, t, position, reason)
+        self.particle = particle
+        self.t = t
+        self.position = position
+        self.reason = reason
+        self.recording = recording
+
+    def __str__(self) -> str:
+        x, y = self.position
+        return f"particle {self.particle} is stuck at t = {self.t:.6g} s, x = {x:.6g} m, y = {y:.6g} m: {self.reason}"
+
+
 class Recorder:
     """Grows by chunks; `finish` turns it into a frozen `Recording`.
 
@@ -56,8 +94,12 @@ class Recorder:
         chunk = np.empty(len(owner), dtype=KNOT)
         chunk["t"], chunk["position"], chunk["velocity"] = t, position, velocity
         chunk["omega"], chunk["entries"] = omega, self.entries[owner]
-        self._knots.append(chunk)
-        self._owners.append(owner)
+        self.add(owner, chunk)
+
+    def add(self, particle: Ints, knots: NDArray[Any]) -> None:
+        """Add finished knots (k,) of particles (k,), each particle's in the order of time."""
+        self._knots.append(knots)
+        self._owners.append(particle)
 
     def book(
         self,
@@ -101,7 +143,11 @@ class Recorder:
         chunk["omega_before"] = omega if omega_before is None else omega_before
         chunk["surface"], chunk["other"] = surface, other
         chunk["normal_impulse"], chunk["tangential_impulse"] = normal_impulse, tangential_impulse
-        self._events.append(chunk)
+        self.tell(chunk)
+
+    def tell(self, events: NDArray[Any]) -> None:
+        """Add finished events."""
+        self._events.append(events)
 
     def finish(
         self,

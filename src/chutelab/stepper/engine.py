@@ -254,7 +254,7 @@ class _Loop:
         k.knot(one, t, x, v, 0.0)
         r.event(Kind.RELEASE, one, t, x, v, 0.0)
         if n not in self.rides:
-            r.take_off(one, t)
+            r.take_off(one)
             return
         k.mode[n] = CARRIED
         if self.rides[n].speed == 0.0 and self.machine.until == "settled" and r.count == 1:
@@ -273,7 +273,7 @@ class _Loop:
         if r.inside[n]:
             r.world.remove(n)
             r.inside[n] = False
-        r.take_off(one, t)
+        r.take_off(one)
 
     def _close_ride(self, n: int, ride: Carriage, until: float) -> None:
         """Write the knots of a ride, and the work by which the belt lets the particle down."""
@@ -299,3 +299,4 @@ class _Loop:
             self._close_ride(n, self.rides[n], end)
         left = np.flatnonzero((k.mode != DONE) & (k.mode != WAITING))
         r.finish(left, "time")
+        r.flush()

@@ -84,48 +84,54 @@ class Forecast:
     def refresh(self, now: float, tick: float) -> None:
         """Foretell the impacts of particles on new paths."""
         run, k = self._run, self._run.tracks
+        everybody = None
         for i in dict.fromkeys(run.fresh):
             mode = k.mode[i]
+            if mode in (WAITING, DONE):
+                continue
             until = float(k.exit[i]) if mode == FLYING else tick
-            if mode in (FLYING, RESTING):
+            if mode != CARRIED:
                 until = min(until, self._solid(i, now, until - now))
-            if self._crowd and mode in (FLYING, RESTING, CARRIED):
-                self._row(i, now, until, tick)
+            if self._crowd:
+                if everybody is None:
+                    everybody = k.all_at(now)
+                self._row(i, everybody, now, until, tick)
         run.fresh.clear()
 
     def _solid(self, i: int, now: float, span: float) -> float:
-        k, one = self._run.tracks, np.array([i])
-        x, v = k.flight(one, now)
-        touch = self._outline.first(x[0], v[0], span)
-        if touch.t == inf:
-            return inf
+        k = self._run.tracks
+        x, y, vx, vy = k.state(i, now)
+        touch = self._outline.first(x, y, vx, vy, span)
         if k.mode[i] == RESTING:
             self._safe_until[i] = -inf
-            fall = v[0] + touch.t * self._run.gravity
-            if -(fall[0] * touch.normal[0] + fall[1] * touch.normal[1]) <= self._run.soft:
+            fall = vy - touch.t * self._run.machine.gravity
+            if -(vx * touch.normal[0] + fall * touch.normal[1]) <= self._run.soft:
                 return inf
+        if touch.t == inf:
+            return inf
         self._push(now + touch.t, i, -1, touch)
         return now + touch.t
 
-    def _row(self, i: int, now: float, until: float, tick: float) -> None:
+    def _row(
+        self, i: int, everybody: tuple[Floats, ...], now: float, until: float, tick: float
+    ) -> None:
         """Foretell what one particle meets, of all there are."""
-        run, k = self._run, self._run.tracks
-        there = (k.mode != WAITING) & (k.mode != DONE)
-        there[i] = False
-        if k.mode[i] == CARRIED:
-            there &= k.mode != CARRIED
-        others = np.flatnonzero(there)
+        run, mode = self._run, self._run.tracks.mode
+        x, y, u, v = (a - a[i] for a in everybody)
+        closing = x * u + y * v < 0.0
+        others = np.flatnonzero(closing & (mode != WAITING) & (mode != DONE))
         if not len(others):
             return
-        x, v = k.flight(np.append(others, i), now)
-        t, approach = meeting(x[:-1] - x[-1], v[:-1] - v[-1], 2.0 * run.radius)
-        modes = k.mode[others]
-        limit = np.where(modes == FLYING, until, min(until, tick)) - now
-        floor = np.full(len(others), ROUNDING * 2.0 * (hypot(*v[-1]) + run.soft))
-        if k.mode[i] != FLYING:
-            floor[modes != FLYING] = run.soft
-        for n in np.flatnonzero((t <= limit) & (approach > floor)).tolist():
-            self._pair(now + float(t[n]), i, int(others[n]))
+        t, approach = meeting(x[others], y[others], u[others], v[others], 2.0 * run.radius)
+        rounding = ROUNDING * (hypot(everybody[2][i], everybody[3][i]) + run.soft)
+        flies, carried = mode[i] == FLYING, mode[i] == CARRIED
+        for n in np.flatnonzero(t <= until - now).tolist():
+            j = int(others[n])
+            held = mode[j] != FLYING
+            if held and (now + t[n] > tick or (carried and mode[j] == CARRIED)):
+                continue
+            if approach[n] > (run.soft if held and not flies else rounding):
+                self._pair(now + float(t[n]), i, j)
 
     def _pair(self, t: float, i: int, j: int) -> None:
         if self._run.tracks.mode[i] == CARRIED:
@@ -155,7 +161,8 @@ class Forecast:
         a, b = a[asked], b[asked]
         if not len(a):
             return
-        t, approach = meeting(x[b] - x[a], v[b] - v[a], 2.0 * run.radius)
+        dx, dv = x[b] - x[a], v[b] - v[a]
+        t, approach = meeting(dx[:, 0], dx[:, 1], dv[:, 0], dv[:, 1], 2.0 * run.radius)
         flies = (modes[a] == FLYING) | (modes[b] == FLYING)
         floor = np.where(flies, ROUNDING * run.soft, run.soft)
         for n in np.flatnonzero((t <= span) & (approach > floor)).tolist():
@@ -170,7 +177,7 @@ class Forecast:
         if not len(due):
             return
         x, v = k.flight(due, now)
-        gap = self._outline.supports(x, NEAR * run.radius).min(axis=1, initial=inf)
+        gap = self._outline.clearance(x, NEAR * run.radius)
         speed = np.maximum(np.hypot(v[:, 0], v[:, 1]), self._fastest)
         pace = speed + np.sqrt(run.machine.gravity * gap)
         with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,4 +1,7 @@
-"""Impacts at the instant they happen: off one path, by one contact, onto another."""
+"""Impacts at the instant they happen: off one path, by one contact, onto another.
+
+Plain numbers throughout: an impact concerns one or two particles, and there are many of them.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +10,6 @@ from math import hypot
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.recording import Kind
 from chutelab.stepper.tracks import CARRIED, RESTING
@@ -16,8 +18,6 @@ if TYPE_CHECKING:
     from chutelab.stepper.outline import Touch
     from chutelab.stepper.state import Run
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Vector = tuple[float, float]
 
 FAINT = 0.01
@@ -32,7 +32,7 @@ class Partner:
     ----------
     particle, solid : int
         Which one it is; the other is -1.
-    normal : ndarray, (2,)
+    normal : tuple of float
         Unit normal from it.
     velocity : tuple of float
         Of its surface along (n_y, -n_x), of the whole along n, m/s; rotation left out.
@@ -48,7 +48,7 @@ class Partner:
 
     particle: int
     solid: int
-    normal: Floats
+    normal: Vector
     velocity: Vector
     omega: float
     free: bool
@@ -58,127 +58,117 @@ class Partner:
 
 def solid_partner(run: Run, touch: Touch) -> Partner:
     """Return a solid, touched."""
-    n = np.array(touch.normal)
-    belt = float(run.solids.belt(np.array([touch.solid]), n[None])[0])
-    return Partner(-1, touch.solid, n, (belt, 0.0), 0.0, False, True, touch.curvature)
+    belt = run.solids.belt_at(touch.solid, touch.normal)
+    return Partner(-1, touch.solid, touch.normal, (belt, 0.0), 0.0, False, True, touch.curvature)
 
 
 def particle_partner(run: Run, i: int, j: int, t: float) -> Partner:
     """Return particle j, met by particle i at t."""
     k = run.tracks
-    x, v = k.flight(np.array([i, j]), t)
-    n = (x[0] - x[1]) / hypot(*(x[0] - x[1]))
-    velocity = float(v[1] @ [n[1], -n[0]]), float(v[1] @ n)
+    x, y, _, _ = k.state(i, t)
+    xj, yj, ux, uy = k.state(j, t)
+    dx, dy = x - xj, y - yj
+    apart = hypot(dx, dy)
+    nx, ny = dx / apart, dy / apart
     carried = bool(k.mode[j] == CARRIED)
-    supported = bool((k.mode[[i, j]] == RESTING).any())
-    omega = 0.0 if carried else k.turn(j)
-    return Partner(j, -1, n, velocity, omega, not carried, carried or supported, 0.0)
+    supported = carried or bool(k.mode[i] == RESTING) or bool(k.mode[j] == RESTING)
+    return Partner(
+        j, -1, (nx, ny), (ux * ny - uy * nx, ux * nx + uy * ny), 0.0 if carried else k.turn(j),
+        not carried, supported, 0.0,
+    )  # fmt: skip
 
 
 def strike(run: Run, i: int, partner: Partner, t: float) -> None:
     """Resolve the contact of particle i, not carried, with a partner at t."""
-    k, n = run.tracks, partner.normal
-    who = np.array([i, partner.particle] if partner.free else [i])
-    along = np.array([n[1], -n[0]])
-    x, v = k.flight(who, t)
-    spin = k.turn(i)
-    mine = float(v[0] @ along), float(v[0] @ n)
+    k, (nx, ny), j = run.tracks, partner.normal, partner.particle
+    x, y, vx, vy = k.state(i, t)
+    spin, belt = k.turn(i), partner.velocity[0]
+    mine = vx * ny - vy * nx, vx * nx + vy * ny
     approach = mine[1] - partner.velocity[1]
-    slip = mine[0] - partner.velocity[0] + run.radius * (spin + partner.omega)
-    (j_t, j_n), spun = run.clash(partner.particle, partner.solid).resolve(
+    slip = mine[0] - belt + run.radius * (spin + partner.omega)
+    (j_t, j_n), spun = run.clash(j, partner.solid).resolve(
         mine, spin, partner.velocity, partner.omega
     )
     share = 0.5 if partner.free else 1.0
     m_n, m_t = share * run.mass, share * run.rolling_mass
 
     # What would bounce for less than two steps does not bounce.
-    lifts = -run.machine.gravity
-    if partner.solid >= 0:
-        lifts = float(run.gravity @ n) + partner.curvature * mine[0] ** 2
+    g = run.machine.gravity
+    lifts = partner.curvature * mine[0] ** 2 - g * ny if partner.solid >= 0 else -g
     rebound = approach + j_n / m_n
     stays = partner.supported and lifts <= 0.0 and rebound <= -lifts * run.dt
-    stays |= run.crowded(who, t)
+    stays |= run.crowded(i, j if partner.free else i, t)
     if stays:
         # On a solid it leaves half of what gravity takes from it up to the next step.
         hop = -0.5 * min(lifts, 0.0) * (run.next_tick(t) - t) if partner.solid >= 0 else 0.0
         j_n = max(j_n - m_n * (rebound - hop), 0.0)
-        grip = run.grip(partner.particle, partner.solid) * j_n
+        grip = run.grip(j, partner.solid) * j_n
         j_t = min(max(j_t, -grip), grip)
         spun = spin + run.turned(j_t)
-    push = j_n * n + j_t * along
+    px, py = j_n * nx + j_t * ny, j_n * ny - j_t * nx
 
     surface = run.particles if partner.solid < 0 else int(run.solids.surface[partner.solid])
-    spins = np.array([spin, partner.omega])[: len(who)]
-    k.close(who[k.mode[who] == RESTING])
-    k.knot(who, t, x, v, spins)
-    if partner.solid < 0 and not partner.free:
+    lost = -j_n * (approach + 0.5 * j_n / m_n), -j_t * (slip + 0.5 * j_t / m_t)
+    who = [(i, (x, y, vx, vy), spin, 1.0)]
+    if partner.free:
+        who.append((j, k.state(j, t), partner.omega, -1.0))
+    elif j >= 0:
         # Whoever is carried is held by the belt: what it gives, the drive pays.
-        run.recorder.book(run.ids[who], 0, j_t * partner.velocity[0] + j_n * partner.velocity[1])
-    run.recorder.book(
-        run.ids[who],
-        surface,
-        j_t * partner.velocity[0] if partner.solid >= 0 else 0.0,
-        -share * j_n * (approach + 0.5 * j_n / m_n),
-        -share * j_t * (slip + 0.5 * j_t / m_t),
-    )
-    after = v + np.array([push, -push])[: len(who)] / run.mass
-    k.knot(who, t, x, after, spins + (spun - spin))
-    _after(run, i, partner, t, stays, (approach, spin, v[0], (j_n, j_t)), surface, who)
-
-
-def _after(
-    run: Run,
-    i: int,
-    partner: Partner,
-    t: float,
-    stays: bool,
-    before: tuple[float, float, Floats, Vector],
-    surface: int,
-    who: Ints,
-) -> None:
-    """Tell of an impact, and send everybody on their way."""
-    k, one = run.tracks, who[:1]
-    approach, spin, velocity, impulse = before
+        run.book(i, 0, j_t * belt + j_n * partner.velocity[1], 0.0, 0.0)
+    for n, state, omega, _ in who:
+        if k.mode[n] == RESTING:
+            k.close(np.array([n]))
+        k.mark(n, t, *state, omega)
+        paid = j_t * belt if partner.solid >= 0 else 0.0
+        run.book(n, surface, paid, share * lost[0], share * lost[1])
+    for n, (xn, yn, un, wn), omega, sign in who:
+        un, wn = un + sign * px / run.mass, wn + sign * py / run.mass
+        k.mark(n, t, xn, yn, un, wn, omega + spun - spin)
     hops = stays and partner.solid >= 0 and run.hopped(i, surface, t)
     kind = None if hops else _kind(run, i, partner, -approach)
     if kind is not None:
-        run.event(
-            kind, one, t, k.x[one], k.v[one], k.omega[one], surface,
-            run.ids[partner.particle] if partner.solid < 0 else -1,
-            velocity_before=velocity, omega_before=spin, impulse=impulse,
-        )  # fmt: skip
-        run.recorder.contacts += 1
-        if not stays:
-            run.tell_separation(who)
-            run.on[who] = -1
+        run.tell(kind, i, j, surface, (vx, vy), spin, (j_n, j_t))
+    _part(run, i, partner, t, stays, kind, surface)
+
+
+def _part(
+    run: Run, i: int, partner: Partner, t: float, stays: bool, kind: Kind | None, surface: int
+) -> None:
+    """Send everybody on their way after an impact."""
+    k, one = run.tracks, np.array([i])
+    who = [i, partner.particle] if partner.free else [i]
+    if kind is not None and not stays:
+        run.tell_separation(np.array(who))
+        run.on[who] = -1
     if kind is Kind.LANDING:
         run.landed[i] = True
         if run.machine.until == "landed":
             run.finish(one, "landed")
             return
-    rested = k.mode[who] == RESTING
     if stays and partner.solid >= 0:
         run.lay(i, partner.normal, partner.curvature)
         run.arrive(one, np.array([surface]), t)
         return
-    if stays and not rested.all():
+    rested = [n for n in who if k.mode[n] == RESTING]
+    if stays and len(rested) < len(who):
         # Who came in leans on who is held; the latter is pushed against what holds it.
-        leans = who[~rested]
-        for n in leans.tolist():
-            run.lay(n, partner.normal if n == i else -partner.normal, None)
-        run.arrive(leans, np.full(len(leans), -1), t)
-        who = who[rested]
-    run.take_off(who, t)
+        for n in who:
+            if n not in rested:
+                sign = 1.0 if n == i else -1.0
+                run.lay(n, (sign * partner.normal[0], sign * partner.normal[1]), None)
+                run.arrive(np.array([n]), np.array([-1]), t)
+        who = rested
+    if who:
+        run.take_off(np.array(who))
 
 
 def _kind(run: Run, i: int, partner: Partner, approach: float) -> Kind | None:
     """Name an impact; None if it only renews a contact that was lost for a moment."""
-    hop = run.machine.gravity * run.dt
-    real = approach > hop
+    real = approach > run.soft
     if partner.solid < 0:
         return Kind.COLLISION if real else None
     landing = run.solids.surface[partner.solid] == run.machine.landing and not run.landed[i]
-    first = approach > FAINT * hop and not run.met[i, partner.solid]
+    first = approach > FAINT * run.soft and not run.met[i, partner.solid]
     run.met[i, partner.solid] = True
     if landing:
         return Kind.LANDING

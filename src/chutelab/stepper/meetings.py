@@ -9,13 +9,15 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-def meeting(offset: Floats, velocity: Floats, reach: float) -> tuple[Floats, Floats]:
-    """Return when |offset + velocity t| falls to `reach`, and the speed of approach then.
+def meeting(
+    x: Floats, y: Floats, u: Floats, v: Floats, reach: float
+) -> tuple[Floats, Floats]:
+    """Return when the distance of disks falls to `reach`, and the speed of approach then.
 
     Parameters
     ----------
-    offset, velocity : ndarray, (k, 2)
-        Of one disk relative to another, m and m/s.
+    x, y, u, v : ndarray, (k,)
+        Position and velocity of one disk relative to another, m and m/s.
     reach : float
         Sum of their radii, m.
 
@@ -24,20 +26,19 @@ def meeting(offset: Floats, velocity: Floats, reach: float) -> tuple[Floats, Flo
     t, approach : ndarray, (k,)
         s, inf if they never meet and 0 if they overlap and approach; m/s.
     """
-    x, y, u, v = offset[:, 0], offset[:, 1], velocity[:, 0], velocity[:, 1]
     closing = -(x * u + y * v)
-    gap = x * x + y * y - reach * reach
-    square = u * u + v * v
     # closing² - square gap, without cancellation where they graze.
     across = x * v - y * u
-    under = np.where(gap > 0.0, reach * reach * square - across * across, closing * closing)
-    meets = np.flatnonzero((closing > 0.0) & (under > 0.0))
+    under = reach * reach * (u * u + v * v) - across * across
     t, approach = np.full(len(x), np.inf), np.zeros(len(x))
+    meets = np.flatnonzero((closing > 0.0) & (under > 0.0))
     if len(meets):
-        root = np.sqrt(under[meets])
+        xm, ym, closing = x[meets], y[meets], closing[meets]
+        gap = xm * xm + ym * ym - reach * reach
+        root = np.where(gap > 0.0, np.sqrt(under[meets]), closing)
         # The form of the first root without cancellation.
-        t[meets] = np.maximum(gap[meets], 0.0) / (closing[meets] + root)
-        approach[meets] = root / np.sqrt(reach * reach + np.minimum(gap[meets], 0.0))
+        t[meets] = np.maximum(gap, 0.0) / (closing + root)
+        approach[meets] = root / np.sqrt(reach * reach + np.minimum(gap, 0.0))
     return t, approach
 
 

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import hypot, inf
+from math import hypot, inf, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.ballistics import closing_time, first_descent
+from chutelab.ballistics import first_descent
 from chutelab.stepper.solids import HALF_THICKNESS, Solids
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+
+GRAZING = 1e-9
+"""Share of a reach, or of a speed, within which a disk leaves a circle along its tangent, and is
+not to meet it again by rounding."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,32 @@ class Touch:
 NOTHING = Touch(inf)
 
 
+@dataclass(frozen=True)
+class _Slab:
+    """A slab by its struck face: start a, unit tangent t and normal n, length and thickness, m."""
+
+    solid: int
+    a: tuple[float, float]
+    t: tuple[float, float]
+    n: tuple[float, float]
+    length: float
+    thickness: float
+
+    def corners(self) -> list[tuple[float, float]]:
+        return [
+            (
+                self.a[0] + u * self.t[0] - w * self.n[0],
+                self.a[1] + u * self.t[1] - w * self.n[1],
+            )
+            for u, w in (
+                (0.0, 0.0),
+                (self.length, 0.0),
+                (self.length, self.thickness),
+                (0.0, self.thickness),
+            )
+        ]
+
+
 class Outline:
     """Four faces and four corners of every slab, and the pulley, for disks of one radius.
 
@@ -56,85 +85,91 @@ class Outline:
     """
 
     def __init__(self, solids: Solids, rim: float, radius: float, gravity: float) -> None:
-        slabs = np.flatnonzero(solids.reach == 0.0)
-        a, b, behind = solids.a[slabs], solids.b[slabs], solids.behind[slabs]
-        corners = np.stack([a, b, b + behind, a + behind])
-        along = np.roll(corners, -1, axis=0) - corners
-        self._start = corners.reshape(-1, 2)
-        self._length = np.hypot(along[..., 0], along[..., 1]).reshape(-1)
-        self._tangent = along.reshape(-1, 2) / self._length[:, None]
-        out = -behind / (2.0 * HALF_THICKNESS)
-        ends = along[0] / np.hypot(along[0, :, 0], along[0, :, 1])[:, None]
-        self._normal = np.stack([out, ends, -out, -ends]).reshape(-1, 2)
-        self._face_solid = np.tile(slabs, 4)
-        round_ = np.flatnonzero(solids.reach > 0.0)
-        self._center = np.concatenate([self._start, solids.a[round_]])
-        self._reach = np.concatenate(
-            [np.full(4 * len(slabs), radius), np.full(len(round_), rim + radius)]
-        )
-        self._circle_solid = np.concatenate([self._face_solid, round_])
-        self._radius = radius
-        self._g = np.array([0.0, -gravity])
-        self._pull = self._normal @ self._g
+        self._radius, self._gravity = radius, gravity
+        self._slabs: list[_Slab] = []
+        circles: list[tuple[float, float, float, int]] = []
+        for k, (a, b, behind) in enumerate(
+            zip(solids.a.tolist(), solids.b.tolist(), solids.behind.tolist(), strict=True)
+        ):
+            if solids.reach[k] > 0.0:
+                circles.append((*a, rim + radius, k))
+                continue
+            length = hypot(b[0] - a[0], b[1] - a[1])
+            thickness = 2.0 * HALF_THICKNESS
+            tangent = (b[0] - a[0]) / length, (b[1] - a[1]) / length
+            out = -behind[0] / thickness, -behind[1] / thickness
+            slab = _Slab(k, tuple(a), tangent, out, length, thickness)
+            self._slabs.append(slab)
+            circles += [(*c, radius, k) for c in slab.corners()]
+        self._circles = circles
 
-    def first(self, x: Floats, v: Floats, until: float) -> Touch:
+    def first(self, x: float, y: float, vx: float, vy: float, until: float) -> Touch:
         """Return the first touch of a flight, at once where a disk that overlaps moves inwards.
 
         Parameters
         ----------
-        x, v : ndarray, (2,)
+        x, y, vx, vy : float
             Position and velocity now, m and m/s.
         until : float
             s from now; may be inf.
         """
-        if not len(self._circle_solid):
-            return NOTHING
-        t, face = self._faces(x, v, until)
         first = NOTHING
-        if face >= 0:
-            n = self._normal[face]
-            first = Touch(t, int(self._face_solid[face]), (float(n[0]), float(n[1])))
-        near = self._near(x, v, min(t, until))
-        return self._round(x, v, near, min(t, until), first) if len(near) else first
+        for slab in self._slabs:
+            first = self._faces(slab, (x, y, vx, vy), until, first)
+        until = min(until, first.t)
+        left, right = _range(x, vx, 0.0, until)
+        bottom, top = _range(y, vy, -self._gravity, until)
+        near = [
+            c
+            for c in self._circles
+            if left < c[0] + c[2]
+            and right > c[0] - c[2]
+            and bottom < c[1] + c[2]
+            and top > c[1] - c[2]
+        ]
+        if near:
+            return self._round(np.array([x, y]), np.array([vx, vy]), near, until, first)
+        return first
 
-    def _faces(self, x: Floats, v: Floats, until: float) -> tuple[float, int]:
-        away = x - self._start
-        normal, tangent = self._normal, self._tangent
-        gap = away[:, 0] * normal[:, 0] + away[:, 1] * normal[:, 1] - self._radius
-        rate = v[0] * normal[:, 0] + v[1] * normal[:, 1]
-        foot = away[:, 0] * tangent[:, 0] + away[:, 1] * tangent[:, 1]
-        over = (foot >= 0.0) & (foot <= self._length)
-        # A disk a hair inside a face touches it: it neither sinks further nor falls through.
-        inside = over & (gap < 0.0) & (gap >= -self._radius)
-        t = closing_time(np.where(inside, 0.0, gap), rate, self._pull)
-        t[(t < 0.0) | (t > until)] = inf
-        there = np.where(t < inf, t, 0.0)
-        pace = v[0] * tangent[:, 0] + v[1] * tangent[:, 1]
-        foot += there * (pace + 0.5 * there * (tangent @ self._g))
-        t[(foot < 0.0) | (foot > self._length)] = inf
-        best = int(np.argmin(t)) if len(t) else 0
-        return (float(t[best]), best) if len(t) and t[best] < inf else (inf, -1)
+    def _faces(
+        self, slab: _Slab, path: tuple[float, float, float, float], until: float, first: Touch
+    ) -> Touch:
+        """Return the first touch with a face, or `first` if that is sooner."""
+        x, y, vx, vy = path
+        (ax, ay), (tx, ty), (nx, ny) = slab.a, slab.t, slab.n
+        r, length, thickness = self._radius, slab.length, slab.thickness
+        u, w = (x - ax) * tx + (y - ay) * ty, (x - ax) * nx + (y - ay) * ny
+        ru, rw = vx * tx + vy * ty, vx * nx + vy * ny
+        au, aw = -self._gravity * ty, -self._gravity * ny
+        for gap, rate, pull, foot, pace, turn, wide, out in (
+            (w - r, rw, aw, u, ru, au, length, (nx, ny)),
+            (-w - thickness - r, -rw, -aw, u, ru, au, length, (-nx, -ny)),
+            (u - length - r, ru, au, -w, -rw, -aw, thickness, (tx, ty)),
+            (-u - r, -ru, -au, -w, -rw, -aw, thickness, (-tx, -ty)),
+        ):
+            if rate >= 0.0 and pull >= 0.0:
+                continue
+            # A disk a hair inside a face touches it: it neither sinks further nor falls through.
+            inside = -r <= gap < 0.0 and 0.0 <= foot <= wide
+            t = closing_time(0.0 if inside else gap, rate, pull)
+            if 0.0 <= t <= until and t < first.t:
+                there = foot + t * (pace + 0.5 * t * turn)
+                if 0.0 <= there <= wide:
+                    first = Touch(t, slab.solid, out)
+        return first
 
-    def _near(self, x: Floats, v: Floats, until: float) -> Ints:
-        """Circles that the box of the path up to `until` touches."""
-        if until == inf:
-            return np.arange(len(self._reach))
-        end = x + until * (v + 0.5 * until * self._g)
-        low, high = np.minimum(x, end), np.maximum(x, end)
-        if self._g[1] < 0.0 < v[1] and -v[1] / self._g[1] < until:
-            high[1] = x[1] - 0.5 * v[1] ** 2 / self._g[1]
-        reach = self._reach
-        cx, cy = self._center[:, 0], self._center[:, 1]
-        return np.flatnonzero(
-            (cx + reach > low[0])
-            & (cx - reach < high[0])
-            & (cy + reach > low[1])
-            & (cy - reach < high[1])
-        )
-
-    def _round(self, x: Floats, v: Floats, near: Ints, until: float, first: Touch) -> Touch:
-        d, g = x - self._center[near], self._g
-        reach = self._reach[near]
+    def _round(
+        self,
+        x: Floats,
+        v: Floats,
+        near: list[tuple[float, float, float, int]],
+        until: float,
+        first: Touch,
+    ) -> Touch:
+        """Return the first touch with a circle, or `first` if that is sooner."""
+        g = np.array([0.0, -self._gravity])
+        circles = np.array(near)
+        d, reach = x - circles[:, :2], circles[:, 2]
         distance = np.hypot(d[:, 0], d[:, 1])
         # |d + v t + g t²/2|² - reach², as a polynomial of t.
         gap = np.stack(
@@ -146,50 +181,71 @@ class Outline:
                 np.full(len(near), 0.25 * (g @ g)),
             ]
         )
-        now = (gap[0] == 0.0) & (gap[1] < 0.0)
-        # What leaves a circle along its tangent is not to meet it again by rounding.
-        grazing = (gap[0] <= 1e-9 * reach**2) & (np.abs(gap[1]) <= 1e-9 * reach * hypot(*v))
-        now &= ~grazing
+        grazing = (gap[0] <= GRAZING * reach**2) & (np.abs(gap[1]) <= GRAZING * reach * hypot(*v))
         gap[0, grazing] = gap[1, grazing] = 0.0
-        shut = grazing & (gap[2] < 0.0)
-        gap[2] = np.where(grazing & (np.abs(gap[2]) <= 1e-9 * (v @ v)), 0.0, gap[2])
-        t = np.where(now | (shut & (gap[2] < 0.0)), 0.0, inf)
-        search = np.flatnonzero((t > 0.0) & (gap < 0.0).any(axis=0))
+        gap[2] = np.where(grazing & (np.abs(gap[2]) <= GRAZING * (v @ v)), 0.0, gap[2])
+        now = (gap[0] == 0.0) & ((gap[1] < 0.0) | ((gap[1] == 0.0) & (gap[2] < 0.0)))
+        t = np.where(now, 0.0, inf)
+        search = np.flatnonzero(~now & (gap < 0.0).any(axis=0))
         if len(search):
-            limit = until if until < inf else self._far(gap[:, search])
+            limit = until
+            if until == inf:
+                # Flights without gravity: after they were nearest, nothing more happens.
+                limit = 1.0 + float(np.max(-gap[1] / np.maximum(gap[2], 1e-300), initial=0.0))
             t[search] = first_descent(gap[:, search], np.full(len(search), limit))
         best = int(np.argmin(t))
-        if not t[best] < min(until, first.t):
-            return first
         s = float(t[best])
-        n = d[best] + s * (v + 0.5 * s * g)
-        size = hypot(*n)
-        return Touch(
-            s,
-            int(self._circle_solid[near[best]]),
-            (float(n[0]) / size, float(n[1]) / size),
-            1.0 / float(reach[best]),
-        )
+        if s >= first.t or s > until or s == inf:
+            return first
+        nx, ny = (d[best] + s * (v + 0.5 * s * g)).tolist()
+        size = hypot(nx, ny)
+        return Touch(s, near[best][3], (nx / size, ny / size), 1.0 / near[best][2])
 
-    @staticmethod
-    def _far(gap: Floats) -> float:
-        """Return a time after which straight flights cannot meet a circle any more, s."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            turn = np.where(gap[2] > 0.0, -gap[1] / gap[2], 0.0)
-        return float(np.maximum(turn.max(), 0.0)) + 1.0
+    def clearance(self, x: Floats, within: float) -> Floats:
+        """Return how far disks at (P, 2) are from the nearest solid, (P,), m.
 
-    def supports(self, x: Floats, within: float) -> Floats:
-        """Distances (P, K), m, of disks at (P, 2) from the faces and circles that are not touched.
-
-        Those closer than `within` are left out (inf).
+        Solids closer than `within` are left out; inf if there is no other.
         """
-        away = x[:, None] - self._start
-        foot = np.clip((away * self._tangent).sum(axis=2), 0.0, self._length)
-        line = np.hypot(*(away - foot[..., None] * self._tangent).transpose(2, 0, 1))
-        gap = line - self._radius
-        circles = self._center[len(self._start) :]
-        if len(circles):
-            d = x[:, None] - circles
-            more = np.hypot(d[..., 0], d[..., 1]) - self._reach[len(self._start) :]
-            gap = np.concatenate([gap, more], axis=1)
-        return np.where(gap > within, gap, inf)
+        out = np.full(len(x), inf)
+        for slab in self._slabs:
+            d = x - slab.a
+            u = d @ slab.t
+            w = d @ slab.n
+            across = u - np.minimum(np.maximum(u, 0.0), slab.length)
+            deep = w - np.minimum(np.maximum(w, -slab.thickness), 0.0)
+            gap = np.hypot(across, deep) - self._radius
+            out = np.minimum(out, np.where(gap > within, gap, inf))
+        for cx, cy, reach, _ in self._circles[4 * len(self._slabs) :]:
+            gap = np.hypot(x[:, 0] - cx, x[:, 1] - cy) - reach
+            out = np.minimum(out, np.where(gap > within, gap, inf))
+        return out
+
+
+def closing_time(gap: float, rate: float, pull: float) -> float:
+    """Return when gap + rate t + pull t²/2 crosses zero downwards, inf if not from now on.
+
+    The same root as `ballistics.closing_time`, of one gap.
+    """
+    square = rate * rate - 2.0 * pull * gap
+    if square < 0.0:
+        return inf
+    root = sqrt(square)
+    if rate <= 0.0:
+        if root - rate == 0.0:
+            return 0.0 if gap == 0.0 and pull < 0.0 else inf
+        t = 2.0 * gap / (root - rate)
+    elif pull == 0.0:
+        return inf
+    else:
+        t = -(rate + root) / pull
+    return t if t >= 0.0 else inf
+
+
+def _range(x: float, v: float, a: float, until: float) -> tuple[float, float]:
+    """Return the least and the largest of x + v t + a t²/2 up to `until`; a is not positive."""
+    if until == inf:
+        return (-inf if v < 0.0 or a < 0.0 else x), (inf if v > 0.0 and a == 0.0 else x if v <= 0.0
+                else x - 0.5 * v * v / a)  # fmt: skip
+    end = x + until * (v + 0.5 * until * a)
+    high = x - 0.5 * v * v / a if v > 0.0 and v + until * a < 0.0 else max(x, end)
+    return min(x, end), high

@@ -21,9 +21,6 @@ stick out further."""
 GRIP = 1e6
 """Coefficient of friction that stands for µ = ∞: finite, because pymunk multiplies it by 0."""
 
-EDGE_ON = 1e-6
-"""Component of a contact normal across a slab below which the contact is with its end wall."""
-
 SLOP = 1e-5
 """Overlap, as a share of the radius, that pymunk leaves alone so that resting contacts persist. The
 pulley is smaller by as much: what lies a hair inside the belt must not feel it behind x = 0."""
@@ -73,20 +70,12 @@ class Solids:
         along = t[:, 0] * normal[:, 1] - t[:, 1] * normal[:, 0]
         return self.speed[solid] * np.where(solid == self.pulley, 1.0, along)
 
-    def face(
-        self, solid: int, normal: Floats
-    ) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:
-        """Return the ends and the outward normal of the side that a contact normal points from."""
-        a, b, behind = self.a[solid], self.b[solid], self.behind[solid]
-        out = -behind / (2.0 * HALF_THICKNESS)
-        facing = float(normal @ out)
-        if abs(facing) < EDGE_ON:
-            along = float(normal @ self.tangent[solid])
-            corner = b if along > 0.0 else a
-            a, b, out = corner, corner + behind, np.sign(along) * self.tangent[solid]
-        elif facing < 0.0:
-            a, b, out = a + behind, b + behind, -out
-        return tuple(a.tolist()), tuple(b.tolist()), tuple(out.tolist())
+    def belt_at(self, solid: int, normal: tuple[float, float]) -> float:
+        """Speed of the surface along (n_y, -n_x) at one contact."""
+        if solid == self.pulley:
+            return float(self.speed[solid])
+        along = self.tangent[solid, 0] * normal[1] - self.tangent[solid, 1] * normal[0]
+        return float(self.speed[solid] * along)
 
     def gaps(self, points: Floats, radius: float) -> Floats:
         """Distances (P, K) between disks of a radius around points (P, 2) and the faces, m."""

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from math import floor
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.recording import Kind
+from chutelab.recording import EVENT, Kind
 from chutelab.stepper.clash import Clash, Disk, Pair
 from chutelab.stepper.solids import SLOP
 from chutelab.stepper.tracks import CARRIED, RESTING, Tracks
@@ -101,8 +101,8 @@ class Run:
         self.moved = np.zeros(count, dtype=bool)
         self.soft = machine.gravity * dt
         self.bend = np.zeros(count)
-        self._impacts = np.zeros(count, dtype=np.int64)
-        self._impacts_until = np.full(count, np.nan)
+        self._impacts: dict[int, tuple[float, int]] = {}
+        self._told: list[tuple[Any, ...]] = []
         self._left = np.full(count, np.nan)
         self._left_state = np.zeros((count, 5))
         self.settles_on: NDArray[np.bool_] = (solids.speed == 0.0) | (
@@ -176,13 +176,15 @@ class Run:
         tick = self.start + n * self.dt
         return tick if tick > t else tick + self.dt
 
-    def crowded(self, who: Ints, t: float) -> bool:
-        """Count an impact; tell whether one of two has had too many since the last step."""
+    def crowded(self, i: int, j: int, t: float) -> bool:
+        """Count an impact; tell whether one of the two has had too many since the last step."""
         tick = self.next_tick(t)
-        self._impacts[who[self._impacts_until[who] != tick]] = 0
-        self._impacts_until[who] = tick
-        self._impacts[who] += 1
-        return bool((self._impacts[who] > MOST_IMPACTS).any())
+        most = 0
+        for n in {i, j}:
+            until, so_far = self._impacts.get(n, (tick, 0))
+            most = max(most, so_far + 1 if until == tick else 1)
+            self._impacts[n] = tick, (so_far + 1 if until == tick else 1)
+        return most > MOST_IMPACTS
 
     def clash(self, particle: int, solid: int) -> Clash:
         """Return where pymunk resolves impacts of particles with a solid or a particle."""
@@ -208,24 +210,56 @@ class Run:
         inertia = self.machine.particle.inertia
         return self.radius * push / inertia if inertia > 0.0 else 0.0
 
-    def lay(self, i: int, normal: Floats, curvature: float | None) -> None:
+    def lay(self, i: int, normal: tuple[float, float], curvature: float | None) -> None:
         """Let a particle rest from its last knot on, a hair inside, so that pymunk sees it.
 
         `curvature` (1/m) of the path along a solid; None for a particle.
         """
-        k, who = self.tracks, np.array([i])
+        k, who, deep = self.tracks, np.array([i]), 0.5 * SLOP * self.radius
         k.rest(who)
         k.leave(who, k.x[who], k.v[who], k.omega[who])
-        k.from_t[i], k.from_x[i] = k.t[i], k.x[i] - 0.5 * SLOP * self.radius * normal
-        k.from_v[i] = k.v[i]
+        k.from_t[i], k.from_v[i] = k.t[i], k.v[i]
+        k.from_x[i] = k.x[i, 0] - deep * normal[0], k.x[i, 1] - deep * normal[1]
         if curvature is not None:
             k.upon[i], self.bend[i] = normal, curvature
         self.changed(who)
 
-    def take_off(self, who: Ints, t: float) -> None:
+    def take_off(self, who: Ints) -> None:
         """Let particles fly from their last knots."""
         self.tracks.fly(who)
         self.changed(who)
+
+    def book(self, i: int, surface: int, belt: float, restitution: float, friction: float) -> None:
+        """Book ledger entries (J) on one particle, and on the surface it met."""
+        entries = belt, restitution, friction
+        self.recorder.entries[self.ids[i]] += entries
+        self.recorder.by_surface[surface] += entries
+
+    def tell(
+        self,
+        kind: Kind,
+        i: int,
+        j: int,
+        surface: int,
+        velocity: tuple[float, float],
+        omega: float,
+        impulse: tuple[float, float],
+    ) -> None:
+        """Write the event of an impact of particle i after its last knot."""
+        k = self.tracks
+        self._told.append(
+            (
+                float(k.t[i]), self.ids[i], self.ids[j] if j >= 0 else -1, kind, surface,
+                tuple(k.x[i].tolist()), velocity, tuple(k.v[i].tolist()), omega,
+                float(k.omega[i]), *impulse,
+            )
+        )  # fmt: skip
+        self.recorder.contacts += 1
+
+    def flush(self) -> None:
+        """Hand over what was written one by one."""
+        self.tracks.flush()
+        self.recorder.tell(np.array(self._told, dtype=EVENT))
 
     def changed(self, who: Ints) -> None:
         """Note that particles are on new paths."""

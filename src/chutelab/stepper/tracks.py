@@ -7,13 +7,13 @@ parabola that the last ones foretold, so memory grows with what happens, not wit
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.ballistics import closing_time
-from chutelab.recording import REASONS
+from chutelab.recording import KNOT, REASONS
+from chutelab.stepper.outline import closing_time
 
 if TYPE_CHECKING:
     from chutelab.machine import Machine
@@ -71,6 +71,8 @@ class Tracks:
         self._held = np.zeros(count, dtype=bool)
         self._held_t, self._held_omega = np.zeros((2, count))
         self._held_x, self._held_v = np.zeros((2, count, 2))
+        self._box = machine.exit_box
+        self._marks: list[tuple[int, tuple[Any, ...]]] = []
         self._bend = np.zeros((count, 2))
         self._bend_omega = np.zeros(count)
         self._bend_known = np.zeros(count, dtype=bool)
@@ -78,16 +80,53 @@ class Tracks:
     def knot(self, who: Ints, t: ArrayLike, x: ArrayLike, v: ArrayLike, omega: ArrayLike) -> None:
         """Write a knot for each of some particles; it becomes their last."""
         if len(who):
+            self.flush()
             self.t[who], self.x[who], self.v[who], self.omega[who] = t, x, v, omega
             self._recorder.knots(
                 self.ids[who], self.t[who], self.x[who], self.v[who], self.omega[who]
             )
+
+    def mark(
+        self, i: int, t: float, x: float, y: float, vx: float, vy: float, omega: float
+    ) -> None:
+        """Write a knot for one particle."""
+        self.t[i], self.omega[i] = t, omega
+        self.x[i], self.v[i] = (x, y), (vx, vy)
+        n = int(self.ids[i])
+        entries = tuple(self._recorder.entries[n].tolist())
+        self._marks.append((n, (t, (x, y), (vx, vy), omega, entries)))
+
+    def flush(self) -> None:
+        """Hand over the knots written one by one."""
+        if self._marks:
+            owners, knots = zip(*self._marks, strict=True)
+            self._recorder.add(np.array(owners), np.array(list(knots), dtype=KNOT))
+            self._marks.clear()
 
     def flight(self, who: Ints | slice, t: float) -> tuple[Floats, Floats]:
         """Return positions and velocities, (k, 2), on the present paths at a time."""
         s = (t - self.from_t[who])[:, None]
         v = self.from_v[who]
         return self.from_x[who] + s * (v + 0.5 * s * self._g), v + s * self._g
+
+    def all_at(self, t: float) -> tuple[Floats, Floats, Floats, Floats]:
+        """Return x, y and velocities, each (N,), of all particles on their present paths."""
+        s, g = t - self.from_t, self._machine.gravity
+        u, v = self.from_v[:, 0], self.from_v[:, 1]
+        fall = s * g
+        return (
+            self.from_x[:, 0] + s * u,
+            self.from_x[:, 1] + s * (v - 0.5 * fall),
+            u,
+            v - fall,
+        )
+
+    def state(self, i: int, t: float) -> tuple[float, float, float, float]:
+        """Return position and velocity of one particle on its present path at a time."""
+        s = t - float(self.from_t[i])
+        (x, y), (vx, vy) = self.from_x[i].tolist(), self.from_v[i].tolist()
+        g = self._machine.gravity
+        return x + s * vx, y + s * (vy - 0.5 * s * g), vx, vy - s * g
 
     def turn(self, i: int) -> float:
         """Return ω of a particle, rad/s."""
@@ -97,20 +136,18 @@ class Tracks:
         """Let particles go from their last knots."""
         self.mode[who] = FLYING
         self.from_t[who], self.from_x[who], self.from_v[who] = self.t[who], self.x[who], self.v[who]
-        left, right, bottom, top = self._machine.exit_box
-        x, v = self.x[who], self.v[who]
-        # Beyond the floor already: at once, whatever way it moves.
-        times = [closing_time(np.maximum(x[:, 1] - bottom, 0.0), v[:, 1], -self._machine.gravity)]
-        if self._machine.gravity == 0.0:
-            times += [
-                closing_time(np.maximum(gap, 0.0), rate, 0.0)
-                for gap, rate in (
-                    (x[:, 0] - left, v[:, 0]),
-                    (right - x[:, 0], -v[:, 0]),
-                    (top - x[:, 1], -v[:, 1]),
-                )
-            ]
-        self.exit[who] = self.t[who] + np.min([np.where(t < 0.0, np.inf, t) for t in times], axis=0)
+        for i in who.tolist():
+            self.exit[i] = self.t[i] + self._way_out(*self.x[i].tolist(), *self.v[i].tolist())
+
+    def _way_out(self, x: float, y: float, vx: float, vy: float) -> float:
+        """Return when a flight leaves the scene, s; at once if it is beyond the edge already."""
+        left, right, bottom, top = self._box
+        if self._machine.gravity > 0.0:
+            return closing_time(max(y - bottom, 0.0), vy, -self._machine.gravity)
+        return min(
+            closing_time(max(gap, 0.0), rate, 0.0)
+            for gap, rate in ((x - left, vx), (right - x, -vx), (y - bottom, vy), (top - y, -vy))
+        )
 
     def rest(self, who: Ints) -> None:
         """Keep particles in contact from their last knots on."""

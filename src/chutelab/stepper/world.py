@@ -95,6 +95,7 @@ class World:
         self._bodies: dict[int, pymunk.Body] = {}
         self._shapes: dict[int, pymunk.Circle] = {}
         self._fixed = [self._solid(solids, k) for k in range(len(solids.reach))]
+        self._codes_of = {body.id: count + k for k, body in enumerate(self._fixed)}
         self._buffer = batch.Buffer()
         self._stale = True
         self._ids = np.empty(0, dtype=np.uintp)
@@ -135,13 +136,15 @@ class World:
         )
         self._space.add(body, shape)
         self._bodies[particle], self._shapes[particle] = body, shape
+        self._codes_of[body.id] = particle
         self._stale = True
 
     def remove(self, particle: int) -> None:
         """Take a particle out."""
-        if particle in self._bodies:
-            self._space.remove(self._bodies.pop(particle), self._shapes.pop(particle))
-            self._stale = True
+        body = self._bodies.pop(particle)
+        del self._codes_of[body.id]
+        self._space.remove(body, self._shapes.pop(particle))
+        self._stale = True
 
     def place(
         self,
@@ -200,10 +203,12 @@ class World:
 
     def _number(self) -> None:
         """Learn anew which body stands where in pymunk's lists: body ids are reused addresses."""
-        known = {body.id: particle for particle, body in self._bodies.items()}
-        known |= {body.id: self.count + k for k, body in enumerate(self._fixed)}
-        self._ids = np.array(sorted(known), dtype=np.uintp)
-        self._codes = np.array([known[i] for i in sorted(known)], dtype=np.int64)
+        known = self._codes_of
+        ids = np.fromiter(known, dtype=np.uintp, count=len(known))
+        order = np.argsort(ids)
+        self._ids = ids[order]
+        codes = np.fromiter(known.values(), dtype=np.int64, count=len(known))
+        self._codes = codes[order]
         self._buffer.clear()
         batch.get_space_bodies(self._space, batch.BodyFields.BODY_ID, self._buffer)
         listed = np.frombuffer(self._buffer.int_buf(), dtype=np.uintp)

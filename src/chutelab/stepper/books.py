@@ -52,67 +52,104 @@ class Motion:
     spin_after: Floats
 
 
+@dataclass(frozen=True, eq=False)
+class Deeds:
+    """What the M contacts of a step did, in the frames of their normals.
+
+    Attributes
+    ----------
+    j_n, j_t : ndarray, (M,)
+        Impulses on the first, N s.
+    belt : ndarray, (M,)
+        Speed of the surface, m/s.
+    before_t, after_n, after_t : ndarray, (M,)
+        Slip before, normal speed and slip after, m/s.
+    rounded : ndarray of bool, (M,)
+        Whether the solid is round there.
+    uses : ndarray, (N,)
+        Number of contacts of each particle.
+    change, turn : ndarray, (N, 2) and (N,)
+        By how much velocity and ω of each particle changed, m/s and rad/s.
+    """
+
+    j_n: Floats
+    j_t: Floats
+    belt: Floats
+    before_t: Floats
+    after_n: Floats
+    after_t: Floats
+    rounded: NDArray[np.bool_]
+    uses: Ints
+    change: Floats
+    turn: Floats
+
+
 def settle_books(run: Run, contacts: Contacts, x: Floats, motion: Motion, t: float) -> None:
     """Book the contacts of a step, write knots and events, and keep the particles in contact.
 
     Parameters
     ----------
     contacts : Contacts
-        Without those of lone particles; the first of a pair is never carried.
+        The first of a pair is never carried.
     x : ndarray, (N, 2)
         Positions after the step, m.
     """
-    i, solid = contacts.first, contacts.other - run.count
-    pairs = solid < 0
-    j = np.where(pairs, contacts.other, 0)
-    n = contacts.normal
-    along = np.stack([n[:, 1], -n[:, 0]], axis=-1)
-    j_n, j_t = _dot(contacts.impulse, n), _dot(contacts.impulse, along)
-    belt = np.zeros(len(i))
-    belt[~pairs] = run.solids.belt(solid[~pairs], n[~pairs])
-    carried = pairs & (run.tracks.mode[j] == CARRIED)
-
-    def parts(v: Floats, omega: Floats) -> tuple[Floats, Floats]:
-        other = np.where(pairs[:, None], v[j], 0.0)
-        rim = run.radius * (omega[i] + np.where(pairs, omega[j], 0.0))
-        relative = v[i] - other
-        return _dot(relative, n), _dot(relative, along) + rim - belt
-
+    k, n = run.tracks, contacts.normal
     # Led round the pulley along a chord, a particle only seems to press outwards.
-    led = np.flatnonzero((run.tracks.aim[i] != run.tracks.w[i]).any(axis=1))
+    i = contacts.first
+    led = np.flatnonzero((k.aim[i] != k.w[i]).any(axis=1))
     motion.before[i[led]] -= _dot(motion.before[i[led]], n[led])[:, None] * n[led]
-    mean = 0.5 * (motion.before + motion.after)
-    normal_speed, slip = parts(mean, 0.5 * (motion.spin_before + motion.spin_after))
-    after_n, after_t = parts(motion.after, motion.spin_after)
-
-    who = np.flatnonzero(_involved(run, contacts))
-    was_flying = run.tracks.mode[who] == FLYING
-    jump = np.abs(motion.after[who] - motion.before[who]).max(axis=1)
+    deeds, before_n = _deeds(run, contacts, x, motion)
+    who = np.flatnonzero((deeds.uses > 0) & (k.mode != CARRIED))
+    was_flying = k.mode[who] == FLYING
+    jump = np.abs(deeds.change[who]).max(axis=1)
     shock = was_flying | (jump > SHOCK + 4.0 * run.machine.gravity * run.dt)
     _knots_before(run, who, shock, was_flying, x, motion, t)
-    _book(run, contacts, pairs, carried, (j_n * normal_speed, j_t * slip, j_t * belt), motion)
+    _book(run, contacts, deeds, before_n, motion)
     hit = who[shock]
-    run.tracks.knot(hit, t, x[hit], motion.after[hit], motion.spin_after[hit])
-    _events(run, contacts, (j_n, j_t), x, motion, t)
+    k.knot(hit, t, x[hit], motion.after[hit], motion.spin_after[hit])
+    _events(run, contacts, deeds, x, motion, t)
 
-    run.tracks.rest(who[was_flying])
-    run.tracks.leave(who, x[who], motion.after[who], motion.spin_after[who])
-    _surfaces(run, contacts, who, after_t, x, motion, t)
-    _calm(run, contacts, who, np.maximum(np.abs(after_n), np.abs(after_t)), motion)
+    k.rest(who[was_flying])
+    k.leave(who, x[who], motion.after[who], motion.spin_after[who])
+    _surfaces(run, contacts, who, deeds, x, motion, t)
+    _calm(run, contacts, who, deeds)
+    if run.machine.align:
+        run.idle.settle(contacts, who, deeds)
     if run.machine.until == "landed":
         run.finish(who[run.landed[who]], "landed")
 
 
+def _deeds(run: Run, contacts: Contacts, x: Floats, motion: Motion) -> tuple[Deeds, Floats]:
+    """Return what the contacts did, and the normal speeds before."""
+    i, solid = contacts.first, contacts.other - run.count
+    pairs = solid < 0
+    rows = np.flatnonzero(pairs)
+    j, fixed = contacts.other[rows], np.flatnonzero(~pairs)
+    nx, ny = contacts.normal[:, 0], contacts.normal[:, 1]
+    push_x, push_y = contacts.impulse[:, 0], contacts.impulse[:, 1]
+    belt, rounded = np.zeros(len(i)), np.zeros(len(i), dtype=bool)
+    belt[fixed] = run.solids.belt(solid[fixed], contacts.normal[fixed])
+    rounded[fixed] = run.solids.rounded(solid[fixed], x[i[fixed]])
+
+    def parts(v: Floats, omega: Floats) -> tuple[Floats, Floats]:
+        relative, rim = v[i], omega[i]
+        relative[rows] -= v[j]
+        rim[rows] += omega[j]
+        u, w = relative[:, 0], relative[:, 1]
+        return u * nx + w * ny, u * ny - w * nx + run.radius * rim - belt
+
+    before_n, before_t = parts(motion.before, motion.spin_before)
+    after_n, after_t = parts(motion.after, motion.spin_after)
+    uses = np.bincount(i, minlength=run.count) + np.bincount(j, minlength=run.count)
+    return Deeds(
+        push_x * nx + push_y * ny, push_x * ny - push_y * nx, belt, before_t, after_n, after_t,
+        rounded, uses, motion.after - motion.before, motion.spin_after - motion.spin_before,
+    ), before_n  # fmt: skip
+
+
 def _dot(a: Floats, b: Floats) -> Floats:
     return np.asarray(np.einsum("md,md->m", a, b))
-
-
-def _involved(run: Run, contacts: Contacts) -> NDArray[np.bool_]:
-    """Tell which particles have a contact and are not carried, (N,)."""
-    out = np.zeros(run.count, dtype=bool)
-    out[contacts.first] = True
-    out[contacts.other[contacts.other < run.count]] = True
-    return np.asarray(out & (run.tracks.mode != CARRIED))
 
 
 def _knots_before(
@@ -133,40 +170,30 @@ def _knots_before(
     k.knot(kink, t, x[kink], v, motion.spin_before[kink])
 
 
-def _book(
-    run: Run,
-    contacts: Contacts,
-    pairs: NDArray[np.bool_],
-    carried: NDArray[np.bool_],
-    works: tuple[Floats, Floats, Floats],
-    motion: Motion,
-) -> None:
+def _book(run: Run, contacts: Contacts, deeds: Deeds, before_n: Floats, motion: Motion) -> None:
     """Book contacts; what two particles lose is shared, what a carried one gives is belt work."""
-    on_normal, on_slip, by_belt = works
-    both = pairs & ~carried
-    half = np.where(both, 0.5, 1.0)
-    surface = np.full(len(pairs), run.particles)
-    surface[~pairs] = run.solids.surface[contacts.other[~pairs] - run.count]
+    i, other = contacts.first, contacts.other
+    pairs = other < run.count
+    carried = pairs & (run.tracks.mode[np.where(pairs, other, 0)] == CARRIED)
+    both = np.flatnonzero(pairs & ~carried)
+    entries = np.empty((len(i) + len(both), 3))
+    share = np.where(pairs & ~carried, -0.25, -0.5)
+    first = entries[: len(i)]
+    first[:, 0] = deeds.j_t * deeds.belt
+    first[:, 1] = share * deeds.j_n * (before_n + deeds.after_n)
+    first[:, 2] = share * deeds.j_t * (deeds.before_t + deeds.after_t)
+    entries[len(i) :] = first[both]
+    surface = np.full(len(entries), run.particles)
+    fixed = np.flatnonzero(~pairs)
+    surface[fixed] = run.solids.surface[other[fixed] - run.count]
+    run.recorder.book(run.ids[np.concatenate([i, other[both]])], surface, *entries.T)
     if carried.any():
-        drive = motion.after[contacts.other[carried]]
-        given = _dot(contacts.impulse[carried], drive)
-        run.recorder.book(run.ids[contacts.first[carried]], 0, given)
-    run.recorder.book(
-        run.ids[np.concatenate([contacts.first, contacts.other[both]])],
-        np.concatenate([surface, surface[both]]),
-        np.concatenate([by_belt, np.zeros(np.count_nonzero(both))]),
-        np.concatenate([-half * on_normal, -0.5 * on_normal[both]]),
-        np.concatenate([-half * on_slip, -0.5 * on_slip[both]]),
-    )
+        given = _dot(contacts.impulse[carried], motion.after[other[carried]])
+        run.recorder.book(run.ids[i[carried]], 0, given)
 
 
 def _events(
-    run: Run,
-    contacts: Contacts,
-    impulse: tuple[Floats, Floats],
-    x: Floats,
-    motion: Motion,
-    t: float,
+    run: Run, contacts: Contacts, deeds: Deeds, x: Floats, motion: Motion, t: float
 ) -> None:
     """Write impacts and collisions: contacts that were not there a step ago, and hit."""
     i, j = contacts.first, contacts.other
@@ -178,15 +205,17 @@ def _events(
     before[run.tracks.mode == FLYING] += 0.5 * run.dt * run.gravity
     relative = before[i] - np.where(pairs[:, None], before[np.where(pairs, j, 0)], 0.0)
     approach = -_dot(relative, contacts.normal)
-    told = begun & (approach > run.machine.gravity * run.dt)
+    told = begun & (approach > run.soft)
     kind = np.where(pairs, Kind.COLLISION, Kind.IMPACT)
     s = np.flatnonzero(~pairs)
     solid = j[s] - run.count
-    told[s] |= (approach[s] > FAINT * run.machine.gravity * run.dt) & ~run.met[i[s], solid]
+    told[s] |= (approach[s] > FAINT * run.soft) & ~run.met[i[s], solid]
     run.met[i[s], solid] = True
     landing = (run.solids.surface[solid] == run.machine.landing) & ~run.landed[i[s]]
     kind[s[landing]], told[s[landing]] = Kind.LANDING, True
     run.landed[i[s[landing]]] = True
+    if not told.any():
+        return
     who = i[told]
     surface = np.full(len(i), run.particles)
     surface[s] = run.solids.surface[solid]
@@ -194,28 +223,26 @@ def _events(
         kind[told], who, t, x[who], motion.after[who], motion.spin_after[who], surface[told],
         np.where(pairs, run.ids[np.where(pairs, j, 0)], -1)[told],
         velocity_before=before[who], omega_before=motion.spin_before[who],
-        impulse=(impulse[0][told], impulse[1][told]),
+        impulse=(deeds.j_n[told], deeds.j_t[told]),
     )  # fmt: skip
     run.recorder.contacts += int(np.count_nonzero(told))
 
 
 def _surfaces(
-    run: Run, contacts: Contacts, who: Ints, slip: Floats, x: Floats, motion: Motion, t: float
+    run: Run, contacts: Contacts, who: Ints, deeds: Deeds, x: Floats, motion: Motion, t: float
 ) -> None:
     """Keep account of which single surface particles lie on, and whether they slip there."""
-    pairs = contacts.other < run.count
-    uses = np.bincount(contacts.first, minlength=run.count)
-    uses += np.bincount(contacts.other[pairs], minlength=run.count)
+    fixed = contacts.other >= run.count
     surface = np.full(run.count, -1)
-    rows = np.flatnonzero(~pairs & (uses[contacts.first] == 1))
+    rows = np.flatnonzero(fixed & (deeds.uses[contacts.first] == 1))
     alone = contacts.first[rows]
     surface[alone] = run.solids.surface[contacts.other[rows] - run.count]
     run.arrive(who, surface[who], t)
-    speed = np.abs(slip[rows])
-    stops = run.slipping[alone] & (speed < SETTLED[0])
-    starts = ~run.slipping[alone] & (speed > SLIPS)
-    _lie(run, contacts, uses)
-    run.slipping[alone] = (run.slipping[alone] & ~stops) | starts
+    speed = np.abs(deeds.after_t[rows])
+    slipping = run.slipping[alone]
+    stops, starts = slipping & (speed < SETTLED[0]), ~slipping & (speed > SLIPS)
+    run.slipping[alone] = (slipping & ~stops) | starts
+    _lie(run, contacts, deeds, np.flatnonzero(fixed))
     for kind, these in ((Kind.STICK, alone[stops]), (Kind.SLIP, alone[starts])):
         run.event(
             kind, these, t, x[these], motion.after[these], motion.spin_after[these],
@@ -223,27 +250,27 @@ def _surfaces(
         )  # fmt: skip
 
 
-def _lie(run: Run, contacts: Contacts, uses: Ints) -> None:
+def _lie(run: Run, contacts: Contacts, deeds: Deeds, rows: Ints) -> None:
     """Note the normals of surfaces that particles lie on, one or several in line; follow curves."""
-    solid = contacts.other >= run.count
-    i, n = contacts.first[solid], contacts.normal[solid]
-    total = np.zeros((run.count, 2))
-    np.add.at(total, i, n)
-    length = np.linalg.norm(total, axis=1)
+    i, n, uses = contacts.first[rows], contacts.normal[rows], deeds.uses
+    total = np.stack(
+        [np.bincount(i, weights=n[:, axis], minlength=run.count) for axis in (0, 1)], axis=-1
+    )
+    length = np.hypot(total[:, 0], total[:, 1])
     in_line = (uses > 0) & (length > (1.0 - IN_LINE) * uses)
     who = np.flatnonzero(in_line)
     run.tracks.upon[who] = total[who] / length[who, None]
-    which = contacts.other[solid] - run.count
-    curved = in_line[i] & run.solids.rounded(which, run.tracks.at[i])
+    curved = in_line[i] & deeds.rounded[rows]
     for row in np.flatnonzero(curved).tolist():
-        run.follow(int(i[row]), n[row], float(run.solids.reach[which[row]]) + run.radius)
+        solid = contacts.other[rows[row]] - run.count
+        run.follow(int(i[row]), n[row], float(run.solids.reach[solid]) + run.radius)
 
 
-def _calm(run: Run, contacts: Contacts, who: Ints, speed: Floats, motion: Motion) -> None:
+def _calm(run: Run, contacts: Contacts, who: Ints, deeds: Deeds) -> None:
     """Count steps in a row in which particles lay still on what they can settle on."""
     limit = STILL[0] if run.machine.interact else SETTLED[0]
     pairs = contacts.other < run.count
-    restless = speed > limit
+    restless = np.maximum(np.abs(deeds.after_n), np.abs(deeds.after_t)) > limit
     solid = contacts.other[~pairs] - run.count
     restless[~pairs] |= ~run.settles_on[solid]
     stirred = np.zeros(run.count, dtype=bool)
@@ -251,6 +278,5 @@ def _calm(run: Run, contacts: Contacts, who: Ints, speed: Floats, motion: Motion
     stirred[contacts.other[restless & pairs]] = True
     if not run.machine.interact:
         # Rolling down a slope is not lying on it.
-        change = np.abs(motion.after - motion.before).max(axis=1)
-        stirred[who] |= change[who] > limit
+        stirred[who] |= np.abs(deeds.change[who]).max(axis=1) > limit
     run.calm[who] = np.where(stirred[who], 0, run.calm[who] + 1)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from chutelab.stepper.solids import Solids
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 Vector = tuple[float, float]
 
 LOOK = 0.25
@@ -58,6 +59,30 @@ class Carriage:
             return [end]
         pieces = max(1, ceil((end - top) * self.speed / self.rho / STEP_ANGLE))
         return [top, *(top + (end - top) * n / pieces for n in range(1, pieces)), end]
+
+
+class Carriages:
+    """The rides of many, as arrays (N,); NaN for who does not ride.
+
+    Parameters
+    ----------
+    rides : dict
+        By particle.
+    count : int
+        Number of particles N.
+    """
+
+    def __init__(self, rides: dict[int, Carriage], count: int) -> None:
+        self._columns = np.full((4, count), np.nan)
+        for n, ride in rides.items():
+            self._columns[:, n] = ride.t, ride.x, ride.speed, ride.rho
+
+    def position(self, who: Ints, t: float) -> Floats:
+        """Return positions (k, 2) at a time, m."""
+        begin, x, speed, rho = self._columns[:, who]
+        along = x + speed * (t - begin)
+        phi = np.maximum(along, 0.0) / rho
+        return np.stack([np.where(along > 0.0, rho * np.sin(phi), along), rho * np.cos(phi)], -1)
 
 
 def carriage(machine: Machine, solids: Solids, particle: int) -> Carriage:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from chutelab.recorder import Recorder
 from chutelab.recording import Kind
 from chutelab.stepper.books import SETTLED, STILL
-from chutelab.stepper.carriage import Carriage, carriage
+from chutelab.stepper.carriage import Carriage, Carriages, carriage
 from chutelab.stepper.forecast import Forecast
 from chutelab.stepper.impacts import particle_partner, solid_partner, strike
 from chutelab.stepper.kick import kick
@@ -128,6 +128,7 @@ class _Loop:
             for n, i in enumerate(ids.tolist())
             if releases.carried[i]
         }
+        self.carriages = Carriages(self.rides, len(ids))
         start = float(self.release[0])
         if len(ids) == 1 and 0 in self.rides:
             # Nothing to step before it is let go.
@@ -188,14 +189,13 @@ class _Loop:
         """Put carried particles on paths that agree with their rides now and at the next step."""
         r, k = self.run_state, self.run_state.tracks
         span = self.tick - now
-        if not self.machine.interact or not 0.0 < span < inf:
-            return
-        for n in np.flatnonzero(k.mode == CARRIED).tolist():
-            x0, _ = self.rides[n].state(now)
-            x1, _ = self.rides[n].state(self.tick)
-            k.from_t[n], k.from_x[n] = now, x0
-            k.from_v[n] = (np.subtract(x1, x0)) / span - 0.5 * span * r.gravity
-            r.version[n] += 1
+        who = np.flatnonzero(k.mode == CARRIED)
+        if self.machine.interact and len(who) and 0.0 < span < inf:
+            begin = self.carriages.position(who, now)
+            k.from_t[who], k.from_x[who] = now, begin
+            mean = (self.carriages.position(who, self.tick) - begin) / span
+            k.from_v[who] = mean - 0.5 * span * r.gravity
+            r.version[who] += 1
 
     def _impact(self, t: float) -> None:
         r, what = self.run_state, self.forecast.take()
@@ -211,11 +211,12 @@ class _Loop:
         mode = r.tracks.mode
         if not self.machine.align:
             kick(r, mode == CARRIED, self.last, t)
-        elif (mode == RESTING).any():
+        elif ((mode == RESTING) & ~r.idle.asleep).any():
             kick(r, self.forecast.beside & (mode == CARRIED), self.last, t)
         self.steps += 1
-        self._settle(t)
         self.last, self.tick = t, t + r.dt
+        r.idle.move(t, self.tick)
+        self._settle(t)
         self._carry(t)
         if self.machine.align:
             self.forecast.window(t, self.tick)
@@ -235,6 +236,7 @@ class _Loop:
 
     def _end_settled(self, who: Ints, t: float) -> None:
         r, k = self.run_state, self.run_state.tracks
+        r.idle.wake(who)
         k.close(who)
         r.event(Kind.SETTLE, who, t, k.x[who], k.v[who], k.omega[who], r.on[who])
         r.finish(who, "settled")
@@ -289,7 +291,9 @@ class _Loop:
     def _stop(self) -> None:
         """End what is left when the time is up."""
         r, k = self.run_state, self.run_state.tracks
-        k.close(np.flatnonzero(k.mode == RESTING))
+        resting = np.flatnonzero(k.mode == RESTING)
+        r.idle.wake(resting)
+        k.close(resting)
         end = self.machine.end_time
         flying = np.flatnonzero(k.mode == FLYING)
         if len(flying):

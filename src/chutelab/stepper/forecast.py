@@ -1,4 +1,4 @@
-"""What comes next: a calendar of impacts foretold, each void once a path it was foretold of ends."""
+"""What comes next: a calendar of impacts foretold, each void once one of its paths ends."""
 
 from __future__ import annotations
 
@@ -155,10 +155,11 @@ class Forecast:
         span = tick - now
         way = span * v + 0.5 * span * span * run.gravity
         margin = run.radius * (1.0 + NEAR)
+        margin2 = 2.0 * margin
         a, b = neighbours(np.minimum(x, x + way) - margin, np.maximum(x, x + way) + margin)
         both = modes[a] * 8 + modes[b]
         asked = (both != FLYING * 9) & (both != CARRIED * 9)
-        a, b = a[asked], b[asked]
+        a, b, both = a[asked], b[asked], both[asked]
         if not len(a):
             return
         dx, dv = x[b] - x[a], v[b] - v[a]
@@ -167,6 +168,10 @@ class Forecast:
         floor = np.where(flies, ROUNDING * run.soft, run.soft)
         for n in np.flatnonzero((t <= span) & (approach > floor)).tolist():
             self._pair(now + float(t[n]), int(who[a[n]]), int(who[b[n]]))
+        touching = np.flatnonzero((both == RESTING * 9) & (np.hypot(dx[:, 0], dx[:, 1]) <= margin2))
+        run.idle.stir(
+            who[a[touching]], who[b[touching]], np.where(t <= span, approach, 0.0)[touching]
+        )
         carried = (modes[a] == CARRIED) | (modes[b] == CARRIED)
         self.beside[who[a[carried & ~flies]]] = self.beside[who[b[carried & ~flies]]] = True
 

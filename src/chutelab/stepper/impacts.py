@@ -117,6 +117,7 @@ def strike(run: Run, i: int, partner: Partner, t: float) -> None:
         run.book(i, 0, j_t * belt + j_n * partner.velocity[1], 0.0, 0.0)
     for n, state, omega, _ in who:
         if k.mode[n] == RESTING:
+            run.idle.disturb(n)
             k.close(np.array([n]))
         k.mark(n, t, *state, omega)
         paid = j_t * belt if partner.solid >= 0 else 0.0

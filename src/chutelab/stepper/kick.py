@@ -27,7 +27,10 @@ def kick(run: Run, carried: NDArray[np.bool_], t0: float, t: float) -> None:
         Carried particles that may push others.
     """
     k = run.tracks
-    free = (k.mode == RESTING) if run.machine.align else (k.mode == RESTING) | (k.mode == FLYING)
+    free = (k.mode == RESTING) & ~run.idle.asleep
+    if not run.machine.align:
+        free |= k.mode == FLYING
+    run.now = t
     _enter(run, free, carried, t)
     run.world.step(run.dt)
     contacts = run.world.contacts()
@@ -35,12 +38,12 @@ def kick(run: Run, carried: NDArray[np.bool_], t0: float, t: float) -> None:
     if contacts is not None:
         touched[contacts.first] = True
         touched[contacts.other[contacts.other < run.count]] = True
-    run.lift(np.flatnonzero((k.mode == RESTING) & ~touched), t0)
+    run.lift(np.flatnonzero(free & (k.mode == RESTING) & ~touched), t0)
     if contacts is None:
         run.touching = np.empty(0, dtype=np.int64)
         return
     _resolve(run, contacts, t)
-    resting = np.flatnonzero(k.mode == RESTING)
+    resting = np.flatnonzero((k.mode == RESTING) & free)
     k.go_on(resting, t, run.dt)
     run.version[resting] += 1
 
@@ -79,9 +82,7 @@ def _enter(run: Run, free: NDArray[np.bool_], carried: NDArray[np.bool_], t: flo
     ):
         world.place(n, tuple(a), tuple(b), c)
     x0, x1 = k.flight(pushed, t - run.dt)[0], k.flight(pushed, t)[0]
-    for n, a, b in zip(
-        pushed.tolist(), x0.tolist(), ((x1 - x0) / run.dt).tolist(), strict=True
-    ):
+    for n, a, b in zip(pushed.tolist(), x0.tolist(), ((x1 - x0) / run.dt).tolist(), strict=True):
         world.place(n, tuple(a), tuple(b))
 
 
@@ -99,4 +100,4 @@ def _resolve(run: Run, contacts: Contacts, t: float) -> None:
     before[carried], spin_before[flying] = v[carried], k.omega[flying]
     spin_before[carried] = 0.0
     settle_books(run, contacts, x, Motion(before, v, spin_before, spin), t)
-    run.touching = run.keys(contacts.first, contacts.other)
+    run.touching = np.sort(run.keys(contacts.first, contacts.other))

@@ -9,9 +9,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-def meeting(
-    x: Floats, y: Floats, u: Floats, v: Floats, reach: float
-) -> tuple[Floats, Floats]:
+def meeting(x: Floats, y: Floats, u: Floats, v: Floats, reach: float) -> tuple[Floats, Floats]:
     """Return when the distance of disks falls to `reach`, and the speed of approach then.
 
     Parameters

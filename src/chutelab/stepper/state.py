@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chutelab.recording import EVENT, Kind
 from chutelab.stepper.clash import Clash, Disk, Pair
+from chutelab.stepper.idle import Idle
 from chutelab.stepper.solids import SLOP
 from chutelab.stepper.tracks import CARRIED, RESTING, Tracks
 from chutelab.stepper.world import World
@@ -50,8 +51,8 @@ class Run:
         Keys, particle times (N + K) plus partner, of the contacts a step ago.
     settles_on : ndarray of bool, (K,)
         Solids at rest, and the outgoing belt.
-    start : float
-        s, from where steps are counted.
+    start, now : float
+        s, from where steps are counted, and when the last one ended.
     inside : ndarray of bool, (N,)
         Whether pymunk has a body for the particle.
     version : ndarray, (N,)
@@ -78,7 +79,7 @@ class Run:
     ) -> None:
         count = len(ids)
         self.machine, self.solids, self.recorder, self.ids = machine, solids, recorder, ids
-        self.start, self.dt = start, dt
+        self.start, self.dt, self.now = start, dt, start
         self._clashes = clashes
         self._world: World | None = None
         self.tracks = Tracks(machine, recorder, ids)
@@ -101,6 +102,7 @@ class Run:
         self.moved = np.zeros(count, dtype=bool)
         self.soft = machine.gravity * dt
         self.bend = np.zeros(count)
+        self.idle = Idle(self)
         self._impacts: dict[int, tuple[float, int]] = {}
         self._told: list[tuple[Any, ...]] = []
         self._left = np.full(count, np.nan)
@@ -130,7 +132,10 @@ class Run:
         keys = self.keys(first, other)
         if len(keys) == len(self.touching) and (keys == self.touching).all():
             return np.zeros(len(keys), dtype=bool)
-        return np.isin(keys, self.touching, invert=True)
+        known = self.touching
+        if not len(known):
+            return np.ones(len(keys), dtype=bool)
+        return np.asarray(known[np.minimum(np.searchsorted(known, keys), len(known) - 1)] != keys)
 
     @property
     def particles(self) -> int:

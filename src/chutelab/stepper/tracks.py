@@ -207,7 +207,7 @@ class Tracks:
             self._bend[them] = (v[turn] - self.v[them]) / step[:, None]
             self._bend_omega[them] = (omega[turn] - self.omega[them]) / step
 
-    def hold(self, who: Ints, t: float, x: Floats, v: Floats, omega: Floats) -> None:
+    def hold(self, who: Ints, t: ArrayLike, x: Floats, v: Floats, omega: Floats) -> None:
         """Remember states as knots that may not be needed."""
         self._held[who], self._held_t[who] = True, t
         self._held_x[who], self._held_v[who], self._held_omega[who] = x, v, omega

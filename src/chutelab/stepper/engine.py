@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from heapq import heapify, heappop, heappush
-from math import inf
+from math import inf, sqrt
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -30,6 +30,10 @@ if TYPE_CHECKING:
     from chutelab.stepper.clash import Clash
 
 Ints = NDArray[np.int64]
+
+SINK = 0.01
+"""Share of the radius by which what touches may sink into another in a step: g dt² at most, which
+bounds the step from above where `run.dt` is coarse, or particles are small."""
 
 PAUSE = 0.05
 """s between two reports of progress."""
@@ -133,7 +137,10 @@ class _Loop:
         if len(ids) == 1 and 0 in self.rides:
             # Nothing to step before it is let go.
             start = min(self.rides[0].until, machine.end_time)
-        self.run_state = Run(machine, shapes, recorder, ids, start, machine.dt, clashes)
+        dt = machine.dt
+        if machine.align and machine.gravity > 0.0:
+            dt = min(dt, sqrt(SINK * machine.particle.radius / machine.gravity))
+        self.run_state = Run(machine, shapes, recorder, ids, start, dt, clashes)
         self.forecast = Forecast(self.run_state, outline)
         self.agenda = [
             (float(t), n, self._release) for n, t in enumerate(self.release) if t < machine.end_time
@@ -214,6 +221,7 @@ class _Loop:
         elif ((mode == RESTING) & ~r.idle.asleep).any():
             kick(r, self.forecast.beside & (mode == CARRIED), self.last, t)
         self.steps += 1
+        r.impacts.clear()
         self.last, self.tick = t, t + r.dt
         r.idle.move(t, self.tick)
         self._settle(t)

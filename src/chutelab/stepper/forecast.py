@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.stepper.meetings import meeting, neighbours
+from chutelab.stepper.state import MOST_IMPACTS
 from chutelab.stepper.tracks import CARRIED, DONE, FLYING, RESTING, WAITING
 
 if TYPE_CHECKING:
@@ -130,10 +131,12 @@ class Forecast:
             held = mode[j] != FLYING
             if held and (now + t[n] > tick or (carried and mode[j] == CARRIED)):
                 continue
-            if approach[n] > (run.soft if held and not flies else rounding):
+            if approach[n] > (run.slow if held and not flies else rounding):
                 self._pair(now + float(t[n]), i, j)
 
     def _pair(self, t: float, i: int, j: int) -> None:
+        if max(self._run.impacts[i], self._run.impacts[j]) > MOST_IMPACTS:
+            return
         if self._run.tracks.mode[i] == CARRIED:
             i, j = j, i
         self._push(t, i, j)
@@ -165,7 +168,7 @@ class Forecast:
         dx, dv = x[b] - x[a], v[b] - v[a]
         t, approach = meeting(dx[:, 0], dx[:, 1], dv[:, 0], dv[:, 1], 2.0 * run.radius)
         flies = (modes[a] == FLYING) | (modes[b] == FLYING)
-        floor = np.where(flies, ROUNDING * run.soft, run.soft)
+        floor = np.where(flies, ROUNDING * run.soft, run.slow)
         for n in np.flatnonzero((t <= span) & (approach > floor)).tolist():
             self._pair(now + float(t[n]), int(who[a[n]]), int(who[b[n]]))
         touching = np.flatnonzero((both == RESTING * 9) & (np.hypot(dx[:, 0], dx[:, 1]) <= margin2))

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chutelab.recording import Kind
-from chutelab.stepper.tracks import CARRIED, RESTING
+from chutelab.stepper.state import MANY, MOST_IMPACTS
+from chutelab.stepper.tracks import CARRIED, FLYING, RESTING
 
 if TYPE_CHECKING:
     from chutelab.stepper.outline import Touch
@@ -86,6 +87,11 @@ def strike(run: Run, i: int, partner: Partner, t: float) -> None:
     mine = vx * ny - vy * nx, vx * nx + vy * ny
     approach = mine[1] - partner.velocity[1]
     slip = mine[0] - belt + run.radius * (spin + partner.omega)
+    impacts = run.count_impact(i, j if partner.free else i, t)
+    calm = run.slow if impacts > MANY else run.soft if partner.supported else 0.0
+    if j >= 0 and -approach <= calm:
+        _join(run, i, partner, t)
+        return
     (j_t, j_n), spun = run.clash(j, partner.solid).resolve(
         mine, spin, partner.velocity, partner.omega
     )
@@ -97,7 +103,7 @@ def strike(run: Run, i: int, partner: Partner, t: float) -> None:
     lifts = partner.curvature * mine[0] ** 2 - g * ny if partner.solid >= 0 else -g
     rebound = approach + j_n / m_n
     stays = partner.supported and lifts <= 0.0 and rebound <= -lifts * run.dt
-    stays |= run.crowded(i, j if partner.free else i, t)
+    stays |= impacts > MOST_IMPACTS
     if stays:
         # On a solid it leaves half of what gravity takes from it up to the next step.
         hop = -0.5 * min(lifts, 0.0) * (run.next_tick(t) - t) if partner.solid >= 0 else 0.0
@@ -132,6 +138,16 @@ def strike(run: Run, i: int, partner: Partner, t: float) -> None:
     _part(run, i, partner, t, stays, kind, surface)
 
 
+def _join(run: Run, i: int, partner: Partner, t: float) -> None:
+    """Let particles that come together slowly stay in contact: the next step sees to them."""
+    k = run.tracks
+    for n, sign in ((i, 1.0), (partner.particle, -1.0)):
+        if k.mode[n] == FLYING:
+            k.mark(n, t, *k.state(n, t), float(k.omega[n]))
+            run.lay(n, (sign * partner.normal[0], sign * partner.normal[1]), None)
+            run.arrive(np.array([n]), np.array([-1]), t)
+
+
 def _part(
     run: Run, i: int, partner: Partner, t: float, stays: bool, kind: Kind | None, surface: int
 ) -> None:
@@ -150,7 +166,8 @@ def _part(
         run.lay(i, partner.normal, partner.curvature)
         run.arrive(one, np.array([surface]), t)
         return
-    rested = [n for n in who if k.mode[n] == RESTING]
+    crowded = max(run.impacts[n] for n in who) > MOST_IMPACTS
+    rested = [n for n in who if k.mode[n] == RESTING and not crowded]
     if stays and len(rested) < len(who):
         # Who came in leans on who is held; the latter is pushed against what holds it.
         for n in who:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from math import floor
+from collections import Counter
+from math import floor, inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,9 +28,14 @@ HOP = 10
 """Steps; a stepped disk hops along a curve. A flight between two contacts with one surface that is
 shorter than this is no separation, and a contact shorter than this none to separate from."""
 
-MOST_IMPACTS = 500
-"""Impacts of a particle within one step; whatever it meets then, it stays in contact with. A
-rattle between others as close as that is a contact for all that a step can see."""
+
+HAIR = 2.5e-3
+"""Share of the radius by which particles in a pile may overlap before a step parts them."""
+
+MANY, MOST_IMPACTS = 4, 32
+"""Impacts of a particle within one step. Beyond the first number, what comes together slowly stays
+together; beyond the second, everything does, and other particles are left to the step: it is part
+of a pile, and a step is as close as its contacts can be told apart."""
 
 
 class Run:
@@ -57,12 +63,17 @@ class Run:
         Whether pymunk has a body for the particle.
     version : ndarray, (N,)
         Counts the paths of each particle; what was foretold of an older one is void.
+    impacts : Counter
+        Impacts of each particle since the last step.
     fresh : list of int
         Particles on new paths, of which nothing was foretold yet.
     moved : ndarray of bool, (N,)
         Whether pymunk's body has to be put on the path anew.
     soft : float
         m/s; the speed that gravity gives in a step: what approaches more slowly does not bounce.
+    slow : float
+        m/s; in a step it leads to an overlap of a `HAIR` at most: what is in contact, and meets
+        others more slowly, is left to the step.
     bend : ndarray, (N,)
         Curvature of the path along the solid a particle was laid on, 1/m.
     """
@@ -101,9 +112,11 @@ class Run:
         self.fresh: list[int] = []
         self.moved = np.zeros(count, dtype=bool)
         self.soft = machine.gravity * dt
+        self.slow = max(self.soft, HAIR * p.radius / dt)
         self.bend = np.zeros(count)
         self.idle = Idle(self)
-        self._impacts: dict[int, tuple[float, int]] = {}
+        self.impacts: Counter[int] = Counter()
+        self._counted_until = -inf
         self._told: list[tuple[Any, ...]] = []
         self._left = np.full(count, np.nan)
         self._left_state = np.zeros((count, 5))
@@ -181,15 +194,15 @@ class Run:
         tick = self.start + n * self.dt
         return tick if tick > t else tick + self.dt
 
-    def crowded(self, i: int, j: int, t: float) -> bool:
-        """Count an impact; tell whether one of the two has had too many since the last step."""
+    def count_impact(self, i: int, j: int, t: float) -> int:
+        """Count an impact of i and j; return how many one of them had since the last step."""
         tick = self.next_tick(t)
-        most = 0
+        if tick != self._counted_until:
+            self.impacts.clear()
+            self._counted_until = tick
         for n in {i, j}:
-            until, so_far = self._impacts.get(n, (tick, 0))
-            most = max(most, so_far + 1 if until == tick else 1)
-            self._impacts[n] = tick, (so_far + 1 if until == tick else 1)
-        return most > MOST_IMPACTS
+            self.impacts[n] += 1
+        return max(self.impacts[i], self.impacts[j])
 
     def clash(self, particle: int, solid: int) -> Clash:
         """Return where pymunk resolves impacts of particles with a solid or a particle."""

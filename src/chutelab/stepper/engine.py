@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from heapq import heapify, heappop, heappush
-from math import inf, sqrt
+from math import ceil, inf, sqrt
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -19,7 +19,7 @@ from chutelab.stepper.impacts import particle_partner, solid_partner, strike
 from chutelab.stepper.kick import kick
 from chutelab.stepper.outline import Outline
 from chutelab.stepper.solids import Solids, solids
-from chutelab.stepper.state import Run
+from chutelab.stepper.state import HAIR, Run
 from chutelab.stepper.tracks import CARRIED, DONE, FLYING, RESTING, WAITING
 
 if TYPE_CHECKING:
@@ -30,10 +30,6 @@ if TYPE_CHECKING:
     from chutelab.stepper.clash import Clash
 
 Ints = NDArray[np.int64]
-
-SINK = 0.01
-"""Share of the radius by which what touches may sink into another in a step: g dt² at most, which
-bounds the step from above where `run.dt` is coarse, or particles are small."""
 
 PAUSE = 0.05
 """s between two reports of progress."""
@@ -139,7 +135,10 @@ class _Loop:
             start = min(self.rides[0].until, machine.end_time)
         dt = machine.dt
         if machine.align and machine.gravity > 0.0:
-            dt = min(dt, sqrt(SINK * machine.particle.radius / machine.gravity))
+            dt = min(dt, sqrt(HAIR * machine.particle.radius / machine.gravity))
+        if machine.end_time > start:
+            # The last step ends with the run.
+            dt = (machine.end_time - start) / ceil((machine.end_time - start) / dt - 1e-9)
         self.run_state = Run(machine, shapes, recorder, ids, start, dt, clashes)
         self.forecast = Forecast(self.run_state, outline)
         self.agenda = [
@@ -222,7 +221,7 @@ class _Loop:
             kick(r, self.forecast.beside & (mode == CARRIED), self.last, t)
         self.steps += 1
         r.impacts.clear()
-        self.last, self.tick = t, t + r.dt
+        self.last, self.tick = t, r.next_tick(t)
         r.idle.move(t, self.tick)
         self._settle(t)
         self._carry(t)

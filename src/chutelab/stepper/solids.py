@@ -21,9 +21,14 @@ stick out further."""
 GRIP = 1e6
 """Coefficient of friction that stands for µ = ∞: finite, because pymunk multiplies it by 0."""
 
-SLOP = 1e-5
-"""Overlap, as a share of the radius, that pymunk leaves alone so that resting contacts persist. The
-pulley is smaller by as much: what lies a hair inside the belt must not feel it behind x = 0."""
+SLOP = 1e-3
+"""Overlap, as a share of the radius, that pymunk leaves alone: parting what overlaps less would
+raise it, and that energy comes from nowhere."""
+
+DEEP = 5e-6
+"""Share of the radius by which a particle is laid into what it rests on, so that pymunk sees the
+contact. The pulley is smaller by twice as much: what lies a hair inside the belt must not feel it
+behind x = 0."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +124,7 @@ def solids(machine: Machine) -> Solids:
     ]
     pulley = machine.pulley
     if pulley is not None:
-        drum = pulley.radius - SLOP * machine.particle.radius
+        drum = pulley.radius - 2.0 * DEEP * machine.particle.radius
         last = [
             np.zeros(2), np.zeros(2), np.zeros(2), drum, np.zeros(2), pulley.speed,
             min(pulley.friction, GRIP), pulley.restitution, pulley.surface,

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from chutelab.recording import EVENT, Kind
 from chutelab.stepper.clash import Clash, Disk, Pair
 from chutelab.stepper.idle import Idle
-from chutelab.stepper.solids import SLOP
+from chutelab.stepper.solids import DEEP
 from chutelab.stepper.tracks import CARRIED, RESTING, Tracks
 from chutelab.stepper.world import World
 
@@ -30,7 +30,8 @@ shorter than this is no separation, and a contact shorter than this none to sepa
 
 
 HAIR = 2.5e-3
-"""Share of the radius by which particles in a pile may overlap before a step parts them."""
+"""Share of the radius by which particles in contact may overlap before a step parts them. It also
+bounds the step: gravity must not do more, g dt², where `run.dt` is coarse or particles are small."""
 
 MANY, MOST_IMPACTS = 4, 32
 """Impacts of a particle within one step. Beyond the first number, what comes together slowly stays
@@ -192,7 +193,10 @@ class Run:
         """Return the time of the next step after t, s."""
         n = floor((t - self.start) / self.dt * (1.0 + 1e-15)) + 1
         tick = self.start + n * self.dt
-        return tick if tick > t else tick + self.dt
+        if tick <= t:
+            tick += self.dt
+        end = self.machine.end_time
+        return end if abs(tick - end) < 1e-6 * self.dt and end > t else tick
 
     def count_impact(self, i: int, j: int, t: float) -> int:
         """Count an impact of i and j; return how many one of them had since the last step."""
@@ -233,11 +237,12 @@ class Run:
 
         `curvature` (1/m) of the path along a solid; None for a particle.
         """
-        k, who, deep = self.tracks, np.array([i]), 0.5 * SLOP * self.radius
+        k, who, deep = self.tracks, np.array([i]), DEEP * self.radius
+        x, y = k.x[i, 0] - deep * normal[0], k.x[i, 1] - deep * normal[1]
+        k.mark(i, float(k.t[i]), float(x), float(y), *k.v[i].tolist(), float(k.omega[i]))
         k.rest(who)
         k.leave(who, k.x[who], k.v[who], k.omega[who])
-        k.from_t[i], k.from_v[i] = k.t[i], k.v[i]
-        k.from_x[i] = k.x[i, 0] - deep * normal[0], k.x[i, 1] - deep * normal[1]
+        k.from_t[i], k.from_x[i], k.from_v[i] = k.t[i], k.x[i], k.v[i]
         if curvature is not None:
             k.upon[i], self.bend[i] = normal, curvature
         self.changed(who)

@@ -260,6 +260,8 @@ def _lie(run: Run, contacts: Contacts, deeds: Deeds, rows: Ints) -> None:
     in_line = (uses > 0) & (length > (1.0 - IN_LINE) * uses)
     who = np.flatnonzero(in_line)
     run.tracks.upon[who] = total[who] / length[who, None]
+    flat = np.flatnonzero((uses[i] == 1) & ~deeds.rounded[rows])
+    run.tracks.face[i[flat]] = contacts.other[rows[flat]] - run.count
     curved = in_line[i] & deeds.rounded[rows]
     for row in np.flatnonzero(curved).tolist():
         solid = contacts.other[rows[row]] - run.count

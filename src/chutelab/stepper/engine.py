@@ -176,6 +176,8 @@ class _Loop:
     def _prepare(self, now: float) -> None:
         """Foretell what new paths lead to; see whether pymunk has to step."""
         r, mode = self.run_state, self.run_state.tracks.mode
+        if not r.fresh and self.tick < inf:
+            return
         flying, resting = (mode == FLYING).any(), (mode == RESTING).any()
         if self.machine.align:
             alive = resting or (flying and self.machine.interact and (mode == CARRIED).any())

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chutelab.recording import Kind
+from chutelab.stepper.outline import Touch
 from chutelab.stepper.state import MANY, MOST_IMPACTS
 from chutelab.stepper.tracks import CARRIED, FLYING, RESTING
 
 if TYPE_CHECKING:
-    from chutelab.stepper.outline import Touch
     from chutelab.stepper.state import Run
 
 Vector = tuple[float, float]
@@ -144,7 +144,7 @@ def _join(run: Run, i: int, partner: Partner, t: float) -> None:
     for n, sign in ((i, 1.0), (partner.particle, -1.0)):
         if k.mode[n] == FLYING:
             k.mark(n, t, *k.state(n, t), float(k.omega[n]))
-            run.lay(n, (sign * partner.normal[0], sign * partner.normal[1]), None)
+            run.lay(n, (sign * partner.normal[0], sign * partner.normal[1]), -1, 0.0)
             run.arrive(np.array([n]), np.array([-1]), t)
 
 
@@ -163,7 +163,7 @@ def _part(
             run.finish(one, "landed")
             return
     if stays and partner.solid >= 0:
-        run.lay(i, partner.normal, partner.curvature)
+        run.lay(i, partner.normal, partner.solid, partner.curvature)
         run.arrive(one, np.array([surface]), t)
         return
     crowded = max(run.impacts[n] for n in who) > MOST_IMPACTS
@@ -173,11 +173,16 @@ def _part(
         for n in who:
             if n not in rested:
                 sign = 1.0 if n == i else -1.0
-                run.lay(n, (sign * partner.normal[0], sign * partner.normal[1]), None)
+                run.lay(n, (sign * partner.normal[0], sign * partner.normal[1]), -1, 0.0)
                 run.arrive(np.array([n]), np.array([-1]), t)
         who = rested
+    faces = [(n, int(k.face[n]), k.upon[n].tolist()) for n in who if k.mode[n] == RESTING]
     if who:
         run.take_off(np.array(who))
+    for n, face, (nx, ny) in faces:
+        # Pushed against the face it lies on, it is held by it at once.
+        if face >= 0 and k.v[n, 0] * nx + k.v[n, 1] * ny < 0.0:
+            strike(run, n, solid_partner(run, Touch(0.0, face, (nx, ny))), t)
 
 
 def _kind(run: Run, i: int, partner: Partner, approach: float) -> Kind | None:

@@ -183,7 +183,7 @@ class Run:
         """End tracks at their last knots and take the particles out."""
         self.tell_separation(who)
         self.tracks.finish(who, reason)
-        self.version[who] += 1
+        self.changed(who)
         if self.inside[who].any():
             for particle in who[self.inside[who]].tolist():
                 self.world.remove(particle)
@@ -232,19 +232,21 @@ class Run:
         inertia = self.machine.particle.inertia
         return self.radius * push / inertia if inertia > 0.0 else 0.0
 
-    def lay(self, i: int, normal: tuple[float, float], curvature: float | None) -> None:
+    def lay(self, i: int, normal: tuple[float, float], solid: int, curvature: float) -> None:
         """Let a particle rest from its last knot on, a hair inside, so that pymunk sees it.
 
-        `curvature` (1/m) of the path along a solid; None for a particle.
+        `curvature` (1/m) of the path along a solid; solid is -1 if it rests on a particle.
         """
         k, who, deep = self.tracks, np.array([i]), DEEP * self.radius
-        x, y = k.x[i, 0] - deep * normal[0], k.x[i, 1] - deep * normal[1]
-        k.mark(i, float(k.t[i]), float(x), float(y), *k.v[i].tolist(), float(k.omega[i]))
+        (x, y), (vx, vy) = k.x[i].tolist(), k.v[i].tolist()
+        x, y = x - deep * normal[0], y - deep * normal[1]
+        k.mark(i, float(k.t[i]), x, y, vx, vy, float(k.omega[i]))
         k.rest(who)
         k.leave(who, k.x[who], k.v[who], k.omega[who])
         k.from_t[i], k.from_x[i], k.from_v[i] = k.t[i], k.x[i], k.v[i]
-        if curvature is not None:
+        if solid >= 0:
             k.upon[i], self.bend[i] = normal, curvature
+            k.face[i] = solid if curvature == 0.0 else -1
         self.changed(who)
 
     def take_off(self, who: Ints) -> None:

@@ -52,6 +52,8 @@ class Tracks:
     upon : ndarray, (N, 2)
         Normal of the surface that a particle in contact lies on; 0 with another particle, or in a
         corner.
+    face : ndarray, (N,)
+        Solid on whose flat face alone a particle in contact lies, or -1.
     exit : ndarray, (N,)
         s; when a flight leaves the scene, inf if it never does.
     """
@@ -67,6 +69,7 @@ class Tracks:
         self.x, self.v, self.at, self.w, self.aim = np.zeros((5, count, 2))
         self.from_t, self.from_x, self.from_v = np.zeros(count), *np.zeros((2, count, 2))
         self.upon = np.zeros((count, 2))
+        self.face = np.full(count, -1)
         self.exit = np.full(count, np.inf)
         self._held = np.zeros(count, dtype=bool)
         self._held_t, self._held_omega = np.zeros((2, count))
@@ -157,7 +160,7 @@ class Tracks:
     def leave(self, who: Ints, x: ArrayLike, w: ArrayLike, omega: ArrayLike) -> None:
         """Note the states in which pymunk leaves particles in contact."""
         self.at[who], self.w[who], self.aim[who], self.spin[who] = x, w, w, omega
-        self.upon[who] = 0.0
+        self.upon[who], self.face[who] = 0.0, -1
 
     def go_on(self, who: Ints, t: float, dt: float) -> None:
         """Put particles in contact on the paths to the next step, dt later, from where they are.

@@ -88,7 +88,9 @@ def strike(run: Run, i: int, partner: Partner, t: float) -> None:
     approach = mine[1] - partner.velocity[1]
     slip = mine[0] - belt + run.radius * (spin + partner.omega)
     impacts = run.count_impact(i, j if partner.free else i, t)
-    calm = run.slow if impacts > MANY else run.soft if partner.supported else 0.0
+    calm = run.soft if partner.supported else 0.0
+    if impacts > MANY:
+        calm = run.slow * (impacts / MANY) ** 2
     if j >= 0 and -approach <= calm:
         _join(run, i, partner, t)
         return
@@ -109,7 +111,7 @@ def strike(run: Run, i: int, partner: Partner, t: float) -> None:
         hop = -0.5 * min(lifts, 0.0) * (run.next_tick(t) - t) if partner.solid >= 0 else 0.0
         j_n = max(j_n - m_n * (rebound - hop), 0.0)
         grip = run.grip(j, partner.solid) * j_n
-        j_t = min(max(j_t, -grip), grip)
+        j_t = min(max(-m_t * slip, -grip), grip)
         spun = spin + run.turned(j_t)
     px, py = j_n * nx + j_t * ny, j_n * ny - j_t * nx
 

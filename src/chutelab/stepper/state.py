@@ -33,10 +33,10 @@ HAIR = 2.5e-3
 """Share of the radius by which particles in contact may overlap before a step parts them. It also
 bounds the step: gravity must not do more, g dt², where `run.dt` is coarse or particles are small."""
 
-MANY, MOST_IMPACTS = 4, 32
-"""Impacts of a particle within one step. Beyond the first number, what comes together slowly stays
-together; beyond the second, everything does, and other particles are left to the step: it is part
-of a pile, and a step is as close as its contacts can be told apart."""
+MANY, MOST_IMPACTS = 8, 100
+"""Impacts of a particle within one step. Beyond the first number it is part of a pile: what comes
+together slowly stays together until the step parts it, and what counts as slow grows with the
+square of the number, so that a pile cannot stall. Beyond the second nothing bounces any more."""
 
 
 class Run:

@@ -1,15 +1,20 @@
 """The pymunk engine: real contacts, friction, spin and pile-ups, stepped headless.
 
-`solids` gives the surfaces the thickness a stepped engine needs, `world` is the only module that
-talks to pymunk, `carriage` is the ride by adhesion in closed form, `tracks` keeps what every
-particle is doing and writes its knots, `blow` and `strike` resolve the impact of a lone particle at
-its very instant, `books` accounts for all other contacts, `state` is what these share, `engine` is
-the loop.
+Between impulses every particle moves on a parabola, and there are two kinds of impulse. An *impact*
+happens at its own instant: `forecast` finds it (with `outline` against solids, `meetings` between
+particles), `impacts` resolves it, `clash` has pymunk's solver work out that one pair. A *contact*
+that lasts gets its impulse once a step: `kick` steps what touches in one Space, `books` accounts
+for it. Contacts in which nothing new happens are not even stepped (`idle`).
 
-Between contacts a flight is known in closed form from its last knot, and nothing is read from
-pymunk. Limits: the step is fixed, so a particle with v dt > r + `HALF_THICKNESS` may pass through a
-surface; bounces shorter than two steps count as rest; contacts that several bodies have within one
-step are resolved together, at its end.
+`solids` gives the surfaces the thickness a stepped contact needs, `world` is that Space, `carriage`
+the ride by adhesion in closed form, `tracks` keeps paths and writes knots, `stays` knows who lies
+on what, `state` is what these share, `engine` is the loop.
+
+With ``run.align = false`` nothing is foretold: everything is in the Space and every step lasts dt,
+the way physics engines are mostly used; impacts are seen late, and what is fast passes through.
+
+Limits: lasting contacts are as exact as a step; bounces shorter than two steps count as rest; what
+a particle meets after many impacts within one step is left to that step.
 """
 
 from chutelab.stepper.engine import run

@@ -237,11 +237,11 @@ def _surfaces(
     rows = np.flatnonzero(fixed & (deeds.uses[contacts.first] == 1))
     alone = contacts.first[rows]
     surface[alone] = run.solids.surface[contacts.other[rows] - run.count]
-    run.arrive(who, surface[who], t)
+    run.stays.arrive(who, surface[who], t)
     speed = np.abs(deeds.after_t[rows])
-    slipping = run.slipping[alone]
+    slipping = run.stays.slipping[alone]
     stops, starts = slipping & (speed < SETTLED[0]), ~slipping & (speed > SLIPS)
-    run.slipping[alone] = (slipping & ~stops) | starts
+    run.stays.slipping[alone] = (slipping & ~stops) | starts
     _lie(run, contacts, deeds, np.flatnonzero(fixed))
     for kind, these in ((Kind.STICK, alone[stops]), (Kind.SLIP, alone[starts])):
         run.event(

@@ -8,8 +8,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import inf
+from typing import TYPE_CHECKING
 
 import pymunk
+
+if TYPE_CHECKING:
+    from chutelab.machine import Machine
+    from chutelab.stepper.solids import Solids
 
 MOMENT = 1e-30
 """s; the step: too short for anything to move, even by a rounding."""
@@ -98,3 +103,38 @@ class Clash:
         mass = upper.mass
         impulse = mass * (after[0] - velocity[0]), mass * (after[1] - velocity[1])
         return impulse, upper.angular_velocity
+
+
+class Clashes:
+    """The pairs that a machine's particles can form, set up when they first meet.
+
+    Parameters
+    ----------
+    machine : Machine
+        The particles.
+    solids : Solids
+        What else they can meet.
+    """
+
+    def __init__(self, machine: Machine, solids: Solids) -> None:
+        p = machine.particle
+        self._disk = Disk(p.mass, p.inertia, p.radius)
+        self._particles = Pair(machine.pair_restitution, machine.pair_friction)
+        self._solids = solids
+        self._known: dict[tuple[int, bool], Clash] = {}
+
+    def of(self, solid: int, *, free: bool) -> Clash:
+        """Return a particle with a solid, or if that is -1 with a particle, free or carried."""
+        key = solid, free
+        if key not in self._known:
+            self._known[key] = Clash(self._disk, self._disk if free else None, self._pair(solid))
+        return self._known[key]
+
+    def grip(self, solid: int) -> float:
+        """Return the coefficient of friction with a solid, or if that is -1 with a particle."""
+        return self._pair(solid).friction
+
+    def _pair(self, solid: int) -> Pair:
+        if solid < 0:
+            return self._particles
+        return Pair(float(self._solids.restitution[solid]), float(self._solids.friction[solid]))

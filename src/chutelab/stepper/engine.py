@@ -14,10 +14,12 @@ from chutelab.recorder import Recorder
 from chutelab.recording import Kind
 from chutelab.stepper.books import SETTLED, STILL
 from chutelab.stepper.carriage import Carriage, Carriages, carriage
+from chutelab.stepper.clash import Clashes
 from chutelab.stepper.forecast import Forecast
 from chutelab.stepper.impacts import particle_partner, solid_partner, strike
 from chutelab.stepper.kick import kick
 from chutelab.stepper.outline import Outline
+from chutelab.stepper.report import Report
 from chutelab.stepper.solids import Solids, solids
 from chutelab.stepper.state import HAIR, Run
 from chutelab.stepper.tracks import CARRIED, DONE, FLYING, RESTING, WAITING
@@ -27,12 +29,8 @@ if TYPE_CHECKING:
 
     from chutelab.machine import Machine
     from chutelab.recording import Recording
-    from chutelab.stepper.clash import Clash
 
 Ints = NDArray[np.int64]
-
-PAUSE = 0.05
-"""s between two reports of progress."""
 
 
 def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Recording:
@@ -63,14 +61,14 @@ def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Re
     begin = perf_counter()
     recorder = Recorder(machine.count, machine.surfaces)
     shapes = solids(machine)
-    report = _Report(progress)
+    report = Report(progress)
     outline = Outline(
         shapes,
         machine.pulley.radius if machine.pulley is not None else 0.0,
         machine.particle.radius,
         machine.gravity,
     )
-    clashes: dict[int, Clash] = {}
+    clashes = Clashes(machine, shapes)
     everybody = np.arange(machine.count)
     groups = [everybody] if machine.interact else np.split(everybody, machine.count)
     steps = 0
@@ -90,24 +88,6 @@ def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Re
     )
 
 
-class _Report:
-    """Passes progress on, but not more often than `PAUSE`."""
-
-    def __init__(self, progress: Callable[[float], None] | None) -> None:
-        self._progress = progress
-        self._next = perf_counter() + PAUSE
-        self.done, self.part = 0.0, 1.0
-
-    def __call__(self, share: float) -> None:
-        if self._progress is not None and perf_counter() >= self._next:
-            self._progress(self.done + self.part * share)
-            self._next = perf_counter() + PAUSE
-
-    def last(self) -> None:
-        if self._progress is not None:
-            self._progress(1.0)
-
-
 class _Loop:
     """Runs one world until its last particle has ended."""
 
@@ -118,7 +98,7 @@ class _Loop:
         outline: Outline,
         recorder: Recorder,
         ids: Ints,
-        clashes: dict[int, Clash],
+        clashes: Clashes,
     ) -> None:
         self.machine = machine
         releases = machine.releases
@@ -148,7 +128,7 @@ class _Loop:
         self.last, self.tick = start, inf
         self.steps = 0
 
-    def run(self, report: _Report) -> int:
+    def run(self, report: Report) -> int:
         """Run to the end; return the number of steps of pymunk, of all and of pairs."""
         r, end = self.run_state, self.machine.end_time
         now = begin = self.agenda[0][0] if self.agenda else end
@@ -247,7 +227,7 @@ class _Loop:
         r, k = self.run_state, self.run_state.tracks
         r.idle.wake(who)
         k.close(who)
-        r.event(Kind.SETTLE, who, t, k.x[who], k.v[who], k.omega[who], r.on[who])
+        r.event(Kind.SETTLE, who, t, k.x[who], k.v[who], k.omega[who], r.stays.on[who])
         r.finish(who, "settled")
 
     def _exit(self, t: float) -> None:
@@ -269,7 +249,7 @@ class _Loop:
             return
         k.mode[n] = CARRIED
         if self.rides[n].speed == 0.0 and self.machine.until == "settled" and r.count == 1:
-            r.on[n] = 0
+            r.stays.on[n] = 0
             self._end_settled(one, t)
             return
         if self.rides[n].until < self.machine.end_time:

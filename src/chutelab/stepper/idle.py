@@ -152,7 +152,7 @@ class Idle:
         pays = resumed[self._dues[resumed].any(axis=1)]
         if len(pays):
             dues = self._dues[pays]
-            run.recorder.book(run.ids[pays], run.on[pays], dues[:, 0], 0.0, dues[:, 1])
+            run.recorder.book(run.ids[pays], run.stays.on[pays], dues[:, 0], 0.0, dues[:, 1])
             self._dues[pays, 1] += dues[:, 2]
         self.wake(who[self._until[who] <= tick])
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from chutelab.recording import Kind
 from chutelab.stepper.outline import Touch
+from chutelab.stepper.solids import DEEP
 from chutelab.stepper.state import MANY, MOST_IMPACTS
 from chutelab.stepper.tracks import CARRIED, FLYING, RESTING
 
@@ -94,7 +95,7 @@ def strike(run: Run, i: int, partner: Partner, t: float) -> None:
     if j >= 0 and -approach <= calm:
         _join(run, i, partner, t)
         return
-    (j_t, j_n), spun = run.clash(j, partner.solid).resolve(
+    (j_t, j_n), spun = run.clashes.of(partner.solid, free=partner.free).resolve(
         mine, spin, partner.velocity, partner.omega
     )
     share = 0.5 if partner.free else 1.0
@@ -107,10 +108,8 @@ def strike(run: Run, i: int, partner: Partner, t: float) -> None:
     stays = partner.supported and lifts <= 0.0 and rebound <= -lifts * run.dt
     stays |= impacts > MOST_IMPACTS
     if stays:
-        # On a solid it leaves half of what gravity takes from it up to the next step.
-        hop = -0.5 * min(lifts, 0.0) * (run.next_tick(t) - t) if partner.solid >= 0 else 0.0
-        j_n = max(j_n - m_n * (rebound - hop), 0.0)
-        grip = run.grip(j, partner.solid) * j_n
+        j_n = max(j_n - m_n * rebound, 0.0)
+        grip = run.clashes.grip(partner.solid) * j_n
         j_t = min(max(-m_t * slip, -grip), grip)
         spun = spin + run.turned(j_t)
     px, py = j_n * nx + j_t * ny, j_n * ny - j_t * nx
@@ -133,7 +132,7 @@ def strike(run: Run, i: int, partner: Partner, t: float) -> None:
     for n, (xn, yn, un, wn), omega, sign in who:
         un, wn = un + sign * px / run.mass, wn + sign * py / run.mass
         k.mark(n, t, xn, yn, un, wn, omega + spun - spin)
-    hops = stays and partner.solid >= 0 and run.hopped(i, surface, t)
+    hops = stays and partner.solid >= 0 and run.stays.hopped(i, surface, t)
     kind = None if hops else _kind(run, i, partner, -approach)
     if kind is not None:
         run.tell(kind, i, j, surface, (vx, vy), spin, (j_n, j_t))
@@ -146,8 +145,39 @@ def _join(run: Run, i: int, partner: Partner, t: float) -> None:
     for n, sign in ((i, 1.0), (partner.particle, -1.0)):
         if k.mode[n] == FLYING:
             k.mark(n, t, *k.state(n, t), float(k.omega[n]))
-            run.lay(n, (sign * partner.normal[0], sign * partner.normal[1]), -1, 0.0)
-            run.arrive(np.array([n]), np.array([-1]), t)
+            _lean(run, n, partner, sign, t)
+
+
+def _lean(run: Run, n: int, partner: Partner, sign: float, t: float) -> None:
+    """Let a particle rest against another, from whose normal the sign leads to it."""
+    k, (nx, ny) = run.tracks, partner.normal
+    (x, y), (vx, vy), deep = k.x[n].tolist(), k.v[n].tolist(), sign * DEEP * run.radius
+    k.mark(n, t, x - deep * nx, y - deep * ny, vx, vy, float(k.omega[n]))
+    run.rest(n)
+    run.stays.arrive(np.array([n]), np.array([-1]), t)
+
+
+def _lie_down(run: Run, i: int, partner: Partner, surface: int, t: float) -> None:
+    """Let a particle rest on a solid, a hair inside, where it will be again at the next step.
+
+    Half of what gravity takes from it up to then the solid gives it now, friction included.
+    """
+    k, (nx, ny), belt = run.tracks, partner.normal, partner.velocity[0]
+    (x, y), (vx, vy), omega = k.x[i].tolist(), k.v[i].tolist(), float(k.omega[i])
+    speed = vx * ny - vy * nx
+    pressed = max(run.machine.gravity * ny - partner.curvature * speed**2, 0.0)
+    j_n = 0.5 * run.mass * pressed * (run.next_tick(t) - t)
+    slip, grip = speed + run.radius * omega - belt, run.clashes.grip(partner.solid) * j_n
+    j_t = min(max(-run.rolling_mass * slip, -grip), grip)
+    run.book(
+        i, surface, j_t * belt, -0.5 * j_n**2 / run.mass,
+        -j_t * (slip + 0.5 * j_t / run.rolling_mass),
+    )  # fmt: skip
+    vx, vy = vx + (j_n * nx + j_t * ny) / run.mass, vy + (j_n * ny - j_t * nx) / run.mass
+    deep = DEEP * run.radius
+    k.mark(i, t, x - deep * nx, y - deep * ny, vx, vy, omega + run.turned(j_t))
+    run.rest(i, partner.normal, partner.solid, partner.curvature)
+    run.stays.arrive(np.array([i]), np.array([surface]), t)
 
 
 def _part(
@@ -157,16 +187,15 @@ def _part(
     k, one = run.tracks, np.array([i])
     who = [i, partner.particle] if partner.free else [i]
     if kind is not None and not stays:
-        run.tell_separation(np.array(who))
-        run.on[who] = -1
+        run.stays.tell_separation(np.array(who))
+        run.stays.on[who] = -1
     if kind is Kind.LANDING:
         run.landed[i] = True
         if run.machine.until == "landed":
             run.finish(one, "landed")
             return
     if stays and partner.solid >= 0:
-        run.lay(i, partner.normal, partner.solid, partner.curvature)
-        run.arrive(one, np.array([surface]), t)
+        _lie_down(run, i, partner, surface, t)
         return
     crowded = max(run.impacts[n] for n in who) > MOST_IMPACTS
     rested = [n for n in who if k.mode[n] == RESTING and not crowded]
@@ -174,9 +203,7 @@ def _part(
         # Who came in leans on who is held; the latter is pushed against what holds it.
         for n in who:
             if n not in rested:
-                sign = 1.0 if n == i else -1.0
-                run.lay(n, (sign * partner.normal[0], sign * partner.normal[1]), -1, 0.0)
-                run.arrive(np.array([n]), np.array([-1]), t)
+                _lean(run, n, partner, 1.0 if n == i else -1.0, t)
         who = rested
     faces = [(n, int(k.face[n]), k.upon[n].tolist()) for n in who if k.mode[n] == RESTING]
     if who:

@@ -75,7 +75,7 @@ def _enter(run: Run, free: NDArray[np.bool_], carried: NDArray[np.bool_], t: flo
         turned = normal[turns] + run.bend[them, None] * (x[turns] - k.from_x[them])
         normal[turns] = turned / np.hypot(turned[:, 0], turned[:, 1])[:, None]
     w -= np.where(laid, (w * normal).sum(axis=1), 0.0)[:, None] * normal
-    k.aim[who] = w
+    k.aim[who] = k.w[who] = w
     turn = np.where(k.mode[who] == RESTING, k.spin[who], k.omega[who])
     for n, a, b, c in zip(
         who.tolist(), (x - run.dt * w).tolist(), w.tolist(), turn.tolist(), strict=True

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.recording import EVENT, Kind
-from chutelab.stepper.clash import Clash, Disk, Pair
+from chutelab.stepper.clash import Clashes
 from chutelab.stepper.idle import Idle
-from chutelab.stepper.solids import DEEP
-from chutelab.stepper.tracks import CARRIED, RESTING, Tracks
+from chutelab.stepper.stays import Stays
+from chutelab.stepper.tracks import Tracks
 from chutelab.stepper.world import World
 
 if TYPE_CHECKING:
@@ -24,14 +24,9 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-HOP = 10
-"""Steps; a stepped disk hops along a curve. A flight between two contacts with one surface that is
-shorter than this is no separation, and a contact shorter than this none to separate from."""
-
-
 HAIR = 2.5e-3
 """Share of the radius by which particles in contact may overlap before a step parts them. It also
-bounds the step: gravity must not do more, g dt², where `run.dt` is coarse or particles are small."""
+bounds the step where `run.dt` is coarse or particles are small: gravity must not do more, g dt²."""
 
 MANY, MOST_IMPACTS = 8, 100
 """Impacts of a particle within one step. Beyond the first number it is part of a pile: what comes
@@ -50,8 +45,10 @@ class Run:
         Has met the outgoing belt.
     met : ndarray of bool, (N, K)
         Has met a solid.
-    on, since, slipping : ndarray, (N,)
-        Surface of the present contact or -1, time it began (s), and whether it slips.
+    clashes : Clashes
+        Where impacts are resolved.
+    stays : Stays
+        Who lies on which surface.
     calm : ndarray, (N,)
         Steps in a row without slip on a surface to settle on.
     touching : ndarray
@@ -87,12 +84,12 @@ class Run:
         ids: Ints,
         start: float,
         dt: float,
-        clashes: dict[int, Clash],
+        clashes: Clashes,
     ) -> None:
         count = len(ids)
         self.machine, self.solids, self.recorder, self.ids = machine, solids, recorder, ids
         self.start, self.dt, self.now = start, dt, start
-        self._clashes = clashes
+        self.clashes = clashes
         self._world: World | None = None
         self.tracks = Tracks(machine, recorder, ids)
         p = machine.particle
@@ -103,9 +100,7 @@ class Run:
         self.gravity = np.array([0.0, -machine.gravity])
         self.landed = np.zeros(count, dtype=bool)
         self.met = np.zeros((count, max(len(solids.reach), 1)), dtype=bool)
-        self.on = np.full(count, -1, dtype=np.int64)
-        self.since = np.zeros(count)
-        self.slipping = np.zeros(count, dtype=bool)
+        self.stays = Stays(self)
         self.calm = np.zeros(count, dtype=np.int64)
         self.touching = np.empty(0, dtype=np.int64)
         self.inside = np.zeros(count, dtype=bool)
@@ -119,8 +114,6 @@ class Run:
         self.impacts: Counter[int] = Counter()
         self._counted_until = -inf
         self._told: list[tuple[Any, ...]] = []
-        self._left = np.full(count, np.nan)
-        self._left_state = np.zeros((count, 5))
         self.settles_on: NDArray[np.bool_] = (solids.speed == 0.0) | (
             solids.surface == machine.landing
         )
@@ -181,7 +174,7 @@ class Run:
 
     def finish(self, who: Ints, reason: str) -> None:
         """End tracks at their last knots and take the particles out."""
-        self.tell_separation(who)
+        self.stays.tell_separation(who)
         self.tracks.finish(who, reason)
         self.changed(who)
         if self.inside[who].any():
@@ -208,45 +201,31 @@ class Run:
             self.impacts[n] += 1
         return max(self.impacts[i], self.impacts[j])
 
-    def clash(self, particle: int, solid: int) -> Clash:
-        """Return where pymunk resolves impacts of particles with a solid or a particle."""
-        free = particle >= 0 and self.tracks.mode[particle] != CARRIED
-        key = solid if particle < 0 else -1 if free else -2
-        if key not in self._clashes:
-            p, s = self.machine.particle, self.solids
-            disk = Disk(p.mass, p.inertia, p.radius)
-            pair = Pair(self.machine.pair_restitution, self.machine.pair_friction)
-            if solid >= 0:
-                pair = Pair(float(s.restitution[solid]), float(s.friction[solid]))
-            self._clashes[key] = Clash(disk, disk if free else None, pair)
-        return self._clashes[key]
-
-    def grip(self, particle: int, solid: int) -> float:
-        """Return the coefficient of friction of a pair."""
-        if particle >= 0:
-            return self.machine.pair_friction
-        return float(self.solids.friction[solid])
-
     def turned(self, push: float) -> float:
         """Return the change of ω by a tangential impulse (N s), rad/s."""
         inertia = self.machine.particle.inertia
         return self.radius * push / inertia if inertia > 0.0 else 0.0
 
-    def lay(self, i: int, normal: tuple[float, float], solid: int, curvature: float) -> None:
-        """Let a particle rest from its last knot on, a hair inside, so that pymunk sees it.
+    def rest(
+        self,
+        i: int,
+        normal: tuple[float, float] = (0.0, 0.0),
+        solid: int = -1,
+        curvature: float = 0.0,
+    ) -> None:
+        """Let a particle rest from its last knot on.
 
-        `curvature` (1/m) of the path along a solid; solid is -1 if it rests on a particle.
+        Parameters
+        ----------
+        normal, solid, curvature
+            Of the solid it lies on, if it does; the last is that of its path, 1/m.
         """
-        k, who, deep = self.tracks, np.array([i]), DEEP * self.radius
-        (x, y), (vx, vy) = k.x[i].tolist(), k.v[i].tolist()
-        x, y = x - deep * normal[0], y - deep * normal[1]
-        k.mark(i, float(k.t[i]), x, y, vx, vy, float(k.omega[i]))
+        k, who = self.tracks, np.array([i])
         k.rest(who)
         k.leave(who, k.x[who], k.v[who], k.omega[who])
         k.from_t[i], k.from_x[i], k.from_v[i] = k.t[i], k.x[i], k.v[i]
-        if solid >= 0:
-            k.upon[i], self.bend[i] = normal, curvature
-            k.face[i] = solid if curvature == 0.0 else -1
+        k.upon[i], self.bend[i] = normal, curvature
+        k.face[i] = solid if curvature == 0.0 else -1
         self.changed(who)
 
     def take_off(self, who: Ints) -> None:
@@ -298,14 +277,7 @@ class Run:
             return
         self.tracks.lift(who, t, self.dt)
         self.changed(who)
-        parts = who[
-            (self.on[who] >= 0)
-            & np.isnan(self._left[who])
-            & (t - self.since[who] > (HOP - 0.5) * self.dt)
-        ]
-        k = self.tracks
-        self._left[parts] = t
-        self._left_state[parts] = np.column_stack([k.x[parts], k.v[parts], k.omega[parts]])
+        self.stays.left(who, t)
 
     def follow(self, particle: int, normal: Floats, rho: float) -> None:
         """Lead a particle round the pulley, or the end of a face, unless it is to fly off.
@@ -326,28 +298,3 @@ class Run:
         k.aim[particle] = w - 0.5 * self.dt * centripetal * normal
         push = 0.5 * self.mass * centripetal * ahead
         self.world.steer(particle, tuple(k.aim[particle].tolist()), tuple(push.tolist()))
-
-    def hopped(self, particle: int, surface: int, t: float) -> bool:
-        """Tell whether a contact renews one with the same surface that ended a moment ago."""
-        since = t - float(self._left[particle])
-        return bool(surface == self.on[particle] and since < HOP * self.dt)
-
-    def arrive(self, who: Ints, surface: Ints, t: float) -> None:
-        """Note contacts of particles with one surface each, -1 for several or another particle."""
-        same = surface == self.on[who]
-        hop = same & (t - self._left[who] < HOP * self.dt)
-        self._left[who[hop]] = np.nan
-        new = who[~hop & ~(same & (self.tracks.mode[who] == RESTING))]
-        self.tell_separation(new)
-        self.since[new] = t
-        self.slipping[new] = True
-        self.on[who] = surface
-
-    def tell_separation(self, who: Ints) -> None:
-        """Write the separations of flights that turned out to be none but hops."""
-        who = who[~np.isnan(self._left[who])]
-        s = self._left_state[who]
-        self.event(
-            Kind.SEPARATION, who, self._left[who], s[:, :2], s[:, 2:4], s[:, 4], self.on[who]
-        )
-        self._left[who] = np.nan

@@ -1,0 +1,74 @@
+"""Who lies on which surface, since when, and whether it slips there."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chutelab.recording import Kind
+from chutelab.stepper.tracks import RESTING
+
+if TYPE_CHECKING:
+    from chutelab.stepper.state import Run
+
+Ints = NDArray[np.int64]
+
+HOP = 10
+"""Steps; a stepped disk hops along a curve. A flight between two contacts with one surface that is
+shorter than this is no separation, and a contact shorter than this none to separate from."""
+
+
+class Stays:
+    """Contacts of particles with one surface each.
+
+    Attributes
+    ----------
+    on, slipping : ndarray, (N,)
+        Surface of the present contact or -1, and whether it slips.
+    """
+
+    def __init__(self, run: Run) -> None:
+        self._run, count = run, run.count
+        self.on = np.full(count, -1, dtype=np.int64)
+        self.slipping = np.zeros(count, dtype=bool)
+        self._since = np.zeros(count)
+        self._left = np.full(count, np.nan)
+        self._left_state = np.zeros((count, 5))
+
+    def left(self, who: Ints, t: float) -> None:
+        """Note who lost its contact at t; whether it separated, its flight will tell."""
+        parts = who[
+            (self.on[who] >= 0)
+            & np.isnan(self._left[who])
+            & (t - self._since[who] > (HOP - 0.5) * self._run.dt)
+        ]
+        k = self._run.tracks
+        self._left[parts] = t
+        self._left_state[parts] = np.column_stack([k.x[parts], k.v[parts], k.omega[parts]])
+
+    def hopped(self, particle: int, surface: int, t: float) -> bool:
+        """Tell whether a contact renews one with the same surface that ended a moment ago."""
+        since = t - float(self._left[particle])
+        return bool(surface == self.on[particle] and since < HOP * self._run.dt)
+
+    def arrive(self, who: Ints, surface: Ints, t: float) -> None:
+        """Note contacts of particles with one surface each, -1 for several or another particle."""
+        same = surface == self.on[who]
+        hop = same & (t - self._left[who] < HOP * self._run.dt)
+        self._left[who[hop]] = np.nan
+        new = who[~hop & ~(same & (self._run.tracks.mode[who] == RESTING))]
+        self.tell_separation(new)
+        self._since[new] = t
+        self.slipping[new] = True
+        self.on[who] = surface
+
+    def tell_separation(self, who: Ints) -> None:
+        """Write the separations of flights that turned out to be none but hops."""
+        who = who[~np.isnan(self._left[who])]
+        s = self._left_state[who]
+        self._run.event(
+            Kind.SEPARATION, who, self._left[who], s[:, :2], s[:, 2:4], s[:, 4], self.on[who]
+        )
+        self._left[who] = np.nan

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.recording import EVENT, Kind
-from chutelab.stepper.clash import Clashes
 from chutelab.stepper.idle import Idle
 from chutelab.stepper.stays import Stays
 from chutelab.stepper.tracks import Tracks
@@ -19,6 +18,7 @@ from chutelab.stepper.world import World
 if TYPE_CHECKING:
     from chutelab.machine import Machine
     from chutelab.recorder import Recorder
+    from chutelab.stepper.clash import Clashes
     from chutelab.stepper.solids import Solids
 
 Floats = NDArray[np.float64]

@@ -17,6 +17,14 @@ FREE = "[stream]\nat = [0, 1]\nvelocity = [0, 0]\n"
 HOOD = '[[surface]]\nname = "hood"\nfrom = [0, 0]\nto = [1, 0]\n'
 BIG = "9" * 400
 
+
+def expect(**keys):
+    """A machine with one expectation, some of its keys changed or, with None, left out."""
+    given = {"quantity": '"x2"', "value": "0.5", "tolerance": "0.1", "source": '"me"', **keys}
+    lines = [f"{key} = {value}\n" for key, value in given.items() if value is not None]
+    return IN + PLATE + OUT + "[[expect]]\n" + "".join(lines)
+
+
 # Text of the file, the keys at fault, and a word of what is allowed.
 BROKEN = {
     # wrong types
@@ -161,6 +169,79 @@ BROKEN = {
         IN + PLATE + "above = 0\nbelow = 0",
         ["plate.above", "plate.below"],
         "length",
+    ),
+    # expectations
+    "number for expectations": ("expect = 3\n" + IN, ["expect"], "each headed by [[expect]]"),
+    "table for expectations": (IN + "[expect]\nvalue = 1", ["expect"], "[[expect]]"),
+    "number for expectation": ("expect = [1]\n" + IN, ["expect[0]"], "a table"),
+    "nothing expected": (expect(quantity=None), ["expect[0].quantity"], "is missing"),
+    "no value expected": (expect(value=None), ["expect[0].value"], '"theory" or a number'),
+    "no tolerance": (expect(tolerance=None), ["expect[0].tolerance"], "is missing"),
+    "no source": (expect(source=None), ["expect[0].source"], "is missing"),
+    "misspelt quantity": (
+        expect(quantity='"landing.xx"'),
+        ["expect[0].quantity"],
+        "did you mean landing.x?",
+    ),
+    "unheard-of quantity": (
+        expect(quantity='"speed"'),
+        ["expect[0].quantity"],
+        "ledger.belt_work and other keys",
+    ),
+    "empty quantity": (expect(quantity='""'), ["expect[0].quantity"], "phi1_deg to slip_heat, "),
+    "quantity in radians": (
+        expect(quantity='"phi1"'),
+        ["expect[0].quantity"],
+        "did you mean phi1_deg?",
+    ),
+    "quantity of an absent table": (
+        IN + '[[expect]]\nquantity = "landing.x"\nvalue = 1\ntolerance = 0\nsource = "me"',
+        ["expect[0].quantity"],
+        "it needs [outgoing]",
+    ),
+    "velocity after a separation": (
+        expect(quantity='"separation.vx_after"'),
+        ["expect[0].quantity"],
+        "no such quantity",
+    ),
+    "statistic of a statistic": (
+        expect(quantity='"landing.x.mean.mean"'),
+        ["expect[0].quantity"],
+        "landing.x.mean?",
+    ),
+    "theory of a mean": (
+        expect(quantity='"landing.x"', value='"theory"'),
+        ["expect[0].value"],
+        "only phi1_deg",
+    ),
+    "unknown expected word": (expect(value='"thery"'), ["expect[0].value"], '"theory" or a num'),
+    "expected NaN": (expect(value="nan"), ["expect[0].value"], "a number"),
+    "expected boolean": (expect(value="true"), ["expect[0].value"], "a number"),
+    "negative tolerance": (expect(tolerance="-1"), ["expect[0].tolerance"], "from 0 to 1"),
+    "generous tolerance": (expect(tolerance="1.5"), ["expect[0].tolerance"], "from 0 to 1"),
+    "tolerance of another unit": (
+        expect(tolerance='"1 s"'),
+        ["expect[0].tolerance"],
+        '"0.5 mm"; x2 is in m',
+    ),
+    "tolerance of no unit": (expect(tolerance='"1"'), ["expect[0].tolerance"], "x2 is in m"),
+    "tolerance in words": (expect(tolerance='"little"'), ["expect[0].tolerance"], "0.5 mm"),
+    "negative length": (expect(tolerance='"-1 mm"'), ["expect[0].tolerance"], "0.5 mm"),
+    "nothing promised": (expect(tolerance='"none"'), ["expect[0].tolerance"], "0.5 mm"),
+    "tolerance for pymunk": (
+        expect(tolerance_pymunk='"no"'),
+        ["expect[0].tolerance_pymunk"],
+        'or "none"; x2 is in m',
+    ),
+    "unit of a count": (
+        expect(quantity='"landing.count"', tolerance='"1 m"'),
+        ["expect[0].tolerance"],
+        'such as "3"; landing.count is a number of things',
+    ),
+    "key of an expectation": (
+        expect(valu="1"),
+        ["expect[0].valu"],
+        "did you mean expect[0].value?",
     ),
     # not TOML
     "no value": (IN + "length = ", ["line 4, column 10"], "Invalid value"),
@@ -368,7 +449,7 @@ VALUES = st.recursive(
     max_leaves=6,
 )
 KNOWN = {
-    "": {"title", "gravity", *GOOD, "surface"},
+    "": {"title", "gravity", *GOOD, "surface", "expect"},
     "particle": {"radius", "mass", "spin"},
     "incoming": {"speed", "pulley_radius", "length", "friction", "restitution"},
     "plate": {

@@ -33,6 +33,7 @@ FILES = [
 KEYS = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
     "impact", "landing", "ended", "ledger", "theory", "theory_as_printed", "error",
+    "accuracy",
 ]  # fmt: skip
 THEORY = [
     "phi1_deg", "t2", "x2", "y2", "v2", "phi2_deg", "phi2r_deg", "v2r", "t3", "x3", "y3", "v3x",
@@ -101,7 +102,7 @@ def test_a_run_prints_particle_0_beside_the_theory_the_ledger_and_the_endings():
 
 
 def test_a_summary_fits_a_terminal_and_has_no_colours_in_a_pipe():
-    for arguments in (["run", "belt-landing"], ["tables"], ["scenes"]):
+    for arguments in (["run", "belt-landing"], ["tables"], ["scenes"], ["verify", "slip"]):
         text = call(*arguments).stdout
         assert max(map(len, text.splitlines())) <= 80
         assert "\x1b" not in text
@@ -165,17 +166,62 @@ def test_quiet_prints_nothing():
 def test_settings_change_the_run():
     found = json.loads(call("run", "perpendicular", "--json", "--set", "plate.distance=0.3").stdout)
     assert found["impact"]["x"] == [pytest.approx(0.396, rel=1e-15)]
-    arguments = ("run", "perpendicular", "--json", "--engine", "pymunk")
+    plain_steps = "--set", "run.align=false"
+    arguments = ("run", "perpendicular", "--json", "--engine", "pymunk", *plain_steps)
     coarse = json.loads(call(*arguments).stdout)
     fine = json.loads(call(*arguments, "--dt", "1e-4").stdout)
     assert coarse["engine"] == fine["engine"] == "pymunk"
     assert fine["steps"] > 5 * coarse["steps"]
     # An option is the setting of its name.
     settings = ["--set", "run.engine=pymunk", "--set", "run.dt=0.0001"]
-    again = json.loads(call("run", "perpendicular", "--json", *settings).stdout)
+    again = json.loads(call("run", "perpendicular", "--json", *settings, *plain_steps).stdout)
     for result in (fine, again):
         del result["seconds"]
     assert again == fine
+
+
+# run: an accuracy that is asked for
+
+
+def test_an_accuracy_is_reported_in_text_json_and_file():
+    text = call("run", "perpendicular", "--accuracy", "1mm").stdout
+    said = text.partition("\nAccuracy\n")[2]
+    assert said.startswith("error of places about ")
+    assert "; asked for 1 mm, reached\nhow it is known: rounding, after 3 rounds; " in said
+    assert max(map(len, text.splitlines())) <= 80
+    result = call("run", "slip", "--accuracy", "1e-6", "--json", "--out", "o", "--only", "json")
+    found = json.loads(result.stdout)
+    assert list(found) == KEYS
+    assert found == json.loads(Path("o/summary.json").read_text(encoding="utf-8"))
+    accuracy = found["accuracy"]
+    assert list(accuracy) == [
+        "asked", "unit", "reached", "method", "met", "worst", "chaotic", "dt", "runs",
+    ]  # fmt: skip
+    assert (accuracy["asked"], accuracy["unit"], accuracy["met"]) == (1e-6, "relative", True)
+    assert found["error"]["max"] <= accuracy["reached"] < 1e-11
+    assert json.loads(call("run", "slip", "--json").stdout)["accuracy"] is None
+
+
+def test_engine_and_step_are_kept_to():
+    arguments = ("run", "perpendicular", "--accuracy", "1e-3", "--json")
+    found = json.loads(call(*arguments, "--engine", "pymunk", "--dt", "0.004").stdout)
+    assert found["engine"] == "pymunk"
+    assert found["accuracy"]["dt"] == 0.002
+    assert json.loads(call(*arguments, "--engine", "exact").stdout)["accuracy"]["dt"] is None
+
+
+def test_an_accuracy_that_is_not_reached_ends_with_1_and_everything_written():
+    result = call("run", "slip", "--accuracy", "1e-15", "--out", "out", "--only", "json", code=1)
+    assert "asked for 1e-15, NOT REACHED" in " ".join(result.stdout.split())
+    assert re.fullmatch(
+        r"Error: the accuracy of 1e-15 was not reached; \S+e-1[34] was\n", result.stderr
+    )
+    found = json.loads(Path("out/summary.json").read_text(encoding="utf-8"))["accuracy"]
+    assert (found["met"], found["asked"]) == (False, 1e-15)
+    quiet = call("run", "slip", "--accuracy", "1e-15", "--quiet", code=1)
+    assert quiet.stdout == ""
+    assert "was not reached" in quiet.stderr
+    assert "the exit code is 1" in " ".join(call("run", "--help").stdout.split())
 
 
 # run: what it writes
@@ -280,6 +326,11 @@ def test_a_destination_that_cannot_be_is_refused_before_the_run(monkeypatch):
          "(from --engine exact)"),
         (["--set", "plate.angle_deg=89", "--out", "out"], "outgoing.drop_from"),
         (["--set", "plate.above=0", "--set", "plate.below=0.1", "--out", "out"], "plate.below"),
+        (["--accuracy", "0"], "'0': must be a relative error from 1e-15 to 0.5"),
+        (["--accuracy=-1"], "'-1': must be"),
+        (["--accuracy", "nan"], "'nan': must be"),
+        (["--accuracy", "5 parsecs"], "'5 parsecs': must be"),
+        (["--accuracy", "1e-30", "--out", "out"], "'1e-30': must be"),
         (["--frames", "3"], "No such option"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
@@ -431,31 +482,69 @@ def test_what_is_over_soon_or_watched_by_nobody_gets_no_bar(monkeypatch):
 # the other commands
 
 
-def test_check_says_what_would_be_built():
+def test_check_says_what_will_happen():
     text = call("check", "perpendicular").stdout
-    assert text.startswith("perpendicular: Perpendicular damping plate, 2 m/s\n")
+    assert text.startswith("perpendicular: Perpendicular damping plate, 2 m/s\nbuilt\n")
     # The belt is d2 + r below the impact, the plate ends 0.05 m above the belt.
     belt = 0.104 - 0.5 * 9.81 * 0.298**2 - 0.5 - 0.004
-    assert f"  outgoing: from (-2, {belt:.6g}) to (4, {belt:.6g}) m, moving at 2 m/s\n" in text
-    assert f"  plate: from (0.6, {belt + 0.05:.6g}) to (0.6, 0.4) m\n" in text
-    assert "  pulley: radius 0.1 m, axis at (0, 0)\n" in text
-    assert "  engine: exact, until landed, at most to t = 30 s\n" in text
+    assert f"  outgoing      from (-2, {belt:.6g}) to (4, {belt:.6g}) m, moving at 2 m/s\n" in text
+    assert "\nskipped\n  surfaces      the scene has no [[surface]]\n" in text
+    assert "  engine        exact: a lone particle meets surfaces only\n" in text
+    assert "at most at t = 30 s\n  contacts      about 2\n  run time      about " in text
+    assert "\nclosed form\n  covers        phi1, t2, x2, " in text
     assert "warning" not in text
-    assert "engine: pymunk, until settled" in call("check", "stream").stdout
-    assert "until t = 0.7 s" in call("check", "slip", "--set", "run.until=0.7").stdout
+    text = call("check", "stream").stdout
+    assert "  engine        pymunk: particles meet each other, " in text
+    assert "  tunnelling    none at any speed: steps end at contacts\n" in text
+    assert re.search(
+        r"^  slop          overlaps up to \S+ .m are left alone, \S+ % of the r", text, re.M
+    )
+    assert "  leaves out    all of it\n" in text
+    assert "at t = 0.7 s" in call("check", "slip", "--set", "run.until=0.7").stdout
 
 
-def test_check_warns():
-    text = call(
-        "check", "perpendicular", "--set", "outgoing.drop=0.15", "--set", "outgoing.drop_from=top"
-    ).stdout
-    assert "  warning: outgoing: it crosses the drive pulley; surfaces may cross" in text
+def test_check_warns_and_says_what_to_change():
+    settings = ["outgoing.drop=0.15", "outgoing.drop_from=top", "plate.below=0.45"]
+    text = call("check", "perpendicular", *(f"--set={setting}" for setting in settings)).stdout
+    said = "  - outgoing: it crosses the drive pulley\n    change: outgoing.drop = 0.218\n"
+    assert said in text
+    settings = ["run.engine=pymunk", "run.align=false", "run.dt=0.01"]
+    text = call("check", "perpendicular", *(f"--set={setting}" for setting in settings)).stdout
+    assert "  tunnelling    POSSIBLE: at 4.4 m/s a particle covers 44 mm in a step" in text
+    assert "\nwarning\n  - a particle covers 44 mm in a step" in text
+
+
+def test_check_fits_a_terminal():
+    for arguments in (
+        ["stream"],
+        ["free-fall"],
+        ["perpendicular", "--set", "plate.angle_deg=80", "--set", "outgoing.drop_from=top"],
+    ):
+        text = call("check", *arguments).stdout
+        assert max(map(len, text.splitlines())) <= 80
+        assert "\x1b" not in text
+
+
+def test_check_gives_json():
+    found = json.loads(call("check", "perpendicular", "stream", "--json").stdout)
+    assert found["format"] == 1
+    alone, crowd = found["scenes"]
+    assert list(alone) == [
+        "scene", "title", "built", "skipped", "engine", "why", "ends", "stepping", "effort",
+        "theory", "advice",
+    ]  # fmt: skip
+    assert (alone["scene"], alone["engine"], alone["stepping"]) == ("perpendicular", "exact", None)
+    assert alone["effort"]["contacts"] == 2
+    assert alone["theory"]["leaves_out"] == []
+    assert crowd["stepping"]["safe"] is True
+    assert crowd["theory"]["covers"] == []
 
 
 def test_check_goes_through_all_scenes_before_it_refuses():
     Path("bad.toml").write_text("[incoming]\nspeed = -1\n", encoding="utf-8")
     result = call("check", "bad.toml", "slip", "nowhere", code=2)
     assert result.stdout.startswith("slip: ")
+    assert "built" in result.stdout
     assert "incoming.speed = -1" in result.stderr
     assert "incoming.pulley_radius is missing" in result.stderr
     assert "nowhere: no such file" in result.stderr
@@ -463,7 +552,7 @@ def test_check_goes_through_all_scenes_before_it_refuses():
 
 def test_every_shipped_scene_can_be_built():
     text = call("check", *sc.shipped()).stdout
-    assert text.count("  engine: ") == len(sc.shipped()) == 11
+    assert text.count("  engine  ") == len(sc.shipped()) == 11
 
 
 def test_the_tables_agree_as_printed_and_mark_what_differs():
@@ -572,31 +661,70 @@ def test_show_says_what_was_probably_meant():
     assert "chutelab run" not in refused("show", "nowhere.npz")
 
 
-def test_verify_finds_the_three_answers_in_agreement():
+def test_verify_finds_what_is_expected_and_the_three_answers_in_agreement():
     text = call("verify", "perpendicular", "low-speed").stdout
-    rows = re.findall(r"(exact, theory|pymunk, exact) +(.+?) +(\S+) +(\S+)$", text, re.MULTILINE)
-    assert len(rows) == 6
-    assert all(float(row[2]) <= float(row[3]) for row in rows if row[3] != "-")
-    assert [row[3] for row in rows if row[0] == "exact, theory"] == ["1.0e-12"] * 2
-    assert text.endswith("all within the tolerance\n")
+    assert text.startswith("perpendicular: Perpendicular damping plate, 2 m/s\n")
+    # Under each quantity and its source a line for each answer, ending in a verdict.
+    row = r"    (exact|pymunk|theory) +(\S+) +(\S+) +(\S+(?: mm)?) +(\S+(?: mm)?)  ok$"
+    part = text.partition("  d3, m: Table 4: R = 0.1 m, d_okr = 0.5 m\n")[2]
+    found = re.findall(row, part.partition("\n  v3x")[0], re.MULTILINE)
+    height = 0.5 * 9.81 * 0.298**2 + 0.5
+    assert [answer[0] for answer in found] == ["exact", "pymunk", "theory"]
+    for _, expected, simulated, error, tolerance in found:
+        assert (float(expected), tolerance) == (0.94, "5 mm")
+        assert float(simulated) == pytest.approx(height, rel=1e-7)
+        assert error == f"{1e3 * (0.94 - height):.1f} mm"
+    pairs = re.findall(
+        r"(exact - theory|pymunk - exact): .+? +(\S+) +(\S+)  ok$", text, re.MULTILINE
+    )
+    assert len(pairs) == 6
+    assert all(float(row[1]) <= float(row[2]) for row in pairs)
+    assert [row[2] for row in pairs if row[0] == "exact - theory"] == ["1.0e-12"] * 2
+    assert "FAILED" not in text
+    assert text.endswith("relative where they have no unit.\nall within the tolerance\n")
+    assert max(map(len, text.splitlines())) <= 80
 
 
 def test_verify_ends_with_1_when_answers_differ(monkeypatch):
-    monkeypatch.setattr("chutelab.agreement.CLOSED_FORM", 0.0)
+    monkeypatch.setattr("chutelab.agreement.pairs.CLOSED_FORM", 0.0)
     text = call("verify", "perpendicular", code=1).stdout
-    assert "FAILED" in text
+    assert text.count("FAILED") == 1
     assert text.endswith("1 outside the tolerance\n")
+
+
+def test_verify_ends_with_1_when_a_scene_shows_something_else():
+    text = sc.shipped()["perpendicular"].read_text(encoding="utf-8")
+    Path("other.toml").write_text(text.replace("value = 0.94", "value = 0.95"), encoding="utf-8")
+    said = call("verify", "other.toml", code=1).stdout
+    assert re.findall(r"^    (\S+) .* 14 mm +5 mm  FAILED$", said, re.MULTILINE) == [
+        "exact", "pymunk", "theory",
+    ]  # fmt: skip
+    assert said.endswith("3 outside the tolerance\n")
+    found = json.loads(call("verify", "other.toml", "slip", "--json", code=1).stdout)
+    assert found["failures"] == 3
+    other, slip = found["scenes"]
+    assert list(other) == ["scene", "title", "expectations", "agreement", "skipped"]
+    assert list(other["expectations"][0]) == [
+        "quantity", "unit", "source", "engine", "expected", "simulated", "error", "tolerance",
+        "relative", "holds",
+    ]  # fmt: skip
+    wrong = [row for row in other["expectations"] if not row["holds"]]
+    assert [(row["quantity"], row["expected"]) for row in wrong] == [("d3", 0.95)] * 3
+    assert all(row["holds"] for row in slip["expectations"])
+    assert list(slip["agreement"][0]) == [*("pair", "quantity", "difference", "tolerance", "holds")]
 
 
 def test_verify_says_what_cannot_be_compared():
     Path("point.toml").write_text(
-        sc.shipped()["perpendicular"].read_text(encoding="utf-8") + "[particle]\nradius = 0\n",
+        "[incoming]\nspeed = 2\npulley_radius = 0.1\n[plate]\ndistance = 0.5\n"
+        "[outgoing]\ndrop = 0.5\n[particle]\nradius = 0\n",
         encoding="utf-8",
     )
     assert "pymunk has no mass points" in call("verify", "point.toml").stdout
     assert "nowhere: no such file" in refused("verify", "nowhere")
-    # Of a stream, particle 0 alone.
-    assert "all within the tolerance" in call("verify", "stream", "free-fall").stdout
+    text = call("verify", "stream-independent", "free-fall").stdout
+    assert "  pymunk is left out: 10000 particles that do not meet" in text
+    assert "exact - theory: outside the model: there is no incoming conveyor" in text
 
 
 # the command itself
@@ -605,7 +733,9 @@ def test_verify_says_what_cannot_be_compared():
 def test_help_lists_the_commands():
     text = call("--help").stdout
     commands = re.findall(r"^  ([a-z]+)  ", text.partition("Commands:")[2], re.MULTILINE)
-    assert commands == ["run", "check", "show", "tables", "verify", "scenes", "schema", "new"]
+    assert commands == [
+        "run", "check", "show", "tables", "verify", "stress", "bench", "scenes", "schema", "new",
+    ]
     assert call("-h").stdout == text
     for command in commands:
         assert call(command, "--help").stdout.startswith(f"Usage: main {command} ")

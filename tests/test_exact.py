@@ -13,7 +13,9 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from chutelab import exact, machine, scene
+from chutelab.exact import engine, journal
 from chutelab.ledger import ledger
+from chutelab.recorder import StalledError
 from chutelab.recording import Kind
 from chutelab.releases import Releases
 
@@ -426,3 +428,255 @@ def test_interacting_particles_are_refused():
     built = machine.build(scene.load("stream"))
     with pytest.raises(ValueError, match="between particles"):
         exact.run(built)
+
+
+def one_of(built, n):
+    """The machine of particle n alone."""
+    rows = [getattr(built.releases, name)[n : n + 1].copy() for name in vars(built.releases)]
+    return replace(built, releases=Releases(*rows))
+
+
+@pytest.mark.parametrize(
+    ("name", "overrides"),
+    [
+        ("stream-independent", ("stream.count=150", "run.until=settled")),
+        ("low-speed", ("stream.count=40", "stream.bed_height=0.02")),
+        ("low-speed", ("stream.count=40", "incoming.friction=0.4", "particle.spin=true")),
+    ],
+)
+def test_each_of_a_crowd_does_what_it_does_alone_whatever_the_blocks(name, overrides, monkeypatch):
+    built = machine.build(scene.load(name, overrides))
+    together = exact.run(built)
+    monkeypatch.setattr(engine, "FEWEST", 7)
+    monkeypatch.setattr(engine, "MOST", 7)
+    apart = exact.run(built)
+    for array in ("knots", "offsets", "ended", "events", "by_surface"):
+        assert getattr(together, array).tobytes() == getattr(apart, array).tobytes()
+    assert (together.steps, together.contacts) == (apart.steps, apart.contacts)
+    for n in (1, 17, 39):
+        assert together.track(n).tobytes() == exact.run(one_of(built, n)).track(0).tobytes()
+
+
+def test_events_at_one_time_go_by_particle():
+    # Particle 10 is released at 10/20 s, when the belt, 1 m at 2 m/s, lets particle 0 go.
+    events = exact.run(
+        machine.build(scene.load("stream-independent", ("stream.count=30", "stream.rate=20")))
+    ).events
+    same = events["t"][1:] == events["t"][:-1]
+    assert same.any()
+    assert (np.diff(events["particle"])[same] > 0).all()
+
+
+# Limits
+
+
+def test_a_run_without_an_end_is_stopped_and_keeps_what_it_recorded(monkeypatch):
+    monkeypatch.setattr(engine, "ROUNDS", 20)
+    floor = {**FLOOR, "restitution": 1.0, "friction": 0.0}
+    with pytest.raises(StalledError, match=r"particle 0 .* 20 events.* lower run.max_time") as end:
+        thrown([0.0, 0.5], [0.3, 0.0], floor, until=60.0)
+    period = 2.0 * sqrt(2.0 * 0.5 / G)
+    assert end.value.particle == 0
+    assert end.value.t == pytest.approx(19.5 * period, rel=1e-12)
+    assert end.value.position == pytest.approx((0.3 * 19.5 * period, 0.0), abs=1e-12)
+    recording = end.value.recording
+    assert recording.contacts == recording.steps == 20
+    assert recording.ended[0] == 0
+    assert recording.track(0)[-1]["t"] == end.value.t
+    assert ledger(recording).relative_residual < 1e-12
+
+
+def test_a_particle_that_hardly_gets_on_is_stopped(monkeypatch):
+    # Two bounces a second are too many here.
+    monkeypatch.setattr(engine, "WINDOW", 4)
+    monkeypatch.setattr(engine, "TICK", 0.5)
+    floor = {**FLOOR, "restitution": 1.0, "friction": 0.0}
+    period = 2.0 * sqrt(2.0 * 0.25 / G)
+    with pytest.raises(StalledError, match=f"4 events took {3.5 * period:.2g} s: .* narrow"):
+        thrown([0.0, 0.25], [0.0, 0.0], floor, until=60.0)
+    assert thrown([0.0, 2.0], [0.0, 0.0], floor, until=60.0).ended[0] == 0
+
+
+def test_long_runs_join_their_chunks_and_lose_nothing(monkeypatch):
+    floor = {**FLOOR, "restitution": 0.9, "friction": 0.2}
+    whole = thrown([0.0, 0.5], [0.3, 0.0], floor, until="settled")
+    monkeypatch.setattr(journal, "MANY", 7)
+    pieces = thrown([0.0, 0.5], [0.3, 0.0], floor, until="settled")
+    for array in ("knots", "offsets", "events", "by_surface"):
+        assert getattr(whole, array).tobytes() == getattr(pieces, array).tobytes()
+
+
+def test_a_run_of_some_seconds_lasts_that_long_wherever_the_particle_is():
+    recording = run(
+        {
+            "gravity": 0.0,
+            "surface": [FLOOR],
+            "stream": {"at": [0.125, 0.25], "velocity": [0.5, 0.25]},
+            "run": {"until": 1e6, "max_time": 1e6},
+        }
+    )
+    end = recording.track(0)[-1]
+    assert recording.ended[0] == 0
+    assert end["t"] == 1e6
+    assert end["position"].tolist() == [500_000.125, 250_000.25]
+
+
+@pytest.mark.parametrize(
+    ("at", "depth"), [([0.0, 0.009], 0.001), ([0.0, -0.004], 0.006), ([50.003, 0.004], 0.005)]
+)
+def test_nobody_starts_inside_a_surface(at, depth):
+    with pytest.raises(scene.SceneError, match=r"stream\.at") as refused:
+        thrown(at, [0.0, 0.0], FLOOR, radius=0.01)
+    assert f"would start {0.01 - depth:.6g} m from it" in str(refused.value)
+    assert "floor" in str(refused.value)
+
+
+def test_a_contact_written_with_few_digits_is_a_contact():
+    recording = thrown([0.0, 0.01 - 5e-10], [1.0, 0.0], FLOOR, radius=0.01)
+    assert recording.track(0)[0]["position"][1] == 0.01
+    assert recording.contacts == 0
+    assert recording.track(0)[-1]["position"][1] == 0.01
+
+
+def test_a_machine_far_away_moves_as_one_here():
+    def off_the_edge(x, y):
+        floor = {"name": "floor", "from": [x - 3.75, y - 3.0], "to": [x - 1.0, y - 3.0]}
+        at = [x - 1.25, y - 3.0 + 1.0 / 64.0]
+        return thrown(at, [0.5, 0.0], floor, radius=1.0 / 64.0, spin=True, until=1.5)
+
+    shift = np.array([-1e6 + 4.0, 1e6 - 4.0])
+    here, there = off_the_edge(0.0, 0.0), off_the_edge(*shift)
+    times = np.linspace(0.0, 1.5, 200)
+    # Half a last place of a coordinate is 6e-11 m.
+    np.testing.assert_allclose(there.at(times)[0] - shift, here.at(times)[0], rtol=0.0, atol=2e-10)
+    assert there.events["kind"].tolist() == here.events["kind"].tolist()
+    for name in ("t", "velocity_after", "omega_after"):
+        np.testing.assert_allclose(there.events[name], here.events[name], rtol=1e-13, atol=1e-13)
+
+
+# Corners that fuzzing found
+
+
+def test_after_turning_round_on_a_slope_a_corner_is_as_far_as_it_is():
+    # It slides up from the corner it came from, stops, and has to slide all the way back.
+    vee = {"name": "vee", "points": [[-0.5, 0.5], [0, 0], [0.5, 0.5]]}
+    recording = thrown(
+        [0.0, 0.5], [0.0, 0.0], {**vee, "restitution": 0.5, "friction": 0.3}, radius=0.004
+    )
+    assert ledger(recording).relative_residual < 1e-12
+    steps = np.diff(recording.track(0)["position"], axis=0)[np.diff(recording.track(0)["t"]) == 0.0]
+    assert np.abs(steps).max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("radius", "gravity", "surfaces", "at", "velocity", "side"),
+    [
+        # Down a slope into the corner with a belt that crosses it.
+        (
+            0.0,
+            9.81,
+            [
+                ([0.9927846994735305, 0.75], [-0.875, -0.625], 0.0, 0.0, 0.0),
+                (
+                    [-0.5367946015887366, 0.0],
+                    [0.2645640303077017, 0.02615828168520129],
+                    0.0,
+                    0.6,
+                    1.5,
+                ),
+            ],
+            [-0.125, 1.25],
+            [1.25, 0.8019713382657905],
+            -1,
+        ),
+        # Into a wedge whose other side returns nearly all.
+        (
+            0.03,
+            9.81,
+            [
+                (
+                    [0.38777654175846776, 0.0],
+                    [0.4883749450981132, 0.5045674775881257],
+                    0.0,
+                    0.0,
+                    0.0,
+                ),
+                ([0.75, -0.4528713779684288], [0.20104447842882522, 0.375], 0.999, 0.0, 0.0),
+            ],
+            [0.25, 1.25],
+            [0.75, -1.75],
+            1,
+        ),
+    ],
+)
+def test_in_a_wedge_it_stays_on_its_side(radius, gravity, surfaces, at, velocity, side):
+    recording = run(
+        {
+            "gravity": gravity,
+            "particle": {"radius": radius},
+            "surface": [
+                {
+                    "name": f"s{n}",
+                    "from": a,
+                    "to": b,
+                    "restitution": restitution,
+                    "friction": friction,
+                    "speed": speed,
+                }
+                for n, (a, b, restitution, friction, speed) in enumerate(surfaces)
+            ],
+            "stream": {"at": at, "velocity": velocity},
+            "run": {"until": 1.5},
+        }
+    )
+    first, end = np.array(surfaces[0][0]), np.array(surfaces[0][1])
+    along = (end - first) / hypot(*(end - first))
+    place = recording.track(0)["position"]
+    foot = (place - first) @ along
+    height = side * ((place - first) @ [-along[1], along[0]])
+    met = (foot > 0.0) & (foot < hypot(*(end - first)))
+    assert height[met].min() >= radius - 1e-12
+    assert met.sum() > 5
+
+
+def test_a_point_that_hits_the_very_tip_of_a_fold_bounces_off_its_outside():
+    # Two surfaces meet at (-1, 0.3), one nearly below the other; both are touched at the tip.
+    fold = {"name": "fold", "points": [[-0.13, 0.0], [-1.0, 0.3], [0.32, 0.0]]}
+    recording = thrown(
+        [-1.0 + 2.0**-53, 1.2],
+        [0.0, -0.4],
+        {**fold, "restitution": 0.8, "friction": 0.0},
+        until=1.0,
+    )
+    (hit,) = recording.select(Kind.IMPACT)
+    normal = np.array([0.3, 1.32]) / hypot(0.3, 1.32)
+    before = np.array([0.0, -sqrt(0.4**2 + 2.0 * G * 0.9)])
+    np.testing.assert_allclose(
+        hit["velocity_after"], before - 1.8 * (before @ normal) * normal, rtol=1e-12
+    )
+
+
+def test_off_a_face_too_fast_for_its_end_it_does_not_come_back():
+    # A small disk leaves a belt: the direction to the end's centre is known to 1e-13 only.
+    recording = run(
+        {
+            "particle": {"radius": 0.001, "spin": True},
+            "surface": [
+                {
+                    "name": "belt",
+                    "from": [-0.75, 0.502071314933001],
+                    "to": [-0.5, 0.5],
+                    "restitution": 0.0,
+                    "friction": 0.6,
+                    "speed": 1.5,
+                }
+            ],
+            "stream": {
+                "at": [-0.1628071293151092, 1.25],
+                "velocity": [-1.0341735256117945, 0.772934697255693],
+            },
+            "run": {"until": 1.5},
+        }
+    )
+    kinds = [Kind.RELEASE, Kind.IMPACT, Kind.STICK, Kind.SEPARATION]
+    assert recording.events["kind"].tolist() == kinds

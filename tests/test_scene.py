@@ -85,7 +85,10 @@ CONTRACT = {
         "friction": 0.3,
     },
     "run": {"engine": "auto", "until": "landed", "max_time": 30.0, "dt": 0.001, "align": True},
+    "expect": (),
 }
+
+EXPECT = {"quantity", "value", "tolerance", "tolerance_pymunk", "source"}
 
 
 def test_the_defaults_are_the_contract():
@@ -306,7 +309,7 @@ def test_the_starter_is_complete_and_valid_and_shows_the_defaults():
     scene = sc.parse(text)
     assert scene.outgoing is not None
     # With what is commented out put in, it is still valid, and every key there is, is in it.
-    keys = re.compile(r"^# (?=[a-z_]+ = |\[\[surface)", re.MULTILINE)
+    keys = re.compile(r"^# (?=[a-z_]+ = |\[\[)", re.MULTILINE)
     everything = tomllib.loads(keys.sub("", text))
     assert set(everything) == set(CONTRACT)
     for table in ("particle", "incoming", "plate", "outgoing", "stream", "run"):
@@ -316,7 +319,10 @@ def test_the_starter_is_complete_and_valid_and_shows_the_defaults():
     assert set(everything["surface"][0]) == {
         *("name", "from", "to", "restitution", "friction", "speed")
     }
-    assert sc.from_dict(everything).surface[0].name == "hood"
+    assert set(everything["expect"][0]) == EXPECT
+    complete = sc.from_dict(everything)
+    assert complete.surface[0].name == "hood"
+    assert complete.expect[0].quantity == "x2"
     minimal = sc.parse(MACHINE, overrides=["incoming.speed=2", "incoming.pulley_radius=0.1"])
     assert scene == sc.from_dict({**sc.to_dict(minimal), "title": scene.title})
 
@@ -390,6 +396,8 @@ def test_the_schema_describes_every_key_of_the_contract():
     for name, keys in CONTRACT.items():
         if isinstance(keys, dict):
             assert set(tables[name]["properties"]) == set(keys)
+    assert set(tables["expect"]["properties"]) == EXPECT
+    assert set(tables["expect"]["required"]) == EXPECT - {"tolerance_pymunk"}
     assert set(tables["surface"]["properties"]) == {
         *("name", "from", "to", "points", "restitution", "friction", "speed")
     }

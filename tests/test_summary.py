@@ -18,6 +18,7 @@ from chutelab.summary import summary
 TOP = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
     "impact", "landing", "ended", "ledger", "theory", "theory_as_printed", "error",
+    "accuracy",
 ]  # fmt: skip
 BEFORE = ["t", "x", "y", "vx", "vy"]
 LEDGER = [

@@ -16,6 +16,7 @@ from chutelab.theory import predict
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from chutelab.accuracy import Accuracy
     from chutelab.recording import Recording
     from chutelab.scene import Scene
     from chutelab.theory import Transfer
@@ -30,11 +31,11 @@ THEORY = (
 )  # fmt: skip
 
 
-def summary(recording: Recording) -> dict[str, Any]:
+def summary(recording: Recording, accuracy: Accuracy | None = None) -> dict[str, Any]:
     """Return a recording's numbers as plain lists and floats, None for what did not happen.
 
     Lists have one entry a particle. Lengths, times and energies are in SI units, angles in degrees
-    under names that end in ``_deg``.
+    under names that end in ``_deg``. ``accuracy`` is None unless one was asked for.
     """
     scene = scene_of(recording)
     compared = compare(recording)
@@ -57,6 +58,7 @@ def summary(recording: Recording) -> dict[str, Any]:
         "theory": _theory(predict(scene)),
         "theory_as_printed": _as_printed(scene),
         "error": {**compared.errors, "max": compared.max},
+        "accuracy": None if accuracy is None else asdict(accuracy),
     }
 
 

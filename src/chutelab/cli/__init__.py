@@ -2,15 +2,19 @@
 
 ===============  ==================================================================================
 `program`        the command ``chutelab`` itself, and what becomes of errors
-`running`        ``run`` and ``check``
+`running`        ``run``
+`checking`       ``check``
 `recordings`     ``show``
 `paper`          ``tables``
 `scenes`         ``scenes``, ``schema`` and ``new``
 `verifying`      ``verify``
+`stressing`      ``stress``
+`benching`       ``bench``
 `parameters`     what several commands take: scenes, overrides, output
 `output`         the files of ``--out``, all of them or none
 `report`         summaries as tables for people
 `console`        text and JSON on standard output
+`stalling`       what becomes of a run that gets stuck
 `progress`       a bar on standard error for what takes longer than a second
 ===============  ==================================================================================
 
@@ -18,14 +22,17 @@ Modules that take long to import are imported inside the commands that need them
 ``chutelab --help`` answers at once.
 """
 
+from chutelab.cli.benching import bench
+from chutelab.cli.checking import check
 from chutelab.cli.paper import tables
 from chutelab.cli.program import main
 from chutelab.cli.recordings import show
-from chutelab.cli.running import check, run
+from chutelab.cli.running import run
 from chutelab.cli.scenes import new, scenes, schema
+from chutelab.cli.stressing import stress
 from chutelab.cli.verifying import verify
 
-for _command in (run, check, show, tables, verify, scenes, schema, new):
+for _command in (run, check, show, tables, verify, stress, bench, scenes, schema, new):
     main.add_command(_command)
 
 __all__ = ["main"]

@@ -15,6 +15,7 @@ from chutelab.cli.progress import progress
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
+    from chutelab.accuracy import Accuracy
     from chutelab.recording import Recording
 
 
@@ -52,14 +53,21 @@ def destination(folder: Path | None, kinds: Sequence[str]) -> Iterator[Path | No
         raise RefusedError(f"--out {folder}: cannot be written to: {reason}") from error
 
 
-def write(recording: Recording, folder: Path, kinds: Sequence[str], *, quiet: bool) -> None:
+def write(
+    recording: Recording,
+    folder: Path,
+    kinds: Sequence[str],
+    *,
+    quiet: bool,
+    accuracy: Accuracy | None = None,
+) -> None:
     """Write the files of the given `KINDS` into an existing folder."""
     for kind in kinds:
         with progress(f"writing {' and '.join(KINDS[kind])}", quiet=quiet):
-            _write(recording, folder, kind)
+            _write(recording, folder, kind, accuracy)
 
 
-def _write(recording: Recording, folder: Path, kind: str) -> None:
+def _write(recording: Recording, folder: Path, kind: str, accuracy: Accuracy | None) -> None:
     match kind:
         case "png":
             from chutelab.plots import overlay
@@ -76,5 +84,5 @@ def _write(recording: Recording, folder: Path, kind: str) -> None:
         case "json":
             from chutelab.summary import summary
 
-            text = json.dumps(summary(recording), indent=1, allow_nan=False)
+            text = json.dumps(summary(recording, accuracy), indent=1, allow_nan=False)
             (folder / "summary.json").write_text(text + "\n", encoding="utf-8")

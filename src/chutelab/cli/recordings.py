@@ -13,6 +13,7 @@ from chutelab.cli.program import RefusedError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from chutelab.accuracy import Accuracy
     from chutelab.recording import Recording
 
 
@@ -55,7 +56,13 @@ def _advice(given: Path) -> str:
 
 
 def tell(
-    recording: Recording, out: Path | None, kinds: Sequence[str], *, as_json: bool, quiet: bool
+    recording: Recording,
+    out: Path | None,
+    kinds: Sequence[str],
+    *,
+    as_json: bool,
+    quiet: bool,
+    accuracy: Accuracy | None = None,
 ) -> None:
     """Print a recording's summary and what was written, as JSON or as tables."""
     from chutelab.cli import console
@@ -63,11 +70,11 @@ def tell(
     if as_json:
         from chutelab.summary import summary
 
-        console.show_json(summary(recording))
+        console.show_json(summary(recording, accuracy))
     elif not quiet:
         from chutelab.cli.report import report
 
-        console.show(*report(recording))
+        console.show(*report(recording, accuracy))
         if out is not None:
             names = ", ".join(name for kind in kinds for name in KINDS[kind])
             click.echo(f"wrote into {out}: {names}")

@@ -11,6 +11,7 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from chutelab.accuracy.wanted import Wanted
 from chutelab.compare import QUANTITIES, compare
 from chutelab.ledger import ledger
 from chutelab.recording import REASONS
@@ -20,9 +21,13 @@ if TYPE_CHECKING:
 
     from rich.console import RenderableType
 
+    from chutelab.accuracy import Accuracy
     from chutelab.compare import Comparison
     from chutelab.ledger import Ledger
     from chutelab.recording import Recording
+
+WIDTH = 80
+"""Columns of a line of prose, at most: a terminal's."""
 
 UNITS = {
     "angle": "°", "time": "s", "length": "m", "speed": "m/s", "energy": "J", "power": "W",
@@ -51,8 +56,8 @@ MEANINGS = {
 }
 
 
-def report(recording: Recording) -> list[RenderableType]:
-    """Return what a run leaves to read: particle 0 beside the theory, the ledger, the endings."""
+def report(recording: Recording, accuracy: Accuracy | None = None) -> list[RenderableType]:
+    """Return what a run leaves to read: particle 0 beside the theory, the ledger, the accuracy."""
     compared = compare(recording)
     parts: list[RenderableType] = [_head(recording)]
     if any(isfinite(value) for value in (*compared.simulated.values(), *compared.theory.values())):
@@ -61,7 +66,8 @@ def report(recording: Recording) -> list[RenderableType]:
         begun = any(isfinite(value) for value in compared.theory.values())
         ends = "No closed form from here on" if begun else "No closed form"
         parts.append(Text(f"\n{ends}; {compared.reason}"))
-    return [*parts, *_books(ledger(recording))]
+    parts += _books(ledger(recording))
+    return parts if accuracy is None else [*parts, _reached(accuracy)]
 
 
 def titled(title: str, table: Table) -> Group:
@@ -78,6 +84,13 @@ def plain_table(columns: Sequence[str], *, texts: int = 1, width: int | None = N
         else:
             table.add_column(column, justify="right", min_width=width)
     return table
+
+
+def wrapped(text: str, width: int) -> list[str]:
+    """Return a text in lines of at most `width` characters, broken between words."""
+    from textwrap import wrap
+
+    return wrap(text, width, break_on_hyphens=False)
 
 
 def _head(recording: Recording) -> Text:
@@ -138,6 +151,23 @@ def _books(books: Ledger) -> list[RenderableType]:
         f" {_number(books.turned_over)} J turned over"
     )
     return [titled("Energy ledger, J", table), changes]
+
+
+def _reached(accuracy: Accuracy) -> Text:
+    """Say how accurate the run is, and how that is known."""
+    wanted = Wanted(accuracy.asked, "m" if accuracy.unit == "m" else "relative")
+    what = "relative error" if accuracy.unit == "relative" else "error of places"
+    if accuracy.reached is None:
+        said = f"cannot be told; asked for {wanted}"
+    else:
+        found = wanted.written(accuracy.reached)
+        said = f"about {found} ({accuracy.worst}); asked for {wanted}"
+    text = Text("\nAccuracy\n", style="bold")
+    line = f"{what} {said}, {'reached' if accuracy.met else 'NOT REACHED'}"
+    text.append("\n".join(wrapped(line, WIDTH)), style="not bold")
+    how = f"how it is known: {accuracy.method}"
+    text.append("\n" + "\n".join(wrapped(how, WIDTH)), style="not bold")
+    return text
 
 
 def _number(value: float) -> str:

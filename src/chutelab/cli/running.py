@@ -1,4 +1,4 @@
-"""``run`` and ``check``: what one does with a scene."""
+"""``run``: from a scene to a summary and its files."""
 
 from __future__ import annotations
 
@@ -8,11 +8,36 @@ import click
 
 from chutelab.cli.parameters import chosen, complete_scene, output_options, set_option
 from chutelab.cli.recordings import tell
+from chutelab.cli.stalling import partial_option, salvaged
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from chutelab.machine import Machine
+    from chutelab.accuracy import Accuracy, Wanted
+    from chutelab.recording import Recording
+
+
+class MissedError(click.ClickException):
+    """The accuracy that was asked for could not be reached."""
+
+    exit_code = 1
+
+    def __init__(self, asked: Wanted, reached: Accuracy) -> None:
+        best = "how much was, cannot be told"
+        if reached.reached is not None:
+            best = f"{asked.written(reached.reached)} was"
+        super().__init__(f"the accuracy of {asked} was not reached; {best}")
+
+
+def _accuracy(_ctx: click.Context, _parameter: click.Parameter, text: str | None) -> Wanted | None:
+    if text is None:
+        return None
+    from chutelab.accuracy import AccuracyError, parse
+
+    try:
+        return parse(text)
+    except AccuracyError as error:
+        raise click.BadParameter(str(error)) from error
 
 
 @click.command(short_help="Simulate a scene and print a summary; write its files.")
@@ -23,21 +48,33 @@ if TYPE_CHECKING:
     help="Same as --set run.engine=...",
 )
 @click.option("--dt", metavar="S", type=float, help="Same as --set run.dt=S.")
+@click.option(
+    "--accuracy",
+    metavar="A",
+    callback=_accuracy,
+    help="Choose engine and step so that errors are at most this: relative, such as 1e-6, or a"
+    " length, such as 1mm; say what was reached.",
+)
 @set_option
 @output_options
+@partial_option
 def run(
     scene: str,
     engine: str | None,
     dt: float | None,
+    accuracy: Wanted | None,
     overrides: tuple[str, ...],
     out: Path | None,
     only: tuple[str, ...] | None,
     as_json: bool,
     quiet: bool,
+    partial: bool,
 ) -> None:
     """Simulate SCENE, a scene file or the name of a shipped one, and print a summary.
 
-    Without --out nothing is written.
+    Without --out nothing is written. With --accuracy, --engine is kept to and --dt is the longest
+    step that is tried; if the accuracy cannot be reached, everything is printed and written all
+    the same, and the exit code is 1.
     """
     from chutelab.cli.output import destination, write
     from chutelab.cli.progress import progress
@@ -46,71 +83,32 @@ def run(
     from chutelab.simulation import simulate
 
     kinds = chosen(out, only)
+    if partial and out is None:
+        raise click.UsageError("--partial keeps files of --out DIR: give --out too.")
     settings = list(overrides)
     if engine is not None:
         settings.append(Setting(f"run.engine={engine}", f"--engine {engine}"))
     if dt is not None:
         settings.append(Setting(f"run.dt={dt}", f"--dt {dt:.12g}"))
     loaded = load(scene, settings)
+    reached: Accuracy | None = None
+
+    def simulated() -> Recording:
+        nonlocal reached
+        if accuracy is None:
+            return simulate(loaded, progress=update)
+        from chutelab.accuracy import reach
+
+        found, reached = reach(loaded, accuracy, update)
+        return found
+
     with destination(out, kinds) as folder:
         with progress("simulating", quiet=quiet) as update:
-            recording = simulate(loaded, progress=update)
+            recording, stuck = salvaged(simulated, keep=partial)
         if folder is not None:
-            write(recording, folder, kinds, quiet=quiet)
-    tell(recording, out, kinds, as_json=as_json, quiet=quiet)
-
-
-@click.command(short_help="Say what would be built, or all that is wrong.")
-@click.argument(
-    "scenes", metavar="SCENE...", nargs=-1, required=True, shell_complete=complete_scene
-)
-@set_option
-@click.pass_context
-def check(ctx: click.Context, scenes: tuple[str, ...], overrides: tuple[str, ...]) -> None:
-    """Say what would be built from each SCENE, or all that is wrong with it."""
-    from chutelab.machine import build
-    from chutelab.scene import SceneError, load
-
-    refused = False
-    for name in scenes:
-        try:
-            machine = build(load(name, overrides))
-        except SceneError as error:
-            refused = True
-            click.echo(f"Error: {error}", err=True)
-        else:
-            click.echo("\n".join(_described(name, machine)))
-    if refused:
-        ctx.exit(2)
-
-
-def _described(name: str, machine: Machine) -> list[str]:
-    from chutelab.simulation import choose
-
-    lines = [f"{name}: {machine.title}"]
-    segments, ends = machine.segments, machine.segments.end
-    for index, surface in enumerate(machine.surfaces):
-        for k in (segments.surface == index).nonzero()[0]:
-            (x0, y0), (x1, y1) = segments.start[k], ends[k]
-            moving = f", moving at {segments.speed[k]:.6g} m/s" if segments.speed[k] else ""
-            lines.append(
-                f"  {surface}: from ({x0:.6g}, {y0:.6g}) to ({x1:.6g}, {y1:.6g}) m{moving}"
-            )
-    if machine.pulley is not None:
-        lines.append(f"  pulley: radius {machine.pulley.radius:.6g} m, axis at (0, 0)")
-    releases, p = machine.releases, machine.particle
-    (x, y), (vx, vy) = releases.position[0], releases.velocity[0]
-    many = f"{machine.count} particles" if machine.count > 1 else "1 particle"
-    lines += [
-        f"  {many}: radius {p.radius:.6g} m, mass {p.mass:.6g} kg,"
-        f" {'a free disk' if p.inertia else 'not turning'},"
-        f" the first from ({x:.6g}, {y:.6g}) m at ({vx:.6g}, {vy:.6g}) m/s",
-        f"  engine: {choose(machine)}, until {_ending(machine)}",
-    ]
-    return [*lines, *(f"  warning: {warning}" for warning in machine.warnings)]
-
-
-def _ending(machine: Machine) -> str:
-    if machine.until == "time":
-        return f"t = {machine.end_time:.6g} s"
-    return f"{machine.until}, at most to t = {machine.end_time:.6g} s"
+            write(recording, folder, kinds, quiet=quiet, accuracy=reached)
+    tell(recording, out, kinds, as_json=as_json, quiet=quiet, accuracy=reached)
+    if stuck is not None:
+        raise stuck
+    if accuracy is not None and reached is not None and not reached.met:
+        raise MissedError(accuracy, reached)

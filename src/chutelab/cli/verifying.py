@@ -1,59 +1,166 @@
-"""``verify``: the three answers to the same scene, side by side."""
+"""``verify``: what scenes are expected to show, and the three answers side by side."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from itertools import groupby
+from math import isfinite
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from chutelab.cli.parameters import complete_scene
 
 if TYPE_CHECKING:
-    from chutelab.agreement import Agreement
+    from collections.abc import Iterator
+
+    from rich.text import Text
+
+    from chutelab.agreement import Agreement, Finding, Verification
+    from chutelab.scene import Scene
+
+WIDTH = 80
+"""Columns of a line, at most: a terminal's."""
+
+OK, FAILED = "ok", "FAILED"
 
 
-@click.command(short_help="Compare theory, exact and pymunk on scenes.")
+@click.command(short_help="Check what scenes promise; compare theory, exact and pymunk.")
 @click.argument("scenes", metavar="[SCENE]...", nargs=-1, shell_complete=complete_scene)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @click.pass_context
-def verify(ctx: click.Context, scenes: tuple[str, ...]) -> None:
-    """Compare theory, exact and pymunk on each SCENE (default: shipped ones of one particle).
+def verify(ctx: click.Context, scenes: tuple[str, ...], as_json: bool) -> None:
+    """Check what each SCENE is expected to show (default: all shipped ones).
 
-    Of a stream, particle 0 is taken alone. Exit code 1 if two of them disagree by more than their
-    tolerance.
+    Every [[expect]] of a scene is looked at on each engine that can run it, and in the theory.
+    Then theory, exact and pymunk are compared on its particle 0, taken alone. Exit code 1 if an
+    error is larger than its tolerance.
     """
-    from chutelab.agreement import agreement
+    from chutelab import agreement
     from chutelab.cli import console
     from chutelab.cli.progress import progress
-    from chutelab.cli.report import plain_table
     from chutelab.scene import load, shipped
 
     loaded = {name: load(name) for name in scenes or shipped()}
-    if not scenes:
-        loaded = {name: scene for name, scene in loaded.items() if scene.stream.count == 1}
-    found = {}
+    found: dict[str, Verification] = {}
     with progress("verifying") as update:
-        for name, scene in loaded.items():
-            found[name] = agreement(scene)
+        for done, (name, scene) in enumerate(loaded.items()):
             if update is not None:
-                update(len(found) / len(loaded))
-    table = plain_table(["scene", "", "quantity", "difference", "tolerance"], texts=3)
-    for name, answers in found.items():
-        for row in answers:
-            table.add_row(name, *_row(row))
-            name = ""
-    console.show(table)
-    failed = sum(not row.holds for answers in found.values() for row in answers)
-    click.echo(f"{failed} outside the tolerance" if failed else "all within the tolerance")
-    if failed:
+                update(done / len(loaded))
+            found[name] = agreement.verify(scene)
+    failures = sum(answer.failures for answer in found.values())
+    if as_json:
+        answers = [_plain(name, loaded[name], answer) for name, answer in found.items()]
+        console.show_json({"format": 1, "failures": failures, "scenes": answers})
+    else:
+        for name, answer in found.items():
+            console.show(*_shown(name, loaded[name], answer))
+        click.echo("Errors and tolerances are relative where they have no unit.")
+        click.echo(f"{failures} outside the tolerance" if failures else "all within the tolerance")
+    if failures:
         ctx.exit(1)
 
 
-def _row(row: Agreement) -> tuple[str, ...]:
-    if row.tolerance is None:
-        return row.pair, row.quantity, _size(row.difference), "-"
-    mark = "" if row.holds else " FAILED"
-    return row.pair, row.quantity, _size(row.difference), f"{row.tolerance:.1e}{mark}"
+def _plain(name: str, scene: Scene, answer: Verification) -> dict[str, Any]:
+    return {
+        "scene": name,
+        "title": scene.title,
+        "expectations": [
+            {
+                "quantity": row.quantity,
+                "unit": row.unit,
+                "source": row.source,
+                "engine": row.engine,
+                "expected": _or_null(row.expected),
+                "simulated": _or_null(row.simulated),
+                "error": _or_null(row.error),
+                "tolerance": row.tolerance,
+                "relative": row.relative,
+                "holds": row.holds,
+            }
+            for row in answer.findings
+        ],
+        "agreement": [
+            {
+                "pair": row.pair.split(", "),
+                "quantity": row.quantity,
+                "difference": row.difference,
+                "tolerance": row.tolerance,
+                "holds": row.holds,
+            }
+            for row in answer.agreements
+        ],
+        "skipped": answer.skipped,
+    }
 
 
-def _size(difference: float | None) -> str:
-    return "-" if difference is None else f"{difference:.1e}"
+def _or_null(value: float) -> float | None:
+    return value if isfinite(value) else None
+
+
+def _shown(name: str, scene: Scene, answer: Verification) -> Iterator[Text]:
+    """Yield the lines on one scene."""
+    from rich.text import Text
+
+    from chutelab.cli.report import wrapped
+
+    yield Text(f"{name}: {scene.title}", style="bold")
+    if answer.findings:
+        yield Text(
+            f"  {'expected':>26}{'simulated':>16}{'error':>13}{'tolerance':>13}", style="dim"
+        )
+    for (quantity, source, unit), rows in groupby(
+        answer.findings, lambda row: (row.quantity, row.source, row.unit)
+    ):
+        shown = unit.replace("degrees", "°")
+        head = f"{quantity}{f', {shown}' if shown else ''}: {source}"
+        for number, line in enumerate(wrapped(head, WIDTH - 4)):
+            yield Text(f"  {'  ' if number else ''}{line}")
+        for row in rows:
+            yield _judged(_columns(row), row.holds, promised=row.tolerance is not None)
+    for engine, reason in answer.skipped.items():
+        yield Text(f"  {engine} is left out: {reason}")
+    yield Text("  particle 0 alone, one answer against another:")
+    for pair in answer.agreements:
+        yield from _compared(pair)
+    yield Text("")
+
+
+def _columns(row: Finding) -> str:
+    from chutelab.scene.units import write_size
+
+    unit = "%" if row.relative else row.unit
+    error = write_size(row.error, unit, 2) if isfinite(row.error) else "-"
+    tolerance = "-" if row.tolerance is None else write_size(row.tolerance, unit)
+    return (
+        f"    {row.engine:<8}{_number(row.expected):>16}{_number(row.simulated):>16}"
+        f"{error:>13}{tolerance:>13}"
+    )
+
+
+def _number(value: float) -> str:
+    return f"{value:.8g}" if isfinite(value) else "-"
+
+
+def _judged(columns: str, holds: bool, *, promised: bool) -> Text:
+    from rich.text import Text
+
+    line = Text(columns)
+    if promised:
+        line.append(f"  {OK if holds else FAILED}", style="green" if holds else "bold red")
+    return line
+
+
+def _compared(row: Agreement) -> Iterator[Text]:
+    from chutelab.cli.report import wrapped
+
+    pair = f"{row.pair.replace(', ', ' - ')}: {row.quantity}"
+    if row.difference is None and row.tolerance is None:
+        from rich.text import Text
+
+        for number, line in enumerate(wrapped(pair, WIDTH - 6)):
+            yield Text(f"    {'  ' if number else ''}{line}")
+        return
+    difference = "-" if row.difference is None else f"{row.difference:.1e}"
+    tolerance = "-" if row.tolerance is None else f"{row.tolerance:.1e}"
+    columns = f"    {pair:<42}{difference:>14}{tolerance:>13}"
+    yield _judged(columns, row.holds, promised=row.tolerance is not None)

@@ -2,7 +2,10 @@
 
 - `errors`: a fault (key, value found, what is allowed) and the one message that lists them all.
 - `quantities`: what a key may hold: strict types, units, ranges.
-- `models`: the tables of a scene as frozen Pydantic models, with the defaults.
+- `units`: sizes with their units, as people write them.
+- `models`: the tables of a scene as frozen Pydantic models, with the defaults; `tables`: what they
+  share.
+- `measures`, `expectations`: what a scene can be expected to show, and ``[[expect]]``.
 - `rules`: what no table can judge alone: conflicts between tables.
 - `wording`: Pydantic's errors as faults, with the allowed values said in words.
 - `overrides`: ``KEY=VALUE`` texts, as ``--set`` takes them, laid over a scene.
@@ -12,7 +15,8 @@
 """
 
 from chutelab.scene.editor import schema
-from chutelab.scene.errors import MISSING, Fault, SceneError
+from chutelab.scene.errors import MISSING, Fault, SceneError, shown
+from chutelab.scene.expectations import Expect
 from chutelab.scene.library import About, about, find, shipped, template
 from chutelab.scene.loading import from_dict, load, parse, to_dict
 from chutelab.scene.models import (
@@ -31,6 +35,7 @@ __all__ = [
     "MISSING",
     "RESERVED_NAMES",
     "About",
+    "Expect",
     "Fault",
     "Incoming",
     "Outgoing",
@@ -48,6 +53,7 @@ __all__ = [
     "parse",
     "schema",
     "shipped",
+    "shown",
     "template",
     "to_dict",
 ]

@@ -7,10 +7,12 @@ from __future__ import annotations
 
 from typing import Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
+from pydantic import ConfigDict, Field, PrivateAttr, model_validator
 
+from chutelab.scene.expectations import Expect
 from chutelab.scene.quantities import (
     LARGEST,
+    MOST_EXPECTATIONS,
     MOST_PARTICLES,
     MOST_SURFACES,
     Coordinate,
@@ -29,17 +31,7 @@ from chutelab.scene.quantities import (
     size,
 )
 from chutelab.scene.rules import ConflictError, Look, conflicts, surface_conflicts
-
-
-class Table(BaseModel):
-    """What all tables share: frozen, and strangers refused."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    def _fill(self, key: str, value: object) -> None:
-        # A default that depends on another key: not counted among the keys that were set, so that
-        # a scene taken apart and changed gets it anew.
-        object.__setattr__(self, key, value)
+from chutelab.scene.tables import Table
 
 
 class Particle(Table):
@@ -226,6 +218,7 @@ class Scene(Table):
     surface: tuple[Surface, ...] = Field((), max_length=MOST_SURFACES)
     stream: Stream = Field(default_factory=Stream)
     run: Run = Field(default_factory=Run)
+    expect: tuple[Expect, ...] = Field((), max_length=MOST_EXPECTATIONS)
 
     _source: str = PrivateAttr("<scene>")
 
@@ -240,6 +233,7 @@ class Scene(Table):
             "surface": Surface,
             "stream": Stream,
             "run": Run,
+            "expect": Expect,
         }
 
     @property

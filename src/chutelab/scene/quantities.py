@@ -27,6 +27,7 @@ MOST_PARTICLES: Final = 10_000_000
 
 MOST_SURFACES: Final = 1_000
 MOST_POINTS: Final = 10_000
+MOST_EXPECTATIONS: Final = 1_000
 
 
 def _distinct(points: tuple[Point, ...]) -> tuple[Point, ...]:

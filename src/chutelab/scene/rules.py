@@ -12,6 +12,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from chutelab.scene.errors import MISSING, Fault
+from chutelab.scene.expectations import expectation_conflicts
 
 ON_BELT: Final = 1e-9
 """How near to the belt's height R + r a release counts as lying on the belt, m."""
@@ -71,7 +72,14 @@ class Look:
 
     def surfaces(self) -> list[Any]:
         """Return the free surfaces, as far as they are tables at all."""
-        found = self._document.get("surface")
+        return self._list("surface")
+
+    def expectations(self) -> list[Any]:
+        """Return what the scene is expected to show, likewise."""
+        return self._list("expect")
+
+    def _list(self, key: str) -> list[Any]:
+        found = self._document.get(key)
         return list(found) if isinstance(found, list | tuple) else []
 
 
@@ -81,6 +89,7 @@ def conflicts(look: Look) -> Iterator[Fault]:
     yield from _engine(look)
     yield from _release(look)
     yield from _surfaces(look)
+    yield from _expectations(look)
 
 
 def _tables(look: Look) -> Iterator[Fault]:
@@ -175,3 +184,13 @@ def surface_conflicts(path: str, surface: Mapping[str, Any]) -> Iterator[Fault]:
         yield Fault(f"{path}.{key}", MISSING, f"a point [x, y], to go with {path}.{other}")
     elif start == to:
         yield Fault(f"{path}.to", to, f"must differ from {path}.from")
+
+
+def _expectations(look: Look) -> Iterator[Fault]:
+    if not look.expectations() or not look.sound("surface"):
+        return
+    names = [table for table in ("incoming", "plate", "outgoing") if look.has(table)]
+    names += [str(free["name"]) for free in look.surfaces()]
+    for index, given in enumerate(look.expectations()):
+        if isinstance(given, Mapping) and look.sound(f"expect[{index}]"):
+            yield from expectation_conflicts(f"expect[{index}]", given, names)

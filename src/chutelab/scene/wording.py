@@ -14,9 +14,10 @@ from annotated_types import Ge, Gt, Le, Lt, MaxLen
 from pydantic.fields import FieldInfo
 
 from chutelab.scene.errors import MISSING, Fault, at_path, joined
-from chutelab.scene.models import Scene, Surface, Table
-from chutelab.scene.quantities import MOST_POINTS, MOST_SURFACES, Point
+from chutelab.scene.models import Scene
+from chutelab.scene.quantities import MOST_POINTS, Point
 from chutelab.scene.rules import ConflictError
+from chutelab.scene.tables import Table
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -28,6 +29,9 @@ Location = tuple[str | int, ...]
 
 _NEAR: Final = 0.55
 """Likeness of a misspelt key and the one that was meant: pivot is taken for pivot_height."""
+
+LISTS: Final = ("surface", "expect")
+"""Tables of which there may be several."""
 
 _WORDS: Final[dict[Any, str]] = {
     float: "a number",
@@ -87,8 +91,8 @@ def _allowed(parts: Location) -> tuple[Location, str]:
     table = Scene.tables().get(head)
     field, depth = Scene.model_fields[head], 1
     annotation, metadata = field.annotation, field.metadata
-    if head == "surface" and len(parts) > 1:
-        annotation, metadata, depth = Surface, [], 2
+    if head in LISTS and len(parts) > 1:
+        annotation, metadata, depth = table, [], 2
     if table is not None and len(parts) > depth:
         field = _keys(table)[str(parts[depth])]
         annotation, metadata, depth = field.annotation, field.metadata, depth + 1
@@ -121,7 +125,8 @@ def _phrases(annotation: Any, metadata: Iterable[Any] = ()) -> list[str]:
     if annotation == tuple[Point, ...]:
         return [f"a list of 2 to {MOST_POINTS} points [[x, y], ...]"]
     if origin is tuple:
-        return [f"at most {MOST_SURFACES} tables, each headed by [[surface]]"]
+        (most,) = (limit.max_length for limit in metadata if isinstance(limit, MaxLen))
+        return [f"at most {most} tables, each headed by [[{arguments[0].__name__.lower()}]]"]
     if isinstance(annotation, type) and issubclass(annotation, Table):
         return ["a table of keys and values"]
     return [_WORDS[annotation] + _range(metadata)]
@@ -178,7 +183,7 @@ def _unknown(parts: Location) -> str:
     if near := _nearest(key, known):
         return f"unknown key; did you mean {joined((*above, *near))}?"
     homes = [
-        f"[[{name}]]" if name == "surface" else f"[{name}]"
+        f"[[{name}]]" if name in LISTS else f"[{name}]"
         for name, other in Scene.tables().items()
         if key in _keys(other)
     ]

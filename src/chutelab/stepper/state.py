@@ -184,10 +184,8 @@ class Run:
 
     def next_tick(self, t: float) -> float:
         """Return the time of the next step after t, s."""
-        n = floor((t - self.start) / self.dt * (1.0 + 1e-15)) + 1
-        tick = self.start + n * self.dt
-        if tick <= t:
-            tick += self.dt
+        # What is a millionth of a step before one is on it: times are rounded.
+        tick = self.start + (floor((t - self.start) / self.dt + 1e-6) + 1) * self.dt
         end = self.machine.end_time
         return end if abs(tick - end) < 1e-6 * self.dt and end > t else tick
 

@@ -1,4 +1,4 @@
-"""The three answers to one scene: exact against theory, pymunk against exact, and how far apart."""
+"""Particle 0 alone in three answers: exact against theory, pymunk against exact."""
 
 from __future__ import annotations
 
@@ -66,16 +66,23 @@ class Agreement:
 def agreement(scene: Scene) -> tuple[Agreement, ...]:
     """Run particle 0 of a scene, alone, with both engines; compare with theory and each other.
 
+    Where the exact engine cannot follow it, that is said instead.
+
     Raises
     ------
     SceneError
-        If an engine cannot run it.
+        If the geometry contradicts itself.
     """
     tables = scenes.to_dict(scene)
     stream = {**tables.get("stream", {}), "count": 1, "interact": False}
     run = {**tables.get("run", {}), "engine": "auto"}
     alone = scenes.from_dict({**tables, "stream": stream, "run": run}, scene.source)
-    exact = simulate(alone, engine="exact")
+    try:
+        exact = simulate(alone, engine="exact")
+    except scenes.SceneError as error:
+        if error.faults[0].key != "run.engine":
+            raise
+        return (Agreement("exact, theory", error.faults[0].allowed, None, None),)
     return _with_theory(alone, exact), *_with_pymunk(alone, exact)
 
 

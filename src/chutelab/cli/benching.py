@@ -1,0 +1,326 @@
+"""``bench``: run time against error, and against the number of particles."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from rich.console import RenderableType
+
+    from chutelab.workprecision import Claim, Record, Size
+
+CASES = ("transfer", "bounce", "belt", "independent", "interacting", "process")
+METHODS = ("exact", "aligned", "fixed", "plain", "dop853")
+MANY = ("independent", "interacting")
+STREAMED = ("exact", "aligned", "fixed")
+"""Methods that are measured against the number of particles."""
+
+REPEATS = 9
+
+
+def _folder(_ctx: click.Context, _parameter: click.Parameter, value: str | None) -> Path | None:
+    if value == "":
+        raise click.BadParameter("the name of a folder is empty")
+    return None if value is None else Path(value)
+
+
+@click.command(short_help="Measure run time against error, and draw the diagram.")
+@click.argument("cases", metavar="[CASE]...", nargs=-1, type=click.Choice(CASES))
+@click.option(
+    "--method",
+    "methods",
+    multiple=True,
+    type=click.Choice(METHODS),
+    help="Only this method. May be repeated.",
+)
+@click.option(
+    "--repeats",
+    metavar="N",
+    type=click.IntRange(1, 1000),
+    default=REPEATS,
+    show_default=True,
+    help="Timed runs after the first, at most; fewer of what takes long.",
+)
+@click.option("--quick", is_flag=True, help="Few values of each parameter: well under a minute.")
+@click.option(
+    "--scaling",
+    is_flag=True,
+    help="Measure time and memory against the number of particles instead:"
+    " 1 to a million independent, 10 to 3,000 interacting.",
+)
+@click.option(
+    "--out",
+    metavar="DIR",
+    type=click.Path(),
+    callback=_folder,
+    help="Write work-precision.tsv and .png (scaling.tsv and .png) into this folder.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")
+def bench(
+    cases: tuple[str, ...],
+    methods: tuple[str, ...],
+    repeats: int,
+    quick: bool,
+    scaling: bool,
+    out: Path | None,
+    as_json: bool,
+) -> None:
+    """Measure how long each method takes on each CASE, and how wrong it is.
+
+    \b
+    transfer     one particle: belt, plate, landing
+    bounce       one particle, until infinitely many bounces are over
+    belt         one particle: landing, slip, until the belt grips
+    independent  1,000 particles that ignore each other
+    interacting  1,000 particles that meet each other
+    process      a whole `chutelab run`, beside a bare `import numpy`
+
+    \b
+    exact        the event-driven engine
+    aligned      the pymunk engine, steps ending at impacts
+    fixed        the pymunk engine, all steps alike (run.align = false)
+    plain        Pymunk as most people write it: step, read, repeat
+    dop853       SciPy's integrator with events (pip install "chutelab[bench]")
+
+    How to read the diagram: a point is one run with one step or tolerance, further left is more
+    accurate, further down is faster, and both axes count powers of ten. A line is a method: where
+    it lies lower, take that method for the accuracy you need. A slope of -1 means that ten times
+    the accuracy costs ten times the time; a point by itself at the far left has no error left to
+    trade.
+
+    Errors are relative to the closed form, the worst of all quantities and machines; of particles
+    that meet each other, how deep they overlap. The first run is told apart from the median of the
+    repeats; imports are never timed. Memory is the peak of what Python and NumPy allocate.
+
+    Measuring everything takes some minutes.
+    """  # noqa: D301 - click wants the backspace
+    from chutelab.cli import console
+    from chutelab.cli.output import destination
+    from chutelab.cli.progress import progress
+    from chutelab.workprecision import environment
+
+    _judge(cases, methods, scaling=scaling)
+    about = environment()
+    with destination(out, ()) as folder:
+        with progress("measuring") as update:
+            if scaling:
+                sizes = _sizes(cases, methods, repeats, quick, update)
+            else:
+                records = _records(cases, methods, repeats, quick, update)
+        if folder is not None:
+            with progress("drawing"):
+                if scaling:
+                    _write_sizes(sizes, about, folder)
+                else:
+                    _write_records(records, about, folder)
+    if scaling:
+        told = {"sizes": [asdict(one) for one in sizes]}
+        parts = list(_sized(sizes))
+    else:
+        from chutelab.workprecision import claims
+
+        said = claims(records)
+        told = {
+            "records": [asdict(one) for one in records],
+            "claims": [asdict(one) for one in said],
+        }
+        parts = list(_measured(records, said))
+    if as_json:
+        console.show_json({"format": 1, "environment": about, **told})
+        return
+    console.show(*parts, _on(about))
+    if out is not None:
+        name = "scaling" if scaling else "work-precision"
+        click.echo(f"wrote into {out}: {name}.tsv, {name}.png")
+
+
+def _judge(cases: Sequence[str], methods: Sequence[str], *, scaling: bool) -> None:
+    """Refuse what would measure nothing."""
+    if not scaling:
+        return
+    if wrong := [case for case in cases if case not in MANY]:
+        raise click.UsageError(f"--scaling is of {' and '.join(MANY)}, not of {wrong[0]}.")
+    if methods and not set(methods) & set(STREAMED):
+        raise click.UsageError(f"--scaling measures {', '.join(STREAMED)}, not {methods[0]}.")
+
+
+def _records(
+    cases: Sequence[str],
+    methods: Sequence[str],
+    repeats: int,
+    quick: bool,
+    update: Callable[[float], None] | None,
+) -> list[Record]:
+    from chutelab.workprecision import PROCESS, measure, whole_process
+
+    names = [case for case in CASES if not cases or case in cases]
+    chosen = [method for method in METHODS if not methods or method in methods]
+    records = measure(
+        [name for name in names if name != PROCESS],
+        chosen,
+        repeats=repeats,
+        quick=quick,
+        progress=update,
+    )
+    if PROCESS in names:
+        records += whole_process(min(repeats, 3) if quick else repeats)
+    return records
+
+
+def _sizes(
+    cases: Sequence[str],
+    methods: Sequence[str],
+    repeats: int,
+    quick: bool,
+    update: Callable[[float], None] | None,
+) -> list[Size]:
+    from chutelab.workprecision import scaling
+
+    names = [case for case in MANY if not cases or case in cases]
+    chosen = [method for method in METHODS if not methods or method in methods]
+    return scaling(names, chosen, repeats=repeats, quick=quick, progress=update)
+
+
+def _write_records(records: Sequence[Record], about: Mapping[str, str], folder: Path) -> None:
+    from chutelab.plots.workprecision import workprecision
+    from chutelab.workprecision import Record, to_tsv
+
+    text = to_tsv(records, Record, about)
+    (folder / "work-precision.tsv").write_text(text, encoding="utf-8")
+    workprecision(records, about, path=folder / "work-precision.png")
+
+
+def _write_sizes(sizes: Sequence[Size], about: Mapping[str, str], folder: Path) -> None:
+    from chutelab.plots.workprecision import scaling
+    from chutelab.workprecision import Size, to_tsv
+
+    (folder / "scaling.tsv").write_text(to_tsv(sizes, Size, about), encoding="utf-8")
+    scaling(sizes, about, path=folder / "scaling.png")
+
+
+def _measured(records: Sequence[Record], said: Sequence[Claim]) -> Iterator[RenderableType]:
+    """Return a table for each case, and what follows from them."""
+    from rich.text import Text
+
+    from chutelab.workprecision import cases as known
+
+    titles = {name: (case.title, f"error: {case.error}") for name, case in known().items()}
+    titles["process"] = (
+        "Whole process",
+        "run: chutelab run perpendicular --json; numpy: python -c 'import numpy'",
+    )
+    for case in dict.fromkeys(one.case for one in records):
+        title, note = titles[case]
+        mine = [one for one in records if one.case == case]
+        yield _table(title, mine, crowd=case == "interacting")
+        failed = [
+            f"{one.method} failed{_at(one, ' at ')}: {one.failed}" for one in mine if one.failed
+        ]
+        yield Text("\n".join([note, *failed]), style="italic")
+    if said:
+        yield Text("\nWhat the rows say", style="bold")
+        yield Text("\n".join(f"{claim.case}: {claim.sentence}" for claim in said))
+
+
+def _table(title: str, records: Sequence[Record], *, crowd: bool) -> RenderableType:
+    from chutelab.cli.report import plain_table, titled
+
+    beside = ["worst", "residual", "shift"] if crowd else ["of", "runs"]
+    table = plain_table(["method", "at", "first", "median", "error", "memory", *beside])
+    for column in table.columns:
+        column.no_wrap = True
+    for one, before in zip(records, [None, *records], strict=False):
+        last = [_digits(one.overlap), _digits(one.residual), _length(one.place_shift)]
+        if not crowd:
+            last = [one.quantity, "" if one.median is None else str(one.repeats)]
+        table.add_row(
+            "" if before is not None and before.method == one.method else one.method,
+            _at(one),
+            _time(one.first),
+            _time(one.median),
+            "failed" if one.failed else _digits(one.error),
+            _bytes(one.memory),
+            *last,
+        )
+    return titled(title, table)
+
+
+def _at(one: Record, lead: str = "") -> str:
+    """Return the parameter of a record, "" without one."""
+    return "" if one.value is None else f"{lead}{one.parameter} {one.value:.0e}"
+
+
+def _digits(value: float | None) -> str:
+    return "" if value is None else f"{value:.1e}"
+
+
+def _length(value: float | None) -> str:
+    return "" if value is None else f"{1e3 * value:.3g} mm"
+
+
+def _sized(sizes: Sequence[Size]) -> Iterator[RenderableType]:
+    """Return a table for each case and method, with the fitted exponents."""
+    from chutelab.cli.report import plain_table, titled
+    from chutelab.workprecision import METHODS as KNOWN
+    from chutelab.workprecision.fit import exponent
+
+    for case, method in dict.fromkeys((one.case, one.method) for one in sizes):
+        table = plain_table(
+            ["particles", "events", "first", "median", "runs", "an event", "memory", ""], texts=0
+        )
+        for one in sizes:
+            if (one.case, one.method) != (case, method):
+                continue
+            each = one.median / one.events if one.median and one.events else None
+            table.add_row(
+                f"{one.particles:,}",
+                "" if one.events is None else f"{one.events:,}",
+                _time(one.first),
+                _time(one.median),
+                str(one.repeats) if one.median is not None else "",
+                _time(each),
+                _bytes(one.memory),
+                one.failed,
+            )
+        powers = (exponent(sizes, case, method, what) for what in ("median", "memory"))
+        fitted = ", ".join(
+            f"{name} ∝ N^{power:.2f}"
+            for name, power in zip(("time", "memory"), powers, strict=True)
+            if power is not None
+        )
+        yield titled(f"{case.capitalize()}, {KNOWN[method].title}: {fitted or 'too few'}", table)
+
+
+def _on(about: Mapping[str, str]) -> RenderableType:
+    from rich.text import Text
+
+    return Text(
+        "\nmeasured on " + ", ".join(f"{key} {value}" for key, value in about.items()),
+        style="italic",
+    )
+
+
+def _time(seconds: float | None) -> str:
+    if seconds is None:
+        return ""
+    for unit, factor in (("s", 1.0), ("ms", 1e3), ("µs", 1e6)):
+        if seconds * factor >= 1.0:
+            return f"{seconds * factor:.3g} {unit}"
+    return f"{seconds * 1e9:.0f} ns"
+
+
+def _bytes(size: int | None) -> str:
+    if size is None:
+        return ""
+    value: float = size
+    for unit in ("B", "kB", "MB"):
+        if value < 999.5:
+            return f"{value:.3g} {unit}"
+        value /= 1e3
+    return f"{value:.3g} GB"

@@ -1,0 +1,80 @@
+"""The laws that every run must keep, one function each.
+
+A law takes `Evidence` and answers with a `Verdict`, or with None where it says nothing. Bounds are
+argued, not fitted: for the exact engine rounding, for pymunk also what can happen within a step.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chutelab.ledger import ledger
+from chutelab.stress.barriers import depth, no_one_through, overlap
+from chutelab.stress.conservation import energy, momentum, residual, spin
+from chutelab.stress.evidence import EPS, ROUNDINGS, Verdict
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from chutelab.stress.evidence import Evidence
+
+    Law = Callable[[Evidence], Verdict | None]
+
+
+def finite(e: Evidence) -> Verdict:
+    """Every number of a recording is finite; the figure counts those that are not."""
+    bad, where = 0, ""
+    for array, names in (
+        (e.recording.knots, ("t", "position", "velocity", "omega", "entries")),
+        (e.recording.events, ("t", "position", "velocity_before", "velocity_after",
+                              "omega_before", "omega_after", "normal_impulse",
+                              "tangential_impulse")),
+    ):  # fmt: skip
+        for name in names:
+            found = int(np.count_nonzero(~np.isfinite(array[name])))
+            bad, where = bad + found, where or (name if found else "")
+    bad += int(np.count_nonzero(~np.isfinite(e.recording.by_surface)))
+    bad += not isfinite(ledger(e.recording).residual)
+    return Verdict(bad, 0.0, where or "numbers")
+
+
+def ordered(e: Evidence) -> Verdict:
+    """No track and no list of events goes back in time; the figure is the longest way back, s."""
+    back = -np.diff(e.recording.events["t"]).min(initial=0.0)
+    for i in range(e.recording.count):
+        back = max(back, -np.diff(e.recording.track(i)["t"]).min(initial=0.0))
+    return Verdict(float(back), 0.0, "s")
+
+
+def released(e: Evidence) -> Verdict:
+    """Every particle whose time comes has a track; the figure counts the lost ones."""
+    due = e.machine.releases.t < e.machine.end_time
+    lost = due & (np.diff(e.recording.offsets) < 2)
+    return Verdict(int(np.count_nonzero(lost)), 0.0, "particles")
+
+
+def lasting(e: Evidence) -> Verdict:
+    """Tracks that only the clock ends last until the end of the run; the figure is in s."""
+    end, offsets = e.machine.end_time, e.recording.offsets
+    there = np.flatnonzero((e.recording.ended == 0) & (np.diff(offsets) > 0))
+    short = np.abs(end - e.recording.knots["t"][offsets[there + 1] - 1])
+    return Verdict(float(short.max(initial=0.0)), ROUNDINGS * EPS * end, "s")
+
+
+LAWS: dict[str, Law] = {
+    "finite numbers": finite,
+    "time goes forward": ordered,
+    "nobody lost": released,
+    "lasts to the end": lasting,
+    "no one through": no_one_through,
+    "no one inside": depth,
+    "no overlap": overlap,
+    "energy never rises": energy,
+    "ledger closes": residual,
+    "momentum": momentum,
+    "angular momentum": spin,
+}
+"""Every law by its name in the table."""

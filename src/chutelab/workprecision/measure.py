@@ -1,0 +1,231 @@
+"""Measuring: one record for each case, method and value of the parameter."""
+
+from __future__ import annotations
+
+import gc
+import tracemalloc
+from dataclasses import replace
+from functools import partial
+from statistics import median
+from time import perf_counter
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from chutelab.ledger import ledger
+from chutelab.recording import Recording
+from chutelab.workprecision.answers import MissedError, worst
+from chutelab.workprecision.cases import cases
+from chutelab.workprecision.crowd import frames_of, overlaps, typical
+from chutelab.workprecision.methods import METHODS, UnableError
+from chutelab.workprecision.records import Record
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from chutelab.scene import Scene
+    from chutelab.workprecision.answers import Answer, Floats
+    from chutelab.workprecision.cases import Case
+    from chutelab.workprecision.methods import Method
+
+PATIENCE = 2.0
+"""s of repeats of one measurement, after which no further one is begun."""
+
+QUICK_PATIENCE = 0.5
+"""The same in a quick run."""
+
+TRACEABLE = 4.0
+"""Runs that take longer than so many times the patience are not repeated under `tracemalloc`, which
+takes two to three times as long."""
+
+REPEATS = 9
+
+
+def measure(
+    names: Sequence[str],
+    methods: Sequence[str],
+    *,
+    repeats: int = REPEATS,
+    quick: bool = False,
+    progress: Callable[[float], None] | None = None,
+) -> list[Record]:
+    """Measure methods on cases.
+
+    Parameters
+    ----------
+    names, methods : sequence of str
+        Of `cases` and of `METHODS`.
+    repeats : int
+        Timed runs after the first one, at most; fewer where they take longer than `PATIENCE`.
+    quick : bool
+        Fewer values of the parameters, and less patience.
+    progress : callable, optional
+        Called with the share that is done.
+
+    Returns
+    -------
+    list of Record
+        Nothing is left out: what failed says why.
+    """
+    known, patience = cases(), QUICK_PATIENCE if quick else PATIENCE
+    tasks = [
+        [
+            (known[name], METHODS[m], value)
+            for m in methods
+            for value in METHODS[m].chosen(name, quick=quick)
+        ]
+        for name in names
+    ]
+    total, done, records = sum(map(len, tasks)), 0, []
+    for case in tasks:
+        trials = []
+        for task in case:
+            if progress is not None:
+                progress(done / total)
+            trials.append(Trial(*task, patience=patience))
+            done += 1
+        # In turn, so that a machine that gets busy is busy for all.
+        for _ in range(repeats):
+            for trial in trials:
+                trial.repeat()
+        records += [trial.record() for trial in trials]
+    return list(_shifted(records))
+
+
+class Trial:
+    """One method on one case with one value of its parameter, run once and judged.
+
+    The first run is told apart from the repeats: it fills caches. Memory is the peak of what Python
+    and NumPy allocate in a run of its own, under `tracemalloc`; what Pymunk's C code allocates is
+    not in it.
+
+    Parameters
+    ----------
+    patience : float
+        s of repeats, after which no further one is begun.
+    """
+
+    def __init__(self, case: Case, method: Method, value: float | None, *, patience: float) -> None:
+        self._case, self._method, self._patience = case, method, patience
+        self._times: list[float] = []
+        self._first = 0.0
+        parameter = "" if value is None else method.parameter
+        self._said = Record(case.name, method.name, parameter, value)
+        try:
+            method.load()
+            scenes = [method.prepare(scene, value) for scene in case.scenes]
+            self._run = partial(method.run, case.name, scenes[0], value)
+            self._first, found = clocked(self._run)
+            # What a run says is looked at before it is repeated: who fails is not worth the time.
+            others = [method.run(case.name, scene, value) for scene in scenes[1:]]
+            self._said = judge(case, [found, *others], self._said)
+        except Exception as error:  # one method that breaks must not cost the others' figures
+            self._said = replace(self._said, failed=reason(error))
+
+    def repeat(self) -> None:
+        """Run once more, unless it failed or patience is at its end."""
+        last = self._times[-1] if self._times else self._first
+        if not self._said.failed and sum(self._times) + last <= self._patience:
+            self._times.append(clocked(self._run)[0])
+
+    def record(self) -> Record:
+        """Return what is known, with the memory of one more run."""
+        if self._said.failed:
+            return self._said
+        return replace(
+            self._said,
+            first=self._first,
+            repeats=len(self._times),
+            median=median(self._times or [self._first]),
+            memory=traced(self._run) if self._first <= TRACEABLE * self._patience else None,
+        )
+
+
+def reason(error: Exception) -> str:
+    """Return why something failed, on one line."""
+    said = " ".join(str(error).split())
+    expected = isinstance(error, (UnableError, MissedError))
+    return said if expected else f"{type(error).__name__}: {said}"
+
+
+def clocked(run: Callable[[], object]) -> tuple[float, object]:
+    """Return the seconds that a call takes, and what it returns."""
+    gc.collect()
+    begin = perf_counter()
+    found = run()
+    return perf_counter() - begin, found
+
+
+def repeated(run: Callable[[], object], first: float, repeats: int, patience: float) -> list[float]:
+    """Return the seconds of up to `repeats` further calls, fewer where patience ends before."""
+    times: list[float] = []
+    while len(times) < repeats and sum(times) + (times[-1] if times else first) <= patience:
+        times.append(clocked(run)[0])
+    return times
+
+
+def traced(run: Callable[[], object]) -> int:
+    """Return the peak (bytes) of what Python and NumPy allocate during a call."""
+    gc.collect()
+    tracemalloc.start()
+    try:
+        run()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def judge(case: Case, found: Sequence[object], blank: Record) -> Record:
+    """Return a record with the error of what a method found, one thing for each machine.
+
+    Raises
+    ------
+    MissedError
+        If a particle did not get where the case ends.
+    """
+    recordings = [one for one in found if isinstance(one, Recording)]
+    residual = max((ledger(one).relative_residual for one in recordings), default=None)
+    blank = replace(blank, residual=residual)
+    if case.reference is None or case.read is None:
+        return _judged_crowd(case.scenes[0], found[0], blank)
+    errors, missed = [], []
+    for scene, one in zip(case.scenes, found, strict=True):
+        answer = case.read(one) if isinstance(one, Recording) else cast("Answer", one)
+        try:
+            errors.append(worst(answer, case.reference(scene)))
+        except MissedError as why:
+            missed.append(str(why))
+    if missed:
+        where = f", in {len(missed)} of {len(found)} machines" if len(found) > 1 else ""
+        raise MissedError(f"{missed[0]}{where}")
+    error, quantity = max(errors)
+    return replace(blank, error=error, quantity=quantity)
+
+
+def _judged_crowd(scene: Scene, found: object, blank: Record) -> Record:
+    seen = frames_of(found) if isinstance(found, Recording) else cast("Floats", found)
+    belt, out = scene.incoming, scene.outgoing
+    assert belt is not None
+    assert out is not None
+    last = seen[-1]
+    # Whoever has left the scene is in no frame, and left it downwards.
+    lost = int(np.count_nonzero(~(last[:, 1] > belt.pulley_radius - out.drop)))
+    if lost:
+        raise MissedError(f"{lost:,} of {len(last):,} fell through the belt")
+    overlap = overlaps(seen, scene.particle.radius)
+    return replace(
+        blank,
+        error=typical(overlap),
+        quantity="overlap",
+        overlap=float(overlap.max(initial=0.0)),
+        place=float(last[:, 0].mean()),
+    )
+
+
+def _shifted(records: Sequence[Record]) -> Iterator[Record]:
+    """Compare mean places with that of the finest run, the one that overlaps least."""
+    placed = [(one.error, one.place) for one in records if one.error is not None]
+    finest = min(((e, place) for e, place in placed if place is not None), default=(0.0, 0.0))[1]
+    for one in records:
+        shift = None if one.place is None else abs(one.place - finest)
+        yield replace(one, place_shift=shift)

@@ -1,0 +1,336 @@
+"""The look at a scene before it runs: what it says must come true."""
+
+from __future__ import annotations
+
+from math import inf
+
+import pytest
+
+from chutelab import scene as sc
+from chutelab import theory
+from chutelab.compare import QUANTITIES
+from chutelab.machine import build
+from chutelab.preflight import preflight
+from chutelab.preflight import trial as trials
+from chutelab.recorder import StalledError
+from chutelab.recording import REASONS, Kind
+from chutelab.simulation import simulate
+
+MACHINE = """
+[incoming]
+speed = 2.0
+pulley_radius = 0.1
+[plate]
+distance = 0.5
+[outgoing]
+drop = 0.5
+"""
+LONE = [name for name in sc.shipped() if "stream" not in name]
+
+
+def look(name, *overrides):
+    return preflight(sc.load(name, overrides))
+
+
+def named(parts):
+    return {part.name: part.what for part in parts}
+
+
+# What is built, and what is skipped.
+
+
+def test_all_parts_are_told_with_their_places():
+    built = named(look("perpendicular").built)
+    assert list(built) == ["incoming", "pulley", "plate", "outgoing", "particle", "release"]
+    assert built["incoming"] == "from (-1, 0.1) to (0, 0.1) m, moving at 2 m/s"
+    assert built["pulley"] == "radius 0.1 m, axis at (0, 0)"
+    # The belt is d2 + r below the impact, the plate ends 0.05 m above the belt.
+    belt = 0.104 - 0.5 * 9.81 * 0.298**2 - 0.5 - 0.004
+    assert built["outgoing"] == f"from (-2, {belt:.6g}) to (4, {belt:.6g}) m, moving at 2 m/s"
+    assert built["plate"] == f"from (0.6, {belt + 0.05:.6g}) to (0.6, 0.4) m"
+    assert built["particle"] == "radius 0.004 m, mass 0.008 kg, not turning"
+    assert built["release"] == "the first from (-1, 0.104) m at (2, 0) m/s"
+
+
+def test_what_a_scene_does_not_need_is_skipped_with_the_reason():
+    skipped = named(look("perpendicular").skipped)
+    assert skipped == {
+        "surfaces": "the scene has no [[surface]]",
+        "rotation": "particle.spin = false",
+        "collisions": "of particles with each other: stream.count = 1",
+        "steps": "the next event is solved for, so no flight is stepped",
+        "what follows": 'the first touch of the outgoing belt: run.until = "landed"',
+    }
+    free = named(look("free-fall", "particle.spin=true").skipped)
+    assert set(free) == {"incoming", "plate", "outgoing", "collisions", "steps"}
+    assert free["collisions"].endswith("stream.interact = false")
+    crowd = named(look("stream").skipped)
+    assert set(crowd) == {"surfaces", "rotation", "flights"}
+
+
+@pytest.mark.parametrize(
+    ("name", "overrides", "engine", "why"),
+    [
+        ("perpendicular", [], "exact", "a lone particle meets surfaces only"),
+        ("stream-independent", [], "exact", "particles do not meet each other"),
+        ("stream", [], "pymunk", "particles meet each other"),
+        ("perpendicular", ["run.engine=pymunk"], "pymunk", 'run.engine = "pymunk" asks for it'),
+        ("perpendicular", ["run.engine=exact"], "exact", 'run.engine = "exact" asks for it'),
+    ],
+)
+def test_the_engine_is_the_one_that_will_run(name, overrides, engine, why):
+    overrides = [*overrides, "stream.count=3"] if "stream" in name else overrides
+    found = look(name, *overrides)
+    assert found.engine == simulate(sc.load(name, overrides)).engine == engine
+    assert found.why.startswith(why)
+    assert (found.stepping is None) == (engine == "exact")
+
+
+def test_the_end_of_the_run_is_told():
+    assert look("slip", "run.until=0.7").ends == "at t = 0.7 s"
+    assert look("slip").ends == "each particle when it has landed (or gone), at most at t = 30 s"
+    assert look("stream", "stream.count=2").ends.startswith("when all are at rest")
+
+
+# Finite steps.
+
+
+@pytest.mark.parametrize(("dt", "safe"), [(1e-3, True), (1.3e-3, True), (1.5e-3, False)])
+def test_a_fixed_step_must_be_shorter_than_what_a_surface_catches(dt, safe):
+    found = look("perpendicular", "run.engine=pymunk", "run.align=false", f"run.dt={dt}")
+    steps = found.stepping
+    assert steps is not None
+    assert steps.safe is safe
+    # It is fastest at its end: v² = v0² + 2 g (y2 + d2) less what the plate has taken of v_x.
+    fastest = (1.0 + 2 * 9.81 * (0.5 * 9.81 * 0.298**2 + 0.5)) ** 0.5
+    assert steps.speed == pytest.approx(fastest, rel=1e-3)
+    assert steps.bound == pytest.approx(0.004 + 0.002, rel=1e-12)
+    assert steps.way == pytest.approx(fastest * dt, rel=1e-3)
+    assert steps.longest == pytest.approx(0.006 / fastest, rel=1e-3)
+    told = [advice for advice in found.advice if "may pass through" in advice.warning]
+    assert bool(told) is not safe
+
+
+def test_steps_that_end_at_impacts_pass_through_nothing():
+    found = look("perpendicular", "run.engine=pymunk", "run.dt=0.05")
+    assert found.stepping is not None
+    assert found.stepping.way is not None
+    assert found.stepping.way > found.stepping.bound
+    assert found.stepping.safe
+    assert found.advice == ()
+
+
+def test_the_step_that_is_recommended_does():
+    bad = ("run.engine=pymunk", "run.align=false", "run.dt=0.01")
+    (advice,) = look("perpendicular", *bad).advice
+    assert advice.change.startswith("run.align = true, or run.dt = ")
+    dt = advice.change.rpartition(" = ")[2]
+    assert look("perpendicular", *bad, f"run.dt={dt}").advice == ()
+    assert look("perpendicular", *bad, "run.align=true").advice == ()
+
+
+def test_slop_is_a_small_share_of_the_radius():
+    steps = look("perpendicular", "run.engine=pymunk", "particle.radius=0.01").stepping
+    assert steps is not None
+    assert steps.slop == pytest.approx(0.01 * steps.slop_to_radius, rel=1e-12)
+    assert 0.0 < steps.slop_to_radius < 0.01
+
+
+# What it costs: on counts; seconds are the machine's.
+
+
+@pytest.mark.parametrize("name", LONE)
+def test_a_lone_particles_contacts_are_those_of_its_run(name):
+    found = look(name)
+    assert found.effort.contacts == simulate(sc.load(name)).contacts
+    assert not found.effort.at_least
+    assert 0.0 < found.effort.seconds < 5.0
+
+
+def test_independent_particles_count_by_rule_of_three():
+    found = look("stream-independent")
+    # Each meets plate and belt, and no more.
+    assert found.effort.contacts == 20_000
+    assert found.effort.how == "scaled up from a trial run of the first 16 of 10,000 particles"
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        ("run.until=landed",),
+        ("stream.count=8",),
+        ("stream.count=40",),
+        ("stream.count=40", "stream.rate=50"),
+    ],
+)
+def test_a_crowds_contacts_are_right_to_a_factor_of_three(overrides):
+    found, real = look("stream", *overrides), simulate(sc.load("stream", overrides)).contacts
+    assert real / 3.0 < found.effort.contacts < 3.0 * real
+
+
+def test_a_trial_that_takes_too_long_is_cut_off_and_says_so(monkeypatch):
+    monkeypatch.setattr(trials, "PATIENCE", 0.0)
+    found = look("belt-landing")
+    assert found.effort.at_least
+    assert "was cut off after" in found.effort.how
+    assert found.effort.contacts <= simulate(sc.load("belt-landing")).contacts
+    slow = look("slip", "run.engine=pymunk")
+    assert slow.effort.contacts <= 2, "plate and belt, as the exact engine knows"
+    assert look("stream").effort.how == "roughly, from nominal figures"
+
+
+def test_a_trial_that_is_stuck_is_a_warning_not_a_crash(monkeypatch):
+    def stuck(*_arguments):
+        raise StalledError(0, 1.5, (0.1, 0.2), "it bounces for ever")
+
+    monkeypatch.setattr(trials, "simulate", stuck)
+    (advice,) = look("perpendicular").advice
+    assert advice.warning.startswith("a trial run did not come to an end: particle 0 is stuck")
+
+
+# What the closed form covers.
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        (),
+        ("outgoing.length=0.1",),
+        ("plate.angle_deg=80", "outgoing.drop_from=top"),
+        ("stream.count=4", "stream.interact=true"),
+    ],
+)
+def test_the_closed_form_covers_what_the_theory_answers(overrides):
+    scene = sc.load("perpendicular", overrides)
+    prediction = theory.predict(scene)
+    found = preflight(scene).theory
+    assert set(found.covers) | set(found.leaves_out) == set(QUANTITIES)
+    for name in QUANTITIES:
+        answered = abs(float(getattr(prediction, name))) < inf
+        assert (name in found.covers) is answered
+        assert (name in found.leaves_out) is not answered
+    assert found.reason == str(prediction.reason)
+    assert found.reason.partition(": ")[2] in found.words
+
+
+def test_words_say_when_belt_work_can_be_compared():
+    assert "until settled" in look("perpendicular").theory.words
+    assert look("belt-landing").theory.words == "All of the transfer, belt to belt."
+    assert "particle 0 only" in look("stream-independent").theory.words
+
+
+# Warnings, each with what to change: applying it must help.
+
+
+def applied(name, overrides, change):
+    """Look again with the change that was recommended."""
+    settings = [part.replace(" = ", "=") for part in change.split(" and ")]
+    return look(name, *overrides, *settings)
+
+
+@pytest.mark.parametrize(
+    ("name", "overrides", "warning", "key"),
+    [
+        (
+            "perpendicular",
+            ("outgoing.drop=0.15", "outgoing.drop_from=top", "plate.below=0.45"),
+            "outgoing: it crosses the drive pulley",
+            "outgoing.drop",
+        ),
+        (
+            "perpendicular",
+            ("outgoing.drop=0.4", "outgoing.drop_from=top"),
+            "0.4316 m below the pivot, off the finite plate",
+            "outgoing.drop",
+        ),
+        (
+            "perpendicular",
+            ("outgoing.drop=1", "outgoing.drop_from=top", "plate.below=0.1"),
+            "off the finite plate",
+            "plate.below",
+        ),
+        (
+            "perpendicular",
+            ("plate.angle_deg=80", "outgoing.drop_from=top", "outgoing.drop=1"),
+            "never meets the plate's line",
+            "plate.angle_deg",
+        ),
+        ("perpendicular", ("plate.below=2",), "outgoing: it crosses plate", "plate.below"),
+        (
+            "free-fall",
+            ("surface.ramp.to=[0.5,-0.1]",),
+            "floor: it crosses ramp",
+            "surface.ramp.points",
+        ),
+        ("perpendicular", ("outgoing.length=0.1",), "misses the outgoing belt", "outgoing.length"),
+        (
+            "perpendicular",
+            ("outgoing.start=1", "outgoing.length=2"),
+            "misses the outgoing belt",
+            "outgoing.start",
+        ),
+    ],
+)
+def test_a_setting_that_is_recommended_does_away_with_its_warning(name, overrides, warning, key):
+    found = look(name, *overrides)
+    (advice,) = [advice for advice in found.advice if warning in advice.warning]
+    assert advice.change.startswith(f"{key} = ")
+    if "points" in key:
+        overrides = tuple(o for o in overrides if "ramp" not in o)
+        points = advice.change.partition(" = ")[2]
+        tables = sc.to_dict(sc.load(name))
+        tables["surface"][0]["points"] = eval(points)
+        again = preflight(sc.from_dict(tables))
+    else:
+        again = applied(name, overrides, advice.change)
+    assert not [other for other in again.advice if warning in other.warning]
+    assert len(again.advice) < len(found.advice)
+
+
+def test_where_nothing_helps_it_says_what_happens():
+    crossed = MACHINE + (
+        '[[surface]]\nname = "a"\nfrom = [2, 0]\nto = [3, 0]\n'
+        '[[surface]]\nname = "b"\nfrom = [-0.05, 0]\nto = [0.05, 0]\n'
+    )
+    (advice,) = preflight(sc.parse(crossed)).advice
+    assert advice.warning == "b: it crosses the drive pulley"
+    assert advice.change == "if it is meant, leave it; the first contact wins"
+
+
+def test_a_run_that_its_bound_stops_is_noticed():
+    (advice,) = look("belt-landing", "run.max_time=2").advice
+    assert "stopped at t = 2 s by run.max_time, before it is at rest" in advice.warning
+    assert advice.change.startswith("run.max_time = 20, or")
+    assert look("belt-landing", "run.max_time=20").advice == ()
+    assert look("belt-landing", "run.until=2").advice == ()
+
+
+def test_pymunk_for_what_exact_does_at_once_is_noticed():
+    (advice,) = look("stream-independent", "run.engine=pymunk").advice
+    assert "10000 particles one after the other" in advice.warning
+    assert advice.change.startswith('run.engine = "auto"')
+    small = look("perpendicular", "run.engine=pymunk", "particle.radius=1e-4").advice
+    assert [advice.change for advice in small] == ['run.engine = "auto", for the exact engine']
+
+
+@pytest.mark.parametrize("name", sc.shipped())
+def test_no_shipped_scene_has_a_warning(name):
+    assert look(name).advice == ()
+
+
+def test_a_trial_is_the_beginning_of_the_stream():
+    scene = sc.load("stream-independent")
+    tried = trials.trial(scene, "exact")
+    whole = simulate(scene)
+    assert tried.recording is not None
+    assert tried.count == tried.recording.count == trials.INDEPENDENT
+    mine = tried.recording.select(Kind.LANDING)["t"][:3]
+    assert mine.tolist() == whole.select(Kind.LANDING)["t"][:3].tolist()
+
+
+def test_geometry_that_contradicts_itself_is_refused_as_by_a_run():
+    with pytest.raises(sc.SceneError, match=r"outgoing\.drop_from"):
+        look("perpendicular", "plate.angle_deg=89")
+    scene = sc.load("perpendicular", ["plate.angle_deg=80", "outgoing.drop_from=top"])
+    assert build(scene).warnings
+    assert REASONS[simulate(scene).ended[0]] == "landed"

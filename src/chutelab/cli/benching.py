@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from chutelab.cli.parameters import folder
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
+    from pathlib import Path
 
     from rich.console import RenderableType
 
@@ -22,12 +24,6 @@ STREAMED = ("exact", "aligned", "fixed")
 """Methods that are measured against the number of particles."""
 
 REPEATS = 9
-
-
-def _folder(_ctx: click.Context, _parameter: click.Parameter, value: str | None) -> Path | None:
-    if value == "":
-        raise click.BadParameter("the name of a folder is empty")
-    return None if value is None else Path(value)
 
 
 @click.command(short_help="Measure run time against error, and draw the diagram.")
@@ -58,7 +54,7 @@ def _folder(_ctx: click.Context, _parameter: click.Parameter, value: str | None)
     "--out",
     metavar="DIR",
     type=click.Path(),
-    callback=_folder,
+    callback=folder,
     help="Write work-precision.tsv and .png (scaling.tsv and .png) into this folder.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")

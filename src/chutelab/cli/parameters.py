@@ -56,7 +56,8 @@ def _kinds(
     return tuple(kind for kind in KINDS if kind in asked)
 
 
-def _folder(_ctx: click.Context, _parameter: click.Parameter, value: str | None) -> Path | None:
+def folder(_ctx: click.Context, _parameter: click.Parameter, value: str | None) -> Path | None:
+    """Return a path from an option, for a folder to be made."""
     if value == "":
         raise click.BadParameter("the name of a folder is empty")
     return None if value is None else Path(value)
@@ -78,7 +79,7 @@ def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
             "--out",
             metavar="DIR",
             type=click.Path(),
-            callback=_folder,
+            callback=folder,
             help="Write pictures, tables and the recording into this folder.",
         ),
         click.option(

@@ -1,6 +1,7 @@
 """The command ``chutelab``: its own options, and one place where errors become exit codes.
 
-0: done. 1: something failed that is not the user's to mend, or ``verify`` found a disagreement.
+0: done. 1: something failed that is not the user's to mend, ``verify`` or ``stress`` found what
+does not hold, or an accuracy was not reached.
 2: what the user gave cannot be used. 130: interrupted with Ctrl-C.
 """
 

@@ -680,3 +680,41 @@ def test_off_a_face_too_fast_for_its_end_it_does_not_come_back():
     )
     kinds = [Kind.RELEASE, Kind.IMPACT, Kind.STICK, Kind.SEPARATION]
     assert recording.events["kind"].tolist() == kinds
+
+
+@pytest.mark.parametrize(("friction", "rests"), [(5.0, True), (0.05, False)])
+def test_from_a_slope_onto_a_tip_that_alone_can_hold_it(friction, rests):
+    # A tip sticks out of a slope; a disk stopped between them is pulled over the tip, unless the
+    # tip's friction holds it: its normal leans by 0.12.
+    r, slope, lean = 0.03, np.array([-sqrt(0.5), sqrt(0.5)]), np.array([-sin(0.12), cos(0.12)])
+    stop = r * slope
+    tip = stop - r * lean
+    surfaces = (
+        {"name": "slope", "from": [0.5, 0.5], "to": [-0.5, -0.5], "friction": 0.0},
+        {"name": "post", "from": tip.tolist(), "to": [tip[0], -1.0], "friction": friction},
+    )
+    start = stop + 1e-9 * np.array([1.0, 1.0])
+    recording = thrown(
+        start.tolist(),
+        [0.0, 0.0],
+        *({**s, "restitution": 0.0} for s in surfaces),
+        until="settled",
+        radius=r,
+    )
+    end = recording.track(0)[-1]
+    assert bool(recording.ended[0] == 2) is rests
+    assert bool(hypot(*(end["position"] - stop)) < 1e-8) is rests
+    assert abs(ledger(recording).residual) < 1e-15
+
+
+def test_the_scene_is_written_down_only_when_somebody_asks():
+    asked = []
+
+    def text():
+        asked.append(1)
+        return "{}"
+
+    recording = exact.run(replace(machine.build(scene.load("perpendicular")), text=text))
+    assert not asked
+    assert recording.scene == recording.scene == "{}"
+    assert asked == [1]

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
+Values = Floats | np.float64 | float
 
 ITERATIONS = 120
 """Bound on the refinements of a root: Newton's method takes about 8, a double root by halving up to
@@ -26,10 +27,6 @@ BERNSTEIN = np.array(
 
 def closing_time(gap: ArrayLike, rate: ArrayLike, acceleration: ArrayLike) -> Floats:
     """Return when gap + rate t + acceleration t²/2 crosses zero downwards; inf if never.
-
-    A parabola crosses any level downwards at most once, with derivative -S, where
-    S² = rate² - 2 acceleration gap. Of the two forms of that root the one without cancellation
-    is taken: 2 gap / (S - rate) while closing, -(rate + S) / acceleration while opening.
 
     Parameters
     ----------
@@ -48,20 +45,31 @@ def closing_time(gap: ArrayLike, rate: ArrayLike, acceleration: ArrayLike) -> Fl
     >>> float(closing_time(1.0, 2.0, 0.0))
     inf
     """
-    gap, rate, acceleration = np.broadcast_arrays(
-        *(np.asarray(a, dtype=np.float64) for a in (gap, rate, acceleration))
-    )
-    discriminant = rate * rate - 2.0 * acceleration * gap
-    root = np.sqrt(np.maximum(discriminant, 0.0))
-    closing = rate <= 0.0
-    numerator = np.where(closing, 2.0 * gap, -(rate + root))
-    denominator = np.where(closing, root - rate, acceleration)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        t = numerator / denominator
-    # A line that opens, or a parabola that turns above zero, has no crossing.
-    missing = (discriminant < 0.0) | (denominator == 0.0)
-    at_once = (gap == 0.0) & (rate == 0.0) & (acceleration < 0.0)
-    return np.where(at_once, 0.0, np.where(missing, np.inf, t))
+        t = descent(*(np.asarray(a, dtype=np.float64) for a in (gap, rate, acceleration)))
+    return np.where(np.isfinite(t), t, np.inf)
+
+
+def descent(gap: Values, rate: Values, acceleration: Values) -> Floats:
+    """Return when gaps close, as `closing_time`, but NaN or ∓inf where they never do.
+
+    A parabola crosses any level downwards at most once, with derivative -S, where
+    S² = rate² - 2 acceleration gap. Of the two forms of that root the one without cancellation
+    is taken: 2 gap / (S - rate) while closing, -(rate + S) / acceleration while opening. Without
+    a crossing S is not a number or a denominator is missing, for which NumPy warns, unless told.
+    """
+    span = np.abs(rate) + np.sqrt(rate * rate - (acceleration + acceleration) * gap)
+    opening = rate > 0.0
+    numerator = gap + gap
+    if np.count_nonzero(opening):
+        t = np.where(opening, span, numerator) / np.where(opening, -acceleration, span)
+    else:
+        t = numerator / span
+    flat = span == 0.0
+    if np.count_nonzero(flat):
+        # Neither gap nor rate: it closes at once if it is pulled.
+        t = np.where(flat & (gap == 0.0) & (acceleration < 0.0), 0.0, t)
+    return np.asarray(t)
 
 
 def first_descent(coefficients: Floats, until: Floats) -> Floats:

@@ -41,6 +41,10 @@ def impulses(
 def limited(slip: ArrayLike, normal: ArrayLike, friction: ArrayLike, share: float) -> Floats:
     """Return the impulse per mass that stops the slip, or the most that friction allows."""
     friction = np.asarray(friction, dtype=np.float64)
-    finite = np.where(np.isinf(friction), 0.0, friction)
-    bound = np.where(np.isinf(friction), np.inf, finite * np.asarray(normal))
-    return np.clip(-share * np.asarray(slip), -bound, bound)
+    sticks = np.isinf(friction)
+    if np.count_nonzero(sticks):
+        # Not inf · 0.
+        bound = np.where(sticks, np.inf, np.where(sticks, 0.0, friction) * np.asarray(normal))
+    else:
+        bound = friction * np.asarray(normal)
+    return np.minimum(np.maximum(-share * np.asarray(slip), -bound), bound)

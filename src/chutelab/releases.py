@@ -47,11 +47,16 @@ class Releases:
 
 
 def release_point(scene: Scene) -> tuple[float, float]:
-    """Return the nominal release point, m."""
-    if scene.stream.at is not None:
+    """Return the nominal release point, m; on the belt exactly at the riding height."""
+    belt = scene.incoming
+    if belt is None:
+        assert scene.stream.at is not None
         return scene.stream.at
-    assert scene.incoming is not None
-    return -scene.incoming.length, scene.incoming.pulley_radius + scene.particle.radius
+    riding = belt.pulley_radius + scene.particle.radius
+    if scene.stream.at is None:
+        return -belt.length, riding
+    x, y = scene.stream.at
+    return (x, riding) if abs(y - riding) <= ON_BELT and -belt.length <= x <= 0.0 else (x, y)
 
 
 def release_velocity(scene: Scene) -> tuple[float, float]:
@@ -68,7 +73,7 @@ def on_belt(scene: Scene) -> bool:
         return False
     x, y = release_point(scene)
     riding = scene.incoming.pulley_radius + scene.particle.radius
-    return abs(y - riding) <= ON_BELT and -scene.incoming.length <= x <= 0.0
+    return y == riding and -scene.incoming.length <= x <= 0.0
 
 
 def draw(scene: Scene) -> Releases:
@@ -79,31 +84,34 @@ def draw(scene: Scene) -> Releases:
     SceneError
         If interacting particles cannot be placed in the bed without overlap.
     """
-    stream = scene.stream
-    rng = np.random.default_rng(stream.seed)
-    t = np.arange(stream.count) / stream.rate
-    height = stream.bed_height * rng.random(stream.count)
-    height[0] = 0.0
-    velocity = np.tile(np.array(release_velocity(scene), dtype=np.float64), (stream.count, 1))
-    spread = stream.speed_spread * rng.uniform(-1.0, 1.0, stream.count)
-    spread[0] = 0.0
-    speed = np.hypot(velocity[:, 0], velocity[:, 1])
-    forward = np.divide(
-        velocity,
-        speed[:, None],
-        out=np.tile([1.0, 0.0], (stream.count, 1)),
-        where=speed[:, None] > 0.0,
-    )
-    velocity += spread[:, None] * forward
+    stream, count = scene.stream, scene.stream.count
+    crowded = stream.interact and count > 1
+    t = np.arange(count) / stream.rate
+    velocity = np.empty((count, 2))
+    velocity[:] = release_velocity(scene)
+    height = np.zeros(count)
+    # Making a generator takes as long as all other preparations for a single particle.
+    if stream.bed_height > 0.0 or stream.speed_spread > 0.0 or crowded:
+        rng = np.random.default_rng(stream.seed)
+        height = stream.bed_height * rng.random(count)
+        height[0] = 0.0
+        spread = stream.speed_spread * rng.uniform(-1.0, 1.0, count)
+        spread[0] = 0.0
+        x, y = release_velocity(scene)
+        speed = float(np.hypot(x, y))
+        velocity += spread[:, None] * ((x / speed, y / speed) if speed > 0.0 else (1.0, 0.0))
     rides = on_belt(scene)
     adheres = rides and scene.incoming is not None and scene.incoming.friction == "adhesion"
-    if stream.interact and stream.count > 1:
+    if crowded:
         fall = 0.0 if adheres else 0.5 * scene.gravity
         floor = 0.0 if rides else -inf
         _spread_apart(scene, t, height, velocity, fall, floor, rng)
-    position = np.tile(np.array(release_point(scene), dtype=np.float64), (stream.count, 1))
+    position = np.empty((count, 2))
+    position[:] = release_point(scene)
     position[:, 1] += height
-    return Releases(t, position, velocity, np.full(stream.count, adheres))
+    carried = np.zeros(count, dtype=bool)
+    carried[:] = adheres
+    return Releases(t, position, velocity, carried)
 
 
 def _spread_apart(
@@ -121,14 +129,19 @@ def _spread_apart(
     ``fall`` (m/s²) times their age squared, but not below ``floor`` (m above the lowest layer).
     """
     stream, diameter = scene.stream, 2.0 * scene.particle.radius
+    # Who may still be in the way: whoever has moved on by a diameter, or has fallen below the bed
+    # by one, stays away for good.
+    close = np.zeros(0, dtype=np.int64)
     for i in range(1, stream.count):
-        age = t[i] - t[:i]
-        dx = velocity[:i, 0] * age
-        near = np.flatnonzero(np.abs(dx) < diameter)
-        dy = height[near] + velocity[near, 1] * age[near] - fall * age[near] ** 2
-        dy = np.maximum(dy, floor)
+        close = np.append(close, i - 1)
+        age = t[i] - t[close]
+        dx = velocity[close, 0] * age
+        dy = height[close] + velocity[close, 1] * age - fall * age**2
+        sinks = velocity[close, 1] <= 2.0 * fall * age
+        near = (np.abs(dx) < diameter) & ~(sinks & (np.maximum(dy, floor) <= -diameter))
+        close, dx, dy = close[near], dx[near], np.maximum(dy[near], floor)
         for _ in range(TRIES):
-            if np.all(dx[near] ** 2 + (dy - height[i]) ** 2 >= diameter**2):
+            if np.all(dx**2 + (dy - height[i]) ** 2 >= diameter**2):
                 break
             height[i] = stream.bed_height * rng.random()
         else:

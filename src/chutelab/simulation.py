@@ -75,14 +75,15 @@ def simulate(
     begin = perf_counter()
     machine = build(scene)
     name = choose(machine, engine)
-    recording = _exact(scene, machine, engine, progress) if name == "exact" else None
+    recording = _exact(scene, machine, engine, progress, begin) if name == "exact" else None
     if recording is None:
         recording = _stepped(scene, machine, progress)
-    return replace(recording, seconds=perf_counter() - begin)
+        recording = replace(recording, seconds=perf_counter() - begin)
+    return recording
 
 
 def _exact(
-    scene: Scene, machine: Machine, engine: str | None, progress: Progress | None
+    scene: Scene, machine: Machine, engine: str | None, progress: Progress | None, began: float
 ) -> Recording | None:
     """Run the exact engine; None if it meets what it cannot do, and another was not ruled out."""
     if machine.interact:
@@ -90,7 +91,7 @@ def _exact(
     from chutelab.exact import CornerError, run
 
     try:
-        return run(machine, progress)
+        return run(machine, progress, began)
     except CornerError as error:
         if "exact" in (engine, scene.run.engine):
             raise _refused(scene, "run.engine", "exact", str(error)) from error

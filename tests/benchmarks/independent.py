@@ -77,8 +77,9 @@ def landing(height):
 
 def seconds(function, *arguments, repeats=1):
     """Return the median time of some runs, and the last result."""
-    times = []
+    times, result = [], None
     for _ in range(repeats):
+        result = None  # its memory is free for the next one
         begin = perf_counter()
         result = function(*arguments)
         times.append(perf_counter() - begin)
@@ -103,14 +104,14 @@ def floor(recording):
 def report(count, repeats):
     name = "perpendicular" if count == 1 else "stream-independent"
     scene = load(name, [f"stream.count={count}"])
-    first, _ = seconds(simulate, scene)
-    # Turn and turn about, so that a busy machine is busy for both.
+    first, recording = seconds(simulate, scene)
     each = 9 if count <= 1000 else 1
-    pairs = [
-        (seconds(dop853, repeats=9), seconds(simulate, scene, repeats=each)) for _ in range(repeats)
-    ]
-    reference = median(pair[0][0] for pair in pairs)
-    time, recording = median(pair[1][0] for pair in pairs), pairs[-1][1][1]
+    ours, theirs = [], []
+    # Turn and turn about, so that a busy machine is busy for both.
+    for _ in range(repeats):
+        theirs.append(seconds(dop853, repeats=9)[0])
+        ours.append(seconds(simulate, scene, repeats=each)[0])
+    time, reference = median(ours), median(theirs)
     heights = recording.select(Kind.RELEASE)["position"][:, 1] - PULLEY - RADIUS
     down = recording.first(recording.select(Kind.LANDING))
     error = max(

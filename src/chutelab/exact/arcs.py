@@ -29,22 +29,22 @@ class Bounds:
 
     low: Floats
     low_obstacle: Ints
-    low_side: Ints
+    low_side: Floats
     low_handover: NDArray[np.bool_]
     high: Floats
     high_obstacle: Ints
-    high_side: Ints
+    high_side: Floats
     high_handover: NDArray[np.bool_]
 
     @classmethod
     def free(cls, count: int) -> Self:
         """No obstacle in any direction."""
 
-        def nothing(limit: float) -> tuple[Floats, Ints, Ints, NDArray[np.bool_]]:
+        def nothing(limit: float) -> tuple[Floats, Ints, Floats, NDArray[np.bool_]]:
             return (
                 np.full(count, limit),
                 np.full(count, NONE, dtype=np.int64),
-                np.zeros(count, dtype=np.int64),
+                np.zeros(count),
                 np.zeros(count, dtype=bool),
             )
 
@@ -52,7 +52,7 @@ class Bounds:
 
     def narrow(
         self, phi: Floats, angle: Floats, closing: Floats, met: NDArray[np.bool_],
-        obstacle: int, side: Ints | int, handover: bool = False,
+        obstacle: int, side: Floats | int, handover: bool = False,
     ) -> None:  # fmt: skip
         """Take in one more obstacle, whose gap falls with φ at the rate `closing` at `angle`."""
         turn = 2.0 * np.pi
@@ -90,38 +90,38 @@ def bounds(
     center = pick(obstacles.center, rows, circle)
     on_pulley = circle + obstacles.segments == obstacles.pulley
     for segment in range(obstacles.segments):
-        start = rows_of(obstacles.start, rows)[:, segment]
-        tangent = rows_of(obstacles.tangent, rows)[:, segment]
-        normal = rows_of(obstacles.normal, rows)[:, segment]
-        length = rows_of(obstacles.length, rows)[:, segment]
+        start = rows_of(obstacles.start[:, segment], rows)
+        tangent = rows_of(obstacles.tangent[:, segment], rows)
+        normal = rows_of(obstacles.normal[:, segment], rows)
+        length = rows_of(obstacles.length[segment], rows)
         owned = obstacles.owns[circle, segment] | (on_pulley & (segment == 0))
         for side in (1, -1):
             # The gap to a face is ρ (cos(φ - tilt) - level).
-            tilt = np.arctan2(side * normal[:, 0], side * normal[:, 1])
+            tilt = np.arctan2(side * normal[0], side * normal[1])
             level = (side * dot(start - center, normal) + radius) / rho
             half = np.arccos(np.clip(level, -1.0, 1.0))
             met = (np.abs(level) <= 1.0) & ~(owned & (~on_pulley | (side == 1)))
             for angle in (tilt - half, tilt + half):
-                foot = dot(center + rho[:, None] * _up(angle) - start, tangent)
+                foot = dot(center + rho * _up(angle) - start, tangent)
                 there = met & (foot >= 0.0) & (foot <= length)
                 found.narrow(phi, angle, np.sin(angle - tilt), there, segment, side)
         # The circle belongs to a segment on the outer side of that segment's end.
-        middle = start + 0.5 * length[:, None] * tangent
-        outward = np.where(dot(center - middle, tangent) > 0.0, 1.0, -1.0)[:, None] * tangent
-        tilt = np.arctan2(outward[:, 0], outward[:, 1])
+        middle = start + 0.5 * length * tangent
+        outward = np.where(dot(center - middle, tangent) > 0.0, 1.0, -1.0) * tangent
+        tilt = np.arctan2(outward[0], outward[1])
         for angle in (tilt - 0.5 * np.pi, tilt + 0.5 * np.pi):
             side_there = np.where(dot(_up(angle), normal) > 0.0, 1, -1)
             found.narrow(phi, angle, np.sin(angle - tilt), owned, segment, side_there, True)
     for other in range(obstacles.center.shape[1]):
         # The gap to a circle grows with -cos(φ - tilt).
-        apart = rows_of(obstacles.center, rows)[:, other] - center
-        distance = np.hypot(apart[:, 0], apart[:, 1])
+        apart = rows_of(obstacles.center[:, other], rows) - center
+        distance = np.hypot(apart[0], apart[1])
         distinct = (circle != other) & (distance > obstacles.touch)
-        reach = rows_of(obstacles.rho, rows)[:, other]
+        reach = rows_of(obstacles.rho[other], rows)
         level = (rho**2 + distance**2 - reach**2) / np.where(distinct, 2.0 * rho * distance, 1.0)
         met = distinct & (np.abs(level) < 1.0)
         half = np.arccos(np.clip(level, -1.0, 1.0))
-        tilt = np.arctan2(apart[:, 0], apart[:, 1])
+        tilt = np.arctan2(apart[0], apart[1])
         for angle in (tilt - half, tilt + half):
             closing = -np.sin(angle - tilt)
             found.narrow(phi, angle, closing, met, other + obstacles.segments, 0)
@@ -129,4 +129,4 @@ def bounds(
 
 
 def _up(angle: Floats) -> Floats:
-    return np.stack([np.sin(angle), np.cos(angle)], axis=-1)
+    return np.stack([np.sin(angle), np.cos(angle)])

@@ -24,7 +24,9 @@ class CornerError(RuntimeError):
     """A spinning disk held between moving surfaces: beyond the exact engine."""
 
 
-def hold(s: Swarm, who: Ints, on: tuple[Ints, Ints], other: tuple[Ints, Ints]) -> None:
+def hold(
+    s: Swarm, who: Ints, on: tuple[Ints, Floats], other: tuple[Ints, Floats]
+) -> NDArray[np.bool_]:
     """Bring particles to rest in the corner of two obstacles, each given with its side.
 
     A moving surface under them goes on doing work, all of it heat. Where a surface is at rest its
@@ -32,9 +34,14 @@ def hold(s: Swarm, who: Ints, on: tuple[Ints, Ints], other: tuple[Ints, Ints]) -
     none. Where friction pulls the particle in harder than any load can hold it (self-locking, as
     with adhesion) a real drive would stall: the particle stays, and nothing more is booked. Where
     gravity pulls out of the corner it falls, from rest.
+
+    Returns
+    -------
+    ndarray of bool, (k,)
+        Which of them gravity pulls away from the one, and onto the other: they are to rest there.
     """
     if not len(who):
-        return
+        return np.zeros(0, dtype=bool)
     a, b = s.contact(who, *on), s.contact(who, *other)
     moving = (a.belt != 0.0) | (b.belt != 0.0)
     if s.spins and moving.any():
@@ -42,15 +49,18 @@ def hold(s: Swarm, who: Ints, on: tuple[Ints, Ints], other: tuple[Ints, Ints]) -
             "a spinning disk is held between two surfaces of which one moves; the exact engine"
             ' cannot follow that: run it with engine = "pymunk"'
         )
-    kinetic = 0.5 * s.mass * (dot(s.v[who], s.v[who]) + 0.5 * s.z[who] ** 2)
-    s.v[who], s.z[who] = 0.0, 0.0
-    s.recorder.book(who, b.surface, 0.0, kinetic, 0.0)
+    v = s.v.take(who, axis=1)
+    kinetic = 0.5 * s.mass * (dot(v, v) + 0.5 * s.z[who] ** 2)
+    s.v[:, who], s.z[who] = 0.0, 0.0
+    s.book(who, b.surface, 0.0, kinetic, 0.0)
     s.knots(who)
     loads, locked = _corner_loads(s, a, b)
     stays = locked | np.all(loads >= -WEIGHTLESS * s.gravity, axis=0)
-    s.fly(who[~stays], other[0][~stays], other[1][~stays], 2)
+    onto = ~stays & (loads[0] < 0.0) & (s.weight_on(b.normal) > 0.0)
+    falls = ~stays & ~onto
+    s.fly(who[falls], other[0][falls], other[1][falls], 2)
     rest = stays & ~moving & (s.machine.until == "settled")
-    s.event(Kind.SETTLE, who[rest], a.surface[rest])
+    s.event(int(Kind.SETTLE), who[rest], a.surface[rest])
     s.finish(who[rest], "settled")
     waits = stays & ~rest
     time = s.stop[who] - s.age[who]
@@ -58,10 +68,11 @@ def hold(s: Swarm, who: Ints, on: tuple[Ints, Ints], other: tuple[Ints, Ints]) -
         heat = np.where(
             waits & ~locked, s.mass * _grip(c) * np.abs(c.belt) * np.maximum(load, 0.0) * time, 0.0
         )
-        s.recorder.book(who, c.surface, heat, 0.0, heat)
+        s.book(who, c.surface, heat, 0.0, heat)
     s.age[who[waits]] = s.stop[who[waits]]
     s.knots(who[waits])
     s.finish(who[waits], "time")
+    return np.asarray(onto)
 
 
 def _grip(c: Contact) -> Floats:
@@ -71,10 +82,9 @@ def _grip(c: Contact) -> Floats:
 
 def _corner_loads(s: Swarm, a: Contact, b: Contact) -> tuple[Floats, NDArray[np.bool_]]:
     """Return the two normal forces per mass that hold a particle, (2, k), and where it locks."""
-    first, second = (c.normal + (np.sign(c.belt) * _grip(c))[:, None] * c.tangent for c in (a, b))
-    determinant = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        loads = s.gravity * np.stack([-second[:, 0], first[:, 0]]) / determinant
+    first, second = (c.normal + (np.sign(c.belt) * _grip(c)) * c.tangent for c in (a, b))
+    determinant = first[0] * second[1] - first[1] * second[0]
+    loads = s.gravity * np.stack([-second[0], first[0]]) / determinant
     loads = np.where(np.isfinite(loads), loads, -1.0)
     inwards = np.zeros(len(determinant), dtype=bool)
     for c, against in ((a, b), (b, a)):

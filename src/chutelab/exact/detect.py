@@ -2,63 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chutelab.ballistics import closing_time, first_descent
-from chutelab.exact.obstacles import NONE, Floats, Ints, Obstacles, dot, pick, rows_of
+from chutelab.ballistics import descent
+from chutelab.exact.circles import first_circle, hidden, touched
+from chutelab.exact.motion import PARALLEL, Motion
+from chutelab.exact.obstacles import Floats, Ints, Obstacles, dot, length_of, rows_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-FOOT = 1e-12
-"""Share of a segment's length by which its face reaches past its ends, so that no particle slips
-through the joint of two segments by rounding."""
+    Bools = NDArray[np.bool_]
 
-SIDES = np.array([1, -1])[:, None, None]
-"""The two faces of a segment; the first wins ties."""
+SIDES = np.array([[1.0], [-1.0]])
+"""The two faces of a segment."""
 
-GLANCING = 1e-3
-"""Share of the speed towards a circle below which a Newton step would not improve the contact."""
-
-PARALLEL = 1e-14
-"""Share of a speed or an acceleration along a surface below which it has no part towards it."""
-
-
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """Particles that move with constant acceleration until something happens, arrays (k, ...).
-
-    Attributes
-    ----------
-    rows : ndarray, (k,)
-        Which particles they are.
-    position, velocity, acceleration : ndarray, (k, 2)
-        SI units.
-    left, left_side, order : ndarray, (k,)
-        Obstacle (and face of it) in contact now that is being left, or -1; how many of the leading
-        coefficients of the gap to it are zero: 1 after a rebound, 2 when leaving tangentially, 3
-        when lifting off a circle. They are exactly zero, so they are divided out.
-    on, on_side : ndarray, (k,)
-        Segment (and face of it) the particle slides on, which it cannot meet, or -1.
-    """
-
-    rows: Ints
-    position: Floats
-    velocity: Floats
-    acceleration: Floats
-    left: Ints
-    left_side: Ints
-    order: Ints
-    on: Ints
-    on_side: Ints
+FEW = 4
+"""Segments up to which looking at all takes no longer than finding out which to look at."""
 
 
 def first_contact(
     motion: Motion, obstacles: Obstacles, radius: float, until: Floats
-) -> tuple[Floats, Ints, Ints]:
+) -> tuple[Floats, Ints, Floats]:
     """Return time from now, obstacle and side of the first contact before `until`, each (k,).
 
     Finds: faces within a segment's length, ends of segments (for a disk), the pulley. Misses, by
@@ -78,143 +45,141 @@ def first_contact(
     Returns
     -------
     time, obstacle, side
-        inf and -1 where there is none; side is +1 or -1 for a face, 0 for a circle.
+        Time inf where there is none, the other two are any numbers then; side is +1 or -1 for a
+        face, 0 for a circle.
     """
-    time, obstacle, side = _faces(motion, obstacles, radius, until)
-    if obstacles.center.shape[1]:
-        t, circle = _circles(motion, obstacles, np.minimum(time, until))
+    segments, count = obstacles.segments, len(until)
+    held = motion.never is not None or motion.on is not None
+    places = _box(motion, until) if held or segments > FEW else None
+    faces, circles = _reached(motion, obstacles, places)
+    if len(faces):
+        time, obstacle, side = _faces(motion, obstacles, radius, until, faces)
+        until = np.minimum(time, until)
+        places = None
+    else:
+        time, side = np.full(count, np.inf), np.zeros(count)
+        obstacle = np.zeros(count, dtype=np.int64)
+    if not len(circles):
+        return time, obstacle, side
+    if places is None:
+        places = _box(motion, until)
+    pairs = touched(places, motion, obstacles, circles)
+    if np.count_nonzero(pairs):
+        pairs &= ~hidden(motion, obstacles, circles)
+    if np.count_nonzero(pairs):
+        t, circle = first_circle(motion, obstacles, until, circles, pairs)
         sooner = t < time
         time = np.where(sooner, t, time)
-        obstacle = np.where(sooner, circle + obstacles.segments, obstacle)
+        obstacle = np.where(sooner, circle + segments, obstacle)
         side = np.where(sooner, 0, side)
     return time, obstacle, side
 
 
-def _faces(
-    motion: Motion, obstacles: Obstacles, radius: float, until: Floats
-) -> tuple[Floats, Ints, Ints]:
-    """Return time, segment and side of the first face met up to `until`, (k,); inf, -1, 0 if none.
-
-    Works on arrays of shape (2, k, S): both faces of all segments.
-    """
-    count, segments = len(motion.rows), obstacles.segments
-    if not segments:
-        return np.full(count, np.inf), np.full(count, NONE), np.zeros(count, dtype=np.int64)
-    normal, start = rows_of(obstacles.normal, motion.rows), rows_of(obstacles.start, motion.rows)
-    p, v, a = (x[:, None] for x in (motion.position, motion.velocity, motion.acceleration))
-    gap = SIDES * dot(p - start, normal) - radius
-    rate, acceleration = SIDES * dot(v, normal), SIDES * dot(a, normal)
-    columns = np.arange(segments)
-    leaving = motion.left[:, None] == columns
-    same = leaving & (motion.left_side[:, None] == SIDES)
-    touching = (np.abs(gap) <= obstacles.touch) | same
-    gap = np.where(touching, 0.0, gap)
-    along_face = touching & (np.abs(rate) <= PARALLEL * np.sqrt(dot(v, v)))
-    rate = np.where(along_face & ~same, 0.0, rate)
-    unpressed = along_face & (np.abs(acceleration) <= PARALLEL * np.sqrt(dot(a, a)))
-    acceleration = np.where(unpressed, 0.0, acceleration)
-    time = closing_time(gap, rate, acceleration)
-    own = (motion.on[:, None] == columns) & (motion.on_side[:, None] == SIDES)
-    never = own | (leaving & ~same) | (same & (motion.order[:, None] > 1))
-    never |= (time < 0.0) | (time > until[:, None])
-    time = np.where(never, np.inf, time)
-    finite = np.where(never, 0.0, time)[..., None]
-    there = p + finite * (v + 0.5 * finite * a) - start
-    tangent = rows_of(obstacles.tangent, motion.rows)
-    foot, pace = dot(there, tangent), dot(v, tangent)
-    length = rows_of(obstacles.length, motion.rows)
-    reach = FOOT * length
-    over = (foot >= -reach) & (foot <= length + reach)
-    # Grazing the end on the way out is not lying on the face.
-    outward = ((foot <= reach) & (pace < 0.0)) | ((foot >= length - reach) & (pace > 0.0))
-    time = np.where(over & ~(along_face & outward), time, np.inf)
-    nearest = np.argmin(time.transpose(1, 0, 2).reshape(count, -1), axis=1)
-    side, segment = np.divmod(nearest, segments)
-    first = time[side, np.arange(count), segment]
-    met = np.isfinite(first)
-    return first, np.where(met, segment, NONE), np.where(met, SIDES[side, 0, 0], 0)
-
-
-def _circles(motion: Motion, obstacles: Obstacles, until: Floats) -> tuple[Floats, Ints]:
-    """Time to the first circle met, and its number, (k,); inf and -1 if none."""
-    time = np.full(len(motion.rows), np.inf)
-    nearest = np.full(len(motion.rows), NONE, dtype=np.int64)
-    who, circle = np.nonzero(_near(motion, obstacles, until))
-    if not len(who):
-        return time, nearest
-    rows = motion.rows[who]
-    v, a = motion.velocity[who], motion.acceleration[who]
-    d = motion.position[who] - pick(obstacles.center, rows, circle)
-    rho = pick(obstacles.rho, rows, circle)
-    distance = np.hypot(d[:, 0], d[:, 1])
-    # |d + v t + a t²/2|² - ρ², as a polynomial of t.
-    gap = np.stack(
-        [
-            (distance - rho) * (distance + rho),
-            2.0 * dot(d, v),
-            dot(v, v) + dot(d, a),
-            dot(v, a),
-            0.25 * dot(a, a),
-        ]
-    )
-    leaving = motion.left[who] == circle + obstacles.segments
-    touching = np.abs(distance - rho) <= obstacles.touch
-    grazing = touching & (np.abs(gap[1]) <= PARALLEL * 2.0 * rho * np.sqrt(dot(v, v)))
-    gap[1] = np.where(grazing & ~leaving, 0.0, gap[1])
-    order = np.where(leaving, motion.order[who], np.where(touching & (gap[1] >= 0.0), 1, 0))
-    now = touching & ~leaving & (gap[1] < 0.0)
-    for n in range(1, 4):
-        shift = order >= n
-        gap[:-1, shift] = gap[1:, shift]
-        gap[-1, shift] = 0.0
-    # Inside already (overlapping), or nothing ever pulls it in: no contact to find.
-    open_ = ~now & (gap[0] >= 0.0) & (gap < 0.0).any(axis=0)
-    t = np.where(now, 0.0, np.inf)
-    if open_.any():
-        found = first_descent(gap[:, open_], until[who[open_]])
-        t[open_] = _polished(found, d[open_], v[open_], a[open_], rho[open_], order[open_] == 0)
-    best = np.argsort(t, kind="stable")[::-1]
-    time[who[best]], nearest[who[best]] = t[best], circle[best]
-    return time, np.where(np.isfinite(time), nearest, NONE)
-
-
-def _polished(
-    t: Floats, d: Floats, v: Floats, a: Floats, rho: Floats, apart: NDArray[np.bool_]
-) -> Floats:
-    """Improve contact times by one Newton step on the distance itself.
-
-    Its rounding does not grow with the flight, as the polynomial's does; but of a contact that is
-    being left (not `apart` before) the polynomial, divided by t, is better on ways below ρ.
-    """
-    time = np.where(np.isfinite(t), t, 0.0)[:, None]
-    there, pace = d + time * (v + 0.5 * time * a), v + time * a
-    distance = np.hypot(there[:, 0], there[:, 1])
-    rate = dot(there, pace) / distance
-    steep = np.isfinite(t) & (rate < -GLANCING * np.sqrt(dot(pace, pace)))
-    better = steep & (apart | (-rate * time[:, 0] > rho))
-    correction = (distance - rho) / np.where(better, rate, 1.0)
-    return np.where(better, np.maximum(t - correction, 0.0), t)
-
-
-def _near(motion: Motion, obstacles: Obstacles, until: Floats) -> NDArray[np.bool_]:
-    """Which circles the box of the path up to `until` touches, (k, C): a cheap way to skip most."""
+def _box(motion: Motion, until: Floats) -> tuple[Floats, Floats]:
+    """Lowest and highest coordinates of each path up to `until`, (2, k)."""
     p, v, a = motion.position, motion.velocity, motion.acceleration
-    t = until[:, None]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        turn = -v / a
-    turn = np.where((turn > 0.0) & (turn < t), turn, 0.0)
-    places = np.stack([p, p + turn * (v + 0.5 * turn * a), p + t * (v + 0.5 * t * a)])
-    low, high = places.min(axis=0)[:, None], places.max(axis=0)[:, None]
-    center = rows_of(obstacles.center, motion.rows)
-    reach = (rows_of(obstacles.rho, motion.rows) - obstacles.touch)[..., None]
-    near = np.all((low < center + reach) & (high > center - reach), axis=-1)
-    # A face that is left with the pull away from it hides its own two ends, as does one slid on.
-    if not obstacles.segments:
-        return np.asarray(near)
-    left = np.where(motion.left < obstacles.segments, motion.left, NONE)
-    normal = motion.left_side[:, None] * pick(obstacles.normal, motion.rows, np.maximum(left, 0))
-    left = np.where(dot(a, normal) >= 0.0, left, NONE)
-    for face in (left, motion.on):
-        own = obstacles.owns[:, np.maximum(face, 0)].T
-        near &= ~(own & (face != NONE)[:, None])
-    return np.asarray(near)
+    end = motion.after(until)
+    low, high = np.minimum(p, end), np.maximum(p, end)
+    turn = -v / a
+    turns = (turn > 0.0) & (turn < until)
+    if np.count_nonzero(turns):
+        turn = np.where(turns, turn, 0.0)
+        top = p + turn * (v + (0.5 * turn) * a)
+        low, high = np.minimum(low, top), np.maximum(high, top)
+    return low, high
+
+
+def _reached(
+    motion: Motion, obstacles: Obstacles, places: tuple[Floats, Floats] | None
+) -> tuple[Ints, Ints]:
+    """Return segments and circles that any of the paths may touch: a cheap way to skip most.
+
+    `places` are the boxes of the paths; without them all may.
+    """
+    if places is None:
+        return obstacles.numbers
+    low = np.minimum.reduce(places[0], axis=1, keepdims=True)
+    high = np.maximum.reduce(places[1], axis=1, keepdims=True)
+    each = (low < obstacles.bound_high) & (high > obstacles.bound_low)
+    near = each[0] & each[1]
+    if motion.never is not None:
+        near &= ~motion.never
+    faces = near[: obstacles.segments].nonzero()[0]
+    if motion.on is not None and len(faces):
+        # Along a face nobody meets the other one either.
+        faces = faces[(motion.on != faces[:, None]).any(axis=1)]
+    return faces, near[obstacles.segments :].nonzero()[0]
+
+
+def _faces(
+    motion: Motion, obstacles: Obstacles, radius: float, until: Floats, segments: Ints
+) -> tuple[Floats, Ints, Floats]:
+    """Return time, segment and side of the first face met up to `until`, (k,); time inf if none.
+
+    Of the given segments; works on arrays of shape (S, F, k), where F is 1 if nobody turns back
+    from a segment before `until` and can so meet one of its faces only, else 2.
+    """
+
+    def of(array: Floats) -> Floats:
+        chosen = array if len(segments) == array.shape[-2] else array[..., segments, :]
+        return rows_of(chosen, motion.rows)[..., None, :]
+
+    frame = of(obstacles.frame)
+    velocity, acceleration = (
+        x[:, None, None, None] for x in (motion.velocity, motion.acceleration)
+    )
+    away = motion.position[:, None, None] - of(obstacles.start)
+    # Components along the normals and the tangents of the segments.
+    rise, pace = dot(velocity, frame)
+    pull, push = dot(acceleration, frame)
+    height, foot = dot(away[:, None], frame)
+    last = rise + pull * until
+    turns = np.count_nonzero(rise * last < 0.0)
+    sides = SIDES if turns else np.where(rise + last > 0.0, -1.0, 1.0)
+    gap, rate, fall = sides * height - radius, sides * rise, sides * pull
+
+    leaving = motion.left == segments[:, None, None]
+    same = leaving & (motion.left_side == sides)
+    touching = np.abs(gap) <= obstacles.touch
+    touching |= same
+    grazing: Bools | None = None
+    if np.count_nonzero(touching):
+        gap[touching] = 0.0
+        grazing = touching & (np.abs(rate) <= PARALLEL * length_of(motion.velocity))
+        if np.count_nonzero(grazing):
+            rate[grazing > same] = 0.0
+            unpressed = np.abs(fall) <= PARALLEL * length_of(motion.acceleration)
+            fall = np.where(grazing & unpressed, 0.0, fall)
+        else:
+            grazing = None
+    time = descent(gap, rate, fall)
+    valid = (time >= 0.0) & (time <= until)
+    if np.count_nonzero(leaving):
+        valid &= ~leaving | (same & (motion.order <= 1))
+    if motion.on is not None:
+        valid &= motion.on != segments[:, None, None]
+
+    if motion.past is not None and np.count_nonzero(touching):
+        past = motion.past
+        height_then = dot(past.place[:, None, None] - of(obstacles.start), frame[:, 0])
+        known = past.obstacle == segments[:, None, None]
+        behind = sides * np.where(known, past.side, height_then) < 0.0
+        valid &= ~(touching & ~same & behind & (time == 0.0))
+
+    # How far along the segment the contact is.
+    foot = foot + time * (pace + (0.5 * time) * push)
+    low, high = of(obstacles.feet)
+    valid &= (foot >= low) & (foot <= high)
+    if grazing is not None:
+        length, reach = of(obstacles.length), -low
+        # Grazing the end on the way out is not lying on the face.
+        outward = ((foot <= reach) & (pace < 0.0)) | ((foot >= length - reach) & (pace > 0.0))
+        valid &= ~(grazing & outward)
+    time[~valid] = np.inf
+    flat = time.reshape(-1, time.shape[-1])
+    nearest, column = flat.argmin(axis=0), np.arange(flat.shape[1])
+    first = flat[nearest, column]
+    # Rows go by segments, then by faces.
+    segment = nearest // 2 if turns else nearest
+    side = 1.0 - 2.0 * (nearest % 2) if turns else sides[segment, 0, column]
+    return first, segments[segment], side

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import ceil, log2
+from sys import float_info
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,103 +11,171 @@ import numpy as np
 from chutelab.exact.obstacles import NONE, Floats, Ints, Obstacles
 
 if TYPE_CHECKING:
-    from chutelab.machine import Machine
+    from numpy.typing import NDArray
+
+    from chutelab.machine import Machine, Segments
+
+FOOT = 1e-12
+"""Share of a segment's length by which its face reaches past its ends, so that no particle slips
+through the joint of two segments by rounding."""
 
 JOINT = 1e-12
 """Share of the scene's size within which two ends are one joint."""
 
-FOLDED = 1e-9
-"""Difference of two directions below which one segment lies on the other."""
-
 TOUCH_ULPS = 256.0
 """Rounding of a coordinate, in units of the last place of the scene's size: closer is touching."""
 
+GIVEN_ULPS = 1.0
+"""The same of a coordinate in the scene file, for one far from the origin."""
 
-def obstacles(machine: Machine) -> Obstacles:
-    """Resolve a machine's surfaces into obstacles.
+REMOTE = 8.0
+"""Sizes of a machine that it must be away from the world's origin to be given one of its own."""
+
+BOX_TOUCHES = 64.0
+"""Width, in `Obstacles.touch`, by which the boxes of faces are larger than they need be."""
+
+
+def origin(machine: Machine) -> tuple[float, float]:
+    """Return the world point that the engine calculates from, m: near the machine.
+
+    It is (0, 0) unless the machine is many times its own size away from there; and so round a
+    number that taking it off a coordinate loses no digit.
+    """
+    start, end = machine.segments.start, machine.segments.end
+    if machine.pulley is not None or not start.size:
+        return 0.0, 0.0
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    axes = tuple(range(low.ndim - 1))
+    low, high = low.min(axis=axes), high.max(axis=axes)
+    extent = float((high - low).max())
+    middle = 0.5 * (low + high)
+    if np.abs(middle).max() <= REMOTE * extent:
+        return 0.0, 0.0
+    unit = 2.0 ** ceil(log2(extent))
+    x, y = (round(float(c) / unit) * unit for c in middle)
+    return x, y
+
+
+def obstacles(machine: Machine, origin: tuple[float, float] = (0.0, 0.0)) -> Obstacles:
+    """Resolve a machine's surfaces into obstacles, in coordinates from an origin.
 
     How segments join is read off the first row where each particle has its own. Of segments that
     lie on each other the first one counts, as it does when two are met at once.
     """
-    seg, r = machine.segments, machine.particle.radius
-    size = max(
-        float(np.abs(places).max(initial=0.0))
-        for places in (seg.start, seg.end, machine.releases.position)
-    )
-    shared = seg.length.ndim == 1
-    all_ends = np.stack([seg.start, seg.end], axis=-2)
-    kept = _distinct(all_ends if shared else all_ends[0], JOINT * size)
+    seg, r, wheel = machine.segments, machine.particle.radius, machine.pulley
+    start, tangent, length = _vectors(seg.start), _vectors(seg.tangent), _scalars(seg.length)
+    far, places = max(map(abs, origin)), machine.releases.position
+    if far > 0.0:
+        start, places = start - np.reshape(origin, (2, 1, 1)), places - origin
+    corners = np.concatenate([start, start + length * tangent], axis=1)
+    size = max(float(np.abs(corners).max(initial=0.0)), float(np.abs(places).max()))
+    # Far away the scene's own numbers are rounded, each by half a last place.
+    touch = float_info.epsilon * (TOUCH_ULPS * size + GIVEN_ULPS * far)
+    spots = _spots(corners[..., 0], JOINT * size)
+    material, surface = _material(seg, tangent), seg.surface
+    kept = _distinct(spots)
+    if len(kept) < len(spots):
+        corners = corners[:, [*kept, *(s + len(spots) for s in kept)]]
+        spots, tangent, length = [spots[s] for s in kept], tangent[:, kept], length[kept]
+        material, surface = material[:, kept], surface[kept]
 
-    def wide(array: Floats) -> Floats:
-        return (array[None] if shared else array)[:, kept]
-
-    start, tangent, length = wide(seg.start), wide(seg.tangent), wide(seg.length)
-    end = start + length[..., None] * tangent
-    rows, count = length.shape
-    corners = np.stack([start[0], end[0]], axis=1)
-    on_pulley = (0, 1) if machine.pulley is not None else None
-    places, end_circle = _ends(corners, JOINT * size, on_pulley) if r > 0.0 else _points(count)
-
-    owner = np.array([s for s, _ in places], dtype=np.int64)
-    owns = (end_circle[None] == np.arange(len(places))[:, None, None]).any(axis=-1)
-    center = np.stack([(start, end)[e][:, s] for s, e in places], axis=1) if places else None
-    center = np.empty((rows, 0, 2)) if center is None else center
-    rho = np.full((rows, len(places)), r)
-    end_circle = np.where(end_circle == NONE, NONE, end_circle + count)
-
-    def with_ends(array: Floats) -> Floats:
-        return np.concatenate([array, array[:, owner]], axis=1)
-
-    belt = with_ends(wide(seg.speed)[..., None] * tangent)
-    restitution, friction = with_ends(wide(seg.restitution)), with_ends(wide(seg.friction))
-    surface = np.concatenate([seg.surface[kept], seg.surface[kept][owner]])
+    # Segments, then their ends, then the pulley.
+    flat, width = length.shape
+    ends, end_circle = _ends(spots, wheel is not None) if r > 0.0 else _points(flat)
+    owner = np.array([s for s, _ in ends], dtype=np.int64)
+    center = corners.take(np.array([s + e * flat for s, e in ends], dtype=np.int64), axis=1)
+    rho = np.full((len(ends), width), r)
+    material = np.concatenate([material, material.take(owner, axis=1)], axis=1)
+    surface = np.concatenate([surface, surface.take(owner)])
+    owns = _owned(end_circle, len(ends))
     pulley, pulley_speed = NONE, 0.0
-    if machine.pulley is not None:
-        p = machine.pulley
-        pulley, pulley_speed = count + len(places), p.speed
+    if wheel is not None:
+        pulley, pulley_speed = flat + len(ends), wheel.speed
         end_circle[0, 1] = pulley
-        owns = np.concatenate([owns, np.zeros((1, count), dtype=bool)])
-        center = np.concatenate([center, np.zeros((rows, 1, 2))], axis=1)
-        rho = _column(rho, p.radius + r)
-        belt = np.concatenate([belt, np.zeros((rows, 1, 2))], axis=1)
-        restitution, friction = _column(restitution, p.restitution), _column(friction, p.friction)
-        surface = np.append(surface, p.surface)
+        own = np.array([0.0, 0.0, wheel.restitution, wheel.friction])
+        material = _more(material, own[:, None])
+        center, rho = _more(center, 0.0), _more(rho, wheel.radius + r)
+        surface = np.append(surface, wheel.surface)
+        owns = np.concatenate([owns, np.zeros((1, flat), dtype=bool)])
+    frame = np.empty((2, 2, flat, width))
+    frame[0, 0], frame[1, 0], frame[:, 1] = -tangent[1], tangent[0], tangent
+    feet = np.empty((2, flat, width))
+    feet[1] = FOOT * length
+    np.negative(feet[1], out=feet[0])
+    feet[1] += length
+    first, second = corners[:, :flat], corners[:, flat:]
+    # A circle's box is smaller: what only touches it does not meet it.
+    reach, inner = r + BOX_TOUCHES * touch, rho - touch
     return Obstacles(
-        start=start,
-        tangent=tangent,
-        normal=np.stack([-tangent[..., 1], tangent[..., 0]], axis=-1),
+        start=first,
+        frame=frame,
         length=length,
+        feet=feet,
         center=center,
         rho=rho,
-        belt=belt,
-        restitution=restitution,
-        friction=friction,
-        surface=surface.astype(np.int64),
+        material=material,
+        low=np.concatenate([np.minimum(first, second) - reach, center - inner], axis=1),
+        high=np.concatenate([np.maximum(first, second) + reach, center + inner], axis=1),
+        surface=surface,
+        spots=tuple(spots),
         end_circle=end_circle,
-        follow=_joints(corners, JOINT * size),
         owns=owns,
         pulley=pulley,
         pulley_speed=pulley_speed,
-        touch=TOUCH_ULPS * float(np.finfo(np.float64).eps) * size,
+        touch=touch,
     )
 
 
-def _column(array: Floats, value: float) -> Floats:
-    return np.concatenate([array, np.full((len(array), 1), value)], axis=1)
+def _material(segments: Segments, tangent: Floats) -> Floats:
+    """Return `Obstacles.material` of the segments, (4, S, n)."""
+    material = np.empty((4, *tangent.shape[1:]))
+    material[:2] = _scalars(segments.speed) * tangent
+    material[2], material[3] = _scalars(segments.restitution), _scalars(segments.friction)
+    return material
 
 
-def _distinct(ends: Floats, tolerance: float) -> Ints:
-    """Return the segments, (S', ), that do not lie on an earlier one; `ends` is (S, 2, 2)."""
-    kept: list[int] = []
-    for s, pair in enumerate(ends):
-        earlier = (ends[k] for k in kept)
-        if not any(
-            np.abs(pair - other[::order]).max() <= tolerance
-            for other in earlier
-            for order in (1, -1)
-        ):
-            kept.append(s)
-    return np.array(kept, dtype=np.int64)
+def _more(array: Floats, value: Floats | float) -> Floats:
+    """Append one obstacle."""
+    out = np.empty((*array.shape[:-2], array.shape[-2] + 1, array.shape[-1]))
+    out[..., :-1, :], out[..., -1, :] = array, value
+    return out
+
+
+def _vectors(array: Floats) -> Floats:
+    """(S, 2) or (N, S, 2) to (2, S, n)."""
+    return array.T[..., None] if array.ndim == 2 else array.transpose(2, 1, 0).copy()
+
+
+def _scalars(array: Floats) -> Floats:
+    """(S,) or (N, S) to (S, n)."""
+    return array[:, None] if array.ndim == 1 else array.T.copy()
+
+
+def _spots(ends: Floats, tolerance: float) -> list[tuple[int, int]]:
+    """Return numbers of the places where segments begin and end; within the tolerance one place.
+
+    `ends` is (2, 2 S): all the first ones, then all the second ones.
+    """
+    x, y = ends.tolist()
+    count = len(x) // 2
+    number = list(range(2 * count))
+    window: list[int] = []
+    for n in sorted(number, key=x.__getitem__):
+        window = [m for m in window if x[n] - x[m] <= tolerance]
+        for m in window:
+            if abs(y[n] - y[m]) <= tolerance:
+                number[n] = number[m]
+                break
+        window.append(n)
+    return list(zip(number[:count], number[count:], strict=True))
+
+
+def _distinct(spots: list[tuple[int, int]]) -> list[int]:
+    """Return the segments that do not lie on an earlier one."""
+    seen: dict[frozenset[int], int] = {}
+    for s, pair in enumerate(spots):
+        seen.setdefault(frozenset(pair), s)
+    return list(seen.values())
 
 
 def _points(count: int) -> tuple[list[tuple[int, int]], Ints]:
@@ -113,47 +183,34 @@ def _points(count: int) -> tuple[list[tuple[int, int]], Ints]:
     return [], np.full((count, 2), NONE, dtype=np.int64)
 
 
-def _ends(
-    corners: Floats, tolerance: float, without: tuple[int, int] | None
-) -> tuple[list[tuple[int, int]], Ints]:
-    """Give each distinct end of the segments, `corners` (S, 2, 2), a number; leave one out.
+def _ends(spots: list[tuple[int, int]], pulley: bool) -> tuple[list[tuple[int, int]], Ints]:
+    """Give each distinct end of the segments a circle; the pulley stands for the first one's end.
 
     Returns
     -------
-    places : list of (segment, end)
+    ends : list of (segment, end)
         Where each of them is, first come.
-    number : ndarray, (S, 2)
-        Which of them each end of each segment is, -1 for the one left out.
+    circle : ndarray, (S, 2)
+        Obstacle number of the circle at each end of each segment, -1 for the one left out.
     """
-    places, number = _points(len(corners))
-    for s, e in np.ndindex(number.shape):
-        if (s, e) == without:
-            continue
-        for n, place in enumerate(places):
-            if np.abs(corners[s, e] - corners[place]).max() <= tolerance:
-                number[s, e] = n
-                break
-        else:
-            number[s, e] = len(places)
-            places.append((s, e))
-    return places, number
-
-
-def _joints(corners: Floats, tolerance: float) -> Ints:
-    """Return which segment goes on where another ends, (S, 2); the first one found wins.
-
-    Segments that fold back onto each other do not go on from each other.
-    """
-    follow = np.full(corners.shape[:2], NONE, dtype=np.int64)
-    along = corners[:, 1] - corners[:, 0]
-    along = along / np.hypot(along[:, 0], along[:, 1])[:, None]
-    outward = np.stack([-along, along], axis=1)
-    for s, e in np.ndindex(follow.shape):
-        for other, f in np.ndindex(follow.shape):
-            if other == s or follow[s, e] != NONE or follow[other, f] != NONE:
+    circles: dict[int, int] = {}
+    ends, circle = _points(len(spots))
+    for s, pair in enumerate(spots):
+        for e, spot in enumerate(pair):
+            if pulley and (s, e) == (0, 1):
                 continue
-            apart = np.abs(corners[s, e] - corners[other, f]).max()
-            folded = np.abs(outward[s, e] - outward[other, f]).max() <= FOLDED
-            if apart <= tolerance and not folded:
-                follow[s, e], follow[other, f] = other, s
-    return follow
+            if spot not in circles:
+                circles[spot] = len(spots) + len(ends)
+                ends.append((s, e))
+            circle[s, e] = circles[spot]
+    return ends, circle
+
+
+def _owned(end_circle: Ints, circles: int) -> NDArray[np.bool_]:
+    """Tell of which segments a circle is an end, (C, S)."""
+    owns = np.zeros((circles, len(end_circle)), dtype=bool)
+    for segment, pair in enumerate(end_circle.tolist()):
+        for circle in pair:
+            if circle != NONE:
+                owns[circle - len(end_circle), segment] = True
+    return owns

@@ -3,11 +3,15 @@
 A disk of radius r touches a segment's face when its centre is r away, and its end when the centre
 is on a circle of radius r about it. The pulley is one more circle, of radius R + r. Obstacles are
 numbered: segments first, then circles.
+
+Arrays have the particles last, and the two components of vectors first, so that what one operation
+reads lies together.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,31 +21,44 @@ Ints = NDArray[np.int64]
 
 NONE = -1
 
+FOLDED = 1e-9
+"""Difference of two directions below which one segment lies on the other."""
+
+PER_PARTICLE = (
+    "start", "frame", "length", "feet", "center", "rho", "material", "low", "high",
+)  # fmt: skip
+"""Arrays of `Obstacles` whose last axis may be the particles."""
+
 
 @dataclass(frozen=True, eq=False)
 class Obstacles:
-    """Faces, shape (n, S), and circles, (n, C), where n is 1 or the number of particles.
+    """Faces, shape (S, n), and circles, (C, n), where n is 1 or the number of particles.
 
     Attributes
     ----------
-    start, tangent, normal : ndarray, (n, S, 2)
-        Segments; the normal is to the left of the tangent.
-    length : ndarray, (n, S)
+    start : ndarray, (2, S, n)
+        First ends of the segments, m.
+    frame : ndarray, (2, 2, S, n)
+        Their unit vectors, components first: normal, and tangent to the right of it.
+    length : ndarray, (S, n)
         m.
-    center : ndarray, (n, C, 2)
+    feet : ndarray, (2, S, n)
+        From where to where along a segment a place counts as beside it, m.
+    center : ndarray, (2, C, n)
         Centres of the circles: segment ends, then the pulley.
-    rho : ndarray, (n, C)
+    rho : ndarray, (C, n)
         Distance of a particle's centre from the circle's at contact, m.
-    belt : ndarray, (n, S + C, 2)
-        Surface velocity of segments and ends as a world vector, m/s.
-    restitution, friction : ndarray, (n, S + C)
-        Pair values.
+    material : ndarray, (4, S + C, n)
+        Surface velocity of segments and ends as a world vector (two rows, m/s), and the pair
+        values: restitution, friction.
+    low, high : ndarray, (2, S + C, n)
+        Box that a particle's centre is in when it touches, m.
     surface : ndarray, (S + C,)
         Index into `Machine.surfaces`.
+    spots : tuple of (int, int), (S,)
+        Numbers of the places where a segment begins and ends; the same where they are joined.
     end_circle : ndarray, (S, 2)
         Obstacle number of the circle at a segment's first and second end, or -1 for a point.
-    follow : ndarray, (S, 2)
-        Segment that shares the end, or -1.
     owns : ndarray of bool, (C, S)
         Of which segments a circle is an end.
     pulley : int
@@ -53,17 +70,17 @@ class Obstacles:
     """
 
     start: Floats
-    tangent: Floats
-    normal: Floats
+    frame: Floats
     length: Floats
+    feet: Floats
     center: Floats
     rho: Floats
-    belt: Floats
-    restitution: Floats
-    friction: Floats
+    material: Floats
+    low: Floats
+    high: Floats
     surface: Ints
+    spots: tuple[tuple[int, int], ...]
     end_circle: Ints
-    follow: Ints
     owns: NDArray[np.bool_]
     pulley: int
     pulley_speed: float
@@ -72,55 +89,132 @@ class Obstacles:
     @property
     def segments(self) -> int:
         """Number of segments S."""
-        return int(self.start.shape[1])
+        return int(self.length.shape[0])
 
-    def normal_at(self, rows: Ints, obstacle: Ints, side: Ints, position: Floats) -> Floats:
-        """Contact normals, (k, 2), of particles touching an obstacle, pointing at the particle."""
-        normal = np.empty((len(rows), 2))
-        flat = obstacle < self.segments
-        normal[flat] = side[flat, None] * pick(self.normal, rows[flat], obstacle[flat])
-        circle = obstacle[~flat] - self.segments
-        away = position[~flat] - pick(self.center, rows[~flat], circle)
-        normal[~flat] = away / np.hypot(away[:, 0], away[:, 1])[:, None]
-        return normal
+    @property
+    def normal(self) -> Floats:
+        """Unit vectors to the left of the segments, (2, S, n)."""
+        return self.frame[:, 0]
 
-    def snapped(self, rows: Ints, obstacle: Ints, side: Ints, position: Floats, r: float) -> Floats:
-        """Positions, (k, 2), put exactly at contact distance, so that rounding cannot add up."""
-        out = position.copy()
-        flat = obstacle < self.segments
-        f, o = rows[flat], obstacle[flat]
-        normal = pick(self.normal, f, o)
-        gap = dot(position[flat] - pick(self.start, f, o), normal) - side[flat] * r
-        out[flat] -= gap[:, None] * normal
-        circle = obstacle[~flat] - self.segments
-        center = pick(self.center, rows[~flat], circle)
-        away = position[~flat] - center
-        distance = np.hypot(away[:, 0], away[:, 1])
-        rho = pick(self.rho, rows[~flat], circle)
-        out[~flat] = center + (rho / distance)[:, None] * away
-        return out
+    @property
+    def tangent(self) -> Floats:
+        """Unit vectors along the segments, (2, S, n)."""
+        return self.frame[:, 1]
 
-    def belt_speed(self, rows: Ints, obstacle: Ints, normal: Floats) -> Floats:
-        """Speed of the surface along (n_y, -n_x) at a contact with that normal, (k,), m/s."""
-        speed = dot(pick(self.belt, rows, obstacle), along(normal))
-        return np.where(obstacle == self.pulley, self.pulley_speed, speed)
+    @cached_property
+    def bound_low(self) -> Floats:
+        """Lower sides of boxes that hold `low` for all particles, (2, S + C)."""
+        return np.asarray(self.low[..., 0] if self.low.shape[-1] == 1 else self.low.min(axis=-1))
+
+    @cached_property
+    def bound_high(self) -> Floats:
+        """Upper sides of the same boxes."""
+        return np.asarray(self.high[..., 0] if self.high.shape[-1] == 1 else self.high.max(axis=-1))
+
+    @cached_property
+    def numbers(self) -> tuple[Ints, Ints]:
+        """Return the numbers of all segments, (S,), and of all circles, (C,), from 0 each."""
+        return np.arange(self.segments), np.arange(len(self.rho))
+
+    @cached_property
+    def under_belt(self) -> NDArray[np.bool_]:
+        """Return what particles held on the incoming belt cannot meet at any height, (S + C,)."""
+        held = np.zeros(len(self.surface), dtype=bool)
+        held[0] = held[self.pulley] = True
+        held[self.segments :] |= self.owns[:, 0]
+        return held
+
+    @cached_property
+    def follow(self) -> Ints:
+        """Return which segment goes on where another ends, (S, 2), -1 if none; the first one wins.
+
+        Segments that fold back onto each other do not go on from each other.
+        """
+        follow = np.full((self.segments, 2), NONE, dtype=np.int64)
+        meeting: dict[int, list[tuple[int, int]]] = {}
+        for segment, pair in enumerate(self.spots):
+            for end, spot in enumerate(pair):
+                meeting.setdefault(spot, []).append((segment, end))
+        along = self.tangent[:, :, 0]
+        for ends in meeting.values():
+            for n, (s, e) in enumerate(ends):
+                for other, f in ends[n + 1 :]:
+                    if other == s or follow[s, e] != NONE or follow[other, f] != NONE:
+                        continue
+                    outward = along[:, s] if e else -along[:, s]
+                    there = along[:, other] if f else -along[:, other]
+                    if np.abs(outward - there).max() > FOLDED:
+                        follow[s, e], follow[other, f] = other, s
+        return follow
+
+    def of(self, first: int, last: int) -> Obstacles:
+        """Return the obstacles of the particles from `first` up to `last`."""
+        if self.length.shape[-1] == 1:
+            return self
+        assert {f.name for f in fields(self)}.issuperset(PER_PARTICLE)
+        return replace(
+            self, **{name: getattr(self, name)[..., first:last] for name in PER_PARTICLE}
+        )
+
+    def normal_at(self, rows: Ints, obstacle: Ints, side: Floats, position: Floats) -> Floats:
+        """Contact normals, (2, k), of particles touching an obstacle, pointing at the particle.
+
+        `position` (2, n) is that of all particles.
+        """
+        normal = side * pick(self.normal, rows, obstacle)
+        round_ = (obstacle >= self.segments).nonzero()[0]
+        if len(round_):
+            circle = obstacle[round_] - self.segments
+            away = position[:, rows[round_]] - pick(self.center, rows[round_], circle)
+            normal[:, round_] = away / np.hypot(away[0], away[1])
+        return np.asarray(normal)
+
+    def snapped(
+        self, rows: Ints, obstacle: Ints, side: Floats, position: Floats, r: float
+    ) -> Floats:
+        """Positions, (2, k), put exactly at contact distance, so that rounding cannot add up.
+
+        `position` (2, n) is that of all particles.
+        """
+        normal = side * pick(self.normal, rows, obstacle)
+        out = position.take(rows, axis=1)
+        out -= (dot(out - pick(self.start, rows, obstacle), normal) - r) * normal
+        round_ = (obstacle >= self.segments).nonzero()[0]
+        if len(round_):
+            circle = obstacle[round_] - self.segments
+            center = pick(self.center, rows[round_], circle)
+            away = position[:, rows[round_]] - center
+            distance = np.hypot(away[0], away[1])
+            out[:, round_] = center + (pick(self.rho, rows[round_], circle) / distance) * away
+        return np.asarray(out)
 
 
 def dot(a: Floats, b: Floats) -> Floats:
-    """Scalar product along the last axis; exact zeros stay exact."""
-    return np.asarray(a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1])
+    """Scalar product along the first axis; exact zeros stay exact."""
+    product: Floats = a * b
+    return np.asarray(product[0] + product[1])
 
 
 def along(normal: Floats) -> Floats:
     """Tangential direction (n_y, -n_x) of a contact: clockwise round a circle."""
-    return np.stack([normal[..., 1], -normal[..., 0]], axis=-1)
+    out = np.empty_like(normal)
+    out[0] = normal[1]
+    np.negative(normal[0], out=out[1])
+    return out
+
+
+def length_of(vector: Floats) -> Floats:
+    """Length of vectors, (2, k) to (k,), without care for overflow."""
+    return np.sqrt(dot(vector, vector))
 
 
 def rows_of(array: Floats, rows: Ints) -> Floats:
-    """Rows of a per-particle array, or the one row that all particles share."""
-    return array if len(array) == 1 else array[rows]
+    """Columns of a per-particle array, or the one column that all particles share."""
+    return array if array.shape[-1] == 1 else array.take(rows, axis=-1)
 
 
-def pick(array: Floats, rows: Ints, column: Ints) -> Floats:
-    """Entry `column` of each particle's row, shape (k, ...)."""
-    return array[np.zeros_like(rows) if len(array) == 1 else rows, column]
+def pick(array: Floats, rows: Ints, which: Ints) -> Floats:
+    """Obstacle `which` for each particle, shape (..., k); numbers too large mean the last one."""
+    if array.shape[-1] == 1:
+        return array[..., 0].take(which, axis=-1, mode="clip")
+    return np.asarray(array[..., np.minimum(which, array.shape[-2] - 1), rows])

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from chutelab.exact.arcs import Bounds, bounds
+from chutelab.exact.arcs import bounds
+from chutelab.exact.grip import end_slip, settle_law
 from chutelab.exact.obstacles import Floats, Ints, dot, pick
 from chutelab.exact.swarm import Mode, Swarm
-from chutelab.exact.touch import end_slip, rest_on, settle_law, strike
+from chutelab.exact.touch import rest_on, strike
 from chutelab.recording import Kind
 from chutelab.ride import STEP_ANGLE, Circle, Outcome, advance, normal_force
 
@@ -19,11 +20,11 @@ def ride_on(s: Swarm, who: Ints, circle: Ints) -> None:
     left, side, surface = s.on[who].copy(), s.side[who].copy(), s.obstacles.surface[s.on[who]]
     c = s.contact(who, circle, np.zeros_like(side))
     rho = pick(s.obstacles.rho, who, circle - s.obstacles.segments)
-    w = dot(s.v[who], c.tangent)
+    w = dot(s.v.take(who, axis=1), c.tangent)
     stays = s.weight_on(c.normal) - w**2 / rho > 0.0
     rest_on(s, who[stays], circle[stays], np.zeros_like(side[stays]), np.zeros(int(stays.sum())))
     off = ~stays
-    s.event(Kind.SEPARATION, who[off], surface[off])
+    s.part(who[off], surface[off])
     # From the pulley it flies tangentially, above it for good; from an end it leaves the face.
     from_pulley = circle[off] == s.obstacles.pulley
     s.fly(
@@ -39,41 +40,44 @@ def carry_round(s: Swarm, who: Ints) -> None:
     if not len(who):
         return
     o = s.obstacles
-    s.p[who, 0] = 0.0
-    rho, v = s.p[who, 1].copy(), s.v[who, 0].copy()
-    with np.errstate(divide="ignore"):
-        cosine = np.minimum(v**2 / (s.gravity * rho), 1.0) if s.gravity > 0.0 else np.ones(len(who))
-    phi = np.arctan2(np.sqrt((1.0 - cosine) * (1.0 + cosine)), cosine)
-    pulley = np.full(len(who), o.pulley - o.segments)
-    found = Bounds.free(len(who))
-    if phi.any():
+    s.p[0, who] = 0.0
+    rho, v = s.p[1, who], s.v[0, who]
+    left = s.stop[who] - s.age[who]
+    cosine = np.minimum(v**2 / (s.gravity * rho), 1.0)
+    end = np.arctan2(np.sqrt((1.0 - cosine) * (1.0 + cosine)), cosine)
+    struck, found = np.zeros(len(who), dtype=bool), None
+    if np.count_nonzero(end):
+        pulley = np.full(len(who), o.pulley - o.segments)
         found = bounds(o, who, pulley, rho, np.zeros(len(who)), s.radius)
-    struck = ~found.high_handover & (found.high < phi)
-    end = np.where(struck, found.high, phi)
-    end = np.where(
-        s.age[who] + end * rho / v > s.stop[who], (s.stop[who] - s.age[who]) * v / rho, end
-    )
-    start, above = s.age[who].copy(), rho
-    rides = np.flatnonzero(end > 0.0)
-    pieces = np.ceil(end / STEP_ANGLE).max(initial=0.0)
-    for n in range(1, int(pieces) + 1):
-        part = end * (n / pieces)
-        _place(s, who[rides], rho[rides], part[rides], v[rides])
-        s.age[who[rides]] = (start + rho * part / v)[rides]
-        # The belt lets the particle down: F v = -m g v sin φ, summed from the last knot.
-        height = rho * np.cos(part)
-        work = -s.mass * s.gravity * (above - height)
-        s.recorder.book(who[rides], o.surface[o.pulley], work[rides])
-        above = height
-        s.knots(who[rides])
+        struck = ~found.high_handover & (found.high < end)
+        end = np.where(struck, found.high, end)
+        end = np.where(end * rho / v > left, left * v / rho, end)
+        _ease_round(s, who, rho, v, end)
     over = s.age[who] >= s.stop[who]
+    hit, free = struck & ~over, ~struck & ~over
     s.finish(who[over], "time")
-    hit = struck & ~over
-    free = ~hit & ~over
-    s.event(Kind.SEPARATION, who[free], 0)
+    s.part(who[free], 0)
     s.fly(who[free], o.pulley, 0, np.where(end[free] > 0.0, 3, 2))
-    if hit.any():
+    if found is not None and np.count_nonzero(hit):
         strike(s, who[hit], found.high_obstacle[hit], found.high_side[hit])
+
+
+def _ease_round(s: Swarm, who: Ints, rho: Floats, v: Floats, end: Floats) -> None:
+    """Carry particles from the top of the pulley to an angle, knot by knot."""
+    surface = s.obstacles.surface[s.obstacles.pulley]
+    start, above = s.age[who], rho.copy()
+    pieces = np.ceil(end / STEP_ANGLE)
+    for n in range(1, int(pieces.max()) + 1):
+        on = (pieces >= n).nonzero()[0]
+        riders, part = who[on], end[on] * (n / pieces[on])
+        _place(s, riders, rho[on], part, v[on])
+        s.age[riders] = start[on] + rho[on] * part / v[on]
+        # The belt lets the particle down: F v = -m g v sin φ, summed from the last knot.
+        height = rho[on] * np.cos(part)
+        work = -s.mass * s.gravity * (above[on] - height)
+        s.book(riders, np.full(len(riders), surface), work)
+        above[on] = height
+        s.knots(riders)
 
 
 def ride(s: Swarm, who: Ints) -> None:
@@ -82,8 +86,8 @@ def ride(s: Swarm, who: Ints) -> None:
     c = s.contact(who, circle, s.side[who])
     rho = pick(s.obstacles.rho, who, circle - s.obstacles.segments)
     state = Circle(
-        phi=np.arctan2(c.normal[:, 0], c.normal[:, 1]),
-        w=dot(s.v[who], c.tangent),
+        phi=np.arctan2(c.normal[0], c.normal[1]),
+        w=dot(s.v.take(who, axis=1), c.tangent),
         z=s.z[who],
         rho=rho,
         gravity=np.full(len(who), s.gravity),
@@ -100,10 +104,10 @@ def ride(s: Swarm, who: Ints) -> None:
     go = np.flatnonzero(~lifted)
     s.count_idle(who, np.where(lifted, 0.0, step.dt))
     s.age[who[go]] += step.dt[go]
-    center = s.p[who] - rho[:, None] * c.normal
-    _place(s, who[go], rho[go], step.phi[go], step.w[go], center[go])
+    center = s.p.take(who, axis=1) - rho * c.normal
+    _place(s, who[go], rho[go], step.phi[go], step.w[go], center[:, go])
     s.z[who[go]] = step.z[go]
-    s.recorder.book(
+    s.book(
         who[go],
         c.surface[go],
         (s.mass * step.work * s.belt[who])[go],
@@ -115,11 +119,11 @@ def ride(s: Swarm, who: Ints) -> None:
     over = (outcome == Outcome.NOTHING) & (s.age[who] >= s.stop[who])
     s.finish(who[over], "time")
     lift = outcome == Outcome.LIFT
-    s.event(Kind.SEPARATION, who[lift], c.surface[lift])
+    s.part(who[lift], c.surface[lift])
     s.fly(who[lift], circle[lift], 0, np.where(lifted[lift], 2, 3))
     onset = outcome == Outcome.ONSET
     s.slip[who[onset]] = np.sign(np.sin(step.phi[onset]))
-    s.event(Kind.SLIP, who[onset], c.surface[onset])
+    s.event(int(Kind.SLIP), who[onset], c.surface[onset])
     grip = outcome == Outcome.GRIP
     end_slip(s, who[grip])
     for name, code in (("low", Outcome.LOW), ("high", Outcome.HIGH)):
@@ -140,5 +144,5 @@ def _place(
 ) -> None:
     """Put particles at an angle of a circle, moving along it."""
     sine, cosine = np.sin(phi), np.cos(phi)
-    s.p[who] = center + rho[:, None] * np.stack([sine, cosine], axis=-1)
-    s.v[who] = w[:, None] * np.stack([cosine, -sine], axis=-1)
+    s.p[:, who] = center + rho * np.stack([sine, cosine])
+    s.v[:, who] = w * np.stack([cosine, -sine])

@@ -1,28 +1,30 @@
-"""The state of all particles of an exact run, and the way it is written down."""
+"""The state of a block of particles of an exact run, and the way it is written down."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from enum import IntEnum
-from typing import TYPE_CHECKING
+from functools import cached_property
+from sys import float_info
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from chutelab.exact.arcs import Bounds
-from chutelab.exact.layout import obstacles
-from chutelab.exact.obstacles import NONE, Floats, Ints, Obstacles, dot
+from chutelab.exact.journal import STATE, Journal
+from chutelab.exact.motion import Past
+from chutelab.exact.obstacles import NONE, Floats, Ints, along, dot, pick
 from chutelab.impact import DISK_SHARE
-from chutelab.recorder import Recorder
+from chutelab.recorder import StalledError
 from chutelab.recording import REASONS, Kind
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from chutelab.machine import Machine
+    from chutelab.exact.world import World
+    from chutelab.recorder import Recorder
 
 
-class Mode(IntEnum):
-    """How a particle moves now; from `FACE` on it touches something."""
+class Mode:
+    """How a particle moves now; from `FACE` on it touches something. Plain numbers, for speed."""
 
     DONE = 0
     FLIGHT = 1
@@ -31,13 +33,12 @@ class Mode(IntEnum):
     ARC = 4
 
 
-@dataclass(frozen=True, eq=False)
-class Contact:
-    """A contact seen from the particles, arrays (k,) and (k, 2).
+class Contact(NamedTuple):
+    """A contact seen from the particles, arrays (k,) and (2, k).
 
     Attributes
     ----------
-    normal, tangent : ndarray, (k, 2)
+    normal, tangent : ndarray, (2, k)
         Unit vectors: from the obstacle to the particle, and (n_y, -n_x).
     belt, friction, restitution : ndarray, (k,)
         Speed of the surface along the tangent (m/s), pair values.
@@ -54,148 +55,212 @@ class Contact:
 
 
 class Swarm:
-    """State arrays of N particles; times are counted from each particle's own release.
+    """State arrays of the particles from `first` up to `last`; age counts from their release.
 
     Attributes
     ----------
-    age, p, v, z : ndarray, (N,) or (N, 2)
-        Time since release (s), position (m), velocity and r ω (m/s).
-    mode : ndarray, (N,)
+    state : ndarray, (9, k)
+        Age (s), position (m), velocity and r ω (m/s), ledger entries (J): a knot, but for the time.
+    age, p, v, z, entries : ndarray, (k,), (2, k) or (3, k)
+        Views of it.
+    past : Past or None
+        See `detect.Motion`.
+    mode : ndarray, (k,)
         See `Mode`.
-    on, side, slip : ndarray, (N,)
+    on, side, slip : ndarray, (k,)
         Obstacle touched while sliding or riding and its face (±1, 0 for circles); sign of the slip,
         0 without (and 1 in flight, where there is nothing to grip).
-    left, left_side, order : ndarray, (N,)
+    left, left_side, order : ndarray, (k,)
         See `detect.Motion`.
-    belt : ndarray, (N,)
+    belt : ndarray, (k,)
         Speed of the surface under a ride round a circle, fixed when the ride begins: the end of a
         belt carries like a roller turning as fast as the belt does there.
-    bounds : Bounds
-        Where rides round circles end.
-    stop : ndarray, (N,)
+    everyone : ndarray, (k,)
+        Their numbers.
+    stop : ndarray, (k,)
         Age at which the run is over.
-    idle, crawls : ndarray, (N,)
+    idle, crawls : ndarray, (k,)
         Events in a row that took no time, and that went slowly to and fro between two obstacles.
+    rounds : int
+        Rounds so far.
+    ended : ndarray, (k,)
+        Why each ended, an index into `REASONS`.
     """
 
-    def __init__(self, machine: Machine) -> None:
-        count = machine.count
-        self.machine = machine
-        self.obstacles: Obstacles = obstacles(machine)
-        self.recorder = Recorder(count, machine.surfaces)
+    def __init__(self, world: World, first: int, last: int) -> None:
+        machine, count = world.machine, last - first
+        self.world, self.machine = world, machine
+        self.obstacles = world.obstacles.of(first, last)
+        self.origin = np.reshape(world.origin, (2, 1)) if any(world.origin) else None
+        self.journal = Journal(first, count)
         self.radius, self.mass = machine.particle.radius, machine.particle.mass
         self.gravity = machine.gravity
+        self.fall = np.array([[0.0], [-machine.gravity]])
         self.spins = machine.particle.inertia > 0.0
         self.share = DISK_SHARE if self.spins else 1.0
         start = machine.releases
-        self.released = start.t
-        self.age = np.zeros(count)
-        self.p, self.v, self.z = start.position.copy(), start.velocity.copy(), np.zeros(count)
-        self.mode = np.where(start.carried, Mode.CARRIED, Mode.FLIGHT).astype(np.int8)
-        self.on, self.left = np.full((2, count), NONE, dtype=np.int64)
-        self.side, self.left_side, self.order = np.zeros((3, count), dtype=np.int64)
-        self.slip, self.belt = np.ones(count), np.zeros(count)
-        self.bounds = Bounds.free(count)
-        self.stop = machine.end_time - start.t
+        self.released = start.t[first:last]
+        self.state = np.zeros((STATE, count))
+        self.age, self.p, self.v = self.state[0], self.state[1:3], self.state[3:5]
+        self.z, self.entries = self.state[5], self.state[6:]
+        self.everyone = np.arange(count)
+        self.p[:], self.v[:] = start.position[first:last].T, start.velocity[first:last].T
+        if self.origin is not None:
+            self.p -= self.origin
+        self.mode = np.where(start.carried[first:last], Mode.CARRIED, Mode.FLIGHT).astype(np.int8)
+        self.on, self.left = np.full((2, count), NONE)
+        self.order, self.idle, self.crawls = np.zeros((3, count), dtype=np.int64)
+        self.side, self.left_side, self.belt, self.slip = np.zeros((4, count))
+        self.slip += 1.0
+        self.stop = machine.end_time - self.released
         self.landed = np.zeros(count, dtype=bool)
-        self.idle, self.crawls = np.zeros((2, count), dtype=np.int64)
+        self.past: Past | None = None
+        if self.radius <= self.obstacles.touch:
+            self.past = Past(np.full(count, NONE), np.zeros(count), self.p.copy())
+        self.idling = self.crawling = False
+        self.ended = np.zeros(count, dtype=np.int8)
+        self.first, self.rounds = first, 0
+
+    @cached_property
+    def bounds(self) -> Bounds:
+        """Where rides round circles end."""
+        return Bounds.free(len(self.mode))
+
+    def hand_over(self, recorder: Recorder) -> None:
+        """Give all that was written down to the recorder."""
+        recorder.ended[self.first : self.first + len(self.ended)] = self.ended
+        self.journal.close(recorder)
 
     def count_idle(self, who: Ints, dt: Floats) -> None:
         """Count events in a row that take no time, and raise rather than hang if they never end."""
-        rounding = 4.0 * np.finfo(np.float64).eps * self.age[who]
-        self.idle[who] = np.where(dt > rounding, 0, self.idle[who] + 1)
-        if self.idle[who].max(initial=0) > 2 * COLLAPSE:
-            stuck = int(who[np.argmax(self.idle[who])])
-            raise RuntimeError(
-                f"exact engine: particle {stuck} makes no progress at t ="
-                f" {self.released[stuck] + self.age[stuck]:.6g} s, at {self.p[stuck].tolist()} m"
+        still = ~(dt > ROUNDING * self.age[who])
+        self.idling = bool(np.count_nonzero(still)) or (self.idling and bool(self.idle.any()))
+        if not self.idling:
+            return
+        self.idle[who] = np.where(still, self.idle[who] + 1, 0)
+        if self.idle[who].max() > 2 * COLLAPSE:
+            reason = (
+                f"{2 * COLLAPSE} events in a row took no time; look for surfaces that nearly"
+                " touch where it is, and join their ends or move them apart"
             )
+            raise self.stalled(int(who[np.argmax(self.idle[who])]), reason)
 
-    def active(self, first: Mode, last: Mode) -> Ints:
-        """Return the particles in one of the modes from `first` to `last`."""
-        return np.flatnonzero((self.mode >= first) & (self.mode <= last))
+    def stalled(self, particle: int, reason: str) -> StalledError:
+        """Say that a particle, numbered within the block, does not get on."""
+        t, x, y = self.now(np.array([particle]))[:3, 0].tolist()
+        return StalledError(self.first + particle, t, (x, y), reason)
+
+    def parties(self) -> list[tuple[int, Ints]]:
+        """Return the modes (but `DONE`) that particles are in now, and who is in each."""
+        count, mode = len(self.mode), int(self.mode[0])
+        if np.count_nonzero(self.mode == mode) == count:
+            return [(mode, self.everyone)] if mode != Mode.DONE else []
+        counts = np.bincount(self.mode).tolist()
+        return [
+            (mode, (self.mode == mode).nonzero()[0])
+            for mode, count in enumerate(counts)
+            if count and mode != Mode.DONE
+        ]
 
     def omega(self, who: Ints) -> Floats:
         """Angular velocities, rad/s."""
         return self.z[who] / self.radius if self.spins else np.zeros(len(who))
 
-    def contact(self, who: Ints, obstacle: Ints, side: Ints) -> Contact:
+    def contact(self, who: Ints, obstacle: Ints, side: Floats) -> Contact:
         """Return what a contact with an obstacle is like where the particles are now."""
         o = self.obstacles
-        normal = o.normal_at(who, obstacle, side, self.p[who])
-        row = np.zeros_like(who) if len(o.friction) == 1 else who
-        return Contact(
-            normal,
-            np.stack([normal[:, 1], -normal[:, 0]], axis=-1),
-            o.belt_speed(who, obstacle, normal),
-            o.friction[row, obstacle],
-            o.restitution[row, obstacle],
-            o.surface[obstacle],
-        )
+        normal = o.normal_at(who, obstacle, side, self.p)
+        tangent, material = along(normal), pick(o.material, who, obstacle)
+        belt = dot(material[:2], tangent)
+        if o.pulley_speed != 0.0:
+            belt[obstacle == o.pulley] = o.pulley_speed
+        return Contact(normal, tangent, belt, material[3], material[2], o.surface[obstacle])
+
+    def at(self, who: Ints) -> Ints | slice:
+        """Return what to assign by: a slice is several times as fast where it is everyone."""
+        return slice(None) if len(who) == len(self.mode) else who
+
+    def now(self, who: Ints) -> Floats:
+        """Return the particles as rows of a knot, (9, k)."""
+        everyone = len(who) == len(self.mode)
+        state = self.state.copy() if everyone else self.state.take(who, axis=1)
+        state[0] += self.released if everyone else self.released[who]
+        if self.origin is not None:
+            state[1:3] += self.origin
+        if self.spins:
+            state[5] /= self.radius
+        return state
 
     def knots(self, who: Ints) -> None:
         """Write a knot for each of the particles as they are now."""
         if len(who):
-            t = self.released[who] + self.age[who]
-            self.recorder.knots(who, t, self.p[who], self.v[who], self.omega(who))
+            self.journal.knots(who, self.now(who))
 
-    def event(
-        self,
-        kind: Kind | ArrayLike,
-        who: Ints,
-        surface: ArrayLike = NONE,
-        *,
-        velocity_before: Floats | None = None,
-        omega_before: Floats | None = None,
-        normal_impulse: ArrayLike = 0.0,
-        tangential_impulse: ArrayLike = 0.0,
-    ) -> None:
-        """Write an event for each of the particles as they are now."""
+    def event(self, kind: int | Ints, who: Ints, surface: int | Ints = NONE) -> None:
+        """Write an event for each of the particles as they are now, without an impulse."""
         if len(who):
-            self.recorder.events(
-                kind,
-                who,
-                self.released[who] + self.age[who],
-                self.p[who],
-                self.v[who],
-                self.omega(who),
-                velocity_before=velocity_before,
-                omega_before=omega_before,
-                surface=surface,
-                normal_impulse=normal_impulse,
-                tangential_impulse=tangential_impulse,
-            )
+            state = self.now(who)
+            self.journal.events(kind, who, surface, state, velocity=state[3:5], omega=state[5])
+
+    def book(
+        self,
+        who: Ints,
+        surface: Ints,
+        belt_work: ArrayLike = 0.0,
+        restitution_loss: ArrayLike = 0.0,
+        friction_loss: ArrayLike = 0.0,
+    ) -> None:
+        """Book ledger entries (J) on particles (k,), each once, and on the surfaces they met."""
+        if not len(who):
+            return
+        rows = np.empty((3, len(who)))
+        rows[0], rows[1], rows[2] = belt_work, restitution_loss, friction_loss
+        self.entries[:, self.at(who)] += rows
+        self.journal.book(who, surface, rows)
 
     def finish(self, who: Ints, reason: str) -> None:
         """End the tracks of the particles."""
         self.mode[who] = Mode.DONE
-        self.recorder.ended[who] = REASONS.index(reason)
+        self.ended[who] = REASONS.index(reason)
 
     def fly(self, who: Ints, left: ArrayLike, side: ArrayLike, order: ArrayLike) -> None:
         """Let the particles go, away from the obstacle they touched."""
-        self.mode[who] = Mode.FLIGHT
-        self.on[who], self.side[who], self.slip[who] = NONE, 0, 1.0
-        self.left[who], self.left_side[who], self.order[who] = left, side, order
+        at = self.at(who)
+        self.mode[at] = Mode.FLIGHT
+        self.on[at], self.side[at], self.slip[at] = NONE, 0.0, 1.0
+        self.left[at], self.left_side[at], self.order[at] = left, side, order
+
+    def part(self, who: Ints, surface: int | Ints) -> None:
+        """Tell that particles leave a surface."""
+        self.event(int(Kind.SEPARATION), who, surface)
 
     def weight_on(self, normal: Floats) -> Floats:
         """Component of gravity into a surface of that normal, m/s²."""
-        return np.asarray(self.gravity * normal[:, 1])
+        return np.asarray(self.gravity * normal[1])
 
     def weight_along(self, normal: Floats) -> Floats:
         """Component of gravity along (n_y, -n_x), m/s²."""
-        return np.asarray(self.gravity * normal[:, 0])
+        return np.asarray(self.gravity * normal[0])
 
-    def slip_of(self, who: Ints, contact: Contact) -> Floats:
-        """Slip of the contact point against the surface, (k,), m/s; exactly 0 below rounding."""
-        w = dot(self.v[who], contact.tangent)
-        slip = w + self.z[who] - contact.belt
-        scale = np.abs(w) + np.abs(self.z[who]) + np.abs(contact.belt)
-        return np.where(np.abs(slip) <= NO_SLIP * scale, 0.0, slip)
+    def slip_of(self, who: Ints, contact: Contact, w: Floats) -> Floats:
+        """Slip of the contact point against the surface at a pace w, (k,), m/s.
+
+        Exactly 0 below rounding.
+        """
+        slip, scale = w - contact.belt, np.abs(w) + np.abs(contact.belt)
+        if self.spins:
+            z = self.z[who]
+            slip, scale = w + z - contact.belt, scale + np.abs(z)
+        slip[np.abs(slip) <= NO_SLIP * scale] = 0.0
+        return slip
 
 
 COLLAPSE = 200
 """Contacts in a row that take no time after which a particle has come to rest in its corner. An
 elastic particle leaves a wedge of angle β after π/β of them."""
+
+ROUNDING = 4.0 * float_info.epsilon
+"""Share of its age that an event of a particle must take to count as progress."""
 
 NO_SLIP = 1e-13
 """Share of the speeds involved below which a slip is rounding."""

@@ -2,6 +2,7 @@
 
 - `parts`: `Machine`, its segments and its pulley.
 - `crossings`: what `chutelab check` says of surfaces that cross.
+- `clearance`: releases that overlap a surface.
 - `builder`: `build`, from a validated scene to a machine.
 """
 

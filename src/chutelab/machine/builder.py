@@ -6,13 +6,14 @@ the height of the outgoing belt, and that the lower end of the plate.
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import pairwise
 from math import ceil, cos, inf, radians, sin
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chutelab.machine.crossings import crossings
+from chutelab.machine.clearance import cleared
 from chutelab.machine.parts import Machine, Pulley, Segments
 from chutelab.nominal import Discharge, discharge, plate_hit
 from chutelab.recording import Particle
@@ -21,8 +22,6 @@ from chutelab.scene import Fault, SceneError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-    from numpy.typing import NDArray
 
     from chutelab.scene import Scene
 
@@ -43,8 +42,8 @@ def build(scene: Scene) -> Machine:
     ------
     SceneError
         If the geometry contradicts itself: the nominal flight misses the plate whose impact should
-        place the outgoing belt, the impact lies off the finite plate, or interacting particles
-        cannot be released without overlap.
+        place the outgoing belt, the impact lies off the finite plate, a particle starts inside a
+        surface, or interacting particles cannot be released without overlap.
     """
     builder = _Builder(scene)
     start = discharge(scene)
@@ -112,35 +111,30 @@ class _Builder:
         if plate is None:
             return height
         alpha = radians(plate.angle_deg)
-        up = np.array([-sin(alpha), cos(alpha)])
-        pivot = np.array([top + plate.distance, float(plate.pivot_height or 0.0)])
+        x, y = top + plate.distance, float(plate.pivot_height or 0.0)
         if plate.below is not None:
             below = plate.below
         elif height is None:
             below = REACH_WITHOUT_BELT
         else:
-            below = max(0.0, (pivot[1] - height - max(CLEARANCE, CLEARANCE_RADII * r)) / cos(alpha))
-        low, high = pivot - below * up, pivot + plate.above * up
+            below = max(0.0, (y - height - max(CLEARANCE, CLEARANCE_RADII * r)) / cos(alpha))
         if below + plate.above <= 0.0:
             raise self._fault("plate.above", plate.above, "above + below must be more than 0 m")
         # Upwards, so that the struck face (-cos α, -sin α) lies to the left of the tangent.
-        self.add("plate", [tuple(low), tuple(high)], 0.0, plate.restitution, plate.friction)
-        self._check_hit(hit, pivot, up, below)
-        return height
-
-    def _check_hit(
-        self,
-        hit: NDArray[np.float64] | None,
-        pivot: NDArray[np.float64],
-        up: NDArray[np.float64],
-        below: float,
-    ) -> None:
-        scene = self.scene
-        assert scene.plate is not None
+        low, high = (
+            (x - reach * sin(alpha), y + reach * cos(alpha)) for reach in (-below, plate.above)
+        )
+        self.add("plate", [low, high], 0.0, plate.restitution, plate.friction)
         if hit is None:
             self.warnings.append("plate: the nominal particle never meets the plate's line")
-            return
-        along = float((hit - pivot) @ up)
+        else:
+            self._check_hit((y - hit[1]) * -cos(alpha) + (x - hit[0]) * sin(alpha), below)
+        return height
+
+    def _check_hit(self, along: float, below: float) -> None:
+        """Look whether a hit that far above the pivot, m, is on the plate."""
+        scene = self.scene
+        assert scene.plate is not None
         if -below <= along <= scene.plate.above:
             return
         where = (
@@ -164,9 +158,10 @@ class _Builder:
 
     def machine(self) -> Machine:
         scene = self.scene
-        rows = np.array(self.rows, dtype=np.float64).reshape(-1, 7)
-        along = rows[:, 2:4] - rows[:, 0:2]
-        length = np.hypot(along[:, 0], along[:, 1])
+        columns = np.array(self.rows, dtype=np.float64).reshape(-1, 7).T.copy()
+        speed, restitution, friction = columns[4:]
+        along = columns[2:4] - columns[0:2]
+        length = np.hypot(along[0], along[1])
         particle = Particle(
             radius=scene.particle.radius,
             mass=scene.particle.mass,
@@ -179,24 +174,22 @@ class _Builder:
             belt = scene.incoming
             grip = inf if belt.friction == "adhesion" else float(belt.friction)
             pulley = Pulley(belt.pulley_radius, belt.speed, grip, belt.restitution, 0)
-        radius = pulley.radius if pulley is not None else None
-        warnings = self.warnings + crossings(self.names, rows[:, :4], self.owner, radius)
-        releases = draw(scene)
+        releases = cleared(scene, draw(scene), self.rows, self.owner, self.names)
         bound = float(releases.t[-1]) + scene.run.max_time
         until = scene.run.until
         return Machine(
             title=scene.title,
-            scene=scene.model_dump_json(by_alias=True),
+            text=partial(scene.model_dump_json, by_alias=True),
             surfaces=tuple(self.names),
             gravity=scene.gravity,
             particle=particle,
             segments=Segments(
-                start=rows[:, 0:2].copy(),
-                tangent=along / length[:, None],
+                start=columns[0:2].T,
+                tangent=(along / length).T,
                 length=length,
-                speed=rows[:, 4].copy(),
-                restitution=rows[:, 5].copy(),
-                friction=rows[:, 6].copy(),
+                speed=speed,
+                restitution=restitution,
+                friction=friction,
                 surface=np.array(self.owner, dtype=np.int64),
             ),
             pulley=pulley,
@@ -210,5 +203,5 @@ class _Builder:
             pair_restitution=scene.stream.restitution,
             pair_friction=scene.stream.friction,
             engine=scene.run.engine,
-            warnings=tuple(warnings),
+            plate_warnings=tuple(self.warnings),
         )

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import inf
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from chutelab.machine.crossings import crossings
+
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from chutelab.recording import Particle
@@ -81,8 +86,10 @@ class Machine:
 
     Attributes
     ----------
-    title, scene : str
-        Title and canonical JSON of the scene, passed on to the recording.
+    title : str
+        Of the scene, passed on to the recording.
+    text : callable
+        Writes the scene as canonical JSON, for `scene`.
     surfaces : tuple of str
         Names; several segments, or a segment and the pulley, may share one.
     gravity : float
@@ -111,12 +118,12 @@ class Machine:
         Of two particles.
     engine : {"auto", "exact", "pymunk"}
         What the scene asks for.
-    warnings : tuple of str
-        What `chutelab check` tells about a machine that works but may surprise.
+    plate_warnings : tuple of str
+        What is to be said of a nominal particle that misses the plate.
     """
 
     title: str
-    scene: str
+    text: Callable[[], str]
     surfaces: tuple[str, ...]
     gravity: float
     particle: Particle
@@ -132,12 +139,25 @@ class Machine:
     pair_restitution: float
     pair_friction: float
     engine: str
-    warnings: tuple[str, ...]
+    plate_warnings: tuple[str, ...]
 
     @property
     def count(self) -> int:
         """Number of particles."""
         return len(self.releases.t)
+
+    @cached_property
+    def scene(self) -> str:
+        """The scene in canonical JSON."""
+        return self.text()
+
+    @cached_property
+    def warnings(self) -> tuple[str, ...]:
+        """What `chutelab check` tells about a machine that works but may surprise."""
+        ends = np.concatenate([self.segments.start, self.segments.end], axis=-1)
+        radius = self.pulley.radius if self.pulley is not None else None
+        owner = self.segments.surface.tolist()
+        return (*self.plate_warnings, *crossings(self.surfaces, ends, owner, radius))
 
     @property
     def exit_box(self) -> tuple[float, float, float, float]:
@@ -145,13 +165,17 @@ class Machine:
 
         With gravity only the bottom is finite: what flies up comes back.
         """
-        ends = np.concatenate([self.segments.start, self.segments.end], axis=-2).reshape(-1, 2)
-        if self.pulley is not None:
-            corner = np.full(2, self.pulley.radius)
-            ends = np.concatenate([ends, [-corner, corner]])
-        if not len(ends):
-            ends = self.releases.position
-        low, high = ends.min(axis=0) - EXIT_MARGIN, ends.max(axis=0) + EXIT_MARGIN
+        start, end = self.segments.start, self.segments.end
+        if not start.size:
+            start = end = self.releases.position
+        wheel = self.pulley.radius if self.pulley is not None else -inf
+        (left, right), (bottom, top) = (
+            (
+                min(float(start[..., axis].min()), float(end[..., axis].min()), -wheel),
+                max(float(start[..., axis].max()), float(end[..., axis].max()), wheel),
+            )
+            for axis in (0, 1)
+        )
         if self.gravity > 0.0:
-            return -inf, inf, float(low[1]), inf
-        return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+            return -inf, inf, bottom - EXIT_MARGIN, inf
+        return left - EXIT_MARGIN, right + EXIT_MARGIN, bottom - EXIT_MARGIN, top + EXIT_MARGIN

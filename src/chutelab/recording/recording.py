@@ -15,12 +15,31 @@ import numpy as np
 from chutelab.recording.tracks import COLUMNS, blocks, energies, hermite
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Callable, Collection
     from pathlib import Path
 
     from numpy.typing import ArrayLike, NDArray
 
     from chutelab.recording.layout import Floats, Ints, Kind, Particle
+
+
+class _Text:
+    """A text field that may be given as a function, which is called when the text is asked for."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.key = f"_{name}"
+
+    def __get__(self, instance: object | None, owner: type) -> str:
+        if instance is None:
+            # So that the field has no default.
+            raise AttributeError(self.key)
+        text: str | Callable[[], str] = vars(instance)[self.key]
+        if not isinstance(text, str):
+            vars(instance)[self.key] = text = text()
+        return text
+
+    def __set__(self, instance: object, value: str | Callable[[], str]) -> None:
+        vars(instance)[self.key] = value
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +49,8 @@ class Recording:
     Attributes
     ----------
     scene : str
-        The scene in canonical JSON, as `Scene.model_dump_json` writes it.
+        The scene in canonical JSON, as `Scene.model_dump_json` writes it; an engine may give a
+        function instead, so that it is written only when somebody asks.
     title, engine : str
         The scene's title; ``"exact"`` or ``"pymunk"``.
     particle : Particle
@@ -47,7 +67,7 @@ class Recording:
     ended : ndarray, shape (N,)
         Indices into `REASONS`.
     events : ndarray, shape (E,), dtype `EVENT`
-        Sorted by time.
+        Sorted by time; at one time by particle, and of one particle as they came.
     by_surface : ndarray, shape (len(surfaces), 3)
         Ledger entries (J) of each surface, summed over particles.
     steps : int
@@ -58,7 +78,10 @@ class Recording:
         Wall time from the validated scene to the recording.
     """
 
-    scene: str
+    if TYPE_CHECKING:
+        scene: str
+    else:
+        scene: _Text = _Text()
     title: str
     engine: str
     particle: Particle

@@ -1,0 +1,158 @@
+"""What a block of particles leaves behind while it runs: knots, events, bookings.
+
+Everything is kept in the order in which it came, and put into the order of the particles once, when
+the block is through. So nothing depends on which particles share a block.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chutelab.recording import EVENT, KNOT
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from chutelab.exact.obstacles import Floats, Ints
+    from chutelab.recorder import Recorder
+
+STATE = 9
+"""Rows of a state: the columns of a knot, namely time, position, velocity, ω, ledger entries."""
+
+
+MANY = 1000
+"""Chunks that are joined into one: a long run of one particle consists of small ones."""
+
+
+class Journal:
+    """Grows by chunks, whose last axis is the particles.
+
+    Parameters
+    ----------
+    first, count : int
+        The block's particles: numbered from 0 here, from `first` on in the recording.
+    """
+
+    def __init__(self, first: int, count: int) -> None:
+        self.first, self.count = first, count
+        self.contacts = 0
+        self._knots: list[tuple[Ints, Floats]] = []
+        self._events: list[tuple[Ints, dict[str, ArrayLike]]] = []
+        self._books: list[tuple[Ints, Floats, Ints]] = []
+        # The same, joined.
+        self._old_knots: list[tuple[Ints, Floats]] = []
+        self._old_events: list[NDArray[Any]] = []
+        self._old_books: list[tuple[Ints, Floats, Ints]] = []
+
+    def knots(self, who: Ints, state: Floats) -> None:
+        """Add a knot for each of the particles; `state` (9, k) is kept, not copied."""
+        self._knots.append((who, state))
+        if len(self._knots) >= MANY:
+            self._old_knots.append((_joined(self._knots, 0), _joined(self._knots, 1)))
+            self._knots.clear()
+
+    def events(
+        self,
+        kind: int | Ints,
+        who: Ints,
+        surface: int | Ints,
+        state: Floats,
+        *,
+        velocity: Floats,
+        omega: Floats,
+        normal: ArrayLike = 0.0,
+        tangential: ArrayLike = 0.0,
+    ) -> None:
+        """Add an event for each of the particles, with velocity (2, k) and ω before it."""
+        if not len(who):
+            return
+        values: dict[str, ArrayLike] = {
+            "kind": kind,
+            "surface": surface,
+            "t": state[0],
+            "position": state[1:3].T,
+            "velocity_before": velocity.T,
+            "velocity_after": state[3:5].T,
+            "omega_before": omega,
+            "omega_after": state[5],
+            "normal_impulse": normal,
+            "tangential_impulse": tangential,
+        }
+        self._events.append((who, values))
+        if len(self._events) >= MANY:
+            self._old_events.append(self._laid_out())
+            self._events.clear()
+
+    def book(self, who: Ints, surface: Ints, entries: Floats) -> None:
+        """Note ledger entries (3, k), J, on surfaces."""
+        self._books.append((who, entries, surface))
+        if len(self._books) >= MANY:
+            who, entries, surface = (_joined(self._books, n) for n in range(3))
+            self._old_books.append((who, entries, surface))
+            self._books.clear()
+
+    def close(self, recorder: Recorder) -> None:
+        """Hand everything over."""
+        recorder.contacts += self.contacts
+        knots, books = self._old_knots + self._knots, self._old_books + self._books
+        if knots:
+            rows, sizes = self._tracks(knots)
+            recorder.tracks(self.first, sizes, rows.view(KNOT)[:, 0])
+        for events in self._old_events:
+            recorder.tell(events)
+        if self._events:
+            recorder.tell(self._laid_out())
+        if books:
+            owner, entries, surface = (_joined(books, n) for n in range(3))
+            if self.count > 1:
+                order = _by_particle(owner)
+                surface, entries = surface[order], entries[:, order]
+            for column, row in enumerate(entries):
+                # One after the other, not pairwise: the sum does not depend on the blocks.
+                np.add.at(recorder.by_surface[:, column], surface, row)
+
+    def _laid_out(self) -> NDArray[Any]:
+        """Return the events, chunk by chunk, (E,)."""
+        events, begin = np.empty(sum(len(who) for who, _ in self._events), dtype=EVENT), 0
+        events["other"] = -1
+        for who, values in self._events:
+            chunk = events[begin : begin + len(who)]
+            chunk["particle"] = who + self.first
+            for name, value in values.items():
+                chunk[name] = value
+            begin += len(who)
+        return events
+
+    def _tracks(self, knots: list[tuple[Ints, Floats]]) -> tuple[Floats, Ints]:
+        """Return knots, particle by particle, (K, 9), and how many each has, (count,)."""
+        each, count = len(knots), self.count
+        if not self._old_knots and all(len(who) == count for who, _ in knots):
+            # Everybody in every chunk.
+            rows = np.empty((count, each, STATE))
+            for n, (_, state) in enumerate(knots):
+                rows[:, n] = state.T
+            return rows.reshape(-1, STATE), np.full(count, each)
+        owner = _joined(knots, 0)
+        order = _by_particle(owner)
+        place = np.empty_like(order)
+        place[order] = np.arange(len(order))
+        rows, begin = np.empty((len(owner), STATE)), 0
+        for who, state in knots:
+            rows[place[begin : begin + len(who)]] = state.T
+            begin += len(who)
+        return rows, np.bincount(owner, minlength=count)
+
+
+def _joined(chunks: Sequence[tuple[Any, ...]], part: int) -> NDArray[Any]:
+    """Join one part of each chunk along the particles."""
+    return np.concatenate([chunk[part] for chunk in chunks], axis=-1)
+
+
+def _by_particle(owner: Ints) -> Ints:
+    """Return the order of the particles, and for each one that in which its entries came."""
+    # 16-bit integers are sorted by radix, in linear time.
+    return np.argsort(owner.astype(np.int16), kind="stable")

@@ -30,11 +30,11 @@ draws = st.fixed_dictionaries(
 )
 
 
-def scene_of(draw, *, outgoing=True, max_time=30.0, dt=1e-3):
+def scene_of(draw, *, outgoing=True, max_time=30.0, dt=1e-3, align=True):
     return scene.from_dict(
         {
             "gravity": GRAVITY,
-            "run": {"max_time": max_time, "dt": dt},
+            "run": {"max_time": max_time, "dt": dt, "align": align},
             "particle": {"radius": draw["radius"]},
             "incoming": {"speed": draw["speed"], "pulley_radius": draw["pulley_radius"]},
             "plate": {
@@ -152,9 +152,121 @@ def test_exact_agrees_with_the_closed_form_on_a_thousand_random_scenes():
 
 stepped_draws = draws.map(lambda d: {**d, "radius": max(d["radius"], 0.002)})
 
+STEPS = (1 / 60, 1e-2, 1e-3, 1e-4)
 
-@pytest.mark.parametrize(("dt", "examples"), [(1e-3, 150), (1e-4, 15)])
-def test_pymunk_agrees_with_exact_to_the_way_of_three_steps(dt, examples):
+CARRIED = (
+    "perpendicular", "perpendicular-fast", "inclined-20", "inclined-40", "inclined-60", "low-speed",
+)  # fmt: skip
+
+
+def apart(mine, its, what, scale):
+    """Largest difference of two lists of events, as a share of a scale."""
+    return float(np.abs(mine[what] - its[what]).max() / scale)
+
+
+@pytest.mark.parametrize("name", CARRIED)
+@pytest.mark.parametrize("dt", STEPS)
+def test_pymunk_tells_the_story_of_a_shipped_scene_as_exact_does(name, dt):
+    built = machine.build(scene.load(scene.find(name), [f"run.dt={dt}"]))
+    recording, stepped = exact.run(built), stepper.run(built)
+    mine, its = recording.events, stepped.events
+    assert its["kind"].tolist() == mine["kind"].tolist()
+    assert its["surface"].tolist() == mine["surface"].tolist()
+    speed = np.hypot(*recording.track(0)["velocity"].T).max()
+    for what, scale in (
+        ("t", mine["t"][-1]),
+        ("position", 1.0),
+        ("velocity_before", speed),
+        ("velocity_after", speed),
+        ("normal_impulse", recording.particle.mass * speed),
+        ("tangential_impulse", recording.particle.mass * speed),
+    ):
+        assert apart(mine, its, what, scale) < 1e-14, what
+    energy = recording.particle.mass * speed**2
+    assert stepped.by_surface == pytest.approx(recording.by_surface, abs=1e-14 * energy)
+    ends = [one.track(0)[-1] for one in (recording, stepped)]
+    assert ends[1]["position"] == pytest.approx(ends[0]["position"], abs=1e-14)
+    assert ends[1]["entries"] == pytest.approx(ends[0]["entries"], abs=1e-14 * energy)
+    # What is not stepped does not depend on the step.
+    assert stepped.steps == 2
+
+
+@pytest.mark.parametrize(
+    "held",
+    [
+        True,
+        pytest.param(
+            False,
+            marks=pytest.mark.xfail(
+                reason="at the very top it lies down on the end of the belt it leaves", strict=True
+            ),
+        ),
+    ],
+    ids=["rides round the pulley", "separates at the top"],
+)
+def test_pymunk_agrees_with_exact_at_any_step(held):
+    tally = Counter()
+
+    @settings(max_examples=60, suppress_health_check=list(HealthCheck), phases=[Phase.generate])
+    @given(stepped_draws, st.sampled_from(STEPS))
+    def one(draw, dt):
+        rho = draw["pulley_radius"] + draw["radius"]
+        if held:
+            draw = {**draw, "speed": 0.95 * min(draw["speed"] / 6.0, 1.0) * (GRAVITY * rho) ** 0.5}
+        else:
+            assume(draw["speed"] ** 2 > 1.001 * GRAVITY * rho)
+        built = built_or_none(scene_of(draw, max_time=1.0 / draw["speed"] + 4.0, dt=dt))
+        assume(built is not None)
+        recording = exact.run(built)
+        assume(contacts_of(recording) == ["plate", "outgoing"])
+        (hit,), (land,) = (recording.select(k) for k in (Kind.IMPACT, Kind.LANDING))
+        # What rebounds more slowly than a step of gravity comes to rest; and steps are shorter
+        # than √(2.5e-3 r/g), which takes 0.022 m/s from 2 cm.
+        assume(hit["velocity_after"] @ plate_normal(recording) > 0.03)
+        stepped = stepper.run(built)
+        assert contacts_of(stepped) == ["plate", "outgoing"]
+        speed = np.hypot(*recording.track(0)["velocity"].T).max()
+        mine, its = (r.select(Kind.IMPACT, Kind.LANDING) for r in (recording, stepped))
+        worst = max(
+            apart(mine, its, what, scale)
+            for what, scale in (
+                ("t", land["t"]),
+                ("position", 1.0),
+                ("velocity_before", speed),
+                ("velocity_after", speed),
+                ("normal_impulse", recording.particle.mass * speed),
+                ("tangential_impulse", recording.particle.mass * speed),
+            )
+        )
+        books = np.abs(stepped.by_surface - recording.by_surface).max()
+        worst = max(worst, books / (recording.particle.mass * speed**2))
+        assert worst < 1e-11, (draw, dt, worst)
+        tally["compared"] += 1
+
+    one()
+    assert tally["compared"] >= 20, tally
+
+
+@pytest.mark.xfail(
+    reason="laid a hair into the plate, it strikes the plate's lower corner", strict=True
+)
+@pytest.mark.parametrize("dt", STEPS)
+def test_pymunk_falls_freely_along_a_plate_that_takes_all(dt):
+    # Nothing presses it on an upright plate, so there is nothing to step on the way down.
+    draw = {
+        "speed": 1.9, "pulley_radius": 0.03, "angle_deg": 0.0, "restitution": 0.0, "radius": 0.002,
+        "distance": 0.1,
+    }  # fmt: skip
+    built = machine.build(scene_of(draw, max_time=3.0, dt=dt))
+    recording, stepped = exact.run(built), stepper.run(built)
+    assert contacts_of(recording) == contacts_of(stepped) == ["plate", "outgoing"]
+    for what in ("t", "position", "velocity_after"):
+        mine, its = (r.select(Kind.LANDING)[what] for r in (recording, stepped))
+        assert its == pytest.approx(mine, abs=1e-8), what
+
+
+@pytest.mark.parametrize(("dt", "examples"), [(1e-3, 60), (1e-4, 6)])
+def test_pymunk_with_fixed_steps_agrees_with_exact_to_the_way_of_three(dt, examples):
     tally = Counter()
 
     @settings(
@@ -162,7 +274,7 @@ def test_pymunk_agrees_with_exact_to_the_way_of_three_steps(dt, examples):
     )
     @given(stepped_draws)
     def one(draw):
-        drawn = scene_of(draw, max_time=3.0, dt=dt)
+        drawn = scene_of(draw, max_time=3.0, dt=dt, align=False)
         built = built_or_none(drawn)
         assume(built is not None)
         recording = exact.run(built)
@@ -177,9 +289,11 @@ def test_pymunk_agrees_with_exact_to_the_way_of_three_steps(dt, examples):
         assert surfaces_met(stepped) == surfaces_met(recording)
         for kind in (Kind.IMPACT, Kind.LANDING):
             mine, its = recording.select(kind)[0], stepped.select(kind)[0]
-            apart = np.abs(mine["position"] - its["position"])
-            assert apart[1 if kind is Kind.IMPACT else 0] <= way, (draw, apart, way)
+            off = np.abs(mine["position"] - its["position"])
+            assert off[1 if kind is Kind.IMPACT else 0] <= way, (draw, off, way)
+            tally["late"] += bool(off.max() > 1e-3 * way)
         tally["compared"] += 1
 
     one()
     assert tally["compared"] >= 0.2 * examples
+    assert tally["late"] >= tally["compared"]  # plain steps they are

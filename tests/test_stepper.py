@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from math import acos, cos, hypot, radians, sin, sqrt
 
@@ -27,7 +28,7 @@ def shipped(name, *overrides):
     return run(build(load(find(name), overrides)))
 
 
-def lone(at, velocity, until, *, surface="", spin=False, more=""):
+def lone(at, velocity, until, *, surface="", spin=False):
     return simulated(
         f"""
 [particle]
@@ -35,7 +36,6 @@ spin = {str(spin).lower()}
 [stream]
 at = [{at[0]}, {at[1]}]
 velocity = [{velocity[0]}, {velocity[1]}]
-{more}
 [run]
 until = {until}
 {surface}
@@ -108,9 +108,9 @@ def test_free_flight_is_the_parabola(vx, vy, end):
     assert relative_residual(recording) < 1e-12
 
 
-@settings(max_examples=40)
+@settings(max_examples=60)
 @given(
-    restitution=st.floats(0.05, 1.0),
+    restitution=st.one_of(st.just(0.0), st.floats(0.05, 1.0)),
     friction=st.floats(0.0, 1.5),
     speed=st.floats(-3.0, 3.0),
     vx=st.floats(-3.0, 3.0),
@@ -232,22 +232,23 @@ def test_oblique_disks_keep_momentum_and_turn(offset, friction, spin):
 def test_a_belt_pays_for_the_speed_it_gives(spin, speed, work, heat):
     recording = lone((0.0, R), (0.0, 0.0), 3.0, surface=floor(friction=0.3, speed=speed), spin=spin)
     books = ledger(recording)
-    assert books.belt_work == pytest.approx(work, rel=1e-5)
-    assert books.friction_loss == pytest.approx(heat, rel=1e-5)
+    assert books.belt_work == pytest.approx(work, rel=1e-12)
+    assert books.friction_loss == pytest.approx(heat, rel=1e-12)
     assert recording.track(0)[-1]["velocity"][0] == pytest.approx(
-        speed / 3.0 if spin else speed, rel=1e-9
+        speed / 3.0 if spin else speed, rel=1e-12
     )
-    assert books.relative_residual < 2e-5
+    # It lies a hair lower than it touched: 5e-6 of r, and half a step's gravity to get there.
+    assert books.relative_residual < 1e-5
 
 
 def test_a_slide_stops_where_friction_says():
-    # v² / (2 µ g), to a step's worth of way.
+    # v² / (2 µ g); a hair deep.
     recording = lone((0.0, R), (1.0, 0.0), '"settled"', surface=floor(friction=0.2))
     end = recording.track(0)[-1]
-    assert end["position"][0] == pytest.approx(1.0 / (2.0 * 0.2 * G), abs=2e-3)
-    assert end["position"][1] == pytest.approx(R, abs=1e-3 * R)
+    assert end["position"][0] == pytest.approx(1.0 / (2.0 * 0.2 * G), abs=1e-6)
+    assert end["position"][1] == pytest.approx(R, abs=1e-5 * R)
     assert REASONS[recording.ended[0]] == "settled"
-    assert len(recording.track(0)) < 12
+    assert len(recording.track(0)) < 10
 
 
 def test_bounces_come_to_rest_in_the_time_of_the_closed_form():
@@ -258,8 +259,8 @@ def test_bounces_come_to_rest_in_the_time_of_the_closed_form():
     down = sqrt(2.0 * fall / G)
     # Down once, then 2 ε^n times as long for every further bounce; a few steps of rest at the end.
     total = down * (1.0 + 2.0 * restitution / (1.0 - restitution))
-    assert recording.track(0)[-1]["t"] == pytest.approx(total, abs=0.03)
-    assert ledger(recording).restitution_loss == pytest.approx(M * G * fall, rel=1e-4)
+    assert recording.track(0)[-1]["t"] == pytest.approx(total, abs=5e-3)
+    assert ledger(recording).restitution_loss == pytest.approx(M * G * fall, rel=2e-5)
 
 
 def test_adhesion_lets_go_at_the_critical_angle():
@@ -284,16 +285,74 @@ def test_adhesion_lets_go_at_the_critical_angle():
     )
 
 
-@pytest.mark.parametrize(
-    ("spin", "friction", "degrees"),
-    # The slip law, and a disk that rolls until it leaves: adhesion would say 36.0°.
-    [("false", "0.5", 22.913), ("true", "1e6", np.degrees(acos((3 * 4 / (G * 0.504) + 4) / 7)))],
-)
-def test_friction_lets_go_where_the_slip_law_says(spin, friction, degrees):
-    recording = shipped("slip", f"incoming.friction={friction}", f"particle.spin={spin}")
+def slip_law(friction, *, spin, speed=2.0, radius=0.5, pieces=20000):
+    """Angle at which a disk leaves a pulley that grips with Coulomb friction, in degrees.
+
+    With y = v²/(g ρ): held, y stays (not turning) or grows by 4/3 sin φ dφ (rolling), and holding
+    takes a friction of m g sin φ, or a third of it; as soon as that is more than the µ m g
+    (cos φ - y) there is, it slips, and y grows by 2 (sin φ - µ (cos φ - y)) dφ. It leaves at
+    cos φ = y.
+    """
+    y, held, step = speed**2 / (G * (radius + R)), True, 1.0 / pieces
+    share, gain = (1.0 / 3.0, 4.0 / 3.0) if spin else (1.0, 0.0)
+
+    def slope(phi, y):
+        return gain * sin(phi) if held else 2.0 * (sin(phi) - friction * (cos(phi) - y))
+
+    phi = 0.0
+    while cos(phi) > y:
+        held = held and share * sin(phi) <= friction * (cos(phi) - y)
+        middle = y + 0.5 * step * slope(phi, y)
+        last, y, phi = (phi, y), y + step * slope(phi + 0.5 * step, middle), phi + step
+    # The last piece, straight.
+    over, under = y - cos(phi), cos(last[0]) - last[1]
+    return np.degrees(last[0] + step * under / (under + over))
+
+
+def angle_of_separation(*overrides):
+    recording = shipped("slip", *overrides)
     away = recording.first(recording.select(Kind.SEPARATION))[0]
-    # Two steps' worth of way: 2 dt v/ρ.
-    assert np.degrees(np.arctan2(*away["position"])) == pytest.approx(degrees, abs=0.47)
+    return np.degrees(np.arctan2(*away["position"]))
+
+
+def test_the_slip_law_is_the_one_of_the_design():
+    assert slip_law(0.5, spin=False) == pytest.approx(22.913, abs=5e-4)
+    # A disk that rolls until it leaves: cos φ = (3 v²/(g ρ) + 4) / 7.
+    rolls = np.degrees(acos((3.0 * 4.0 / (G * 0.504) + 4.0) / 7.0))
+    assert slip_law(1e9, spin=True) == pytest.approx(rolls, abs=5e-4)
+
+
+@pytest.mark.parametrize(
+    ("spin", "friction"),
+    [
+        (False, 0.5),
+        (True, 0.5),
+        pytest.param(
+            True,
+            1e6,
+            marks=pytest.mark.xfail(
+                reason="a separation is told at a step, not between two", strict=True
+            ),
+        ),
+    ],
+)
+def test_friction_lets_go_where_the_slip_law_says(spin, friction):
+    found = angle_of_separation(
+        f"incoming.friction={friction}", f"particle.spin={str(spin).lower()}"
+    )
+    assert found == pytest.approx(slip_law(friction, spin=spin), abs=0.05)
+
+
+@pytest.mark.parametrize(("spin", "friction"), [(False, 0.5), (True, 0.5), (True, 1e6)])
+@pytest.mark.parametrize("dt", [1 / 60, 0.99e-3, 1.003e-3, 5e-4, 2e-4])
+def test_the_slip_law_holds_wherever_the_steps_fall(spin, friction, dt):
+    found = angle_of_separation(
+        f"incoming.friction={friction}", f"particle.spin={str(spin).lower()}", f"run.dt={dt}"
+    )
+    # A separation is told at a step, so this scatters over the way of one.
+    # Gravity must not sink a disk by more than 2.5e-3 r in one: coarser steps are shortened.
+    way = np.degrees(2.14 * min(dt, sqrt(2.5e-3 * R / G)) / (0.5 + R))
+    assert found == pytest.approx(slip_law(friction, spin=spin), abs=0.75 * way)
 
 
 @pytest.mark.parametrize("dt", [1e-3, 1e-4])
@@ -311,9 +370,19 @@ def test_a_transfer_lands_where_the_parabolas_meet(dt):
     assert recording.contacts == 2
 
 
-@pytest.mark.parametrize("name", ["perpendicular", "belt-landing", "slip", "free-fall", "stream"])
+BOOKS = {
+    "perpendicular": 1e-15,
+    "belt-landing": 1e-6,
+    "slip": 1e-6,
+    "free-fall": 1e-6,
+    "stream": 2e-5,
+}
+
+
+@pytest.mark.parametrize("name", BOOKS)
 def test_the_ledger_closes(name):
-    assert relative_residual(shipped(name)) < {"stream": 2e-4}.get(name, 1e-5)
+    few = ["stream.count=80"] if name == "stream" else []
+    assert relative_residual(shipped(name, *few)) < BOOKS[name]
 
 
 def test_a_wrong_end_velocity_moves_the_residual():
@@ -326,11 +395,11 @@ def test_a_wrong_end_velocity_moves_the_residual():
 
 
 def test_a_stream_meets_itself_and_settles():
-    recording = shipped("stream")
+    recording = shipped("stream", "stream.count=80")
     assert len(recording.select(Kind.COLLISION)) >= 100
     assert recording.contacts >= len(recording.select(Kind.COLLISION))
     assert {REASONS[i] for i in recording.ended} <= {"settled", "exit"}
-    assert np.count_nonzero(recording.ended == REASONS.index("settled")) > 150
+    assert np.count_nonzero(recording.ended == REASONS.index("settled")) > 60
     books = ledger(recording).by_surface["particles"]
     assert books["restitution_loss"] > 0.0
     assert books["friction_loss"] > 0.0
@@ -341,7 +410,7 @@ def test_a_stream_meets_itself_and_settles():
 
 @pytest.mark.parametrize("name", ["stream", "belt-landing"])
 def test_two_runs_agree_to_the_bit(name):
-    few = ["stream.count=60"] if name == "stream" else []
+    few = ["stream.count=20"] if name == "stream" else []
     a, b = shipped(name, *few), shipped(name, *few)
     assert a.knots.tobytes() == b.knots.tobytes()
     assert a.events.tobytes() == b.events.tobytes()
@@ -384,7 +453,7 @@ until = 0.6
 """
     )
     hit = recording.select(Kind.IMPACT, surface="scraper")[0]
-    assert hit["t"] == pytest.approx(0.5 - R, abs=2e-3)
+    assert hit["t"] == pytest.approx(0.5 - R, abs=1e-12)
     assert hit["velocity_after"][0] == pytest.approx(-0.5, abs=1e-9)
 
 
@@ -445,11 +514,168 @@ def test_a_mass_point_is_refused():
         run(machine)
 
 
-def test_a_surface_is_thick_enough_for_the_promised_speed():
+def test_with_fixed_steps_a_surface_is_thick_enough_for_the_promised_speed():
     # v dt just below r + half the thickness: met, not passed, wherever the step falls.
     v = 0.95 * (R + HALF_THICKNESS) / 1e-3
     for shift in np.linspace(0.0, v * 1e-3, 7):
         recording = lone(
-            (0.0, 0.2 + shift), (0.0, -v), 0.1, surface=floor(restitution=1.0), more=""
+            (0.0, 0.2 + shift), (0.0, -v), "0.1\nalign = false", surface=floor(restitution=1.0)
         )
         assert len(recording.select(Kind.IMPACT)) == 1
+
+
+@pytest.mark.parametrize("dt", [1 / 60, 1e-3])
+@pytest.mark.parametrize("speed", [20.0, 200.0, 2000.0])
+@pytest.mark.parametrize("lean", [0.0, 40.0, -70.0])
+def test_nothing_is_too_fast_to_be_stopped(dt, speed, lean):
+    # r = 2 mm against a plate 1 m away, whose normal leans by an angle; without gravity.
+    r, a = 0.002, radians(lean)
+    recording = simulated(
+        f"""
+gravity = 0.0
+[particle]
+radius = {r}
+[stream]
+at = [-1.0, 0.0]
+velocity = [{speed}, 0.0]
+[run]
+until = {1.5 / speed}
+dt = {dt}
+[[surface]]
+name = "wall"
+from = [{-sin(a)}, {-cos(a)}]
+to = [{sin(a)}, {cos(a)}]
+restitution = 0.5
+friction = 0.0
+"""
+    )
+    (hit,) = recording.select(Kind.IMPACT)
+    way = 1.0 - r / cos(a)
+    assert hit["t"] == pytest.approx(way / speed, rel=1e-13)
+    assert hit["position"] == pytest.approx([-r / cos(a), 0.0], abs=1e-13)
+    # (1 + ε) of the normal velocity is given back along the normal (-cos a, sin a).
+    given_back = 1.5 * speed * cos(a)
+    after = np.array([speed - given_back * cos(a), given_back * sin(a)])
+    assert hit["velocity_after"] == pytest.approx(after, abs=1e-11 * speed)
+    end = recording.track(0)[-1]
+    assert end["position"] == pytest.approx(
+        hit["position"] + after * (1.5 - way) / speed, abs=1e-11
+    )
+
+
+def test_with_fixed_steps_what_is_fast_enough_passes():
+    # Three times as far in a step as disk and surface are thick: it is seen by luck.
+    way, seen = 3.0 * (R + HALF_THICKNESS), Counter()
+    for align in ("true", "false"):
+        for shift in np.linspace(0.0, way, 9, endpoint=False):
+            recording = simulated(
+                f"""
+[stream]
+at = [0.0, {0.2 + shift}]
+velocity = [0.0, {-way / 1e-3}]
+[run]
+until = 0.1
+dt = 1e-3
+align = {align}
+"""
+                + floor(restitution=1.0, friction=0.1)
+            )
+            seen[align] += len(recording.select(Kind.IMPACT)) > 0
+    assert seen["true"] == 9
+    assert 0 < seen["false"] < 9
+
+
+@pytest.mark.parametrize("name", ["perpendicular", "inclined-40"])
+def test_with_fixed_steps_an_impact_is_seen_up_to_a_step_late(name):
+    shares = []
+    for dt in (1.1e-3, 1e-3, 7e-4, 5e-4, 3e-4):
+        precise, late = (
+            shipped(name, f"run.dt={dt}", f"run.align={align}").select(Kind.IMPACT)[0]
+            for align in ("true", "false")
+        )
+        shares.append((late["t"] - precise["t"]) / dt)
+        off = late["position"] - precise["position"]
+        assert hypot(*off) <= 1.01 * dt * hypot(*precise["velocity_before"])
+        assert hypot(*(late["velocity_before"] - precise["velocity_before"])) <= 1.01 * G * dt
+    assert min(shares) >= -1e-6
+    assert max(shares) <= 1.0 + 1e-6
+    assert max(shares) > 0.1
+
+
+@pytest.mark.parametrize("name", ["inclined-20", "inclined-40"])
+def test_with_fixed_steps_the_books_close_to_first_order(name):
+    residuals = [
+        relative_residual(shipped(name, f"run.dt={dt}", "run.align=false"))
+        for dt in (2e-3, 1e-3, 5e-4)
+    ]
+    orders = np.log2(np.divide(residuals[:-1], residuals[1:]))
+    assert orders == pytest.approx([1.0, 1.0], abs=0.1)
+
+
+def test_alignment_closes_the_books_of_a_stream():
+    few = ("stream.count=40",)
+    aligned, plain = (shipped("stream", *few, f"run.align={a}") for a in ("true", "false"))
+    assert relative_residual(aligned) < 1e-5
+    assert relative_residual(plain) > 50.0 * relative_residual(aligned)
+
+
+def test_collisions_keep_momentum():
+    recording = shipped("stream", "stream.count=40")
+    counted = 0
+    for hit in recording.select(Kind.COLLISION):
+        tracks = [recording.track(hit[who]) for who in ("particle", "other")]
+        knots = [track[track["t"] == hit["t"]] for track in tracks]
+        if [len(of_one) for of_one in knots] != [2, 2]:
+            continue  # more happened at that instant
+        before, after = knots[0]["velocity"] + knots[1]["velocity"]
+        assert after == pytest.approx(before, abs=1e-14)
+        counted += 1
+    assert counted >= 30
+
+
+def test_energy_never_rises_where_nothing_is_driven():
+    recording = shipped("free-fall")
+    # In contact half a step of gravity is given back at once, the other half is lost until then.
+    hop = 0.5 * M * (0.5 * G * 1e-3) ** 2
+    for particle in range(recording.count):
+        track = recording.track(particle)
+        energy = np.sum(recording.energies(track), axis=0)
+        assert np.diff(energy).max() <= 1.02 * hop
+        assert energy[-1] < 0.1 * energy[0]
+
+
+def test_energy_never_rises_in_a_box():
+    recording = simulated(
+        """
+[stream]
+count = 6
+rate = 50.0
+at = [0.0, 0.08]
+velocity = [0.3, 0.0]
+bed_height = 0.03
+interact = true
+restitution = 0.9
+[run]
+until = 0.5
+[[surface]]
+name = "box"
+points = [[-0.05, 0.2], [-0.05, 0.0], [0.05, 0.0], [0.05, 0.2]]
+friction = 0.3
+restitution = 0.9
+"""
+    )
+    # Everybody's energy just before and just after each instant at which something happened, from
+    # the last release on: the energy of each track is constant between its knots.
+    times, changes = [], []
+    for particle in range(recording.count):
+        track = recording.track(particle)
+        energy = np.sum(recording.energies(track), axis=0)
+        times.append(track["t"][1:])
+        changes.append(np.diff(energy))
+    order = np.argsort(np.concatenate(times), kind="stable")
+    when, change = np.concatenate(times)[order], np.concatenate(changes)[order]
+    instants, index = np.unique(np.round(when, 12), return_inverse=True)
+    sums = np.bincount(index, weights=change)
+    assert len(instants) > 20
+    assert sums.max() < 1e-6 * M * G * 0.08
+    assert sums.sum() < -0.5 * M * G * 0.08

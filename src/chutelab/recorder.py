@@ -171,8 +171,9 @@ class Recorder:
         gravity: float,
         steps: int,
         seconds: float,
+        origin: tuple[float, float] = (0.0, 0.0),
     ) -> Recording:
-        """Sort what was collected and freeze it."""
+        """Sort what was collected, counted from `origin` (m), and freeze it."""
         count = len(self.ended)
         knots, sizes = _joined(self._knots, KNOT), self.sizes
         if self._owners:
@@ -189,6 +190,10 @@ class Recorder:
             np.cumsum(np.where(sizes == 1, 2, sizes), out=offsets[1:])
         events = _joined(self._events, EVENT)
         events = events.take(_in_time(events))
+        if any(origin):
+            knots = knots.copy()
+            for rows in (knots, events):
+                rows["position"] += origin
         return Recording(
             scene=cast("str", scene),  # or what writes it, see `Recording`
             title=title,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import ceil, log2
 from sys import float_info
 from typing import TYPE_CHECKING
 
@@ -28,32 +27,8 @@ TOUCH_ULPS = 256.0
 GIVEN_ULPS = 1.0
 """The same of a coordinate in the scene file, for one far from the origin."""
 
-REMOTE = 8.0
-"""Sizes of a machine that it must be away from the world's origin to be given one of its own."""
-
 BOX_TOUCHES = 64.0
 """Width, in `Obstacles.touch`, by which the boxes of faces are larger than they need be."""
-
-
-def origin(machine: Machine) -> tuple[float, float]:
-    """Return the world point that the engine calculates from, m: near the machine.
-
-    It is (0, 0) unless the machine is many times its own size away from there; and so round a
-    number that taking it off a coordinate loses no digit.
-    """
-    start, end = machine.segments.start, machine.segments.end
-    if machine.pulley is not None or not start.size:
-        return 0.0, 0.0
-    low, high = np.minimum(start, end), np.maximum(start, end)
-    axes = tuple(range(low.ndim - 1))
-    low, high = low.min(axis=axes), high.max(axis=axes)
-    extent = float((high - low).max())
-    middle = 0.5 * (low + high)
-    if np.abs(middle).max() <= REMOTE * extent:
-        return 0.0, 0.0
-    unit = 2.0 ** ceil(log2(extent))
-    x, y = (round(float(c) / unit) * unit for c in middle)
-    return x, y
 
 
 def obstacles(machine: Machine, origin: tuple[float, float] = (0.0, 0.0)) -> Obstacles:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Self
 
-from chutelab.exact.layout import obstacles, origin
+from chutelab.exact.layout import obstacles
+from chutelab.machine import origin
 
 if TYPE_CHECKING:
     from chutelab.exact.obstacles import Obstacles

@@ -3,10 +3,12 @@
 - `parts`: `Machine`, its segments and its pulley.
 - `crossings`: what `chutelab check` says of surfaces that cross.
 - `clearance`: releases that overlap a surface.
+- `frame`: a place near the machine to count from.
 - `builder`: `build`, from a validated scene to a machine.
 """
 
 from chutelab.machine.builder import build
+from chutelab.machine.frame import moved, origin
 from chutelab.machine.parts import Machine, Pulley, Segments
 
-__all__ = ["Machine", "Pulley", "Segments", "build"]
+__all__ = ["Machine", "Pulley", "Segments", "build", "moved", "origin"]

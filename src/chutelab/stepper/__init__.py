@@ -6,6 +6,8 @@ particles), `impacts` resolves it, `clash` has pymunk's solver work out that one
 that lasts gets its impulse once a step: `kick` steps what touches in one Space, `books` accounts
 for it. Contacts in which nothing new happens are not even stepped (`idle`).
 
+`crowd` knows where impacts are too many to be resolved one by one, and left to the steps.
+
 `solids` gives the surfaces the thickness a stepped contact needs, `world` is that Space, `carriage`
 the ride by adhesion in closed form, `tracks` keeps paths and writes knots, `stays` knows who lies
 on what, `state` is what these share, `engine` is the loop.

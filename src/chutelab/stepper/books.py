@@ -97,10 +97,10 @@ def settle_books(run: Run, contacts: Contacts, x: Floats, motion: Motion, t: flo
     k, n = run.tracks, contacts.normal
     # Led round the pulley along a chord, a particle only seems to press outwards.
     i = contacts.first
-    led = np.flatnonzero((k.aim[i] != k.w[i]).any(axis=1))
+    led = ((k.aim[i] != k.w[i]).any(axis=1)).nonzero()[0]
     motion.before[i[led]] -= _dot(motion.before[i[led]], n[led])[:, None] * n[led]
     deeds, before_n = _deeds(run, contacts, x, motion)
-    who = np.flatnonzero((deeds.uses > 0) & (k.mode != CARRIED))
+    who = ((deeds.uses > 0) & (k.mode != CARRIED)).nonzero()[0]
     was_flying = k.mode[who] == FLYING
     jump = np.abs(deeds.change[who]).max(axis=1)
     shock = was_flying | (jump > SHOCK + 4.0 * run.machine.gravity * run.dt)
@@ -124,8 +124,8 @@ def _deeds(run: Run, contacts: Contacts, x: Floats, motion: Motion) -> tuple[Dee
     """Return what the contacts did, and the normal speeds before."""
     i, solid = contacts.first, contacts.other - run.count
     pairs = solid < 0
-    rows = np.flatnonzero(pairs)
-    j, fixed = contacts.other[rows], np.flatnonzero(~pairs)
+    rows = pairs.nonzero()[0]
+    j, fixed = contacts.other[rows], (~pairs).nonzero()[0]
     nx, ny = contacts.normal[:, 0], contacts.normal[:, 1]
     push_x, push_y = contacts.impulse[:, 0], contacts.impulse[:, 1]
     belt, rounded = np.zeros(len(i)), np.zeros(len(i), dtype=bool)
@@ -175,7 +175,7 @@ def _book(run: Run, contacts: Contacts, deeds: Deeds, before_n: Floats, motion: 
     i, other = contacts.first, contacts.other
     pairs = other < run.count
     carried = pairs & (run.tracks.mode[np.where(pairs, other, 0)] == CARRIED)
-    both = np.flatnonzero(pairs & ~carried)
+    both = (pairs & ~carried).nonzero()[0]
     entries = np.empty((len(i) + len(both), 3))
     share = np.where(pairs & ~carried, -0.25, -0.5)
     first = entries[: len(i)]
@@ -184,7 +184,7 @@ def _book(run: Run, contacts: Contacts, deeds: Deeds, before_n: Floats, motion: 
     first[:, 2] = share * deeds.j_t * (deeds.before_t + deeds.after_t)
     entries[len(i) :] = first[both]
     surface = np.full(len(entries), run.particles)
-    fixed = np.flatnonzero(~pairs)
+    fixed = (~pairs).nonzero()[0]
     surface[fixed] = run.solids.surface[other[fixed] - run.count]
     run.recorder.book(run.ids[np.concatenate([i, other[both]])], surface, *entries.T)
     if carried.any():
@@ -207,7 +207,7 @@ def _events(
     approach = -_dot(relative, contacts.normal)
     told = begun & (approach > run.soft)
     kind = np.where(pairs, Kind.COLLISION, Kind.IMPACT)
-    s = np.flatnonzero(~pairs)
+    s = (~pairs).nonzero()[0]
     solid = j[s] - run.count
     told[s] |= (approach[s] > FAINT * run.soft) & ~run.met[i[s], solid]
     run.met[i[s], solid] = True
@@ -234,7 +234,7 @@ def _surfaces(
     """Keep account of which single surface particles lie on, and whether they slip there."""
     fixed = contacts.other >= run.count
     surface = np.full(run.count, -1)
-    rows = np.flatnonzero(fixed & (deeds.uses[contacts.first] == 1))
+    rows = (fixed & (deeds.uses[contacts.first] == 1)).nonzero()[0]
     alone = contacts.first[rows]
     surface[alone] = run.solids.surface[contacts.other[rows] - run.count]
     run.stays.arrive(who, surface[who], t)
@@ -242,7 +242,7 @@ def _surfaces(
     slipping = run.stays.slipping[alone]
     stops, starts = slipping & (speed < SETTLED[0]), ~slipping & (speed > SLIPS)
     run.stays.slipping[alone] = (slipping & ~stops) | starts
-    _lie(run, contacts, deeds, np.flatnonzero(fixed))
+    _lie(run, contacts, deeds, fixed.nonzero()[0])
     for kind, these in ((Kind.STICK, alone[stops]), (Kind.SLIP, alone[starts])):
         run.event(
             kind, these, t, x[these], motion.after[these], motion.spin_after[these],
@@ -258,12 +258,12 @@ def _lie(run: Run, contacts: Contacts, deeds: Deeds, rows: Ints) -> None:
     )
     length = np.hypot(total[:, 0], total[:, 1])
     in_line = (uses > 0) & (length > (1.0 - IN_LINE) * uses)
-    who = np.flatnonzero(in_line)
+    who = in_line.nonzero()[0]
     run.tracks.upon[who] = total[who] / length[who, None]
-    flat = np.flatnonzero((uses[i] == 1) & ~deeds.rounded[rows])
+    flat = ((uses[i] == 1) & ~deeds.rounded[rows]).nonzero()[0]
     run.tracks.face[i[flat]] = contacts.other[rows[flat]] - run.count
     curved = in_line[i] & deeds.rounded[rows]
-    for row in np.flatnonzero(curved).tolist():
+    for row in curved.nonzero()[0].tolist():
         solid = contacts.other[rows[row]] - run.count
         run.follow(int(i[row]), n[row], float(run.solids.reach[solid]) + run.radius)
 

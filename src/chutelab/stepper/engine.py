@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.recorder import Recorder
+from chutelab.machine import moved, origin
+from chutelab.recorder import Recorder, StalledError
 from chutelab.recording import Kind
 from chutelab.stepper.books import SETTLED, STILL
 from chutelab.stepper.carriage import Carriage, Carriages, carriage
@@ -55,10 +56,14 @@ def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Re
     ------
     ValueError
         If the particle has no radius.
+    StalledError
+        If there are too many impacts within one step; it has the recording so far.
     """
     if machine.particle.radius <= 0.0:
         raise ValueError("particle.radius = 0: pymunk needs disks with a radius above 0 m")
     begin = perf_counter()
+    place = origin(machine)
+    machine = moved(machine, -place[0], -place[1])
     recorder = Recorder(machine.count, machine.surfaces)
     shapes = solids(machine)
     report = Report(progress)
@@ -70,36 +75,38 @@ def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Re
     )
     clashes = Clashes(machine, shapes)
     everybody = np.arange(machine.count)
+
+    def finished(steps: int) -> Recording:
+        return recorder.finish(
+            scene=machine.text, title=machine.title, engine="pymunk", particle=machine.particle,
+            gravity=machine.gravity, steps=steps, seconds=perf_counter() - begin, origin=place,
+        )  # fmt: skip
+
     groups = [everybody] if machine.interact else np.split(everybody, machine.count)
     steps = 0
     for done, ids in enumerate(groups):
         loop = _Loop(machine, shapes, outline, recorder, ids, clashes)
         report.done, report.part = done / len(groups), 1.0 / len(groups)
-        steps += loop.run(report)
+        try:
+            loop.run(report)
+        except StalledError as stalled:
+            loop.stop(stalled.t)
+            stalled.recording = finished(steps + loop.steps)
+            x, y = stalled.position
+            stalled.position = x + place[0], y + place[1]
+            raise
+        steps += loop.steps
     report.last()
-    return recorder.finish(
-        scene=machine.scene,
-        title=machine.title,
-        engine="pymunk",
-        particle=machine.particle,
-        gravity=machine.gravity,
-        steps=steps,
-        seconds=perf_counter() - begin,
-    )
+    return finished(steps)
 
 
 class _Loop:
-    """Runs one world until its last particle has ended."""
+    """Runs one world until its last particle has ended, in `steps` of all and of pairs."""
 
     def __init__(
-        self,
-        machine: Machine,
-        shapes: Solids,
-        outline: Outline,
-        recorder: Recorder,
-        ids: Ints,
+        self, machine: Machine, shapes: Solids, outline: Outline, recorder: Recorder, ids: Ints,
         clashes: Clashes,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.machine = machine
         releases = machine.releases
         self.release = releases.t[ids]
@@ -128,8 +135,8 @@ class _Loop:
         self.last, self.tick = start, inf
         self.steps = 0
 
-    def run(self, report: Report) -> int:
-        """Run to the end; return the number of steps of pymunk, of all and of pairs."""
+    def run(self, report: Report) -> None:
+        """Run to the end."""
         r, end = self.run_state, self.machine.end_time
         now = begin = self.agenda[0][0] if self.agenda else end
         while True:
@@ -139,19 +146,19 @@ class _Loop:
             now = min(impact, exit_, due, self.tick)
             if now > end or now == inf:
                 break
-            if now == due:
+            # At one time the step goes first: what joins a contact then has no part in it yet.
+            if now == self.tick:
+                self._step(now)
+            elif now == due:
                 _, n, act = heappop(self.agenda)
                 act(n, now)
             elif now == exit_:
                 self._exit(now)
-            elif now == impact:
-                self._impact(now)
             else:
-                self._step(now)
+                self._impact(now)
             if self.steps % 32 == 0:
                 report((now - begin) / (end - begin) if end > begin else 1.0)
-        self._stop()
-        return self.steps
+        self.stop(end)
 
     def _prepare(self, now: float) -> None:
         """Foretell what new paths lead to; see whether pymunk has to step."""
@@ -160,7 +167,11 @@ class _Loop:
             return
         flying, resting = (mode == FLYING).any(), (mode == RESTING).any()
         if self.machine.align:
-            alive = resting or (flying and self.machine.interact and (mode == CARRIED).any())
+            alive = resting or (
+                flying
+                and self.machine.interact
+                and ((mode == CARRIED).any() or r.crowd.stepped.any())
+            )
         else:
             alive = flying or resting
         if not alive:
@@ -177,7 +188,7 @@ class _Loop:
         """Put carried particles on paths that agree with their rides now and at the next step."""
         r, k = self.run_state, self.run_state.tracks
         span = self.tick - now
-        who = np.flatnonzero(k.mode == CARRIED)
+        who = (k.mode == CARRIED).nonzero()[0]
         if self.machine.interact and len(who) and 0.0 < span < inf:
             begin = self.carriages.position(who, now)
             k.from_t[who], k.from_x[who] = now, begin
@@ -199,10 +210,10 @@ class _Loop:
         mode = r.tracks.mode
         if not self.machine.align:
             kick(r, mode == CARRIED, self.last, t)
-        elif ((mode == RESTING) & ~r.idle.asleep).any():
+        elif (((mode == RESTING) & ~r.idle.asleep) | ((mode == FLYING) & r.crowd.stepped)).any():
             kick(r, self.forecast.beside & (mode == CARRIED), self.last, t)
         self.steps += 1
-        r.impacts.clear()
+        r.crowd.look(t)
         self.last, self.tick = t, r.next_tick(t)
         r.idle.move(t, self.tick)
         self._settle(t)
@@ -216,11 +227,11 @@ class _Loop:
         if self.machine.until != "settled":
             return
         if self.machine.interact:
-            live = np.flatnonzero(mode != DONE)
+            live = (mode != DONE).nonzero()[0]
             if (mode[live] != RESTING).any() or (r.calm[live] * r.dt < STILL[1]).any():
                 return
         else:
-            live = np.flatnonzero((mode == RESTING) & (r.calm >= SETTLED[1]))
+            live = ((mode == RESTING) & (r.calm >= SETTLED[1])).nonzero()[0]
         self._end_settled(live, t)
 
     def _end_settled(self, who: Ints, t: float) -> None:
@@ -232,7 +243,7 @@ class _Loop:
 
     def _exit(self, t: float) -> None:
         r, k = self.run_state, self.run_state.tracks
-        gone = np.flatnonzero(k.exit <= t)
+        gone = (k.exit <= t).nonzero()[0]
         x, v = k.flight(gone, t)
         k.knot(gone, t, x, v, k.omega[gone])
         r.event(Kind.EXIT, gone, t, x, v, k.omega[gone])
@@ -277,19 +288,18 @@ class _Loop:
             if time > k.t[n]:
                 k.knot(one, time, x, v, 0.0)
 
-    def _stop(self) -> None:
-        """End what is left when the time is up."""
+    def stop(self, end: float) -> None:
+        """End what is left."""
         r, k = self.run_state, self.run_state.tracks
-        resting = np.flatnonzero(k.mode == RESTING)
+        resting = (k.mode == RESTING).nonzero()[0]
         r.idle.wake(resting)
         k.close(resting)
-        end = self.machine.end_time
-        flying = np.flatnonzero(k.mode == FLYING)
+        flying = (k.mode == FLYING).nonzero()[0]
         if len(flying):
             x, v = k.flight(flying, end)
             k.knot(flying, end, x, v, k.omega[flying])
-        for n in np.flatnonzero(k.mode == CARRIED).tolist():
+        for n in (k.mode == CARRIED).nonzero()[0].tolist():
             self._close_ride(n, self.rides[n], end)
-        left = np.flatnonzero((k.mode != DONE) & (k.mode != WAITING))
+        left = ((k.mode != DONE) & (k.mode != WAITING)).nonzero()[0]
         r.finish(left, "time")
         r.flush()

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from chutelab.stepper.crowd import MOST
 from chutelab.stepper.meetings import meeting, neighbours
-from chutelab.stepper.state import MOST_IMPACTS
 from chutelab.stepper.tracks import CARRIED, DONE, FLYING, RESTING, WAITING
 
 if TYPE_CHECKING:
@@ -119,23 +119,27 @@ class Forecast:
         """Foretell what one particle meets, of all there are."""
         run, mode = self._run, self._run.tracks.mode
         x, y, u, v = (a - a[i] for a in everybody)
-        closing = x * u + y * v < 0.0
-        others = np.flatnonzero(closing & (mode != WAITING) & (mode != DONE))
-        if not len(others):
+        t, approach = meeting(x, y, u, v, 2.0 * run.radius)
+        soon = (t <= until - now).nonzero()[0]
+        if not len(soon):
             return
-        t, approach = meeting(x[others], y[others], u[others], v[others], 2.0 * run.radius)
         rounding = ROUNDING * (hypot(everybody[2][i], everybody[3][i]) + run.soft)
-        flies, carried = mode[i] == FLYING, mode[i] == CARRIED
-        for n in np.flatnonzero(t <= until - now).tolist():
-            j = int(others[n])
-            held = mode[j] != FLYING
-            if held and (now + t[n] > tick or (carried and mode[j] == CARRIED)):
+        impacts, crowd = run.crowd.impacts, run.crowd.stepped
+        stepped, carried = mode[i] != FLYING or crowd[i], mode[i] == CARRIED
+        for j in soon.tolist():
+            if mode[j] == WAITING or mode[j] == DONE:
                 continue
-            if approach[n] > (run.slow if held and not flies else rounding):
-                self._pair(now + float(t[n]), i, j)
+            held = mode[j] != FLYING
+            if held and (now + t[j] > tick or (carried and mode[j] == CARRIED)):
+                continue
+            floor = rounding
+            if stepped and (held or crowd[j]):
+                floor = run.crowd.calm(max(impacts[i], impacts[j]))
+            if approach[j] > floor:
+                self._pair(now + float(t[j]), i, j)
 
     def _pair(self, t: float, i: int, j: int) -> None:
-        if max(self._run.impacts[i], self._run.impacts[j]) > MOST_IMPACTS:
+        if max(self._run.crowd.impacts[i], self._run.crowd.impacts[j]) > MOST:
             return
         if self._run.tracks.mode[i] == CARRIED:
             i, j = j, i
@@ -144,13 +148,13 @@ class Forecast:
     def window(self, now: float, tick: float) -> None:
         """Foretell up to the next step what those meet that do not fly, and pairs with them."""
         run, k = self._run, self._run.tracks
-        resting = np.flatnonzero(k.mode == RESTING)
+        resting = (k.mode == RESTING).nonzero()[0]
         if len(resting):
             self._solids(resting, now, tick)
         self.beside[:] = False
         if not self._crowd:
             return
-        who = np.flatnonzero((k.mode != WAITING) & (k.mode != DONE))
+        who = ((k.mode != WAITING) & (k.mode != DONE)).nonzero()[0]
         modes = k.mode[who]
         if (modes == FLYING).all() or (modes == CARRIED).all():
             return
@@ -167,15 +171,18 @@ class Forecast:
             return
         dx, dv = x[b] - x[a], v[b] - v[a]
         t, approach = meeting(dx[:, 0], dx[:, 1], dv[:, 0], dv[:, 1], 2.0 * run.radius)
-        flies = (modes[a] == FLYING) | (modes[b] == FLYING)
-        floor = np.where(flies, ROUNDING * run.soft, run.slow)
-        for n in np.flatnonzero((t <= span) & (approach > floor)).tolist():
+        flies = (modes == FLYING) & ~run.crowd.stepped[who]
+        flies = flies[a] | flies[b]
+        impacts = run.crowd.impacts[who]
+        calm = run.crowd.calm(np.maximum(impacts[a], impacts[b]))
+        floor = np.where(flies, ROUNDING * run.soft, calm)
+        for n in ((t <= span) & (approach > floor)).nonzero()[0].tolist():
             self._pair(now + float(t[n]), int(who[a[n]]), int(who[b[n]]))
-        touching = np.flatnonzero((both == RESTING * 9) & (np.hypot(dx[:, 0], dx[:, 1]) <= margin2))
+        carried = (modes[a] == CARRIED) | (modes[b] == CARRIED)
+        touching = (~flies & ~carried & (np.hypot(dx[:, 0], dx[:, 1]) <= margin2)).nonzero()[0]
         run.idle.stir(
             who[a[touching]], who[b[touching]], np.where(t <= span, approach, 0.0)[touching]
         )
-        carried = (modes[a] == CARRIED) | (modes[b] == CARRIED)
         self.beside[who[a[carried & ~flies]]] = self.beside[who[b[carried & ~flies]]] = True
 
     def _solids(self, resting: Ints, now: float, tick: float) -> None:

@@ -75,7 +75,7 @@ class Idle:
         run, k = self._run, self._run.tracks
         i, j = contacts.first, contacts.other
         pairs = j < run.count
-        flat = np.flatnonzero(~pairs & (deeds.uses[i] == 1))
+        flat = (~pairs & (deeds.uses[i] == 1)).nonzero()[0]
         flat = flat[~deeds.rounded[flat]]
         change, turn = deeds.change[who], deeds.turn[who]
         off = np.abs(change - self._change[who]).max(axis=1)
@@ -103,7 +103,7 @@ class Idle:
         self._dues[new] = 0.0
         crowd = new[~alone[new]]
         self._change[crowd], self._turn[crowd] = 0.0, 0.0
-        supported = np.flatnonzero(~pairs & ~awake[i])
+        supported = (~pairs & ~awake[i]).nonzero()[0]
         left = self._way_left(i[supported], j[supported] - run.count)
         np.minimum.at(self._until, i[supported], left)
         self._slide(contacts, flat[~awake[i[flat]]], deeds)
@@ -137,7 +137,7 @@ class Idle:
 
     def move(self, t: float, tick: float) -> None:
         """Move sleepers on to t; wake those who need the step that ends at `tick`."""
-        who = np.flatnonzero(self.asleep)
+        who = self.asleep.nonzero()[0]
         if not len(who):
             return
         run, k = self._run, self._run.tracks
@@ -172,7 +172,7 @@ class Idle:
         """Wake a particle that is hit, and what touches it."""
         if self.asleep[i]:
             k = self._run.tracks
-            who = np.flatnonzero(self.asleep)
+            who = self.asleep.nonzero()[0]
             apart = k.from_x[who] - k.from_x[i]
             reach = 2.0 * self._run.radius * (1.0 + CONTACT)
             self.wake(who[np.hypot(apart[:, 0], apart[:, 1]) <= reach])
@@ -182,13 +182,13 @@ class Idle:
         run = self._run
         if not self.asleep.any():
             return
-        awake = (run.tracks.mode == RESTING) & ~self.asleep
+        awake = run.crowd.stepped | ((run.tracks.mode == RESTING) & ~self.asleep)
         awake[first[approach > QUIET]] = True
         spread(awake, first, second)
-        self.wake(np.flatnonzero(awake & self.asleep))
+        self.wake((awake & self.asleep).nonzero()[0])
 
 
 def spread(mark: NDArray[np.bool_], first: Ints, second: Ints) -> None:
     """Spread a mark along pairs until nobody new is marked."""
-    while len(news := np.flatnonzero(mark[first] != mark[second])):
+    while len(news := (mark[first] != mark[second]).nonzero()[0]):
         mark[first[news]] = mark[second[news]] = True

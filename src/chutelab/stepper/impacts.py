@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chutelab.recording import Kind
-from chutelab.stepper.outline import Touch
+from chutelab.stepper.crowd import MOST
+from chutelab.stepper.outline import PARALLEL, Touch
 from chutelab.stepper.solids import DEEP
-from chutelab.stepper.state import MANY, MOST_IMPACTS
 from chutelab.stepper.tracks import CARRIED, FLYING, RESTING
 
 if TYPE_CHECKING:
@@ -46,6 +46,8 @@ class Partner:
         Whether it, or who meets it, is in contact with something else already.
     curvature : float
         1/m, of the path of a disk that stays in contact with it.
+    gap : float
+        m; negative if they overlap.
     """
 
     particle: int
@@ -56,12 +58,15 @@ class Partner:
     free: bool
     supported: bool
     curvature: float
+    gap: float
 
 
 def solid_partner(run: Run, touch: Touch) -> Partner:
     """Return a solid, touched."""
     belt = run.solids.belt_at(touch.solid, touch.normal)
-    return Partner(-1, touch.solid, touch.normal, (belt, 0.0), 0.0, False, True, touch.curvature)
+    return Partner(
+        -1, touch.solid, touch.normal, (belt, 0.0), 0.0, False, True, touch.curvature, touch.gap
+    )  # fmt: skip
 
 
 def particle_partner(run: Run, i: int, j: int, t: float) -> Partner:
@@ -76,7 +81,7 @@ def particle_partner(run: Run, i: int, j: int, t: float) -> Partner:
     supported = carried or bool(k.mode[i] == RESTING) or bool(k.mode[j] == RESTING)
     return Partner(
         j, -1, (nx, ny), (ux * ny - uy * nx, ux * nx + uy * ny), 0.0 if carried else k.turn(j),
-        not carried, supported, 0.0,
+        not carried, supported, 0.0, min(apart - 2.0 * run.radius, 0.0),
     )  # fmt: skip
 
 
@@ -88,10 +93,10 @@ def strike(run: Run, i: int, partner: Partner, t: float) -> None:
     mine = vx * ny - vy * nx, vx * nx + vy * ny
     approach = mine[1] - partner.velocity[1]
     slip = mine[0] - belt + run.radius * (spin + partner.omega)
-    impacts = run.count_impact(i, j if partner.free else i, t)
+    impacts = run.crowd.count(i, j if partner.free else i, t)
     calm = run.soft if partner.supported else 0.0
-    if impacts > MANY:
-        calm = run.slow * (impacts / MANY) ** 2
+    if run.crowd.is_in(impacts):
+        calm = run.crowd.calm(impacts)
     if j >= 0 and -approach <= calm:
         _join(run, i, partner, t)
         return
@@ -104,9 +109,10 @@ def strike(run: Run, i: int, partner: Partner, t: float) -> None:
     # What would bounce for less than two steps does not bounce.
     g = run.machine.gravity
     lifts = partner.curvature * mine[0] ** 2 - g * ny if partner.solid >= 0 else -g
+    presses = lifts < -PARALLEL * g
     rebound = approach + j_n / m_n
-    stays = partner.supported and lifts <= 0.0 and rebound <= -lifts * run.dt
-    stays |= impacts > MOST_IMPACTS
+    stays = partner.supported and presses and rebound <= -lifts * run.dt
+    stays |= impacts > MOST
     if stays:
         j_n = max(j_n - m_n * rebound, 0.0)
         grip = run.clashes.grip(partner.solid) * j_n
@@ -148,10 +154,15 @@ def _join(run: Run, i: int, partner: Partner, t: float) -> None:
             _lean(run, n, partner, sign, t)
 
 
+def _deeper(run: Run, partner: Partner) -> float:
+    """Return how much deeper a particle has to lie for pymunk to see the contact, m."""
+    return max(DEEP * run.radius + partner.gap, 0.0)
+
+
 def _lean(run: Run, n: int, partner: Partner, sign: float, t: float) -> None:
     """Let a particle rest against another, from whose normal the sign leads to it."""
     k, (nx, ny) = run.tracks, partner.normal
-    (x, y), (vx, vy), deep = k.x[n].tolist(), k.v[n].tolist(), sign * DEEP * run.radius
+    (x, y), (vx, vy), deep = k.x[n].tolist(), k.v[n].tolist(), sign * _deeper(run, partner)
     k.mark(n, t, x - deep * nx, y - deep * ny, vx, vy, float(k.omega[n]))
     run.rest(n)
     run.stays.arrive(np.array([n]), np.array([-1]), t)
@@ -174,7 +185,7 @@ def _lie_down(run: Run, i: int, partner: Partner, surface: int, t: float) -> Non
         -j_t * (slip + 0.5 * j_t / run.rolling_mass),
     )  # fmt: skip
     vx, vy = vx + (j_n * nx + j_t * ny) / run.mass, vy + (j_n * ny - j_t * nx) / run.mass
-    deep = DEEP * run.radius
+    deep = _deeper(run, partner)
     k.mark(i, t, x - deep * nx, y - deep * ny, vx, vy, omega + run.turned(j_t))
     run.rest(i, partner.normal, partner.solid, partner.curvature)
     run.stays.arrive(np.array([i]), np.array([surface]), t)
@@ -197,7 +208,7 @@ def _part(
     if stays and partner.solid >= 0:
         _lie_down(run, i, partner, surface, t)
         return
-    crowded = max(run.impacts[n] for n in who) > MOST_IMPACTS
+    crowded = max(run.crowd.impacts[n] for n in who) > MOST
     rested = [n for n in who if k.mode[n] == RESTING and not crowded]
     if stays and len(rested) < len(who):
         # Who came in leans on who is held; the latter is pushed against what holds it.
@@ -211,7 +222,9 @@ def _part(
     for n, face, (nx, ny) in faces:
         # Pushed against the face it lies on, it is held by it at once.
         if face >= 0 and k.v[n, 0] * nx + k.v[n, 1] * ny < 0.0:
-            strike(run, n, solid_partner(run, Touch(0.0, face, (nx, ny))), t)
+            strike(
+                run, n, solid_partner(run, Touch(0.0, face, (nx, ny), gap=-DEEP * run.radius)), t
+            )
 
 
 def _kind(run: Run, i: int, partner: Partner, approach: float) -> Kind | None:

@@ -28,8 +28,7 @@ def kick(run: Run, carried: NDArray[np.bool_], t0: float, t: float) -> None:
     """
     k = run.tracks
     free = (k.mode == RESTING) & ~run.idle.asleep
-    if not run.machine.align:
-        free |= k.mode == FLYING
+    free |= (k.mode == FLYING) & (run.crowd.stepped if run.machine.align else True)
     run.now = t
     _enter(run, free, carried, t)
     run.world.step(run.dt)
@@ -38,12 +37,12 @@ def kick(run: Run, carried: NDArray[np.bool_], t0: float, t: float) -> None:
     if contacts is not None:
         touched[contacts.first] = True
         touched[contacts.other[contacts.other < run.count]] = True
-    run.lift(np.flatnonzero(free & (k.mode == RESTING) & ~touched), t0)
+    run.lift((free & (k.mode == RESTING) & ~touched).nonzero()[0], t0)
     if contacts is None:
         run.touching = np.empty(0, dtype=np.int64)
         return
     _resolve(run, contacts, t)
-    resting = np.flatnonzero((k.mode == RESTING) & free)
+    resting = ((k.mode == RESTING) & free).nonzero()[0]
     k.go_on(resting, t, run.dt)
     run.version[resting] += 1
 
@@ -52,23 +51,23 @@ def _enter(run: Run, free: NDArray[np.bool_], carried: NDArray[np.bool_], t: flo
     """Have pymunk's own move bring every body to where its path is at t."""
     k, world = run.tracks, run.world
     want = free | carried
-    for n in np.flatnonzero(run.inside & ~want).tolist():
+    for n in (run.inside & ~want).nonzero()[0].tolist():
         world.remove(n)
-    new = np.flatnonzero(want & ~run.inside)
+    new = (want & ~run.inside).nonzero()[0]
     for n in new.tolist():
         world.add(n, carried=bool(carried[n]))
     run.inside = want
     run.moved[new] = True
-    who = np.flatnonzero(want & run.moved)
+    who = (want & run.moved).nonzero()[0]
     run.moved[who] = False
-    pushed = np.flatnonzero(carried)
+    pushed = carried.nonzero()[0]
     if not len(who) and not len(pushed):
         return
     x, v = k.flight(who, t)
     w = v - 0.5 * run.dt * run.gravity
     laid = k.upon[who].any(axis=1) & (k.mode[who] == RESTING)
     normal = k.upon[who]
-    turns = np.flatnonzero(laid & (run.bend[who] > 0.0))
+    turns = (laid & (run.bend[who] > 0.0)).nonzero()[0]
     if len(turns):
         # Round a curve the normal turns with the way gone.
         them = who[turns]
@@ -94,7 +93,7 @@ def _resolve(run: Run, contacts: Contacts, t: float) -> None:
     first_carried = carried[contacts.first]
     if first_carried.any():
         contacts = contacts.turned(first_carried)
-    flying = np.flatnonzero((k.mode == FLYING) & run.inside)
+    flying = ((k.mode == FLYING) & run.inside).nonzero()[0]
     before, spin_before = k.aim.copy(), k.spin.copy()
     before[flying] = k.flight(flying, t)[1] - 0.5 * run.dt * run.gravity
     before[carried], spin_before[flying] = v[carried], k.omega[flying]

@@ -29,7 +29,7 @@ def meeting(x: Floats, y: Floats, u: Floats, v: Floats, reach: float) -> tuple[F
     across = x * v - y * u
     under = reach * reach * (u * u + v * v) - across * across
     t, approach = np.full(len(x), np.inf), np.zeros(len(x))
-    meets = np.flatnonzero((closing > 0.0) & (under > 0.0))
+    meets = ((closing > 0.0) & (under > 0.0)).nonzero()[0]
     if len(meets):
         xm, ym, closing = x[meets], y[meets], closing[meets]
         gap = xm * xm + ym * ym - reach * reach

@@ -18,6 +18,13 @@ GRAZING = 1e-9
 not to meet it again by rounding."""
 
 
+PARALLEL = 1e-14
+"""Share of a speed, or of gravity, below which it has no part towards a face but rounding."""
+
+END = 1e-9
+"""Share of the radius within which a touch is at the very end of a face."""
+
+
 @dataclass(frozen=True)
 class Touch:
     """A contact between a disk and the outline.
@@ -32,12 +39,15 @@ class Touch:
         Unit normal towards the disk.
     curvature : float
         1/m, of the path round the contact; 0 on a face.
+    gap : float
+        m; negative if they overlap.
     """
 
     t: float
     solid: int = -1
     normal: tuple[float, float] = (0.0, 0.0)
     curvature: float = 0.0
+    gap: float = 0.0
 
 
 NOTHING = Touch(inf)
@@ -138,6 +148,7 @@ class Outline:
         x, y, vx, vy = path
         (ax, ay), (tx, ty), (nx, ny) = slab.a, slab.t, slab.n
         r, length, thickness = self._radius, slab.length, slab.thickness
+        still, free, hair = PARALLEL * hypot(vx, vy), PARALLEL * self._gravity, END * r
         u, w = (x - ax) * tx + (y - ay) * ty, (x - ax) * nx + (y - ay) * ny
         ru, rw = vx * tx + vy * ty, vx * nx + vy * ny
         au, aw = -self._gravity * ty, -self._gravity * ny
@@ -147,15 +158,16 @@ class Outline:
             (u - length - r, ru, au, -w, -rw, -aw, thickness, (tx, ty)),
             (-u - r, -ru, -au, -w, -rw, -aw, thickness, (-tx, -ty)),
         ):
-            if rate >= 0.0 and pull >= 0.0:
+            if rate >= -still and pull >= -free:
                 continue
             # A disk a hair inside a face touches it: it neither sinks further nor falls through.
             inside = -r <= gap < 0.0 and 0.0 <= foot <= wide
             t = closing_time(0.0 if inside else gap, rate, pull)
             if 0.0 <= t <= until and t < first.t:
-                there = foot + t * (pace + 0.5 * t * turn)
-                if 0.0 <= there <= wide:
-                    first = Touch(t, slab.solid, out)
+                there, speed = foot + t * (pace + 0.5 * t * turn), pace + t * turn
+                # Moving out over the very end is not a touch of the face.
+                if hair * (speed < 0.0) <= there <= wide - hair * (speed > 0.0):
+                    first = Touch(t, slab.solid, out, gap=gap if inside else 0.0)
         return first
 
     def _round(
@@ -186,7 +198,7 @@ class Outline:
         gap[2] = np.where(grazing & (np.abs(gap[2]) <= GRAZING * (v @ v)), 0.0, gap[2])
         now = (gap[0] == 0.0) & ((gap[1] < 0.0) | ((gap[1] == 0.0) & (gap[2] < 0.0)))
         t = np.where(now, 0.0, inf)
-        search = np.flatnonzero(~now & (gap < 0.0).any(axis=0))
+        search = (~now & (gap < 0.0).any(axis=0)).nonzero()[0]
         if len(search):
             limit = until
             if until == inf:
@@ -199,7 +211,8 @@ class Outline:
             return first
         nx, ny = (d[best] + s * (v + 0.5 * s * g)).tolist()
         size = hypot(nx, ny)
-        return Touch(s, near[best][3], (nx / size, ny / size), 1.0 / near[best][2])
+        depth = min(size - near[best][2], 0.0)
+        return Touch(s, near[best][3], (nx / size, ny / size), 1.0 / near[best][2], depth)
 
     def clearance(self, x: Floats, within: float) -> Floats:
         """Return how far disks at (P, 2) are from the nearest solid, (P,), m.

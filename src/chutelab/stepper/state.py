@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from math import floor, inf
+from math import floor
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.recording import EVENT, Kind
+from chutelab.stepper.crowd import Crowd
 from chutelab.stepper.idle import Idle
 from chutelab.stepper.stays import Stays
 from chutelab.stepper.tracks import Tracks
@@ -27,11 +27,6 @@ Ints = NDArray[np.int64]
 HAIR = 2.5e-3
 """Share of the radius by which particles in contact may overlap before a step parts them. It also
 bounds the step where `run.dt` is coarse or particles are small: gravity must not do more, g dt²."""
-
-MANY, MOST_IMPACTS = 8, 100
-"""Impacts of a particle within one step. Beyond the first number it is part of a pile: what comes
-together slowly stays together until the step parts it, and what counts as slow grows with the
-square of the number, so that a pile cannot stall. Beyond the second nothing bounces any more."""
 
 
 class Run:
@@ -61,8 +56,8 @@ class Run:
         Whether pymunk has a body for the particle.
     version : ndarray, (N,)
         Counts the paths of each particle; what was foretold of an older one is void.
-    impacts : Counter
-        Impacts of each particle since the last step.
+    crowd : Crowd
+        Who had how many impacts lately.
     fresh : list of int
         Particles on new paths, of which nothing was foretold yet.
     moved : ndarray of bool, (N,)
@@ -111,8 +106,7 @@ class Run:
         self.slow = max(self.soft, HAIR * p.radius / dt)
         self.bend = np.zeros(count)
         self.idle = Idle(self)
-        self.impacts: Counter[int] = Counter()
-        self._counted_until = -inf
+        self.crowd = Crowd(self)
         self._told: list[tuple[Any, ...]] = []
         self.settles_on: NDArray[np.bool_] = (solids.speed == 0.0) | (
             solids.surface == machine.landing
@@ -188,16 +182,6 @@ class Run:
         tick = self.start + (floor((t - self.start) / self.dt + 1e-6) + 1) * self.dt
         end = self.machine.end_time
         return end if abs(tick - end) < 1e-6 * self.dt and end > t else tick
-
-    def count_impact(self, i: int, j: int, t: float) -> int:
-        """Count an impact of i and j; return how many one of them had since the last step."""
-        tick = self.next_tick(t)
-        if tick != self._counted_until:
-            self.impacts.clear()
-            self._counted_until = tick
-        for n in {i, j}:
-            self.impacts[n] += 1
-        return max(self.impacts[i], self.impacts[j])
 
     def turned(self, push: float) -> float:
         """Return the change of ω by a tangential impulse (N s), rad/s."""

@@ -7,6 +7,7 @@ parabola that the last ones foretold, so memory grows with what happens, not wit
 
 from __future__ import annotations
 
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -144,6 +145,8 @@ class Tracks:
 
     def _way_out(self, x: float, y: float, vx: float, vy: float) -> float:
         """Return when a flight leaves the scene, s; at once if it is beyond the edge already."""
+        if self._machine.until == "time":
+            return inf
         left, right, bottom, top = self._box
         if self._machine.gravity > 0.0:
             return closing_time(max(y - bottom, 0.0), vy, -self._machine.gravity)
@@ -202,7 +205,7 @@ class Tracks:
         off = (np.abs(off_x).max(axis=1) > KNOT_POSITION * r) | (
             np.maximum(np.abs(off_v).max(axis=1), off_rim) > KNOT_SPEED
         )
-        turn = np.flatnonzero(off & self._held[who])
+        turn = (off & self._held[who]).nonzero()[0]
         if len(turn):
             them = who[turn]
             self._write_held(them)

@@ -1,0 +1,109 @@
+"""Where the alignment gives way: crowds, in which impacts follow each other ever faster.
+
+Particles that lose energy when they meet would meet infinitely often within a moment (inelastic
+collapse). Who is in a crowd is stepped even in flight, and what comes together slowly there is left
+to the step; the faster a crowd would meet, the more counts as slow, up to plain steps in a pile.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chutelab.recorder import StalledError
+from chutelab.stepper.tracks import FLYING
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from chutelab.stepper.state import Run
+
+MANY = 10
+"""Impacts of a particle lately, beyond which it is in a crowd. Lately: since the last step, and
+half of what it was then."""
+
+MOST = 200
+"""Impacts of a particle lately, beyond which it does not bounce any more."""
+
+LOAD = 100, 0.05
+"""Impacts of all particles lately, at least and per particle, beyond which each counts for more:
+some tens are resolved within the time of a step of pymunk's and its books."""
+
+BOUND = 10_000, 1_000
+"""Impacts within one step, and of these per particle, beyond which a run does not get on."""
+
+
+class Crowd:
+    """Counts impacts.
+
+    Attributes
+    ----------
+    impacts : ndarray, (N,)
+        Of each particle lately.
+    stepped : ndarray of bool, (N,)
+        Whether it was in a crowd at the last step, and is stepped even in flight.
+    """
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+        self.impacts = np.zeros(run.count, dtype=np.int64)
+        self.stepped = np.zeros(run.count, dtype=bool)
+        self._until, self._load, self._within = run.start, 0, 0
+        self._allowed = max(LOAD[0], LOAD[1] * run.count)
+        self._bound = BOUND[0] + BOUND[1] * run.count
+
+    def count(self, i: int, j: int, t: float) -> int:
+        """Count an impact of i and j, perhaps the same; return how many one of them had lately.
+
+        Raises
+        ------
+        StalledError
+            If there were too many within one step.
+        """
+        self._forget(t)
+        for n in {i, j}:
+            self.impacts[n] += 1
+            self._load += 1
+        self._within += 1
+        if self._within > self._bound:
+            run = self._run
+            x, y, _, _ = run.tracks.state(i, t)
+            reason = (
+                f"{self._within} impacts within one step of {run.dt:.3g} s; lower run.dt, the "
+                "number of particles, or the speeds"
+            )
+            raise StalledError(int(run.ids[i]), t, (x, y), reason)
+        return int(max(self.impacts[i], self.impacts[j]))
+
+    def _forget(self, t: float) -> None:
+        """Halve what was counted with each step that is over."""
+        tick = self._run.next_tick(t)
+        if tick > self._until:
+            self.impacts >>= min(round((tick - self._until) / self._run.dt), 60)
+            self._load, self._within, self._until = int(self.impacts.sum()), 0, tick
+
+    def look(self, t: float) -> None:
+        """Note at a step who is in a crowd; who is in none any more flies on as foretold."""
+        self._forget(t)
+        run = self._run
+        if run.count == 1:
+            return
+        stepped = self.impacts * self._pressure > MANY
+        out = (self.stepped & ~stepped & (run.tracks.mode == FLYING)).nonzero()[0]
+        self.stepped = stepped
+        if len(out):
+            run.changed(out)
+
+    def is_in(self, impacts: int) -> bool:
+        """Tell whether that many impacts lately make a crowd."""
+        return impacts * self._pressure > MANY
+
+    def calm(self, impacts: ArrayLike) -> Any:
+        """Return what approaches too slowly to be foretold where all are stepped, m/s."""
+        p = self._pressure
+        return self._run.slow * (p * np.maximum(np.asarray(impacts) * p / MANY, 1.0)) ** 2
+
+    @property
+    def _pressure(self) -> float:
+        return max(1.0, self._load / self._allowed)

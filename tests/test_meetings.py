@@ -1,0 +1,116 @@
+"""Which disks can meet, and when: against all pairs, and against lines stepped finely."""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from chutelab.stepper.meetings import meeting, neighbours
+
+
+def pairs(first, second):
+    return {(min(a, b), max(a, b)) for a, b in zip(first.tolist(), second.tolist(), strict=True)}
+
+
+def all_pairs(low, high):
+    """Every two boxes, compared one by one; sides that touch overlap."""
+    found = set()
+    for a in range(len(low)):
+        for b in range(a + 1, len(low)):
+            if np.all(low[a] <= high[b]) and np.all(low[b] <= high[a]):
+                found.add((a, b))
+    return found
+
+
+@settings(max_examples=100)
+@given(
+    seed=st.integers(0, 2**31),
+    count=st.integers(0, 40),
+    size=st.floats(0.0, 0.5),
+    grid=st.booleans(),
+)
+def test_neighbours_are_all_boxes_that_overlap(seed, count, size, grid):
+    rng = np.random.default_rng(seed)
+    low = rng.uniform(-1.0, 1.0, (count, 2))
+    sides = rng.uniform(0.0, size, (count, 2))
+    if grid:
+        # Many sides that coincide.
+        low, sides = np.round(4.0 * low) / 4.0, np.round(4.0 * sides) / 4.0
+    first, second = neighbours(low, low + sides)
+    assert len(first) == len(pairs(first, second))  # each pair once
+    assert not np.any(first == second)
+    assert pairs(first, second) == all_pairs(low, low + sides)
+
+
+def test_neighbours_of_a_thousand_in_a_heap():
+    rng = np.random.default_rng(1)
+    low = rng.uniform(0.0, 1.0, (1000, 2))
+    first, second = neighbours(low, low + 0.02)
+    gap = np.abs(low[:, None] - low).max(axis=2)
+    expected = np.argwhere(np.triu(gap <= 0.02, 1))
+    assert len(first) == len(expected) > 100
+    assert pairs(first, second) == set(map(tuple, expected.tolist()))
+
+
+def test_a_wide_box_is_the_neighbour_of_all_below_it():
+    low = np.array([[-10.0, 0.0], *([float(x), 0.5] for x in range(5)), [0.0, 2.0]])
+    high = low + 0.1
+    high[0] = [10.0, 1.0]
+    assert pairs(*neighbours(low, high)) == {(0, n) for n in range(1, 6)}
+
+
+@settings(max_examples=200)
+@given(
+    place=st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)),
+    velocity=st.tuples(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0)),
+    reach=st.floats(0.01, 0.2),
+)
+def test_at_the_meeting_the_distance_is_the_reach_and_before_it_is_more(place, velocity, reach):
+    (x, y), (u, v) = place, velocity
+    apart, speed = np.hypot(x, y), np.hypot(u, v)
+    assume(apart > reach * (1.0 + 1e-6))
+    (t,), (approach,) = meeting(*(np.array([a]) for a in (x, y, u, v)), reach)
+    nearest = abs(x * v - y * u) / speed if speed > 0.0 else apart
+    if x * u + y * v >= 0.0 or nearest >= reach:
+        assert t == inf
+        assert approach == 0.0
+        return
+    assume(nearest < reach * (1.0 - 1e-9))
+    dx, dy = x + t * u, y + t * v
+    assert np.hypot(dx, dy) == pytest.approx(reach, abs=1e-13 * (apart + speed * t))
+    assert approach == pytest.approx(-(dx * u + dy * v) / reach, rel=1e-6, abs=1e-12)
+    earlier = np.linspace(0.0, t, 200)[:-1]
+    assert np.all(np.hypot(x + earlier * u, y + earlier * v) > reach * (1.0 - 1e-12))
+
+
+@pytest.mark.parametrize("below", [1e-4, 1e-8, 1e-12, 1e-14])
+def test_grazing_loses_no_digits(below):
+    # Past at (1 - below) of the reach: the approach is speed √(2 below - below²).
+    reach, speed = 0.008, 2.0
+    miss = reach * (1.0 - below)
+    (t,), (approach,) = meeting(
+        np.array([-0.1]), np.array([miss]), np.array([speed]), np.array([0.0]), reach
+    )
+    part = 1.0 - miss / reach  # what of `below` a float keeps
+    leg = sqrt(part * (2.0 - part))
+    assert approach == pytest.approx(speed * leg, rel=1e-16 / part + 1e-14)
+    assert t == pytest.approx((0.1 - reach * leg) / speed, rel=1e-13 + 1e-16 / leg)
+
+
+@pytest.mark.parametrize(("u", "t", "approach"), [(-2.0, 0.0, 2.0), (2.0, inf, 0.0)])
+@pytest.mark.parametrize("share", [1.0, 0.9, 0.5])
+def test_disks_that_overlap_meet_at_once_or_never(u, t, approach, share):
+    x = np.array([0.008 * share])
+    found = meeting(x, np.zeros(1), np.array([u]), np.zeros(1), 0.008)
+    assert found[0] == pytest.approx([t], abs=1e-16)
+    assert found[1] == pytest.approx([approach], rel=1e-14)
+
+
+def test_disks_at_rest_to_each_other_never_meet():
+    t, approach = meeting(np.array([0.1, 0.008]), np.zeros(2), np.zeros(2), np.zeros(2), 0.008)
+    assert t.tolist() == [inf, inf]
+    assert approach.tolist() == [0.0, 0.0]

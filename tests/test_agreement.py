@@ -195,12 +195,7 @@ def test_pymunk_tells_the_story_of_a_shipped_scene_as_exact_does(name, dt):
     "held",
     [
         True,
-        pytest.param(
-            False,
-            marks=pytest.mark.xfail(
-                reason="at the very top it lies down on the end of the belt it leaves", strict=True
-            ),
-        ),
+        False,
     ],
     ids=["rides round the pulley", "separates at the top"],
 )
@@ -247,9 +242,6 @@ def test_pymunk_agrees_with_exact_at_any_step(held):
     assert tally["compared"] >= 20, tally
 
 
-@pytest.mark.xfail(
-    reason="laid a hair into the plate, it strikes the plate's lower corner", strict=True
-)
 @pytest.mark.parametrize("dt", STEPS)
 def test_pymunk_falls_freely_along_a_plate_that_takes_all(dt):
     # Nothing presses it on an upright plate, so there is nothing to step on the way down.

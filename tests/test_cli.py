@@ -734,7 +734,16 @@ def test_help_lists_the_commands():
     text = call("--help").stdout
     commands = re.findall(r"^  ([a-z]+)  ", text.partition("Commands:")[2], re.MULTILINE)
     assert commands == [
-        "run", "check", "show", "tables", "verify", "stress", "bench", "scenes", "schema", "new",
+        "run",
+        "check",
+        "show",
+        "tables",
+        "verify",
+        "stress",
+        "bench",
+        "scenes",
+        "schema",
+        "new",
     ]
     assert call("-h").stdout == text
     for command in commands:

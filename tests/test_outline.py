@@ -20,6 +20,10 @@ FLOOR = ((-1.0, 0.0), (1.0, 0.0))
 THICK = 2.0 * HALF_THICKNESS
 
 
+LONG = 1e3
+"""s; longer than any flight here."""
+
+
 def outline(*lines, gravity=G, at=(0.3, 5.0)):
     """Outline of lines; their struck faces look to `at`."""
     text = f"gravity = {gravity}\n[particle]\nradius = {R}\n"
@@ -74,7 +78,7 @@ def brute_force(gap, until, samples=20001):
 def test_a_parabola_meets_a_floor_at_the_root_of_a_quadratic(height, vx, vy, gravity):
     t = (vy + sqrt(vy**2 + 2.0 * gravity * (height - R))) / gravity
     assume(abs(vx) * t < 0.99)
-    touch = outline(FLOOR, gravity=gravity).first(0.0, height, vx, vy, inf)
+    touch = outline(FLOOR, gravity=gravity).first(0.0, height, vx, vy, LONG)
     assert touch.t == pytest.approx(t, rel=1e-13)
     assert (touch.solid, touch.normal, touch.curvature) == (0, (0.0, 1.0), 0.0)
 
@@ -84,11 +88,11 @@ def test_a_floor_beyond_the_horizon_is_not_met():
     floor = outline(FLOOR)
     assert floor.first(0.0, 1.0, 0.0, 0.0, 0.999 * t).t == inf
     assert floor.first(0.0, 1.0, 0.0, 0.0, 1.001 * t).t == pytest.approx(t, rel=1e-14)
-    assert floor.first(1.0 + R + 1e-9, 1.0, 0.0, 0.0, inf).t == inf
+    assert floor.first(1.0 + R + 1e-9, 1.0, 0.0, 0.0, LONG).t == inf
 
 
 def test_struck_from_behind_a_floor_is_its_thickness_lower():
-    touch = outline(FLOOR).first(0.0, -0.5, 0.0, 4.0, inf)
+    touch = outline(FLOOR).first(0.0, -0.5, 0.0, 4.0, LONG)
     way = 0.5 - THICK - R
     assert touch.t == pytest.approx((4.0 - sqrt(16.0 - 2.0 * G * way)) / G, rel=1e-13)
     assert touch.normal == (0.0, -1.0)
@@ -96,7 +100,7 @@ def test_struck_from_behind_a_floor_is_its_thickness_lower():
 
 def test_a_floor_met_end_on():
     # Half as deep as it is thick, without gravity: its edge is 4 mm high.
-    touch = outline(FLOOR, gravity=0.0).first(2.0, -HALF_THICKNESS, -3.0, 0.0, inf)
+    touch = outline(FLOOR, gravity=0.0).first(2.0, -HALF_THICKNESS, -3.0, 0.0, LONG)
     assert touch.t == pytest.approx((1.0 - R) / 3.0, rel=1e-14)
     assert touch.normal == (1.0, 0.0)
 
@@ -105,7 +109,7 @@ def test_a_floor_met_end_on():
 @given(over=st.floats(0.01, 0.99), fall=st.floats(0.1, 2.0))
 def test_the_end_of_a_floor_is_round(over, fall):
     # Straight down beside the end: over R is the sine of the normal's angle.
-    touch = outline(FLOOR).first(1.0 + over * R, fall, 0.0, 0.0, inf)
+    touch = outline(FLOOR).first(1.0 + over * R, fall, 0.0, 0.0, LONG)
     depth = sqrt(1.0 - over**2) * R
     assert touch.t == pytest.approx(sqrt(2.0 * (fall - depth) / G), rel=1e-11)
     assert touch.normal == pytest.approx((over, sqrt(1.0 - over**2)), abs=1e-9)
@@ -118,7 +122,7 @@ def test_the_pulley_is_a_circle(side, drop, radius):
     # Falling on it from above, right of the belt's end.
     rho = radius + R
     x = side * rho
-    touch = drum(radius).first(x, rho + drop, 0.0, 0.0, inf)
+    touch = drum(radius).first(x, rho + drop, 0.0, 0.0, LONG)
     y = sqrt(rho**2 - x**2)
     assert touch.t == pytest.approx(sqrt(2.0 * (rho + drop - y) / G), rel=1e-11)
     assert touch.normal == pytest.approx((x / rho, y / rho), abs=1e-9)
@@ -193,22 +197,22 @@ def test_the_first_of_two_is_the_sooner_of_both(low, high, velocity, until):
 def test_an_overlap_counts_inwards_only(depth, vx, vy, gravity):
     floor = outline(FLOOR, gravity=gravity)
     y = R * (1.0 - depth)
-    inwards = floor.first(0.0, y, vx, -vy, inf)
+    inwards = floor.first(0.0, y, vx, -vy, LONG)
     assert (inwards.t, inwards.normal) == (0.0, (0.0, 1.0))
     # Outwards it is let go, and caught when it has sunk as deep again.
-    outwards = floor.first(0.0, y, 0.1 * vx, vy, inf)
+    outwards = floor.first(0.0, y, 0.1 * vx, vy, LONG)
     back = 2.0 * vy / gravity if gravity > 0.0 else inf
     assert outwards.t == pytest.approx(back, rel=1e-9)
 
 
 @pytest.mark.parametrize("vy", [-1.0, 0.0, 1.0])
 def test_in_contact_with_the_floor(vy):
-    touch = outline(FLOOR).first(0.0, R, 0.3, vy, inf)
+    touch = outline(FLOOR).first(0.0, R, 0.3, vy, LONG)
     assert touch.t == pytest.approx(max(2.0 * vy / G, 0.0), rel=1e-14)
 
 
 def test_at_rest_on_a_floor_without_gravity_nothing_happens():
-    assert outline(FLOOR, gravity=0.0).first(0.0, R, 3.0, 0.0, inf).t == inf
+    assert outline(FLOOR, gravity=0.0).first(0.0, R, 3.0, 0.0, LONG).t == inf
 
 
 @pytest.mark.parametrize(("miss", "meets"), [(1e-9, False), (-1e-9, True)])
@@ -233,9 +237,6 @@ def test_leaving_the_pulley_along_its_tangent_does_not_meet_it_again(cosine, rad
     assert touch.t == inf
 
 
-@pytest.mark.xfail(
-    reason="at the very top it lies down on the end of the belt it leaves", strict=True
-)
 def test_leaving_at_the_very_top_meets_neither_the_pulley_nor_the_belt():
     # The belt ends there, to a rounding of either coordinate.
     touches = [

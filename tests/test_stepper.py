@@ -327,13 +327,7 @@ def test_the_slip_law_is_the_one_of_the_design():
     [
         (False, 0.5),
         (True, 0.5),
-        pytest.param(
-            True,
-            1e6,
-            marks=pytest.mark.xfail(
-                reason="a separation is told at a step, not between two", strict=True
-            ),
-        ),
+        (True, 1e6),
     ],
 )
 def test_friction_lets_go_where_the_slip_law_says(spin, friction):

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.recording import Kind
+from chutelab.stepper.curves import follow
 from chutelab.stepper.impacts import FAINT
 from chutelab.stepper.tracks import CARRIED, FLYING
 
@@ -112,6 +113,7 @@ def settle_books(run: Run, contacts: Contacts, x: Floats, motion: Motion, t: flo
 
     k.rest(who[was_flying])
     k.leave(who, x[who], motion.after[who], motion.spin_after[who])
+    run.bent[who], run.bend[who] = run.bend[who], 0.0
     _surfaces(run, contacts, who, deeds, x, motion, t)
     _calm(run, contacts, who, deeds)
     if run.machine.align:
@@ -265,7 +267,7 @@ def _lie(run: Run, contacts: Contacts, deeds: Deeds, rows: Ints) -> None:
     curved = in_line[i] & deeds.rounded[rows]
     for row in curved.nonzero()[0].tolist():
         solid = contacts.other[rows[row]] - run.count
-        run.follow(int(i[row]), n[row], float(run.solids.reach[solid]) + run.radius)
+        follow(run, int(i[row]), n[row], float(run.solids.reach[solid]) + run.radius)
 
 
 def _calm(run: Run, contacts: Contacts, who: Ints, deeds: Deeds) -> None:

@@ -90,7 +90,7 @@ class Forecast:
             mode = k.mode[i]
             if mode in (WAITING, DONE):
                 continue
-            until = float(k.exit[i]) if mode == FLYING else tick
+            until = min(float(k.exit[i]) if mode == FLYING else tick, run.machine.end_time)
             if mode != CARRIED:
                 until = min(until, self._solid(i, now, until - now))
             if self._crowd:
@@ -198,5 +198,8 @@ class Forecast:
         with np.errstate(divide="ignore", invalid="ignore"):
             safe = np.where(gap < inf, gap / np.where(pace > 0.0, pace, 1.0), inf)
         self._safe_until[due] = now + safe
-        for i in due[now + safe < tick].tolist():
+        close = due[now + safe < tick]
+        # What is asleep is not stepped: nothing would stop it there.
+        run.idle.wake(close)
+        for i in close.tolist():
             self._solid(i, now, tick - now)

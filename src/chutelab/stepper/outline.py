@@ -121,7 +121,7 @@ class Outline:
         x, y, vx, vy : float
             Position and velocity now, m and m/s.
         until : float
-            s from now; may be inf.
+            s from now.
         """
         first = NOTHING
         for slab in self._slabs:
@@ -200,14 +200,10 @@ class Outline:
         t = np.where(now, 0.0, inf)
         search = (~now & (gap < 0.0).any(axis=0)).nonzero()[0]
         if len(search):
-            limit = until
-            if until == inf:
-                # Flights without gravity: after they were nearest, nothing more happens.
-                limit = 1.0 + float(np.max(-gap[1] / np.maximum(gap[2], 1e-300), initial=0.0))
-            t[search] = first_descent(gap[:, search], np.full(len(search), limit))
+            t[search] = first_descent(gap[:, search], np.full(len(search), until))
         best = int(np.argmin(t))
         s = float(t[best])
-        if s >= first.t or s > until or s == inf:
+        if s >= first.t or s > until:
             return first
         nx, ny = (d[best] + s * (v + 0.5 * s * g)).tolist()
         size = hypot(nx, ny)
@@ -256,9 +252,6 @@ def closing_time(gap: float, rate: float, pull: float) -> float:
 
 def _range(x: float, v: float, a: float, until: float) -> tuple[float, float]:
     """Return the least and the largest of x + v t + a t²/2 up to `until`; a is not positive."""
-    if until == inf:
-        return (-inf if v < 0.0 or a < 0.0 else x), (inf if v > 0.0 and a == 0.0 else x if v <= 0.0
-                else x - 0.5 * v * v / a)  # fmt: skip
     end = x + until * (v + 0.5 * until * a)
     high = x - 0.5 * v * v / a if v > 0.0 and v + until * a < 0.0 else max(x, end)
     return min(x, end), high

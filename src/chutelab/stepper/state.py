@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chutelab.recording import EVENT, Kind
 from chutelab.stepper.crowd import Crowd
+from chutelab.stepper.curves import leave
 from chutelab.stepper.idle import Idle
 from chutelab.stepper.stays import Stays
 from chutelab.stepper.tracks import Tracks
@@ -67,8 +68,9 @@ class Run:
     slow : float
         m/s; in a step it leads to an overlap of a `HAIR` at most: what is in contact, and meets
         others more slowly, is left to the step.
-    bend : ndarray, (N,)
-        Curvature of the path along the solid a particle was laid on, 1/m.
+    bend, bent : ndarray, (N,)
+        Curvature of the path along the solid that a particle in contact goes round, and went round
+        a step ago, 1/m; 0 on a face.
     """
 
     def __init__(
@@ -104,7 +106,7 @@ class Run:
         self.moved = np.zeros(count, dtype=bool)
         self.soft = machine.gravity * dt
         self.slow = max(self.soft, HAIR * p.radius / dt)
-        self.bend = np.zeros(count)
+        self.bend, self.bent = np.zeros((2, count))
         self.idle = Idle(self)
         self.crowd = Crowd(self)
         self._told: list[tuple[Any, ...]] = []
@@ -257,26 +259,9 @@ class Run:
         """Let go what is in contact no more; whether it separated, its flight will tell."""
         if not len(who):
             return
-        self.tracks.lift(who, t, self.dt)
+        k = self.tracks
+        curved = (self.bend[who] > 0.0) & (k.from_t[who] == t)
+        left = [i for i in who[curved].tolist() if leave(self, i, t)]
+        k.lift(who[~np.isin(who, left)], t, self.dt)
         self.changed(who)
         self.stays.left(who, t)
-
-    def follow(self, particle: int, normal: Floats, rho: float) -> None:
-        """Lead a particle round the pulley, or the end of a face, unless it is to fly off.
-
-        Moved along the tangent it would lose the contact and hop. It gets the chord instead, and
-        between move and solve half the centripetal change, so that the contact feels
-        g cos φ - v²/ρ.
-        """
-        k = self.tracks
-        w = k.w[particle]
-        along = np.array([normal[1], -normal[0]])
-        speed = float(w @ along)
-        centripetal = speed * speed / rho
-        if centripetal >= self.machine.gravity * normal[1]:
-            return
-        turn = speed * self.dt / rho
-        ahead = np.cos(turn) * normal + np.sin(turn) * along
-        k.aim[particle] = w - 0.5 * self.dt * centripetal * normal
-        push = 0.5 * self.mass * centripetal * ahead
-        self.world.steer(particle, tuple(k.aim[particle].tolist()), tuple(push.tolist()))

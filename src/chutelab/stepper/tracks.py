@@ -218,6 +218,12 @@ class Tracks:
         self._held[who], self._held_t[who] = True, t
         self._held_x[who], self._held_v[who], self._held_omega[who] = x, v, omega
 
+    def give_up(self, i: int, t: float) -> None:
+        """Write the last state of a particle in contact if it is from before t, else forget it."""
+        if self._held_t[i] < t:
+            self._write_held(np.array([i]))
+        self._held[i] = False
+
     def close(self, who: Ints) -> None:
         """Write the last states of particles in contact, if they are not knots yet."""
         self._write_held(who)

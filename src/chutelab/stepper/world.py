@@ -23,6 +23,9 @@ SMALLEST_SHARE = 1e-12
 """Pymunk multiplies the values of two shapes; a pair value of 0 becomes this, so that the others
 can be divided by its root."""
 
+ITERATIONS = 30
+"""Of the contact solver; pymunk's 10 leave the lower layers of a pile pressed into each other."""
+
 FREE, CARRIED, SOLID = 1, 2, 4
 """Categories of shapes: only pairs with a free particle in them collide."""
 
@@ -85,6 +88,7 @@ class World:
         self._space = pymunk.Space()
         self._space.gravity = (0.0, -machine.gravity)
         self._space.collision_slop = SLOP * machine.particle.radius
+        self._space.iterations = ITERATIONS
         # A contact that ends is forgotten at once: what pymunk remembers longer it reports as part
         # of the impulse when the pair meets again, without applying it.
         self._space.collision_persistence = 1

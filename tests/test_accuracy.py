@@ -239,7 +239,7 @@ def test_a_handful_of_colliding_particles_is_no_chaos():
 
 
 def test_a_heap_is_chaotic_and_its_mean_is_what_can_be_known():
-    scene = sc.load("stream", ["stream.count=24"])
+    scene = sc.load("stream", ["stream.count=40"])
     recording, found = reach(scene, "1um")
     assert found.chaotic
     assert not found.met

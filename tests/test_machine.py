@@ -47,7 +47,8 @@ def impact(alpha, *, radius=r, pivot=R, speed=V, angle=0.0):
 
 
 @given(
-    alpha=st.floats(-50.0, 10.0),
+    # np.roots divides by the sine of the angle.
+    alpha=st.floats(-50.0, 10.0).filter(lambda a: a == 0.0 or abs(a) > 1e-9),
     radius=st.one_of(st.just(0.0), st.floats(1e-4, 0.03)),
     speed=st.floats(1.5, 6.0),
     pivot=st.floats(-0.1, 0.3),

@@ -30,6 +30,15 @@ class Program(click.Group):
         """Return the names of the commands in the order of help."""
         return list(self.commands)
 
+    def main(self, *args: Any, **kwargs: Any) -> Any:
+        """Run the program; Ctrl-C between two commands' worth of code is Ctrl-C all the same."""
+        try:
+            return super().main(*args, **kwargs)
+        except SystemExit as end:
+            if _was_interrupted(end.__context__):
+                raise SystemExit(INTERRUPTED) from None
+            raise
+
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command; turn what goes wrong into a message and an exit code."""
         for stream in (sys.stdout, sys.stderr):
@@ -44,12 +53,24 @@ class Program(click.Group):
         except (click.ClickException, click.exceptions.Exit, click.Abort, BrokenPipeError):
             raise
         except Exception as error:
+            if _was_interrupted(error):
+                click.echo("\nInterrupted.", err=True)
+                ctx.exit(INTERRUPTED)
             if _is_refusal(error):
                 raise RefusedError(str(error)) from error
             if ctx.params["debug"]:
                 raise
             click.echo(_failure(error), err=True)
             ctx.exit(1)
+
+
+def _was_interrupted(error: BaseException | None) -> bool:
+    """Tell whether Ctrl-C is behind an error: compiled code may turn it into another one."""
+    while error is not None:
+        if isinstance(error, KeyboardInterrupt):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
 
 
 def _is_refusal(error: Exception) -> bool:

@@ -114,7 +114,9 @@ def settle_books(run: Run, contacts: Contacts, x: Floats, motion: Motion, t: flo
     k.rest(who[was_flying])
     k.leave(who, x[who], motion.after[who], motion.spin_after[who])
     run.bent[who], run.bend[who] = run.bend[who], 0.0
-    _surfaces(run, contacts, who, deeds, x, motion, t)
+    flew = np.zeros(run.count, dtype=bool)
+    flew[who[was_flying]] = True
+    _surfaces(run, contacts, who, flew, deeds, x, motion, t)
     _calm(run, contacts, who, deeds)
     if run.machine.align:
         run.idle.settle(contacts, who, deeds)
@@ -231,8 +233,9 @@ def _events(
 
 
 def _surfaces(
-    run: Run, contacts: Contacts, who: Ints, deeds: Deeds, x: Floats, motion: Motion, t: float
-) -> None:
+    run: Run, contacts: Contacts, who: Ints, flew: NDArray[np.bool_], deeds: Deeds, x: Floats,
+    motion: Motion, t: float,
+) -> None:  # fmt: skip
     """Keep account of which single surface particles lie on, and whether they slip there."""
     fixed = contacts.other >= run.count
     surface = np.full(run.count, -1)
@@ -242,7 +245,9 @@ def _surfaces(
     run.stays.arrive(who, surface[who], t)
     speed = np.abs(deeds.after_t[rows])
     slipping = run.stays.slipping[alone]
-    stops, starts = slipping & (speed < SETTLED[0]), ~slipping & (speed > SLIPS)
+    # A blow out of flight that ends the slip is no sticking yet.
+    stops = slipping & ~flew[alone] & (speed < SETTLED[0])
+    starts = ~slipping & (speed > SLIPS)
     run.stays.slipping[alone] = (slipping & ~stops) | starts
     _lie(run, contacts, deeds, fixed.nonzero()[0])
     for kind, these in ((Kind.STICK, alone[stops]), (Kind.SLIP, alone[starts])):

@@ -161,10 +161,9 @@ def _deeper(run: Run, partner: Partner) -> float:
 
 def _lean(run: Run, n: int, partner: Partner, sign: float, t: float) -> None:
     """Let a particle rest against another, from whose normal the sign leads to it."""
-    k, (nx, ny) = run.tracks, partner.normal
-    (x, y), (vx, vy), deep = k.x[n].tolist(), k.v[n].tolist(), sign * _deeper(run, partner)
-    k.mark(n, t, x - deep * nx, y - deep * ny, vx, vy, float(k.omega[n]))
-    run.rest(n)
+    nx, ny = partner.normal
+    deep = sign * _deeper(run, partner)
+    run.rest(n, sunk=(-deep * nx, -deep * ny))
     run.stays.arrive(np.array([n]), np.array([-1]), t)
 
 
@@ -185,9 +184,9 @@ def _lie_down(run: Run, i: int, partner: Partner, surface: int, t: float) -> Non
         -j_t * (slip + 0.5 * j_t / run.rolling_mass),
     )  # fmt: skip
     vx, vy = vx + (j_n * nx + j_t * ny) / run.mass, vy + (j_n * ny - j_t * nx) / run.mass
+    k.mark(i, t, x, y, vx, vy, omega + run.turned(j_t))
     deep = _deeper(run, partner)
-    k.mark(i, t, x - deep * nx, y - deep * ny, vx, vy, omega + run.turned(j_t))
-    run.rest(i, partner.normal, partner.solid, partner.curvature)
+    run.rest(i, partner.normal, partner.solid, partner.curvature, (-deep * nx, -deep * ny))
     run.stays.arrive(np.array([i]), np.array([surface]), t)
 
 

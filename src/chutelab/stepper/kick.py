@@ -64,6 +64,8 @@ def _enter(run: Run, free: NDArray[np.bool_], carried: NDArray[np.bool_], t: flo
     if not len(who) and not len(pushed):
         return
     x, v = k.flight(who, t)
+    x[k.mode[who] == RESTING] += run.sunk[who][k.mode[who] == RESTING]
+    run.sunk[who] = 0.0
     w = v - 0.5 * run.dt * run.gravity
     laid = k.upon[who].any(axis=1) & (k.mode[who] == RESTING)
     normal = k.upon[who]

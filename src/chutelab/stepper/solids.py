@@ -21,7 +21,7 @@ stick out further."""
 GRIP = 1e6
 """Coefficient of friction that stands for µ = ∞: finite, because pymunk multiplies it by 0."""
 
-SLOP = 1e-4
+SLOP = 1e-3
 """Overlap, as a share of the radius, that pymunk leaves alone: parting what overlaps less would
 raise it, and that energy comes from nowhere."""
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-HAIR = 2.5e-3
+HAIR = 2e-3
 """Share of the radius by which particles in contact may overlap before a step parts them. It also
 bounds the step where `run.dt` is coarse or particles are small: gravity must not do more, g dt²."""
 
@@ -61,6 +61,8 @@ class Run:
         Who had how many impacts lately.
     fresh : list of int
         Particles on new paths, of which nothing was foretold yet.
+    sunk : ndarray, (N, 2)
+        By how much the next step finds a particle deeper in what it was laid on, m.
     moved : ndarray of bool, (N,)
         Whether pymunk's body has to be put on the path anew.
     soft : float
@@ -107,6 +109,7 @@ class Run:
         self.soft = machine.gravity * dt
         self.slow = max(self.soft, HAIR * p.radius / dt)
         self.bend, self.bent = np.zeros((2, count))
+        self.sunk = np.zeros((count, 2))
         self.idle = Idle(self)
         self.crowd = Crowd(self)
         self._told: list[tuple[Any, ...]] = []
@@ -196,6 +199,7 @@ class Run:
         normal: tuple[float, float] = (0.0, 0.0),
         solid: int = -1,
         curvature: float = 0.0,
+        sunk: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         """Let a particle rest from its last knot on.
 
@@ -203,12 +207,14 @@ class Run:
         ----------
         normal, solid, curvature
             Of the solid it lies on, if it does; the last is that of its path, 1/m.
+        sunk : tuple of float
+            By how much the next step is to find it deeper in what it rests on, m.
         """
         k, who = self.tracks, np.array([i])
         k.rest(who)
         k.leave(who, k.x[who], k.v[who], k.omega[who])
         k.from_t[i], k.from_x[i], k.from_v[i] = k.t[i], k.x[i], k.v[i]
-        k.upon[i], self.bend[i] = normal, curvature
+        k.upon[i], self.bend[i], self.sunk[i] = normal, curvature, sunk
         k.face[i] = solid if curvature == 0.0 else -1
         self.changed(who)
 

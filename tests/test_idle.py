@@ -14,6 +14,7 @@ from chutelab.recording import Kind
 from chutelab.scene import parse
 from chutelab.stepper import run
 from chutelab.stepper.idle import Idle, spread
+from chutelab.stepper.solids import SLOP
 
 G, R, DT = 9.81, 0.004, 1e-3
 
@@ -165,8 +166,10 @@ def test_a_pile_that_sleeps_lies_as_one_that_is_stepped(both_ways, machine):
     assert ledger(sleeping).relative_residual < 5e-5
     # Left alone for longer it does not stir.
     longer = run(replace(machine(), end_time=4.0))
-    assert last(longer) == pytest.approx(last(sleeping), abs=2e-5 * R)
-    assert len(longer.knots) == len(sleeping.knots)
+    # What rests may lie anywhere within the slop, layer by layer.
+    assert last(longer) == pytest.approx(last(sleeping), abs=4.0 * SLOP * R)
+    # The step is fitted to the end of the run, so it falls together a little differently.
+    assert abs(len(longer.knots) - len(sleeping.knots)) <= 10
 
 
 def test_a_sleeper_hit_from_the_side_slides_on(both_ways):
@@ -200,7 +203,10 @@ def test_a_sleeper_is_woken_by_what_falls_on_it(both_ways):
     (hit, *_) = sleeping.select(Kind.COLLISION)
     # Centres 2 r apart, the upper one ½ r to the right.
     fall = 0.2 - R - sqrt(4.0 - 0.25) * R
-    assert hit["t"] == pytest.approx(0.3 + sqrt(2.0 * fall / G), abs=5e-7)
+    # The lower one lies up to the slop deep in the floor.
+    assert hit["t"] == pytest.approx(
+        0.3 + sqrt(2.0 * fall / G), abs=SLOP * R / sqrt(2.0 * fall * G)
+    )
     assert last(sleeping)[0] == pytest.approx([0.0, R], abs=0.5 * R)
     assert last(sleeping)[1, 0] > 2.0 * R  # it rolled off to the right
 
@@ -212,7 +218,8 @@ def test_a_sleeper_is_woken_by_the_end_of_its_support():
     end = recording.track(0)[-1]
     fall = end["t"] - (1.0 - speed) / (0.1 * G)
     assert end["t"] == 1.0
-    assert end["velocity"][0] == pytest.approx(speed, abs=1e-4)
+    # The end of the table is seen by a step: it rubs that much longer at most.
+    assert end["velocity"][0] == pytest.approx(speed, abs=0.1 * G * DT)
     assert end["position"][0] == pytest.approx(0.3 + speed * fall, abs=speed * DT)
     assert end["position"][1] == pytest.approx(R - 0.5 * G * fall**2, abs=0.02)
 

@@ -6,7 +6,7 @@ Plain numbers throughout: an impact concerns one or two particles, and there are
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import hypot
+from math import copysign, hypot
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -176,9 +176,15 @@ def _lie_down(run: Run, i: int, partner: Partner, surface: int, t: float) -> Non
     (x, y), (vx, vy), omega = k.x[i].tolist(), k.v[i].tolist(), float(k.omega[i])
     speed = vx * ny - vy * nx
     pressed = max(run.machine.gravity * ny - partner.curvature * speed**2, 0.0)
-    j_n = 0.5 * run.mass * pressed * (run.next_tick(t) - t)
-    slip, grip = speed + run.radius * omega - belt, run.clashes.grip(partner.solid) * j_n
-    j_t = min(max(-run.rolling_mass * slip, -grip), grip)
+    span = run.next_tick(t) - t
+    j_n = 0.5 * run.mass * pressed * span
+    slip = speed + run.radius * omega - belt
+    # The next step rubs for a whole dt, half of it for the time before: for span, not for dt.
+    grip = run.clashes.grip(partner.solid) * run.mass * pressed * (span - 0.5 * run.dt)
+    stop = -run.rolling_mass * slip
+    j_t = min(max(stop, -grip), grip) if grip >= 0.0 else copysign(-grip, slip)
+    if grip < 0.0 and abs(stop) <= -grip:
+        j_t = 0.0
     run.book(
         i, surface, j_t * belt, -0.5 * j_n**2 / run.mass,
         -j_t * (slip + 0.5 * j_t / run.rolling_mass),

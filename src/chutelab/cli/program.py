@@ -34,6 +34,8 @@ class Program(click.Group):
         """Run the program; Ctrl-C between two commands' worth of code is Ctrl-C all the same."""
         try:
             return super().main(*args, **kwargs)
+        except KeyboardInterrupt:
+            raise SystemExit(INTERRUPTED) from None
         except SystemExit as end:
             if _was_interrupted(end.__context__):
                 raise SystemExit(INTERRUPTED) from None

@@ -10,12 +10,10 @@ import click
 from chutelab.cli.parameters import folder
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
-    from rich.console import RenderableType
-
-    from chutelab.workprecision import Claim, Record, Size
+    from chutelab.workprecision import Record, Size
 
 CASES = ("transfer", "bounce", "belt", "independent", "interacting", "process")
 METHODS = ("exact", "aligned", "fixed", "plain", "dop853")
@@ -96,7 +94,7 @@ def bench(
 
     Measuring everything takes some minutes.
     """  # noqa: D301 - click wants the backspace
-    from chutelab.cli import console
+    from chutelab.cli import benchtables, console
     from chutelab.cli.output import destination
     from chutelab.cli.progress import progress
     from chutelab.workprecision import environment
@@ -117,7 +115,7 @@ def bench(
                     _write_records(records, about, folder)
     if scaling:
         told = {"sizes": [asdict(one) for one in sizes]}
-        parts = list(_sized(sizes))
+        parts = list(benchtables.sizes(sizes))
     else:
         from chutelab.workprecision import claims
 
@@ -126,11 +124,11 @@ def bench(
             "records": [asdict(one) for one in records],
             "claims": [asdict(one) for one in said],
         }
-        parts = list(_measured(records, said))
+        parts = list(benchtables.records(records, said))
     if as_json:
         console.show_json({"format": 1, "environment": about, **told})
         return
-    console.show(*parts, _on(about))
+    console.show(*parts, benchtables.environment(about))
     if out is not None:
         name = "scaling" if scaling else "work-precision"
         click.echo(f"wrote into {out}: {name}.tsv, {name}.png")
@@ -198,125 +196,3 @@ def _write_sizes(sizes: Sequence[Size], about: Mapping[str, str], folder: Path) 
 
     (folder / "scaling.tsv").write_text(to_tsv(sizes, Size, about), encoding="utf-8")
     scaling(sizes, about, path=folder / "scaling.png")
-
-
-def _measured(records: Sequence[Record], said: Sequence[Claim]) -> Iterator[RenderableType]:
-    """Return a table for each case, and what follows from them."""
-    from rich.text import Text
-
-    from chutelab.workprecision import cases as known
-
-    titles = {name: (case.title, f"error: {case.error}") for name, case in known().items()}
-    titles["process"] = (
-        "Whole process",
-        "run: chutelab run perpendicular --json; numpy: python -c 'import numpy'",
-    )
-    for case in dict.fromkeys(one.case for one in records):
-        title, note = titles[case]
-        mine = [one for one in records if one.case == case]
-        yield _table(title, mine, crowd=case == "interacting")
-        failed = [
-            f"{one.method} failed{_at(one, ' at ')}: {one.failed}" for one in mine if one.failed
-        ]
-        yield Text("\n".join([note, *failed]), style="italic")
-    if said:
-        yield Text("\nWhat the rows say", style="bold")
-        yield Text("\n".join(f"{claim.case}: {claim.sentence}" for claim in said))
-
-
-def _table(title: str, records: Sequence[Record], *, crowd: bool) -> RenderableType:
-    from chutelab.cli.report import plain_table, titled
-
-    beside = ["worst", "residual", "shift"] if crowd else ["of", "runs"]
-    table = plain_table(["method", "at", "first", "median", "error", "memory", *beside])
-    for column in table.columns:
-        column.no_wrap = True
-    for one, before in zip(records, [None, *records], strict=False):
-        last = [_digits(one.overlap), _digits(one.residual), _length(one.place_shift)]
-        if not crowd:
-            last = [one.quantity, "" if one.median is None else str(one.repeats)]
-        table.add_row(
-            "" if before is not None and before.method == one.method else one.method,
-            _at(one),
-            _time(one.first),
-            _time(one.median),
-            "failed" if one.failed else _digits(one.error),
-            _bytes(one.memory),
-            *last,
-        )
-    return titled(title, table)
-
-
-def _at(one: Record, lead: str = "") -> str:
-    """Return the parameter of a record, "" without one."""
-    return "" if one.value is None else f"{lead}{one.parameter} {one.value:.0e}"
-
-
-def _digits(value: float | None) -> str:
-    return "" if value is None else f"{value:.1e}"
-
-
-def _length(value: float | None) -> str:
-    return "" if value is None else f"{1e3 * value:.3g} mm"
-
-
-def _sized(sizes: Sequence[Size]) -> Iterator[RenderableType]:
-    """Return a table for each case and method, with the fitted exponents."""
-    from chutelab.cli.report import plain_table, titled
-    from chutelab.workprecision import METHODS as KNOWN
-    from chutelab.workprecision.fit import exponent
-
-    for case, method in dict.fromkeys((one.case, one.method) for one in sizes):
-        table = plain_table(
-            ["particles", "events", "first", "median", "runs", "an event", "memory", ""], texts=0
-        )
-        for one in sizes:
-            if (one.case, one.method) != (case, method):
-                continue
-            each = one.median / one.events if one.median and one.events else None
-            table.add_row(
-                f"{one.particles:,}",
-                "" if one.events is None else f"{one.events:,}",
-                _time(one.first),
-                _time(one.median),
-                str(one.repeats) if one.median is not None else "",
-                _time(each),
-                _bytes(one.memory),
-                one.failed,
-            )
-        powers = (exponent(sizes, case, method, what) for what in ("median", "memory"))
-        fitted = ", ".join(
-            f"{name} ∝ N^{power:.2f}"
-            for name, power in zip(("time", "memory"), powers, strict=True)
-            if power is not None
-        )
-        yield titled(f"{case.capitalize()}, {KNOWN[method].title}: {fitted or 'too few'}", table)
-
-
-def _on(about: Mapping[str, str]) -> RenderableType:
-    from rich.text import Text
-
-    return Text(
-        "\nmeasured on " + ", ".join(f"{key} {value}" for key, value in about.items()),
-        style="italic",
-    )
-
-
-def _time(seconds: float | None) -> str:
-    if seconds is None:
-        return ""
-    for unit, factor in (("s", 1.0), ("ms", 1e3), ("µs", 1e6)):
-        if seconds * factor >= 1.0:
-            return f"{seconds * factor:.3g} {unit}"
-    return f"{seconds * 1e9:.0f} ns"
-
-
-def _bytes(size: int | None) -> str:
-    if size is None:
-        return ""
-    value: float = size
-    for unit in ("B", "kB", "MB"):
-        if value < 999.5:
-            return f"{value:.3g} {unit}"
-        value /= 1e3
-    return f"{value:.3g} GB"

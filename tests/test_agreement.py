@@ -12,9 +12,11 @@ from hypothesis import HealthCheck, Phase, assume, given, settings
 from hypothesis import strategies as st
 
 from chutelab import exact, machine, scene, stepper, theory
+from chutelab.agreement import agreement
 from chutelab.compare import QUANTITIES, compare
 from chutelab.compare import scene_of as scene_from
 from chutelab.recording import Kind
+from chutelab.simulation import simulate
 
 GRAVITY = 9.81
 
@@ -289,3 +291,37 @@ def test_pymunk_with_fixed_steps_agrees_with_exact_to_the_way_of_three(dt, examp
     one()
     assert tally["compared"] >= 0.2 * examples
     assert tally["late"] >= tally["compared"]  # plain steps they are
+
+
+# What `verify` promises of one answer beside another.
+
+
+def test_steps_that_end_at_impacts_are_promised_1e_8_of_the_extent():
+    rows = agreement(scene.load("belt-landing"))
+    assert [row.pair for row in rows] == ["exact, theory", "pymunk, exact", "pymunk, exact"]
+    landing = simulate(scene.load("belt-landing")).track(0)["position"]
+    assert rows[2].tolerance == pytest.approx(1e-8 * np.abs(landing).max(), rel=1e-12)
+    assert all(row.holds and row.difference < 1e-12 for row in rows)
+
+
+def test_fixed_steps_are_promised_three_steps_of_way():
+    rows = agreement(scene.load("perpendicular", ["run.align=false"]))
+    # The fastest it gets, at the landing: v² = v0² + 2 g (drop to the belt) after the impact.
+    track = simulate(scene.load("perpendicular")).track(0)
+    fastest = max(np.hypot(*velocity) for velocity in track["velocity"])
+    assert rows[2].tolerance == pytest.approx(3.0 * 1e-3 * fastest, rel=1e-12)
+    assert rows[2].holds
+    assert rows[2].difference > 1e-5
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        ["particle.radius=0.001"],
+        ["run.align=false", "run.dt=0.1"],
+        ["incoming.friction=0.5"],
+    ],
+)
+def test_no_bound_where_none_is_known(overrides):
+    rows = agreement(scene.load("perpendicular", overrides))
+    assert {row.tolerance for row in rows[1:]} == {None}

@@ -6,7 +6,6 @@ k = 1/m1 + 1/m2 + r1²/I1 + r2²/I2.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import asin, cos, hypot, radians, sin, sqrt
 
 import numpy as np
@@ -15,12 +14,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from chutelab.ledger import ledger
-from chutelab.machine import build
 from chutelab.recording import Kind
-from chutelab.scene import parse
-from chutelab.stepper import run
 from chutelab.stepper.clash import Clash, Disk, Pair
 from chutelab.stepper.meetings import meeting
+from machines import two_disks
 
 R, M = 0.004, 0.008
 
@@ -147,41 +144,9 @@ def test_when_and_where_disks_meet(course, share, speed, gap):
     assert approach == pytest.approx(speed * leg / reach, rel=1e-9)
 
 
-def thrown(
-    position, velocities, *, gravity=0.0, restitution=0.7, friction=0.4, spin=True, until=0.2
-):
-    """Two disks in the engine: the first starts at the origin, the second as told."""
-    machine = build(
-        parse(
-            f"""
-gravity = {gravity}
-[particle]
-spin = {str(spin).lower()}
-[stream]
-count = 2
-rate = 1.0
-at = [0.0, 1.0]
-velocity = [1.0, 0.0]
-bed_height = 0.01
-interact = true
-restitution = {restitution}
-friction = {friction}
-[run]
-until = {until}
-dt = {1 / 60}
-[[surface]]
-name = "far"
-points = [[-50.0, -50.0], [50.0, -50.0], [50.0, 50.0]]
-"""
-        )
-    )
-    releases = replace(
-        machine.releases,
-        t=np.zeros(2),
-        position=np.array([[0.0, 0.0], position]),
-        velocity=np.array(velocities, dtype=float),
-    )
-    return run(replace(machine, releases=releases))
+def thrown(position, velocities, **told):
+    """The first starts at the origin, the second as told; few steps, so that impacts end them."""
+    return two_disks([(0.0, 0.0), position], velocities, dt=1 / 60, **told)
 
 
 @settings(max_examples=60)

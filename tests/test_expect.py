@@ -20,20 +20,12 @@ from chutelab.scene.measures import SYMBOLS, unit_of
 from chutelab.scene.units import read_size, write_size
 from chutelab.simulation import simulate
 from chutelab.summary import summary
+from machines import PERPENDICULAR
 
 G = 9.81
-MACHINE = """
-[incoming]
-speed = 2.0
-pulley_radius = 0.1
-[plate]
-distance = 0.5
-[outgoing]
-drop = 0.5
-"""
 
 
-def expecting(quantity, value, tolerance, *, more="", machine=MACHINE):
+def expecting(quantity, value, tolerance, *, more="", machine=PERPENDICULAR):
     lines = f'quantity = "{quantity}"\nvalue = {value}\ntolerance = {tolerance}\nsource = "me"\n'
     return sc.parse(f"{machine}[[expect]]\n{lines}{more}")
 
@@ -189,7 +181,7 @@ def test_a_number_is_relative_and_a_string_absolute(value, tolerance, holds):
 
 
 def test_angles_are_degrees_but_relative_to_a_radian():
-    machine = MACHINE.replace("0.1", "0.5")
+    machine = PERPENDICULAR.replace("0.1", "0.5")
     angle = degrees(acos(4.0 / (G * 0.504)))
     row = only(verify(expecting("phi1_deg", angle + 1.0, "1.0", machine=machine)), "exact")
     assert row.error == pytest.approx(np.pi / 180.0, rel=1e-12)
@@ -220,7 +212,7 @@ def test_pymunk_may_have_a_tolerance_of_its_own_or_none():
 
 
 def test_what_does_not_happen_fails():
-    machine = MACHINE + "length = 0.1\n"
+    machine = PERPENDICULAR + "length = 0.1\n"
     found = verify(expecting("landing.x", 0.5, 1.0, machine=machine))
     assert not only(found, "exact").holds
     assert isnan(only(found, "exact").error)
@@ -260,13 +252,13 @@ def test_the_theory_is_asked_for_its_own_symbols_only():
     ],
 )
 def test_engines_that_are_not_for_a_scene_are_left_out(more, engines, skipped):
-    found = verify(expecting("landing.count", 1, 1, machine=MACHINE + more))
+    found = verify(expecting("landing.count", 1, 1, machine=PERPENDICULAR + more))
     assert [row.engine for row in found.findings] == engines
     assert found.skipped == skipped
 
 
 def test_a_scene_that_expects_nothing_has_its_three_answers_compared():
-    found = verify(sc.parse(MACHINE))
+    found = verify(sc.parse(PERPENDICULAR))
     assert found.findings == ()
     assert [row.pair for row in found.agreements] == [
         *("exact, theory", "pymunk, exact", "pymunk, exact")

@@ -15,16 +15,8 @@ from chutelab.preflight import trial as trials
 from chutelab.recorder import StalledError
 from chutelab.recording import REASONS, Kind
 from chutelab.simulation import simulate
+from machines import PERPENDICULAR
 
-MACHINE = """
-[incoming]
-speed = 2.0
-pulley_radius = 0.1
-[plate]
-distance = 0.5
-[outgoing]
-drop = 0.5
-"""
 LONE = [name for name in sc.shipped() if "stream" not in name]
 
 
@@ -288,7 +280,7 @@ def test_a_setting_that_is_recommended_does_away_with_its_warning(name, override
 
 
 def test_where_nothing_helps_it_says_what_happens():
-    crossed = MACHINE + (
+    crossed = PERPENDICULAR + (
         '[[surface]]\nname = "a"\nfrom = [2, 0]\nto = [3, 0]\n'
         '[[surface]]\nname = "b"\nfrom = [-0.05, 0]\nto = [0.05, 0]\n'
     )

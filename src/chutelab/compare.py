@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from math import atan2, cos, hypot, isfinite, nan, radians, sin
+from math import atan2, cos, degrees, hypot, isfinite, nan, radians, sin
 from typing import TYPE_CHECKING, Any
 
 from chutelab import scene as scenes
 from chutelab.ledger import ledger
 from chutelab.recording import REASONS, Kind
+from chutelab.sheet import Sheet, Shown, number
 from chutelab.theory import predict
 
 if TYPE_CHECKING:
@@ -30,9 +31,36 @@ QUANTITIES = {
 }  # fmt: skip
 """What is compared, under the paper's symbols, and what kind of quantity it is."""
 
+UNITS = {
+    "angle": "°", "time": "s", "length": "m", "speed": "m/s", "energy": "J", "power": "W",
+}  # fmt: skip
+"""What each kind is shown in."""
 
-@dataclass(frozen=True)
-class Comparison:
+MEANINGS = {
+    "phi1": "angle of separation",
+    "t2": "time from there to the plate",
+    "x2": "way forward to the plate",
+    "y2": "fall to the plate",
+    "v2": "speed at the plate",
+    "phi2": "angle to the plate, before",
+    "phi2r": "angle to the plate, after",
+    "v2r": "speed after the impact",
+    "t3": "time from there to landing",
+    "x3": "way back from the plate",
+    "y3": "fall from impact to landing",
+    "v3x": "landing velocity, back",
+    "v3y": "landing velocity, down",
+    "v3": "landing speed",
+    "d3": "height of the transfer",
+    "dEk": "energy, Eq. (14)",
+    "P": "power, Eq. (15)",
+    "belt_work": "work of the outgoing belt",
+    "slip_heat": "heat of the slip on it",
+}
+
+
+@dataclass(frozen=True, repr=False)
+class Comparison(Shown):
     """Particle 0 of a recording beside the theory, SI units and radians.
 
     Attributes
@@ -54,6 +82,32 @@ class Comparison:
     def max(self) -> float | None:
         """Largest of the errors; None if nothing could be compared."""
         return max(self.errors.values(), default=None)
+
+    def sheet(self) -> Sheet:
+        """Return every quantity that one of the two has, and the largest error."""
+        rows = []
+        for name, kind in QUANTITIES.items():
+            simulated, theory = (
+                degrees(values[name]) if kind == "angle" else values[name]
+                for values in (self.simulated, self.theory)
+            )
+            if isfinite(simulated) or isfinite(theory):
+                error = f"{self.errors[name]:.1e}" if name in self.errors else ""
+                what = f"{MEANINGS[name]}, {UNITS[kind]}"
+                rows.append((name, what, number(simulated), number(theory), error))
+        foot: list[tuple[str, ...]] = []
+        if self.max is not None:
+            foot = [("max", "largest relative error", "", "", f"{self.max:.1e}")]
+        begun = any(isfinite(value) for value in self.theory.values())
+        ends = "No closed form from here on" if begun else "No closed form"
+        return Sheet(
+            "Particle 0",
+            ("", "", "simulated", "theory", "error"),
+            tuple(rows),
+            foot=tuple(foot),
+            texts=2,
+            notes=(f"{ends}; {self.reason}",) if self.reason else (),
+        )
 
 
 def scene_of(recording: Recording) -> Scene:

@@ -10,10 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from chutelab.recording import ENTRIES, Recording, balance
+from chutelab.sheet import Sheet, Shown, number
 
 
-@dataclass(frozen=True)
-class Ledger:
+@dataclass(frozen=True, repr=False)
+class Ledger(Shown):
     """Energies of all particles together, J.
 
     Attributes
@@ -49,6 +50,29 @@ class Ledger:
     def relative_residual(self) -> float:
         """|residual| as a share of the energy turned over (0 if nothing was)."""
         return abs(self.residual) / self.turned_over if self.turned_over > 0.0 else 0.0
+
+    def sheet(self) -> Sheet:
+        """Return the entries of each surface that has any, their sum, and how the books close."""
+        total = (self.belt_work, self.restitution_loss, self.friction_loss)
+        moved = (
+            f"{name} {number(before)} -> {number(after)} J"
+            for name, (before, after) in (("kinetic", self.kinetic), ("potential", self.potential))
+        )
+        return Sheet(
+            "Energy ledger, J",
+            ("", *(name.replace("_", " ") for name in ENTRIES)),
+            tuple(
+                (name, *map(number, entries.values()))
+                for name, entries in self.by_surface.items()
+                if any(entries.values())
+            ),
+            foot=(("total", *map(number, total)),),
+            notes=(
+                ", ".join(moved),
+                f"residual {self.residual:.1e} J, {self.relative_residual:.1e} of the"
+                f" {number(self.turned_over)} J turned over",
+            ),
+        )
 
 
 def ledger(recording: Recording) -> Ledger:

@@ -10,7 +10,7 @@ import click
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from chutelab.theory.tables import Cell, Table
+    from chutelab.theory.tables import Table
 
 NUMBERS = (1, 3, 4, 5)
 
@@ -55,16 +55,10 @@ def _shown(table: Table) -> list[RenderableType]:
 
     from chutelab.cli.report import plain_table, titled
 
-    rows = [(row.label, *(_cell(cell) for cell in row.cells)) for row in table.rows]
+    sheet = table.sheet()
     # Broken here, or the terminal breaks some of them elsewhere.
-    columns = [column.replace(" = ", " =\n") for column in table.columns]
-    drawn = plain_table(columns, width=max(len(text) for row in rows for text in row[1:]))
-    for row in rows:
+    columns = [column.replace(" = ", " =\n") for column in sheet.columns]
+    drawn = plain_table(columns, width=max(len(text) for row in sheet.rows for text in row[1:]))
+    for row in sheet.rows:
         drawn.add_row(*row)
-    said = f"{table.differing} of {table.cells} cells differ in a printed digit."
-    head = f"{table.title}\n(printed, computed with Eq. (9) {table.rebound.replace('-', ' ')})"
-    return [titled(head, drawn), Text("\n" + "\n".join([said, *table.notes]))]
-
-
-def _cell(cell: Cell) -> str:
-    return f"{cell.printed} {cell.rounded}{'*' if cell.differs else ''}"
+    return [titled(sheet.title, drawn), Text("\n" + "\n".join(sheet.notes))]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from math import degrees, isfinite
 from typing import TYPE_CHECKING
 
 from rich import box
@@ -12,9 +11,10 @@ from rich.table import Table
 from rich.text import Text
 
 from chutelab.accuracy.wanted import Wanted
-from chutelab.compare import QUANTITIES, compare
+from chutelab.compare import compare
 from chutelab.ledger import ledger
 from chutelab.recording import REASONS
+from chutelab.sheet import WIDTH
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,52 +22,31 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from chutelab.accuracy import Accuracy
-    from chutelab.compare import Comparison
-    from chutelab.ledger import Ledger
     from chutelab.recording import Recording
-
-WIDTH = 80
-"""Columns of a line of prose, at most: a terminal's."""
-
-UNITS = {
-    "angle": "°", "time": "s", "length": "m", "speed": "m/s", "energy": "J", "power": "W",
-}  # fmt: skip
-
-MEANINGS = {
-    "phi1": "angle of separation",
-    "t2": "time from there to the plate",
-    "x2": "way forward to the plate",
-    "y2": "fall to the plate",
-    "v2": "speed at the plate",
-    "phi2": "angle to the plate, before",
-    "phi2r": "angle to the plate, after",
-    "v2r": "speed after the impact",
-    "t3": "time from there to landing",
-    "x3": "way back from the plate",
-    "y3": "fall from impact to landing",
-    "v3x": "landing velocity, back",
-    "v3y": "landing velocity, down",
-    "v3": "landing speed",
-    "d3": "height of the transfer",
-    "dEk": "energy, Eq. (14)",
-    "P": "power, Eq. (15)",
-    "belt_work": "work of the outgoing belt",
-    "slip_heat": "heat of the slip on it",
-}
+    from chutelab.sheet import Sheet
 
 
 def report(recording: Recording, accuracy: Accuracy | None = None) -> list[RenderableType]:
     """Return what a run leaves to read: particle 0 beside the theory, the ledger, the accuracy."""
-    compared = compare(recording)
+    compared = compare(recording).sheet()
     parts: list[RenderableType] = [_head(recording)]
-    if any(isfinite(value) for value in (*compared.simulated.values(), *compared.theory.values())):
-        parts.append(_quantities(compared))
-    if compared.reason:
-        begun = any(isfinite(value) for value in compared.theory.values())
-        ends = "No closed form from here on" if begun else "No closed form"
-        parts.append(Text(f"\n{ends}; {compared.reason}"))
-    parts += _books(ledger(recording))
+    if compared.rows:
+        parts.append(drawn(compared))
+    parts += [Text(f"\n{note}") for note in compared.notes]
+    books = ledger(recording).sheet()
+    parts += [drawn(books), Text("\n" + "\n".join(books.notes))]
     return parts if accuracy is None else [*parts, _reached(accuracy)]
+
+
+def drawn(sheet: Sheet) -> Group:
+    """Return the table of a sheet under its title; its notes are left to the caller."""
+    table = plain_table(sheet.columns, texts=sheet.texts)
+    for row in sheet.rows:
+        table.add_row(*row)
+    table.add_section()
+    for row in sheet.foot:
+        table.add_row(*row)
+    return titled(sheet.title, table)
 
 
 def titled(title: str, table: Table) -> Group:
@@ -108,51 +87,6 @@ def _head(recording: Recording) -> Text:
     return head
 
 
-def _quantities(compared: Comparison) -> Group:
-    worst = compared.max
-    table = plain_table(["", "", "simulated", "theory", "error"], texts=2)
-    for name, kind in QUANTITIES.items():
-        simulated, theory = (
-            degrees(values[name]) if kind == "angle" else values[name]
-            for values in (compared.simulated, compared.theory)
-        )
-        if not isfinite(simulated) and not isfinite(theory):
-            continue
-        error = compared.errors.get(name)
-        table.add_row(
-            name,
-            f"{MEANINGS[name]}, {UNITS[kind]}",
-            _number(simulated),
-            _number(theory),
-            "" if error is None else f"{error:.1e}",
-        )
-    if worst is not None:
-        table.add_section()
-        table.add_row("max", "largest relative error", "", "", f"{worst:.1e}")
-    return titled("Particle 0", table)
-
-
-def _books(books: Ledger) -> list[RenderableType]:
-    table = plain_table(["", "belt work", "restitution loss", "friction loss"])
-    for name, entries in books.by_surface.items():
-        if any(entries.values()):
-            table.add_row(name, *(_number(entry) for entry in entries.values()))
-    table.add_section()
-    table.add_row(
-        "total",
-        _number(books.belt_work),
-        _number(books.restitution_loss),
-        _number(books.friction_loss),
-    )
-    changes = Text(
-        f"\nkinetic {_number(books.kinetic[0])} -> {_number(books.kinetic[1])} J,"
-        f" potential {_number(books.potential[0])} -> {_number(books.potential[1])} J\n"
-        f"residual {books.residual:.1e} J, {books.relative_residual:.1e} of the"
-        f" {_number(books.turned_over)} J turned over"
-    )
-    return [titled("Energy ledger, J", table), changes]
-
-
 def _reached(accuracy: Accuracy) -> Text:
     """Say how accurate the run is, and how that is known."""
     wanted = Wanted(accuracy.asked, "m" if accuracy.unit == "m" else "relative")
@@ -168,7 +102,3 @@ def _reached(accuracy: Accuracy) -> Text:
     how = f"how it is known: {accuracy.method}"
     text.append("\n" + "\n".join(wrapped(how, WIDTH)), style="not bold")
     return text
-
-
-def _number(value: float) -> str:
-    return f"{value:.6g}" if isfinite(value) else "-"

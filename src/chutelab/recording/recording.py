@@ -7,12 +7,15 @@ knots however long it lasts. An impact is two knots at one time.
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from chutelab.recording.layout import REASONS, Kind
 from chutelab.recording.tracks import COLUMNS, blocks, energies, hermite
+from chutelab.sheet import Sheet, Shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
@@ -20,7 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from chutelab.recording.layout import Floats, Ints, Kind, Particle
+    from chutelab.recording.layout import Floats, Ints, Particle
 
 
 class _Text:
@@ -42,8 +45,8 @@ class _Text:
         vars(instance)[self.key] = value
 
 
-@dataclass(frozen=True, eq=False)
-class Recording:
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(Shown):
     """A finished run: read-only arrays, the same type from every engine.
 
     Attributes
@@ -104,6 +107,22 @@ class Recording:
     def count(self) -> int:
         """Number of particles."""
         return len(self.offsets) - 1
+
+    def sheet(self) -> Sheet:
+        """Return what it holds, in a few lines."""
+        first, last = self.ends()
+        happened = sorted(Counter(self.events["kind"].tolist()).items())
+        ended = sorted(Counter(self.ended.tolist()).items())
+        told = {
+            "engine": self.engine,
+            "particles": f"{self.count:,}",
+            "time": f"{first['t'].min():.6g} to {last['t'].max():.6g} s" if len(first) else "none",
+            "events": ", ".join(f"{n:,} {Kind(k).name.lower()}" for k, n in happened),
+            "ended": ", ".join(f"{n:,} {REASONS[k]}" for k, n in ended),
+            "knots": f"{len(self.knots):,}",
+            "run time": f"{self.seconds:.3g} s",
+        }
+        return Sheet(self.title, ("", ""), tuple(told.items()), texts=2)
 
     def save(self, path: str | Path) -> Path:
         """Write an npz file, whole or not at all; `load` gives the recording back bit for bit."""

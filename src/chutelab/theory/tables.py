@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Decimal
 from typing import TYPE_CHECKING
 
+from chutelab.sheet import Sheet, Shown
 from chutelab.theory.printed import DISTANCES, ENERGIES, HEIGHTS, IMPACTS, RADII
 from chutelab.theory.transfer import transfer
 
@@ -52,6 +53,9 @@ class Cell:
     rounded: str
     differs: bool
 
+    def __str__(self) -> str:
+        return f"{self.printed} {self.rounded}{'*' if self.differs else ''}"
+
 
 @dataclass(frozen=True)
 class Row:
@@ -61,8 +65,8 @@ class Row:
     cells: tuple[Cell, ...]
 
 
-@dataclass(frozen=True)
-class Table:
+@dataclass(frozen=True, repr=False)
+class Table(Shown):
     """One table of the paper.
 
     Attributes
@@ -97,6 +101,19 @@ class Table:
     def differing(self) -> int:
         """Number of cells that differ in a printed digit."""
         return sum(cell.differs for row in self.rows for cell in row.cells)
+
+    def sheet(self) -> Sheet:
+        """Return printed and computed numbers side by side, marked with * where they differ."""
+        form = self.rebound.replace("-", " ")
+        return Sheet(
+            f"{self.title}\n(printed, computed with Eq. (9) {form})",
+            self.columns,
+            tuple((row.label, *map(str, row.cells)) for row in self.rows),
+            notes=(
+                f"{self.differing} of {self.cells} cells differ in a printed digit.",
+                *self.notes,
+            ),
+        )
 
 
 def table(number: int, rebound: Rebound = "as-printed") -> Table:

@@ -1,0 +1,123 @@
+"""Tables that read well in a terminal and in a notebook."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import pytest
+
+import chutelab
+from chutelab import theory
+from chutelab.ledger import ledger
+from chutelab.sheet import Sheet
+
+SHEET = Sheet(
+    "What & where",
+    ("name", "unit", "value"),
+    (("x", "m", "1.25"), ("a<b", "", "-10")),
+    foot=(("sum", "", "-8.75"),),
+    texts=2,
+    notes=("x " * 60,),
+)
+
+
+class Cells(HTMLParser):
+    """Collects the cells of an HTML table, and that each tag is closed by its own."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.rows = [], []
+        self.feed(text)
+        assert not self.open
+
+    def handle_starttag(self, tag, attrs):
+        self.open.append(tag)
+        if tag == "tr":
+            self.rows.append([])
+        elif tag in ("td", "th"):
+            self.rows[-1].append("")
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if self.open[-1] in ("td", "th"):
+            self.rows[-1][-1] += data
+
+
+def test_text_is_aligned_words_left_and_numbers_right():
+    assert str(SHEET).splitlines()[:7] == [
+        "What & where",
+        "name  unit  value",
+        "----  ----  -----",
+        "x     m      1.25",
+        "a<b           -10",
+        "----  ----  -----",
+        "sum         -8.75",
+    ]
+    notes = str(SHEET).splitlines()[7:]
+    assert len(notes) == 2
+    assert max(map(len, notes)) <= 80
+
+
+def test_html_has_the_same_cells_escaped():
+    text = SHEET._repr_html_()
+    assert "a&lt;b" in text
+    assert "What &amp; where" in text
+    assert Cells(text).rows == [list(SHEET.columns), *map(list, SHEET.rows + SHEET.foot)]
+    assert text.count("text-align:right") == 4  # the head and three numbers
+
+
+def test_no_head_where_no_column_is_named():
+    plain = Sheet("", ("", ""), (("engine", "exact"),), texts=2)
+    assert str(plain) == "engine  exact"
+    assert "<th" not in plain._repr_html_()
+
+
+@pytest.fixture(scope="module")
+def recording():
+    return chutelab.simulate(chutelab.load("perpendicular", ["stream.count=3"]))
+
+
+def test_a_recording_says_what_it_holds(recording):
+    rows = dict(recording.sheet().rows)
+    assert rows["engine"] == "exact"
+    assert rows["particles"] == "3"
+    assert rows["events"] == "3 release, 3 separation, 3 impact, 3 landing"
+    assert rows["ended"] == "3 landed"
+    # Belt 1 m at 2 m/s, 0.298 s to the plate, then 1 m of fall in all; two more, 5 ms apart.
+    assert rows["time"] == "0 to 0.946739 s"
+    assert repr(recording).startswith("Perpendicular damping plate, 2 m/s\nengine     exact\n")
+
+
+def test_a_recording_that_never_began_says_so(recording):
+    none = replace(recording, knots=recording.knots[:0], offsets=recording.offsets * 0)
+    assert dict(none.sheet().rows)["time"] == "none"
+
+
+def test_a_comparison_shows_what_one_of_the_two_has(recording):
+    rows = {row[0]: row[1:] for row in chutelab.compare(recording).sheet().rows}
+    assert rows["x2"][:3] == ("way forward to the plate, m", "0.596", "0.596")
+    assert rows["phi2"][0] == "angle to the plate, before, °"
+    assert rows["belt_work"][1] == "-"
+    assert rows["belt_work"][3] == ""
+    missed = chutelab.simulate(chutelab.load("free-fall"))
+    told = chutelab.compare(missed).sheet()
+    assert (told.rows, told.foot) == ((), ())
+    assert told.notes[0].startswith("No closed form; ")
+
+
+def test_a_ledger_closes_in_its_own_table(recording):
+    sheet = ledger(recording).sheet()
+    numbers = [[float(cell) for cell in row[1:]] for row in sheet.rows]
+    total = [float(cell) for cell in sheet.foot[0][1:]]
+    assert [sum(column) for column in zip(*numbers, strict=True)] == pytest.approx(total, rel=1e-5)
+    assert sheet.notes[1].startswith("residual ")
+
+
+def test_the_papers_tables_mark_what_differs():
+    sheet = theory.table(1, "corrected").sheet()
+    assert sum(cell.endswith("*") for row in sheet.rows for cell in row) == 22
+    assert sheet.notes[0] == "22 of 88 cells differ in a printed digit."
+    assert len(Cells(theory.table(3)._repr_html_()).rows) == 3

@@ -1,21 +1,34 @@
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+import subprocess
+from io import BytesIO
+from itertools import groupby
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
 from PIL import Image
 
 from chutelab import scene, theory
-from chutelab.animate import animate, moments
+from chutelab.animate import VideoError, animate, moments, video
+from chutelab.animate.arrows import outline
 from chutelab.animate.bars import SIGNS, stacks
-from chutelab.animate.gif import PURE, shared_palette
+from chutelab.animate.gif import GifWriter
+from chutelab.animate.layout import Layout, lay_out
+from chutelab.animate.lettering import Lettering
 from chutelab.animate.moments import Moment, film, slowness, span
-from chutelab.animate.stage import VIEW, Stage
-from chutelab.animate.words import contact_normal, sentence
+from chutelab.animate.palette import BITS, CLEAR, Palette, colours, tint
+from chutelab.animate.stage import Stage
+from chutelab.animate.words import contact_normal, going_on, in_flight, sentence
+from chutelab.cli import main
 from chutelab.machine import build
+from chutelab.plots import style
 from chutelab.plots.sampling import energies
 from chutelab.plots.scenery import machine_of, scene_of
 from chutelab.plots.window import window_of
@@ -45,6 +58,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from numpy.typing import NDArray
+
 WIDTH, HEIGHT = 800, 450
 
 
@@ -52,17 +67,20 @@ def moments_at(times: Sequence[float]) -> tuple[Moment, ...]:
     return tuple(Moment(t, 4, "") for t in times)
 
 
-def stage_of(recording: Recording, at: tuple[Moment, ...], slow: float = 5.0) -> Stage:
-    machine = machine_of(recording)
+def laid_out(recording: Recording, width: int = WIDTH, height: int = HEIGHT, **more: Any) -> Layout:
+    return lay_out(recording, machine_of(recording), width=width, height=height, **more)
+
+
+def stage_of(
+    recording: Recording, at: tuple[Moment, ...], slow: float = 5.0, layout: Layout | None = None
+) -> Stage:
     return Stage(
         recording,
-        machine,
+        machine_of(recording),
         theory.predict(scene_of(recording)),
-        window_of(recording, machine).fitted(VIEW[2] * WIDTH / (VIEW[3] * HEIGHT)),
+        layout or laid_out(recording),
         at,
         slow=slow,
-        width=WIDTH,
-        height=HEIGHT,
     )
 
 
@@ -73,7 +91,7 @@ def runs() -> dict[str, Recording]:
 
 
 def filmed(recording: Recording) -> tuple[tuple[Moment, ...], float]:
-    begin, end = span(recording, window_of(recording, machine_of(recording)))
+    begin, end = span(recording, laid_out(recording).window)
     slow = slowness(end - begin)
     return film(recording, begin, end, fps=25, slow=slow), slow
 
@@ -140,7 +158,15 @@ def test_rates_a_gif_cannot_have_are_refused(fps: int, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "options",
-    [{"slow": 0.0}, {"slow": float("nan")}, {"slow": -1.0}, {"width": 319}, {"height": 100}],
+    [
+        {"slow": 0.0},
+        {"slow": float("nan")},
+        {"slow": -1.0},
+        {"width": 319},
+        {"height": 100},
+        {"show": ["energy", "spin"]},
+        {"show": "wobble"},
+    ],
 )
 def test_other_impossible_wishes_are_refused(options: dict[str, Any], tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="allowed"):
@@ -166,14 +192,17 @@ def test_film_begins_as_the_particle_comes_into_view(runs: dict[str, Recording])
     window = window_of(recording, machine_of(recording))
     begin, end = span(recording, window)
     x = -1.0 + 2.0 * begin
-    assert window.left < x < window.left + 0.01
+    inset = moments.EDGE * max(window.width, window.height)
+    assert window.left + inset < x < window.left + inset + 0.01
     assert end == recording.track(0)["t"][-1]
+    # All of it is in the picture: 6 pt across.
+    assert inset / window.width * 0.675 * 8.0 * 72.0 > 3.0
 
 
 def test_a_long_stream_is_filmed_for_three_lives_of_particle_0() -> None:
     text = TEXT + "[stream]\ncount = 100\nrate = 10.0\nbed_height = 0.02\n"
     recording = simulate(scene.parse(text))
-    begin, end = span(recording, window_of(recording, machine_of(recording)))
+    begin, end = span(recording, laid_out(recording).window)
     life = recording.track(0)["t"][-1] - begin
     assert end - begin == pytest.approx(3.0 * life, rel=1e-12)
     assert end < recording.knots["t"].max()
@@ -190,16 +219,49 @@ def test_words_tell_the_numbers_of_the_impacts() -> None:
     speed = np.hypot(V, G * t_impact())
     lost = 0.5 * MASS * V**2 * (1.0 - EPS**2)
     assert at_plate == (
-        f"t = {BELT_TIME + t_impact():.3f} s: strikes the plate at {speed:.3g} m/s;"
-        f" normal speed 2 m/s → 1 m/s\n{1e3 * lost:.1f} mJ lost in the rebound"
+        f"t = {BELT_TIME + t_impact():.3f} s: strikes the plate at {speed:.3g} m/s, ε = {EPS:g}\n"
+        f"−{1e3 * lost:.1f} mJ in the rebound"
     )
     on_belt = said[round(BELT_TIME + t_landing(), 6)]
     push = min(MU * MASS * G * t_landing(), MASS * V * (1.0 + EPS))
-    assert f"lands on the outgoing belt at {np.hypot(EPS * V, G * t_landing()):.3g} m/s" in on_belt
-    assert f"{1e3 * push * V:.1f} mJ paid by the belt" in on_belt
+    landing = np.hypot(EPS * V, G * t_landing())
+    assert f"lands on the outgoing belt at {landing:.3g} m/s, ε = 0\n" in on_belt
+    assert f"+{1e3 * push * V:.1f} mJ from the belt" in on_belt
     assert shots[0].words == "rides the incoming belt"
-    between = [shot.words for shot in shots if BELT_TIME < shot.t < BELT_TIME + t_impact()]
-    assert set(between) == {"t = 0.500 s: leaves the drive pulley at the top, at 2 m/s"}
+    # What happened is told for a while, then what goes on.
+    news = f"t = {BELT_TIME:.3f} s: leaves the drive pulley at the top, at 2 m/s"
+    flying = [shot for shot in shots if BELT_TIME < shot.t < BELT_TIME + t_impact()]
+    last = BELT_TIME + moments.TOLD / 8.0
+    assert [shot.words for shot in flying] == [
+        news if shot.t <= last else "in flight" for shot in flying
+    ]
+    assert {shot.words for shot in flying} == {news, "in flight"}
+
+
+def test_words_of_a_weak_impact_give_way_to_what_goes_on(runs: dict[str, Recording]) -> None:
+    # It bounces ever lower, slides from 1.52 s on, and rides from 4.32 s on.
+    shots, _ = filmed(runs["belt-landing"])
+    bounces = runs["belt-landing"].select(Kind.IMPACT, surface="outgoing")["t"]
+    assert bounces[-1] == pytest.approx(1.519, abs=1e-3)
+    told = max(shot.t for shot in shots if "strikes the outgoing belt" in shot.words)
+    assert told < bounces[-1]
+    sliding = {shot.words for shot in shots if bounces[-1] < shot.t < 4.3}
+    assert sliding == {"slides on the outgoing belt"}
+    flying = {shot.words for shot in shots if 1.2 < shot.t < 1.28}
+    assert all(words.startswith("t = 0.937 s: lands on") for words in flying)
+    assert shots[-1].words == "t = 4.323 s: has settled on the outgoing belt"
+
+
+def test_flight_is_told_from_contact() -> None:
+    recording = by_hand()
+    near = 1e-3
+    before, after = BELT_TIME + np.array([-2e-3, 2e-3])
+    hit = BELT_TIME + t_impact()
+    found = in_flight(recording, np.array([0.1, before, after, hit, hit + 0.01]), near)
+    assert found.tolist() == [False, False, True, True, True]
+    (landing,) = recording.select(Kind.LANDING)
+    assert going_on(recording, landing, flying=False) == "slides on the outgoing belt"
+    assert going_on(recording, landing, flying=True) == "in flight"
 
 
 @pytest.mark.parametrize(("rode", "said"), [(2.0, False), (2.001, False), (2.1, True)])
@@ -244,6 +306,32 @@ def test_separation_is_told_by_its_angle(runs: dict[str, Recording]) -> None:
     assert f"{angle:.1f}° past the top, at 2 m/s" in sentence(recording, event)
 
 
+def test_a_ramp_is_left_by_its_name() -> None:
+    recording = simulate(
+        scene.parse(
+            "[[surface]]\nname = 'ramp'\nfrom = [0.0, 0.5]\nto = [1.0, 0.2]\nfriction = 0.1\n"
+            "[stream]\nat = [0.3, 0.6]\nvelocity = [0.0, 0.0]\n[run]\nuntil = 1.5\n"
+        )
+    )
+    (event,) = recording.select(Kind.SEPARATION)
+    speed = np.hypot(*event["velocity_after"])
+    assert sentence(recording, event) == f"leaves “ramp” at {speed:.3g} m/s"
+    begin, end = span(recording, laid_out(recording).window)
+    words = [shot.words for shot in film(recording, begin, end, fps=25, slow=3.0)]
+    assert words[0] == "in flight"
+    assert "slides on “ramp”" in words
+    assert "rides the incoming belt" not in words
+
+
+def test_what_was_struck_before_the_separation_does_not_bound_the_window() -> None:
+    text = TEXT.split("[plate]")[0] + "friction = 0.5\n"
+    text += "[stream]\nat = [-0.5, 0.3]\nvelocity = [2.0, 0.0]\n[run]\nuntil = 0.6\n"
+    recording = simulate(scene.parse(text))
+    (separation,) = recording.select(Kind.SEPARATION)
+    assert (recording.select(Kind.IMPACT)["t"] < separation["t"]).all()
+    assert laid_out(recording).window.holds(recording.at([0.6])[0][0]).all()
+
+
 def test_every_kind_of_event_can_be_told(runs: dict[str, Recording]) -> None:
     told = {
         Kind(int(event["kind"])): sentence(runs[name], event)
@@ -261,20 +349,61 @@ def test_every_kind_of_event_can_be_told(runs: dict[str, Recording]) -> None:
 def test_actors_stand_where_the_particle_is() -> None:
     recording = by_hand()
     times = BELT_TIME + np.array([0.1, t_impact() + 0.05])
-    stage = stage_of(recording, moments_at(times))
+    layout = laid_out(recording)
+    stage = stage_of(recording, moments_at(times), layout=layout)
     for i, t in enumerate(times):
         stage.show(i)
-        known = expected(np.array([t - BELT_TIME]))[0]
-        assert np.asarray(stage.nominal.dot.get_xydata()) == pytest.approx(known, abs=1e-14)
+        known, pace = (values[0] for values in (expected(np.array([t - BELT_TIME]))))
+        assert np.asarray(stage.nominal.dot.get_xydata())[0] == pytest.approx(known, abs=1e-14)
         trail = np.asarray(stage.nominal.trail.get_xydata())
-        assert trail[-1] == pytest.approx(known[0], abs=1e-14)
-        assert trail[0] == pytest.approx([-1.0, R + PARTICLE], abs=1e-15)
+        assert trail[-1] == pytest.approx(known, abs=1e-14)
+        begun = expected(np.array([t - BELT_TIME - layout.trail]))[0][0]
+        assert trail[0] == pytest.approx(begun, abs=0.02)
         strobe = np.asarray(stage.nominal.strobe.get_xydata())
         passed = 0.05 * np.arange(int(t / 0.05) + 1)
         assert len(strobe) == len(passed)
         flown = passed > BELT_TIME + 1e-9
         assert strobe[flown] == pytest.approx(expected(passed[flown] - BELT_TIME)[0], abs=1e-13)
-        assert f"t = {t:.3f} s, 5× slower" == stage.clock.get_text()
+        assert f"t = {t:.3f} s" == stage.clock.text
+        # The corner opposite the shaft's middle is the tip of an arrow.
+        tips = {n: arrow.get_xy()[3] - known for n, arrow in stage.nominal.arrows.arrows.items()}
+        assert tips["v"] == pytest.approx(layout.arrow * pace, abs=1e-12)
+        assert tips["vx"] == pytest.approx(layout.arrow * pace * (1.0, 0.0), abs=1e-12)
+        assert tips["vy"] == pytest.approx(layout.arrow * pace * (0.0, 1.0), abs=1e-12)
+
+
+def test_a_component_is_drawn_only_beside_another() -> None:
+    stage = stage_of(by_hand(), moments_at([0.3, BELT_TIME + 0.2]))
+    stage.show(0)
+    assert stage.nominal.arrows.artists == [stage.nominal.arrows.arrows["v"]]
+    stage.show(1)
+    assert len(stage.nominal.arrows.artists) == 3
+
+
+@given(st.floats(-3.0, 3.0), st.floats(0.1, 50.0), st.floats(0.1, 20.0))
+def test_arrows_are_as_long_as_they_should_be(angle: float, length: float, head: float) -> None:
+    along = length * np.array([np.cos(angle), np.sin(angle)])
+    corners = outline(along, 1.0, head)
+    assert corners[3] == pytest.approx(along, rel=1e-12, abs=1e-12)
+    across = np.array([-np.sin(angle), np.cos(angle)])
+    assert (corners @ across)[[0, 6]] == pytest.approx([0.5, -0.5], abs=1e-10)
+    assert np.ptp(corners @ across) == pytest.approx(max(0.8 * min(head, length), 1.0), rel=1e-9)
+
+
+def test_everything_that_moves_and_its_arrow_is_in_the_window(runs: dict[str, Recording]) -> None:
+    for name, recording in runs.items():
+        layout = laid_out(recording)
+        shots, _ = filmed(recording)
+        ends = float(recording.track(0)["t"][-1])
+        times = [shot.t for shot in shots if shot.t <= ends]
+        position, velocity = (values[:, 0] for values in recording.at(times))
+        aspect = layout.view[2] * WIDTH / (layout.view[3] * HEIGHT)
+        # What leaves the window for good takes its arrow with it.
+        inside = window_of(recording, machine_of(recording)).fitted(aspect).holds(position)
+        tips = position + layout.arrow * velocity
+        assert layout.window.holds(tips[inside]).all(), name
+        fastest = np.hypot(*(layout.arrow * velocity[inside]).T).max()
+        assert 0.05 < fastest / layout.window.width < 0.11, name
 
 
 def test_dashed_parabola_in_the_background_is_the_formula() -> None:
@@ -295,14 +424,20 @@ def test_crowd_is_at_the_recorded_positions_and_says_how_many() -> None:
     times = [0.3, 0.8, 1.2]
     stage = stage_of(recording, moments_at(times))
     assert len(stage.crowd.particles) == 299
+    assert stage.crowd.since is not None
     assert 0 not in stage.crowd.particles
     for i, t in enumerate(times):
         stage.show(i)
         positions = recording.at([t])[0][0, stage.crowd.particles]
         np.testing.assert_array_equal(stage.crowd.dots.get_xydata(), positions)
+        # Each trail ends at its particle, and NaN comes before the next one.
+        back = i - stage.crowd.since[i]
+        trails = np.asarray(stage.crowd.trails.get_xydata()).reshape(299, back + 2, 2)
+        np.testing.assert_array_equal(trails[:, -2], positions)
+        assert np.isnan(trails[:, -1]).all()
     legend = stage.view.get_legend()
     assert legend is not None
-    assert "300 of 700 particles" in [entry.get_text() for entry in legend.get_texts()]
+    assert "300 of 700" in [entry.get_text() for entry in legend.get_texts()]
 
 
 def test_particles_are_drawn_to_scale_or_visibly() -> None:
@@ -319,49 +454,74 @@ def test_particles_are_drawn_to_scale_or_visibly() -> None:
     assert drawn > true
 
 
-def heights(stage: Stage) -> list[dict[str, float]]:
-    return [{name: bar.get_height() for name, bar in bars.items()} for bars in stage.bars.bars]
+def stacked(stage: Stage) -> list[list[tuple[str, int]]]:
+    """Return what is painted in each bar, from the bottom up: names, and rows of pixels."""
+    assert stage.bars is not None
+    shown = stage.frame(0)
+    names = {bytes.fromhex(colour[1:]): name for name, colour in style.ENERGY.items()}
+    found = []
+    for x in (0.0, 1.0):
+        column, base = stage.bars.ax.transData.transform((x, 0.0))
+        pixels = shown[: HEIGHT - round(base), round(column)][::-1]
+        rows = [names.get(pixel.tobytes()) for pixel in pixels]
+        end = rows.index(None)
+        found.append([(str(name), len(list(some))) for name, some in groupby(rows[:end])])
+    return found
 
 
 def test_bars_add_up_to_the_energies_at_all_times() -> None:
     times = [0.2, BELT_TIME + 0.2, BELT_TIME + t_impact(), BELT_TIME + t_landing()]
     stage = stage_of(by_hand(), moments_at(times))
+    assert stage.bars is not None
     lowest = R + PARTICLE - 0.5 * G * t_landing() ** 2
     at_release = 1e3 * (0.5 * MASS * V**2 + MASS * G * (R + PARTICLE - lowest))
     push = min(MU * MASS * G * t_landing(), MASS * V * (1.0 + EPS))
     for i in range(4):
         stage.show(i)
-        put_in, is_now = heights(stage)
+        put_in, is_now = stage.bars.heights
         assert sum(put_in.values()) == pytest.approx(sum(is_now.values()), rel=1e-12)
         assert put_in["start"] == pytest.approx(at_release, rel=1e-12)
+        assert stage.bars.values["start"].text == f"{at_release:.1f}"
     assert put_in["belt_work"] == pytest.approx(1e3 * push * V, rel=1e-12)
     assert is_now["kinetic"] == pytest.approx(
         1e3 * 0.5 * MASS * (push / MASS - EPS * V) ** 2, rel=1e-12
     )
     stage.show(1)
     fall = 0.5 * G * 0.2**2
-    _, is_now = heights(stage)
+    _, is_now = stage.bars.heights
     assert is_now["kinetic"] == pytest.approx(1e3 * 0.5 * MASS * (V**2 + (0.2 * G) ** 2), rel=1e-12)
     assert is_now["potential"] == pytest.approx(
         1e3 * MASS * G * (R + PARTICLE - fall - lowest), rel=1e-11
     )
-    # Each bar rests on the one before it.
-    for bars in stage.bars.bars:
-        base = 0.0
-        for bar in bars.values():
-            assert bar.get_y() == pytest.approx(base, abs=1e-12)
-            base += bar.get_height()
+
+
+@pytest.mark.parametrize("t", [0.2, BELT_TIME + 0.2, BELT_TIME + t_landing()])
+def test_bars_are_painted_one_on_the_other_to_equal_heights(t: float) -> None:
+    stage = stage_of(by_hand(), moments_at([t]))
+    assert stage.bars is not None
+    painted = stacked(stage)
+    assert len({sum(rows for _, rows in bar) for bar in painted}) == 1
+    scale = stage.bars.ax.transData.transform([(0.0, 0.0), (0.0, 1.0)])[:, 1]
+    for bar, heights in zip(painted, stage.bars.heights, strict=True):
+        rows = dict(bar)
+        for name, height in heights.items():
+            # Edges are rounded to whole pixels.
+            assert rows.get(name, 0) == pytest.approx(height * np.ptp(scale), abs=1.0), name
 
 
 @pytest.mark.parametrize("planted", [0.003, -0.003])
 def test_bars_add_up_with_the_residual_in_sight(planted: float) -> None:
     stage = stage_of(by_hand(residual=planted), moments_at([BELT_TIME + t_landing()]))
+    assert stage.bars is not None
     stage.show(0)
-    put_in, is_now = heights(stage)
+    put_in, is_now = stage.bars.heights
     assert sum(put_in.values()) == pytest.approx(sum(is_now.values()), rel=1e-12)
     shown = put_in["residual"] - is_now["residual"]
     assert shown == pytest.approx(-1e3 * planted, rel=1e-9)
-    assert stage.bars.values["residual"].get_text() == ("−3e−3 J" if planted > 0 else "3e−3 J")
+    assert stage.bars.values["residual"].text == ("−3e−3 J" if planted > 0 else "3e−3 J")
+    left, right = (dict(bar) for bar in stacked(stage))
+    assert ("residual" in left) is (planted < 0.0)
+    assert ("residual" in right) is (planted > 0.0)
 
 
 @given(st.fixed_dictionaries({name: st.floats(-1e3, 1e3) for name in SIGNS if name != "residual"}))
@@ -384,13 +544,48 @@ def test_books_of_every_run_balance_at_every_moment(runs: dict[str, Recording]) 
 def test_pulley_turns_and_belt_marks_run_with_the_belt() -> None:
     stage = stage_of(by_hand(), moments_at([0.60, 0.61]))
     stage.show(0)
-    tip, marks = np.asarray(stage.drives.spoke.get_xydata())[1], stage.drives.marks.get_xydata()
+    holes, marks = (
+        np.asarray(line.get_xydata()) for line in (stage.drives.holes, stage.drives.marks)
+    )
     angle = V * 0.6 / R
-    assert tip == pytest.approx(0.9 * R * np.array([np.sin(angle), np.cos(angle)]), abs=1e-14)
+    assert holes[0] == pytest.approx(0.6 * R * np.array([np.sin(angle), np.cos(angle)]), abs=1e-14)
+    assert np.hypot(*holes.T) == pytest.approx(0.6 * R, rel=1e-12)
+    assert holes.sum(axis=0) == pytest.approx([0.0, 0.0], abs=1e-14)
     stage.show(1)
     moved = np.asarray(stage.drives.marks.get_xydata())
-    shift = np.abs(moved[:, None, 0] - np.asarray(marks)[None, :, 0] - V * 0.01).min(axis=1)
+    shift = np.abs(moved[:, None, 0] - marks[None, :, 0] - V * 0.01).min(axis=1)
     assert np.mean(shift < 1e-12) > 0.9  # all but those that came in at an end
+
+
+def test_what_is_not_asked_for_is_not_shown() -> None:
+    recording, at = by_hand(), moments_at([BELT_TIME + 0.2])
+    full = stage_of(recording, at)
+    full.show(0)
+    assert full.bars is not None
+    bare = stage_of(recording, at, layout=laid_out(recording, shows=frozenset()))
+    bare.show(0)
+    assert bare.bars is None
+    assert bare.nominal.artists == [bare.nominal.dot]
+    assert set(full.nominal.artists) > {full.nominal.trail, full.nominal.strobe, full.nominal.dot}
+    assert not [line for line in bare.view.lines if line.get_gid() == "analytic"]
+    assert bare.view.get_position().width > 1.4 * full.view.get_position().width
+
+
+def test_title_and_question_are_shown_and_cut_at_words() -> None:
+    recording, at = by_hand(), moments_at([0.6])
+    asked = "Where does it land?"
+    stage = stage_of(recording, at, layout=laid_out(recording, title="Mine", question=asked))
+    said = [text.get_text() for text in stage.figure.texts]
+    assert "Mine" in said
+    assert asked in said
+    assert recording.title not in said
+    long = "word " * 40
+    stage = stage_of(recording, at, layout=laid_out(recording, title=long, question=long))
+    cut = [text for text in stage.figure.texts if text.get_text().startswith("word")]
+    assert len(cut) == 2
+    for text in cut:
+        assert text.get_text().endswith("word …")
+        assert 0.8 * WIDTH < text.get_window_extent().x1 <= 0.99 * WIDTH
 
 
 def test_frames_leave_no_traces_in_each_other(runs: dict[str, Recording]) -> None:
@@ -402,18 +597,28 @@ def test_frames_leave_no_traces_in_each_other(runs: dict[str, Recording]) -> Non
     assert first.shape == (HEIGHT, WIDTH, 3)
     fresh = stage_of(runs["perpendicular"], moments_at([0.9]))
     # The scale of the bars is another with other times; the scene is not.
-    np.testing.assert_array_equal(fresh.frame(0)[60:390, :555], last[60:390, :555])
+    np.testing.assert_array_equal(fresh.frame(0)[75:390, :555], last[75:390, :555])
 
 
-@pytest.mark.parametrize("name", [*EXACT, "free-fall"])
-def test_no_text_is_cut_off_overlapping_or_small(name: str, runs: dict[str, Recording]) -> None:
-    shots, slow = filmed(runs[name])
-    stage = stage_of(runs[name], shots, slow)
-    longest = max(range(len(shots)), key=lambda i: max(map(len, shots[i].words.split("\n"))))
-    stage.frame(longest)
-    boxes = [(text, text.get_window_extent()) for text in seen(stage.figure)]
+def boxes_of(stage: Stage) -> list[tuple[str, Bbox]]:
+    """Return where text is in the picture, what is painted as pixels included."""
+    found = [(text.get_text(), text.get_window_extent()) for text in seen(stage.figure)]
+    for text in seen(stage.figure):
+        assert text.get_fontsize() >= 9.0, text
+    labels = [stage.clock] if stage.bars is None else [stage.clock, *stage.bars.values.values()]
+    for label in labels:
+        rows, columns = label.lettering.strip(label.text).shape
+        top = HEIGHT - label.top
+        box = Bbox.from_extents(label.right - columns, top - rows, label.right, top)
+        # A strip has room above its digits and below.
+        found.append((label.text, Bbox.from_extents(box.x0, box.y0 + 5, box.x1, box.y1 - 5)))
+    return found
+
+
+def assert_readable(stage: Stage, index: int) -> None:
+    stage.frame(index)
+    boxes = boxes_of(stage)
     for text, box in boxes:
-        assert text.get_fontsize() >= 9.0
         assert min(box.x0, box.y0) >= 0.0, text
         assert box.x1 <= WIDTH, text
         assert box.y1 <= HEIGHT, text
@@ -424,19 +629,81 @@ def test_no_text_is_cut_off_overlapping_or_small(name: str, runs: dict[str, Reco
             assert min(overlap, above) < 1.5, (text, other)
 
 
+@pytest.mark.parametrize("name", [*EXACT, "free-fall"])
+@pytest.mark.parametrize("question", ["", "How much of the energy is left when it lands?"])
+def test_no_text_is_cut_off_overlapping_or_small(
+    name: str, question: str, runs: dict[str, Recording]
+) -> None:
+    shots, slow = filmed(runs[name])
+    layout = laid_out(runs[name], question=question)
+    stage = stage_of(runs[name], shots, slow, layout)
+    longest = max(range(len(shots)), key=lambda i: max(map(len, shots[i].words.split("\n"))))
+    for index in (0, longest, len(shots) - 1):
+        assert_readable(stage, index)
+
+
+def test_a_stream_s_legend_has_room() -> None:
+    text = TEXT + "[stream]\ncount = 10000\nrate = 10000.0\n"
+    recording = simulate(scene.parse(text))
+    stage = stage_of(recording, (Moment(10.25, 4, ""),), slow=1.5)
+    assert_readable(stage, 0)
+
+
+@pytest.mark.parametrize("text", ["t = 0.472 s", "−8e−17 J", "111.8", "3.95"])
+def test_numbers_are_set_as_matplotlib_would(text: str) -> None:
+    strip = Lettering(10.5, 100.0).strip(text)
+    figure = Figure(figsize=(2.0, 0.3), dpi=100.0)
+    canvas: Any = FigureCanvasAgg(figure)
+    wide = figure.text(0.0, 0.5, text, fontsize=10.5).get_window_extent().width
+    # Each character is rounded to whole pixels.
+    assert strip.shape[1] == pytest.approx(wide, abs=0.5 * len(text))
+    canvas.draw()
+    ink = 255.0 - strip.view(np.uint8).reshape(*strip.shape, 4)[..., 0]
+    drawn = 255.0 - np.asarray(canvas.buffer_rgba())[..., 0]
+    assert ink.sum() == pytest.approx(drawn.sum(), rel=0.05)
+
+
 # The file
 
 
-def test_gif_reads_back_frame_by_frame(tmp_path: Path) -> None:
+class Block(NamedTuple):
+    left: int
+    top: int
+    width: int
+    height: int
+    delay: int
+    keeps: bool
+
+
+def blocks(data: bytes) -> list[Block]:
+    """Read the frames of a GIF by its specification; no frame may have colours of its own."""
+    at, found = 13 + 3 * 2 ** ((data[10] & 7) + 1), []
+    delay, keeps = 0, False
+    while data[at : at + 1] != b";":
+        if data[at : at + 2] == b"!\xf9":
+            delay, keeps = int.from_bytes(data[at + 4 : at + 6], "little"), data[at + 3] >> 2 == 1
+        if data[at : at + 1] == b",":
+            left, top, width, height = np.frombuffer(data[at + 1 : at + 9], "<u2").tolist()
+            assert data[at + 9] == 0, "a palette of its own"
+            found.append(Block(left, top, width, height, delay, keeps))
+            at += 11
+        else:
+            at += 2
+        while data[at]:
+            at += data[at] + 1
+        at += 1
+    assert at == len(data) - 1
+    return found
+
+
+@pytest.mark.parametrize(("fps", "delay"), [(25, 4), (50, 2)])
+def test_gif_reads_back_frame_by_frame(fps: int, delay: int, tmp_path: Path) -> None:
     recording = by_hand()
-    path = animate(recording, tmp_path / "lesson.gif", slow=4.0, fps=50, width=640, height=360)
+    path = animate(recording, tmp_path / "lesson.gif", slow=4.0, fps=fps, width=640, height=360)
     assert path == tmp_path / "lesson.gif"
     assert list(tmp_path.iterdir()) == [path]
-    window = window_of(recording, machine_of(recording)).fitted(VIEW[2] * 640 / (VIEW[3] * 360))
-    begin, end = span(recording, window)
-    shots = film(recording, begin, end, fps=50, slow=4.0)
-    stage = stage_of(recording, shots, 4.0)
-    assert stage.frame(0).shape == (HEIGHT, WIDTH, 3)
+    begin, end = span(recording, laid_out(recording, 640, 360).window)
+    shots = film(recording, begin, end, fps=fps, slow=4.0)
     with Image.open(path) as gif:
         assert gif.size == (640, 360)
         assert gif.info["loop"] == 0
@@ -444,14 +711,19 @@ def test_gif_reads_back_frame_by_frame(tmp_path: Path) -> None:
         for i, shot in enumerate(shots):
             gif.seek(i)
             assert gif.info["duration"] == 10 * shot.delay
+    frames = blocks(path.read_bytes())
+    assert [frame.delay for frame in frames] == [shot.delay for shot in shots]
+    # Exactly 25 or 50 frames a second, but for the holds.
+    assert {frame.delay for frame in frames} == {delay, 130}
+    assert all(frame.keeps for frame in frames)
+    assert frames[0][:4] == (0, 0, 640, 360)
+    assert all(frame.width * frame.height < 640 * 360 for frame in frames[1:])
 
 
 def test_gif_frames_are_the_stage_s_in_nearly_its_colours(tmp_path: Path) -> None:
     recording = by_hand()
     path = animate(recording, tmp_path / "lesson.gif", slow=2.0, fps=5)
-    machine = machine_of(recording)
-    window = window_of(recording, machine).fitted(VIEW[2] * WIDTH / (VIEW[3] * HEIGHT))
-    shots = film(recording, *span(recording, window), fps=5, slow=2.0)
+    shots = film(recording, *span(recording, laid_out(recording).window), fps=5, slow=2.0)
     stage = stage_of(recording, shots, 2.0)
     with Image.open(path) as gif:
         for i in range(len(shots)):
@@ -459,18 +731,123 @@ def test_gif_frames_are_the_stage_s_in_nearly_its_colours(tmp_path: Path) -> Non
             seen_in_file = np.asarray(gif.convert("RGB")).astype(int)
             drawn = stage.frame(i).astype(int)
             off = np.abs(seen_in_file - drawn).max(axis=2)
-            assert off.mean() < 0.3
-            assert np.quantile(off, 0.999) <= 24
+            assert off.mean() < 0.8
+            assert np.quantile(off, 0.999) <= 40
             assert (seen_in_file[drawn.min(axis=2) == 255] == 255).all()
 
 
-def test_palette_holds_the_colours_that_mean_something() -> None:
-    stage = stage_of(by_hand(), moments_at([0.6, 0.9]))
-    palette = shared_palette([stage.frame(0), stage.frame(1)]).getpalette()
-    assert palette is not None
-    table = {tuple(palette[i : i + 3]) for i in range(0, len(palette), 3)}
-    assert {tuple(bytes.fromhex(colour[1:])) for colour in PURE} <= table
-    assert len(palette) <= 3 * 255  # one index is free
+@pytest.mark.parametrize("name", ["perpendicular", "free-fall"])
+def test_what_stands_still_never_changes_its_colour(
+    name: str, runs: dict[str, Recording], tmp_path: Path
+) -> None:
+    path = animate(runs[name], tmp_path / "lesson.gif", fps=4)
+    shots, slow = filmed(runs[name])
+    shots = film(runs[name], shots[0].t, shots[-1].t, fps=4, slow=slow)
+    stage = stage_of(runs[name], shots, slow)
+    drawn = np.array([stage.frame(i) for i in range(len(shots))])
+    with Image.open(path) as gif:
+        assert gif.n_frames == len(shots)
+        shown = []
+        for i in range(len(shots)):
+            gif.seek(i)
+            shown.append(np.asarray(gif.convert("RGB")))
+    still = (drawn == drawn[0]).all(axis=(0, 3))
+    assert 0.8 < still.mean() < 1.0
+    assert (np.array(shown)[:, still] == shown[0][still]).all()
+    # And the same colour is shown as the same one wherever and whenever it is drawn.
+    place = np.array([1, 256, 65536])
+    drawn, shown = drawn @ place, np.array(shown) @ place
+    shows = np.zeros(1 << 24, dtype=np.int64)
+    shows[drawn] = shown
+    assert (shows[drawn] == shown).all()
+
+
+@pytest.mark.parametrize("name", [*EXACT, "inclined-20", "perpendicular-fast"])
+def test_lesson_of_one_particle_is_small(name: str, tmp_path: Path) -> None:
+    path = animate(simulate(scene.load(name)), tmp_path / "lesson.gif")
+    assert path.stat().st_size < 200_000
+
+
+def test_palette_is_small_and_holds_the_colours_that_mean_something() -> None:
+    held = colours()
+    assert len(held) == len(set(held)) <= CLEAR < 2**BITS
+    meant = {"#FFFFFF", "#000000", style.TRACK, style.STREAM, style.ANALYTIC, style.BELT}
+    assert meant | {colour.upper() for colour in style.ENERGY.values()} <= set(held)
+    table = np.frombuffer(Palette().bytes(), dtype=np.uint8).reshape(2**BITS, 3)
+    for index, colour in enumerate(held):
+        pixel = np.uint32(int.from_bytes(bytes.fromhex(colour[1:]) + b"\xff", "little"))
+        assert Palette().indices(np.array([pixel]))[0] == index
+        assert table[index].tobytes().hex().upper() == colour[1:]
+
+
+@given(st.lists(st.integers(0, 0xFFFFFF), min_size=1, max_size=20))
+def test_palette_shows_each_colour_as_the_nearest(pixels: list[int]) -> None:
+    found = PALETTE.indices(np.array(pixels, dtype=np.uint32))
+    table = np.frombuffer(PALETTE.bytes(), dtype=np.uint8).reshape(-1, 3)[: len(colours())]
+    for pixel, index in zip(pixels, found, strict=True):
+        rgb = np.array([pixel & 255, pixel >> 8 & 255, pixel >> 16], dtype=int)
+        apart = ((table.astype(int) - rgb) ** 2).sum(axis=1)
+        assert apart[index] == apart.min()
+
+
+PALETTE = Palette()
+
+
+def written(pictures: list[NDArray[np.uint32]], delays: list[int]) -> bytes:
+    file = BytesIO()
+    gif = GifWriter(file, pictures[0].shape[1], pictures[0].shape[0])
+    for picture, delay in zip(pictures, delays, strict=True):
+        gif.add(picture, delay)
+    gif.close()
+    return file.getvalue()
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(2, 40), st.integers(1, 30), st.integers(2, 5))
+def test_any_pictures_come_back_from_the_file(seed: int, w: int, h: int, count: int) -> None:
+    draw = np.random.default_rng(seed)
+    table = np.array([[int(c[i : i + 2], 16) for i in (1, 3, 5)] for c in colours()], np.uint8)
+    pictures = [draw.integers(0, len(table), (h, w))]
+    for _ in range(count - 1):
+        pictures.append(pictures[-1].copy())
+        pictures[-1][draw.random((h, w)) < 0.1] = draw.integers(len(table))
+    packed = [table[p].astype(np.uint32) @ np.array([1, 256, 65536], np.uint32) for p in pictures]
+    # So that no two in a row are alike.
+    for i, picture in enumerate(packed):
+        picture[0, 0] = 0 if i % 2 else 0xFFFFFF
+    with Image.open(BytesIO(written(packed, [4] * count))) as gif:
+        assert gif.n_frames == count
+        for i, picture in enumerate(packed):
+            gif.seek(i)
+            rgb = np.asarray(gif.convert("RGB")).astype(np.uint32)
+            np.testing.assert_array_equal(rgb @ np.array([1, 256, 65536], np.uint32), picture)
+
+
+def test_only_what_changed_is_in_a_frame_and_what_stays_is_one_frame() -> None:
+    white = np.full((20, 30), 0xFFFFFF, dtype=np.uint32)
+    dotted = white.copy()
+    dotted[7:9, 11:14] = 0
+    data = written([white, white, dotted, dotted, white], [4, 4, 130, 4, 4])
+    assert [frame[:5] for frame in blocks(data)] == [
+        (0, 0, 30, 20, 8),
+        (11, 7, 3, 2, 134),
+        (11, 7, 3, 2, 4),
+    ]
+    # A frame can stay for 655.35 s at most.
+    data = written([white, white, white], [60_000, 60_000, 5_000])
+    assert [frame.delay for frame in blocks(data)] == [60_000, 65_000]
+
+
+def test_tints_are_mixtures() -> None:
+    assert tint("#204060", 1.0) == "#204060"
+    assert tint("#204060", 0.0, "#808080") == "#808080"
+    assert tint("#204060", 0.25, "#60A0E0") == "#5088C0"
+
+
+@pytest.mark.parametrize("suffix", [".avi", "", ".gif.txt"])
+def test_other_files_are_refused(suffix: str, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"allowed are files that end in \.gif, \.mp4, \.webm"):
+        animate(by_hand(), tmp_path / f"lesson{suffix}")
+    assert not list(tmp_path.iterdir())
 
 
 def test_failure_leaves_the_old_file_and_nothing_else(
@@ -478,14 +855,14 @@ def test_failure_leaves_the_old_file_and_nothing_else(
 ) -> None:
     path = tmp_path / "lesson.gif"
     path.write_text("old")
-    drawn = Stage.frame
+    drawn = Stage.paint
 
     def breaks(self: Stage, index: int) -> Any:
         if index == 7:
             raise RuntimeError("planted")
         return drawn(self, index)
 
-    monkeypatch.setattr(Stage, "frame", breaks)
+    monkeypatch.setattr(Stage, "paint", breaks)
     with pytest.raises(RuntimeError, match="planted"):
         animate(by_hand(), path, fps=10, slow=4.0)
     assert path.read_text() == "old"
@@ -498,3 +875,90 @@ def test_the_same_recording_gives_the_same_file(tmp_path: Path) -> None:
         for i in (1, 2)
     ]
     assert files[0].read_bytes() == files[1].read_bytes()
+
+
+# Videos
+
+
+@pytest.mark.parametrize("kind", video.VIDEOS)
+def test_video_shows_the_stage_at_its_rate(kind: str, tmp_path: Path) -> None:
+    imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
+    recording = by_hand()
+    path = animate(recording, tmp_path / f"lesson.{kind}", fps=10, slow=1.0, width=320, height=180)
+    assert list(tmp_path.iterdir()) == [path]
+    layout = laid_out(recording, 320, 180)
+    shots = film(recording, *span(recording, layout.window), fps=10, slow=1.0)
+    stage = stage_of(recording, shots, 1.0, layout)
+    frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(path))
+    assert frames == sum(shot.delay for shot in shots) / 10
+    assert seconds == pytest.approx(0.1 * frames, abs=0.01)
+    done = subprocess.run(
+        [imageio_ffmpeg.get_ffmpeg_exe(), "-i", path, "-f", "rawvideo", "-pix_fmt", "rgb24", "-"],
+        capture_output=True,
+        check=True,
+    )
+    decoded = np.frombuffer(done.stdout, np.uint8).reshape(frames, 180, 320, 3).astype(int)
+    for shown, index in ((decoded[0], 0), (decoded[-1], len(shots) - 1)):
+        assert np.abs(shown - stage.frame(index)).mean() < 4.0
+
+
+def test_video_of_odd_size_is_refused(tmp_path: Path) -> None:
+    pytest.importorskip("imageio_ffmpeg")
+    with pytest.raises(ValueError, match="801 x 450 pixels: allowed in a video are even numbers"):
+        animate(by_hand(), tmp_path / "lesson.mp4", width=801)
+    assert not list(tmp_path.iterdir())
+
+
+def test_missing_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(video, "find_spec", lambda _name: None)
+    with pytest.raises(VideoError, match=r'pip install "chutelab\[video\]"'):
+        animate(by_hand(), tmp_path / "lesson.mp4")
+    assert not list(tmp_path.iterdir())
+    result = CliRunner().invoke(
+        main, ["run", "perpendicular", "--out", str(tmp_path / "out"), "--format", "webm"]
+    )
+    assert result.exit_code == 2
+    assert 'a film as webm needs what is not installed: pip install "chutelab[video]"' in (
+        result.output
+    )
+    assert not list(tmp_path.iterdir())
+
+
+# The command line
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--out", "out", "--format", "avi"], "'avi' is not one of 'gif', 'mp4', 'webm'"),
+        (["--format", "mp4"], "give --out too"),
+        (["--out", "out", "--only", "png", "--format", "gif"], "add gif to --only"),
+    ],
+)
+def test_impossible_formats_are_refused(
+    arguments: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner().invoke(main, ["run", "perpendicular", *arguments])
+    assert result.exit_code == 2
+    assert said in " ".join(result.output.split())
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "files"),
+    [
+        (["--only", "json,gif", "--format", "mp4"], ["lesson.mp4", "summary.json"]),
+        (["--only", "webm,strobe", "--format", "gif"], ["lesson.gif", "strobe.png"]),
+    ],
+)
+def test_films_and_the_still_can_be_chosen(
+    arguments: list[str], files: list[str], tmp_path: Path
+) -> None:
+    if "lesson.mp4" in files:
+        pytest.importorskip("imageio_ffmpeg")
+    out = tmp_path / "out"
+    result = CliRunner().invoke(main, ["run", "perpendicular", "--out", str(out), *arguments])
+    assert result.exit_code == 0, result.output
+    assert all(name in result.output.partition("wrote into")[2] for name in files)
+    assert sorted(path.name for path in out.iterdir()) == files

@@ -1,17 +1,25 @@
-"""The lesson picture: a GIF of a recording, slowed down, that stops at what matters.
+"""The lesson picture: a film of a recording, slowed down, that stops at what matters.
 
 ===============  ==================================================================================
 `moments`        which moments are shown, and for how long each
-`words`          what happened, in words
-`bars`           the energy ledger as two stacked bars that always add up
+`words`          what happened, and what goes on, in words
+`layout`         where everything is in the picture, and which part of the world it shows
+`arrows`         the velocity with its components
 `actors`         what moves in the scene: particles, belts, pulley
-`stage`          the picture: a cached background, and the artists that move on it
-`gif`            one shared palette, and the file, written whole or not at all
+`bars`           the energy ledger as two stacked bars that always add up
+`lettering`      numbers that change with every frame, set from characters drawn once
+`stage`          the picture: a background drawn once, and what moves on it
+`palette`        the colours of every film
+`gif`            the file as a GIF, of each frame only what changed
+`video`          the file as mp4 or webm
+`lesson`         `animate`, all of it together
 ===============  ==================================================================================
 """
 
-from chutelab.animate.gif import animate
+from chutelab.animate.layout import SHOWS
+from chutelab.animate.lesson import FORMATS, animate
 from chutelab.animate.moments import Moment, film
 from chutelab.animate.stage import Stage
+from chutelab.animate.video import VideoError, need_video
 
-__all__ = ["Moment", "Stage", "animate", "film"]
+__all__ = ["FORMATS", "SHOWS", "Moment", "Stage", "VideoError", "animate", "film", "need_video"]

@@ -1,152 +1,135 @@
-"""The film as a GIF: one shared palette, delays in whole hundredths, written whole or not at all.
+"""A GIF, frame by frame: one shared palette, and of each frame only the rectangle that changed.
 
-Pillow writes the file itself, not through imageio: that has no way to pass frames that already
-share a palette.
+Inside it, what stays as it was is transparent, and transparent pixels in long runs cost next to
+nothing. Pillow does the compression; the blocks around it are those of the GIF89a specification,
+since neither Pillow nor imageio can be handed frames with indices into a palette they share.
 """
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING
+from struct import pack
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 from PIL import Image
 
-from chutelab.animate.moments import film, frame_delay, slowness, span
-from chutelab.animate.stage import VIEW, Stage
-from chutelab.files import whole
-from chutelab.plots import style
-from chutelab.plots.scenery import machine_of, scene_of
-from chutelab.plots.window import window_of
-from chutelab.theory import predict
+from chutelab.animate.palette import BITS, CLEAR, Palette, Pixels
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from numpy.typing import NDArray
 
-    from chutelab.recording import Recording
+FOREVER = b"!\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00"
+"""The application extension that makes a GIF start again whenever it ends."""
 
-COLOURS = 255
-"""Of the palette: one index is left, for what does not change from frame to frame."""
+LONGEST = 0xFFFF
+"""Hundredths of a second that one frame can stay."""
 
-PURE = ("#FFFFFF", *sorted({*style.ENERGY.values(), style.TRACK, style.STREAM, style.ANALYTIC}))
-"""Colours that the palette holds unmixed."""
+KEEP, TRANSPARENT = 1 << 2, 1
+"""Of a frame: the next one is drawn over it; it has a transparent index."""
 
-NEXT_TO = 11
-"""Steps (of 255) in every channel within which a mixed colour gives way to a pure one: Pillow looks
-colours up by the corner of a cell, up to 3 steps away in each channel, so that one at less than
-twice that distance could be taken for it."""
-
-SAMPLES = 8
-"""Frames that the palette is made from."""
-
-LEAST = (320, 180)
-"""Pixels below which text cannot be read."""
+Part = tuple[slice, slice]
+"""Rows and columns of a picture, with starts and stops."""
 
 
-def animate(
-    recording: Recording,
-    path: str | Path,
-    *,
-    fps: int = 25,
-    width: int = 800,
-    height: int = 450,
-    slow: float | None = None,
-) -> Path:
-    """Write the lesson picture of a recording, a GIF that loops for ever.
+class GifWriter:
+    """Writes frames to a file; to be closed, or the last one is missing.
 
     Parameters
     ----------
-    recording : Recording
-        From either engine, with at least one knot of particle 0.
-    path : path
-        Where to; written whole or not at all.
-    fps : int
-        Pictures a second: 25 or 50, or another divisor of 100 below.
+    file : binary file
+        Open for writing.
     width, height : int
         Pixels.
-    slow : float, optional
-        Seconds on the screen for one second of the recording; by default a round number that
-        makes the motion take four to six seconds, holds not counted.
-
-    Returns
-    -------
-    Path
-        Of the file.
-
-    Raises
-    ------
-    ValueError
-        If `fps`, `slow` or the size is not possible.
-    OSError
-        If the file cannot be written.
     """
-    frame_delay(fps)
-    if width < LEAST[0] or height < LEAST[1]:
-        raise ValueError(f"{width} x {height} pixels: allowed are at least {LEAST[0]} x {LEAST[1]}")
-    machine = machine_of(recording)
-    aspect = VIEW[2] * width / (VIEW[3] * height)
-    window = window_of(recording, machine).fitted(aspect)
-    begin, end = span(recording, window)
-    pace = slowness(end - begin) if slow is None else slow
-    moments = film(recording, begin, end, fps=fps, slow=pace)
-    stage = Stage(
-        recording,
-        machine,
-        predict(scene_of(recording)),
-        window,
-        moments,
-        slow=pace,
-        width=width,
-        height=height,
-    )
-    path = Path(path)
-    with whole(path) as unfinished:
-        _write(stage, unfinished)
-    return path
+
+    def __init__(self, file: BinaryIO, width: int, height: int) -> None:
+        self._file = file
+        self._palette = Palette()
+        self._seen: Pixels | None = None
+        self._screen: NDArray[np.uint8] = np.full((height, width), CLEAR, dtype=np.uint8)
+        self._waiting: tuple[bytes, int] | None = None
+        # A global table of 2**BITS colours, eight bits each; no background, square pixels.
+        packed = 0x80 | 7 << 4 | (BITS - 1)
+        file.write(pack("<6sHHBBB", b"GIF89a", width, height, packed, 0, 0))
+        file.write(self._palette.bytes() + FOREVER)
+
+    def add(self, pixels: Pixels, delay: int) -> None:
+        """Append a picture.
+
+        Parameters
+        ----------
+        pixels : ndarray, shape (height, width), uint32
+            Red in the lowest byte; it may be overwritten afterwards.
+        delay : int
+            Hundredths of a second that it stays. A picture like the one before lengthens that.
+        """
+        data = self._data(pixels)
+        if data is None and self._waiting is not None and self._waiting[1] + delay <= LONGEST:
+            self._waiting = self._waiting[0], self._waiting[1] + delay
+            return
+        self._flush()
+        # Nothing new, but too long for one frame: a pixel of nothing.
+        self._waiting = data or _block(np.s_[0:1, 0:1], np.full((1, 1), CLEAR, np.uint8)), delay
+
+    def close(self) -> None:
+        """Write the last frame and the end."""
+        self._flush()
+        self._file.write(b";")
+
+    def _flush(self) -> None:
+        if self._waiting is not None:
+            block, delay = self._waiting
+            control = pack("<3sBHBB", b"!\xf9\x04", KEEP | TRANSPARENT, delay, CLEAR, 0)
+            self._file.write(control + block)
+        self._waiting = None
+
+    def _data(self, pixels: Pixels) -> bytes | None:
+        """Return the image block of what changed; None if nothing did."""
+        whole = (slice(0, pixels.shape[0]), slice(0, pixels.shape[1]))
+        if self._seen is None:
+            self._seen = pixels.copy()
+            self._screen = self._palette.indices(pixels.ravel()).reshape(pixels.shape)
+            return _block(whole, self._screen)
+        differs = pixels != self._seen
+        self._seen[:] = pixels
+        part = bounds(differs, whole)
+        if part is None:
+            return None
+        changed = differs[part]
+        screen = self._screen[part]
+        new = self._palette.indices(pixels[part][changed])
+        # Colours that differ may be shown as the same one.
+        patch = np.full(changed.shape, CLEAR, dtype=np.uint8)
+        patch[changed] = np.where(new == screen[changed], np.uint8(CLEAR), new)
+        screen[changed] = new
+        inner = bounds(patch != CLEAR, part)
+        if inner is None:
+            return None
+        row, column = inner[0].start - part[0].start, inner[1].start - part[1].start
+        rows, columns = inner[0].stop - inner[0].start, inner[1].stop - inner[1].start
+        return _block(inner, patch[row : row + rows, column : column + columns])
 
 
-def _write(stage: Stage, path: Path) -> None:
-    count = len(stage.moments)
-    palette = shared_palette(
-        [stage.frame(i) for i in np.unique(np.linspace(0, count - 1, SAMPLES).astype(int))]
-    )
-    frames = _frames(stage, palette)
-    next(frames).save(
-        path,
-        format="GIF",
-        save_all=True,
-        append_images=frames,
-        # Pillow counts in milliseconds.
-        duration=[10 * moment.delay for moment in stage.moments],
-        loop=0,
-        optimize=True,
-    )
+def _block(part: Part, indices: NDArray[np.uint8]) -> bytes:
+    """Return indices, (rows, columns), as the image block of a GIF."""
+    rows, columns = indices.shape
+    image = Image.frombytes("P", (columns, rows), indices.tobytes())
+    place = pack("<cHHHHBB", b",", part[1].start, part[0].start, columns, rows, 0, BITS)
+    return place + image.tobytes("gif", "P", BITS, 0) + b"\0"
 
 
-def _frames(stage: Stage, palette: Image.Image) -> Iterator[Image.Image]:
-    for i in range(len(stage.moments)):
-        picture = Image.fromarray(stage.frame(i))
-        yield picture.quantize(palette=palette, dither=Image.Dither.NONE)
+def bounds(mask: NDArray[np.bool_], part: Part) -> Part | None:
+    """Return the smallest part that holds all that is true in the mask of a part, None if nothing.
 
-
-def shared_palette(frames: list[NDArray[np.uint8]]) -> Image.Image:
-    """Return an image whose palette suits all of the frames, (height, width, 3) each.
-
-    White and the colours that stand for something are in it as they are; median cut, which mixes
-    neighbours, chooses the rest.
+    >>> bounds(np.array([[False, True, True], [False, False, False]]), np.s_[10:12, 20:23])
+    (slice(10, 11, None), slice(21, 23, None))
     """
-    exact = np.array([_rgb(colour) for colour in PURE], dtype=np.uint8)
-    mixed = Image.fromarray(np.concatenate(frames)).quantize(
-        colors=COLOURS - len(exact), method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE
+    rows = np.flatnonzero(mask.any(axis=1))
+    if not len(rows):
+        return None
+    columns = np.flatnonzero(mask[rows[0] : rows[-1] + 1].any(axis=0))
+    top, left = part[0].start, part[1].start
+    return (
+        slice(top + int(rows[0]), top + int(rows[-1]) + 1),
+        slice(left + int(columns[0]), left + int(columns[-1]) + 1),
     )
-    rest = np.array(mixed.getpalette(), dtype=np.uint8).reshape(-1, 3)
-    apart = np.abs(rest[:, None].astype(int) - exact).max(axis=2).min(axis=1) > NEXT_TO
-    table = Image.new("P", (1, 1))
-    table.putpalette([*exact.ravel().tolist(), *rest[apart].ravel().tolist()])
-    return table
-
-
-def _rgb(colour: str) -> tuple[int, ...]:
-    return tuple(bytes.fromhex(colour.removeprefix("#")))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chutelab.animate.words import sentence
+from chutelab.animate.words import going_on, in_flight, sentence
 from chutelab.plots.sampling import STRUCK, action, subset
 from chutelab.recording import Kind
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from chutelab.plots.window import Window
     from chutelab.recording import Recording
 
-RUNNING = 5.8
+RUNNING = 4.2
 """s; the longest the motion of a film takes on the screen by default, holds not counted."""
 
 LIVES = 3.0
@@ -32,6 +32,12 @@ WORTH = 0.05
 
 HOLD_TOTAL, HOLD_LONGEST = 300, 130
 """Hundredths of a second: all holds together at most, and one of them."""
+
+EDGE = 0.012
+"""Share of the window's larger side that particle 0 is inside it as the film begins: all of it."""
+
+TOLD = 1.2
+"""s on the screen, holds not counted, for which the caption tells what happened."""
 
 TAIL = 120
 """Hundredths of a second that the last picture stays."""
@@ -90,7 +96,7 @@ def film(
     hold = min(HOLD_TOTAL // max(len(stops), 1), HOLD_LONGEST)
     delays = np.where(np.isin(times, stops), hold, delay)
     delays[-1] = max(delays[-1], TAIL)
-    words = _words(recording, mine, held, times)
+    words = _words(recording, mine, held, times, slow)
     return tuple(Moment(float(t), int(d), w) for t, d, w in zip(times, delays, words, strict=True))
 
 
@@ -119,8 +125,9 @@ def span(recording: Recording, shown: Window) -> tuple[float, float]:
     track = recording.track(0)
     first, last = float(track["t"][0]), float(track["t"][-1])
     times = np.linspace(first, max(action(recording)[0], first), 400)
-    x, y = subset(recording, [0]).at(times)[0][:, 0].T
-    inside = (x > shown.left) & (x < shown.right) & (y > shown.bottom) & (y < shown.top)
+    inset = max(EDGE, recording.particle.radius / max(shown.width, shown.height))
+    all_of_it = shown.padded(*[-inset] * 4)
+    inside = all_of_it.holds(subset(recording, [0]).at(times)[0][:, 0])
     begin = float(times[np.argmax(inside)]) if inside.any() else first
     end = float(recording.knots["t"].max())
     return begin, min(end, begin + LIVES * (last - begin)) if last > begin else end
@@ -130,7 +137,7 @@ def slowness(length: float) -> float:
     """Return the round factor that shows `length` seconds in at most `RUNNING`, but not by much.
 
     >>> slowness(0.6), slowness(2.5), slowness(40.0)
-    (8.0, 2.0, 0.1)
+    (6.0, 1.5, 0.1)
     """
     if length <= 0.0:
         return 1.0
@@ -164,25 +171,56 @@ def _words(
     mine: NDArray[Any],
     held: NDArray[np.int64],
     times: NDArray[np.float64],
+    slow: float,
 ) -> list[str]:
-    """Return the caption at each time: the last event that is held at, or is no impact."""
-    struck = np.isin(mine["kind"], [int(kind) for kind in STRUCK])
-    told = ~struck & (mine["kind"] != Kind.RELEASE)
+    """Return the caption at each time: for a while what happened last, then what goes on.
+
+    What is told: the impacts that the film holds at, and events that are no impacts.
+    """
+    told = ~np.isin(mine["kind"], [int(kind) for kind in (*STRUCK, Kind.RELEASE)])
     if list(mine["kind"][:2]) == [Kind.RELEASE, Kind.STICK]:
         # Released at the belt's speed, it never slipped.
         released, rode = mine["velocity_after"][:2]
         told[1] = not np.allclose(rode, released, rtol=1e-3, atol=1e-6)
     told[held] = True
-    rides = np.any(mine["kind"] == Kind.SEPARATION)
-    lines = ["rides the incoming belt" if rides else ""]
-    when = [-np.inf]
-    for i in np.flatnonzero(told):
-        lines.append(f"t = {mine['t'][i]:.3f} s: {sentence(recording, mine[i])}")
-        when.append(float(mine["t"][i]))
-    captions = [lines[int(k) - 1] for k in np.searchsorted(when, times, side="right")]
+    stories = np.flatnonzero(told)
+    lines = [f"t = {mine['t'][i]:.3f} s: {sentence(recording, mine[i])}" for i in stories]
+    carried = "rides the incoming belt" if _is_carried(recording, mine) else ""
+    gone = float(recording.track(0)["t"][-1])
+    near = 0.25 * float(np.diff(times).min(initial=np.inf))
+    flying = in_flight(recording, times, near)
+    captions = []
+    for t, flies in zip(times, flying, strict=True):
+        story = int(np.searchsorted(mine["t"][stories], t, side="right")) - 1
+        if story >= 0 and _still_told(mine[stories[story]], t, slow, flying=bool(flies)):
+            captions.append(lines[story])
+        elif story < 0 and carried:
+            captions.append(carried)
+        else:
+            latest = int(np.searchsorted(mine["t"], t, side="right")) - 1
+            known = latest >= 0 and t <= gone
+            captions.append(going_on(recording, mine[latest], flying=bool(flies)) if known else "")
     for i in held:
         # What else happens in the same instant has to wait for the next picture.
-        captions[int(np.searchsorted(times, mine["t"][i]))] = (
-            f"t = {mine['t'][i]:.3f} s: {sentence(recording, mine[i])}"
-        )
+        at = int(np.searchsorted(times, mine["t"][i]))
+        captions[at] = lines[int(np.searchsorted(stories, i))]
     return captions
+
+
+def _is_carried(recording: Recording, mine: NDArray[Any]) -> bool:
+    """Tell whether particle 0 comes on the incoming belt: that is the first it leaves."""
+    struck = np.isin(mine["kind"], [int(kind) for kind in STRUCK])
+    leaves = np.flatnonzero(struck | (mine["kind"] == Kind.SEPARATION))
+    incoming = recording.surface_index("incoming")
+    return bool(len(leaves)) and not struck[leaves[0]] and mine["surface"][leaves[0]] == incoming
+
+
+def _still_told(event: Any, t: float, slow: float, *, flying: bool) -> bool:
+    """Tell whether an event is news at time t, or the beginning of what still goes on.
+
+    An impact is no news any more once the particle slides.
+    """
+    kind = Kind(int(event["kind"]))
+    if kind in (Kind.STICK, Kind.SETTLE, Kind.EXIT):
+        return True
+    return slow * (t - float(event["t"])) <= TOLD and (flying or kind not in STRUCK)

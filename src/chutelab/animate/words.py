@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chutelab.plots.sampling import STRUCK
+from chutelab.plots.sampling import STRUCK, subset
 from chutelab.plots.style import quantity
 from chutelab.recording import PARTICLES, Kind
 
@@ -57,11 +57,13 @@ def sentence(recording: Recording, event: Any) -> str:
     speed = hypot(*event["velocity_after"])
     if kind in STRUCK:
         return _impact(recording, event, kind, name)
+    on = surface_words(name)
+    if kind is Kind.SEPARATION and name != "incoming":
+        return f"leaves {on} at {speed:.3g} m/s"
     if kind is Kind.SEPARATION:
         angle = degrees(atan2(*event["position"]))
         where = "at the top" if angle < 5e-4 else f"{angle:.1f}° past the top"
         return f"leaves the drive pulley {where}, at {speed:.3g} m/s"
-    on = surface_words(name)
     return {
         Kind.RELEASE: "is released",
         Kind.SLIP: f"begins to slip on {on}",
@@ -81,17 +83,40 @@ def _impact(recording: Recording, event: Any, kind: Kind, name: str) -> str:
     verb = "lands on" if kind is Kind.LANDING else "strikes"
     text = f"{verb} {surface_words(name)} at {before:.3g} m/s"
     normal = contact_normal(event, recording.particle.mass)
-    if np.all(np.isfinite(normal)):
-        into, off = (abs(float(event[v] @ normal)) for v in ("velocity_before", "velocity_after"))
-        text += f"; normal speed {into:.3g} m/s → {off:.3g} m/s"
+    into, off = (abs(float(event[v] @ normal)) for v in ("velocity_before", "velocity_after"))
+    if into > 0.0:
+        text += f", ε = {round(off / into, 3):g}"
     belt, restitution, friction = losses(recording, event)
     said = [
-        f"{quantity(float(value), 'J')} {what}"
+        f"{'+' if value > 0.0 else ''}{quantity(value, 'J')} {what}"
         for value, what in (
-            (restitution, "lost in the rebound"),
-            (friction, "lost to slip heat"),
-            (belt, "paid by the belt"),
+            (-float(restitution), "in the rebound"),
+            (-float(friction), "to slip heat"),
+            (float(belt), "from the belt"),
         )
         if abs(value) > 1e-15
     ]
     return f"{text}\n{', '.join(said) or 'no energy lost'}"
+
+
+def going_on(recording: Recording, event: Any, *, flying: bool) -> str:
+    """Return what particle 0 does some time after an event, in contact or `flying`."""
+    kind = Kind(int(event["kind"]))
+    if flying:
+        return "in flight"
+    if kind in (Kind.RELEASE, Kind.COLLISION) or event["surface"] < 0:
+        return ""
+    verb = "slides" if kind in (*STRUCK, Kind.SLIP) else "rides"
+    return f"{verb} on {surface_words(recording.surfaces[event['surface']])}"
+
+
+def in_flight(recording: Recording, times: NDArray[np.float64], near: float) -> NDArray[np.bool_]:
+    """Tell at which times (T,) particle 0 moves as gravity alone would have it.
+
+    Just before a time or just after it, within `near` seconds: an impact is in flight too.
+    """
+    moments = times[:, None] + np.array([-near, 0.0, near])
+    velocity = subset(recording, [0]).at(moments.ravel())[1].reshape(*moments.shape, 2)
+    pulled = np.diff(velocity, axis=1) / near + np.array([0.0, recording.gravity])
+    least = 1e-6 * max(recording.gravity, float(np.abs(pulled[np.isfinite(pulled)]).max(initial=0)))
+    return np.asarray((np.hypot(*np.moveaxis(pulled, 2, 0)) <= least).any(axis=1))

@@ -73,10 +73,14 @@ def _write(recording: Recording, folder: Path, kind: str, accuracy: Accuracy | N
             from chutelab.plots import overlay
 
             overlay(recording, path=folder / "overlay.png")
-        case "gif":
+        case "strobe":
+            from chutelab.plots import strobe
+
+            strobe(recording, path=folder / "strobe.png")
+        case "gif" | "mp4" | "webm":
             from chutelab.animate import animate
 
-            animate(recording, folder / "lesson.gif")
+            animate(recording, folder / f"lesson.{kind}")
         case "csv":
             recording.to_csv(folder)
         case "npz":

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
+from chutelab.cli.program import RefusedError
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
@@ -19,8 +21,17 @@ KINDS = {
     "csv": ("events.csv", "trajectory.csv"),
     "npz": ("recording.npz",),
     "json": ("summary.json",),
+    "mp4": ("lesson.mp4",),
+    "webm": ("lesson.webm",),
+    "strobe": ("strobe.png",),
 }
 """What ``--only`` takes, and the files it stands for."""
+
+FILMS = ("gif", "mp4", "webm")
+"""Those that are the lesson picture; ``--format`` chooses one."""
+
+USUAL = ("png", "gif", "csv", "npz", "json")
+"""Those that are written unless ``--only`` chooses."""
 
 
 def complete_scene(
@@ -73,7 +84,7 @@ set_option = click.option(
 
 
 def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add ``--out``, ``--only``, ``--json`` and ``--quiet``."""
+    """Add ``--out``, ``--only``, ``--format``, ``--json`` and ``--quiet``."""
     options: tuple[Decorator, ...] = (
         click.option(
             "--out",
@@ -88,7 +99,15 @@ def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
             multiple=True,
             callback=_kinds,
             shell_complete=complete_kinds,
-            help=f"With --out: only some of {','.join(KINDS)}. May be repeated.",
+            help=f"With --out: only some of {','.join(KINDS)}; without, the first"
+            f" {len(USUAL)}. May be repeated.",
+        ),
+        click.option(
+            "--format",
+            "film",
+            type=click.Choice(FILMS),
+            help="With --out: the lesson picture as this instead of a GIF; mp4 and webm need the"
+            " extra chutelab[video].",
         ),
         click.option(
             "--json", "as_json", is_flag=True, help="Print one JSON object instead of tables."
@@ -100,8 +119,32 @@ def output_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-def chosen(out: Path | None, only: tuple[str, ...] | None) -> tuple[str, ...]:
-    """Return the kinds of files to write; refuse ``--only`` where nothing is written."""
-    if out is None and only is not None:
-        raise click.UsageError("--only chooses among the files of --out DIR: give --out too.")
-    return tuple(KINDS) if only is None else only
+def chosen(
+    out: Path | None, only: tuple[str, ...] | None, film: str | None = None
+) -> tuple[str, ...]:
+    """Return the kinds of files to write.
+
+    Refuse ``--only`` and ``--format`` where nothing is written, ``--format`` where there is no
+    film, and a film that cannot be written here.
+    """
+    if out is None:
+        for option, given in (("--only chooses among", only), ("--format is for one of", film)):
+            if given is not None:
+                raise click.UsageError(f"{option} the files of --out DIR: give --out too.")
+    kinds = USUAL if only is None else only
+    if film is not None:
+        if not set(kinds) & set(FILMS):
+            raise click.UsageError(
+                f"--format {film} is for the lesson picture, which --only {','.join(kinds)}"
+                " leaves out: add gif to --only."
+            )
+        kinds = tuple(kind for kind in KINDS if kind == film or kind in set(kinds) - set(FILMS))
+    for kind in kinds:
+        if kind in FILMS and kind != "gif":
+            from chutelab.animate import VideoError, need_video
+
+            try:
+                need_video(kind)
+            except VideoError as error:
+                raise RefusedError(str(error)) from error
+    return kinds

@@ -24,6 +24,7 @@ def show(
     recording: Path,
     out: Path | None,
     only: tuple[str, ...] | None,
+    film: str | None,
     as_json: bool,
     quiet: bool,
 ) -> None:
@@ -32,7 +33,7 @@ def show(
     from chutelab.recording import Recording
     from chutelab.storage import RecordingError
 
-    kinds = chosen(out, only)
+    kinds = chosen(out, only, film)
     try:
         loaded = Recording.load(recording)
     except RecordingError as error:

@@ -66,6 +66,7 @@ def run(
     overrides: tuple[str, ...],
     out: Path | None,
     only: tuple[str, ...] | None,
+    film: str | None,
     as_json: bool,
     quiet: bool,
     partial: bool,
@@ -82,7 +83,7 @@ def run(
     from chutelab.scene.overrides import Setting
     from chutelab.simulation import simulate
 
-    kinds = chosen(out, only)
+    kinds = chosen(out, only, film)
     if partial and out is None:
         raise click.UsageError("--partial keeps files of --out DIR: give --out too.")
     settings = list(overrides)

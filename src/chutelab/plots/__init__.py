@@ -1,4 +1,4 @@
-"""Pictures of recordings: `overlay`, and small functions that take and return `Axes`.
+"""Pictures of recordings: `overlay`, `strobe`, and small functions that take and return `Axes`.
 
 ===============  ==================================================================================
 `style`          colours, text sizes, units
@@ -8,6 +8,7 @@
 `analytic`       the analytic parabola as arcs of flight
 `panels`         tracks, parabola, residual, velocity, energy ledger
 `figure`         the overlay
+`strobe`         a still for print: where the particle is at round times
 ===============  ==================================================================================
 
 Figures are drawn by Agg through `Figure` objects: no pyplot, no global state.
@@ -24,6 +25,7 @@ from chutelab.plots.panels import (
     draw_velocity,
 )
 from chutelab.plots.scenery import draw_scene, machine_of
+from chutelab.plots.strobe import strobe
 from chutelab.plots.window import Window, window_of
 
 __all__ = [
@@ -40,5 +42,6 @@ __all__ = [
     "flight",
     "machine_of",
     "overlay",
+    "strobe",
     "window_of",
 ]

@@ -71,7 +71,7 @@ def overlay(
     side = figure.add_gridspec(2, 1, left=0.63, right=0.985, top=0.88, bottom=0.155, hspace=0.34)
     parts, start = analytic_of(recording, prediction)
     view = figure.add_subplot(grid[0])
-    _view(view, recording, parts)
+    draw_view(view, recording, parts)
     draw_residual(figure.add_subplot(grid[1]), recording, parts, start, str(prediction.reason))
     draw_velocity(figure.add_subplot(side[0]), recording, parts, start)
     books = draw_ledger(figure.add_subplot(side[1]), recording)
@@ -94,7 +94,8 @@ def overlay(
     return figure
 
 
-def _view(ax: Axes, recording: Recording, parts: tuple[Arc, ...]) -> None:
+def draw_view(ax: Axes, recording: Recording, parts: tuple[Arc, ...]) -> Axes:
+    """Draw the scene to scale with tracks, strobe dots and the analytic parabola, and a legend."""
     machine = machine_of(recording)
     style.dress(ax, "x, m", "y, m")
     draw_scene(ax, machine, window_of(recording, machine))
@@ -108,6 +109,7 @@ def _view(ax: Axes, recording: Recording, parts: tuple[Arc, ...]) -> None:
         borderaxespad=0.3,
         handlelength=2.2,
     )
+    return ax
 
 
 def _said(recording: Recording) -> str:

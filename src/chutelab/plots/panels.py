@@ -45,7 +45,7 @@ FLOOR = 1e-17
 def analytic_of(recording: Recording, prediction: Transfer) -> tuple[tuple[Arc, ...], float]:
     """Return the arcs known analytically, and the time (s) of the recording at which they begin."""
     parts = arcs(prediction, scene_of(recording))
-    separated = recording.select(Kind.SEPARATION)
+    separated = recording.select(Kind.SEPARATION, surface="incoming")
     if not np.any(separated["particle"] == 0):
         return (), 0.0
     return parts, action(recording)[0]

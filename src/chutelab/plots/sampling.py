@@ -22,9 +22,6 @@ STRUCK = (Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
 STROBES = 10
 """Strobe dots aimed at from separation to the last impact."""
 
-CHUNK = 200_000
-"""Particle-times that one call of `energy_at` gets: some tens of MB."""
-
 
 def subset(recording: Recording, particles: Sequence[int] | NDArray[np.int64]) -> Recording:
     """Return the recording of some particles only; its events are left out."""
@@ -68,10 +65,11 @@ def round_times(begin: float, end: float, step: float) -> Floats:
 def action(recording: Recording) -> tuple[float, float]:
     """Return when particle 0 begins to do something, and when it ends, s.
 
-    It begins at its separation, or at its release if it is not carried to one.
+    It begins at its separation from the incoming belt, or at its release if it is not carried to
+    one.
     """
     track = recording.track(0)
-    separation = recording.select(Kind.SEPARATION)
+    separation = recording.select(Kind.SEPARATION, surface="incoming")
     separation = separation[separation["particle"] == 0]
     begin = separation["t"][0] if len(separation) else track["t"][0]
     return float(begin), float(track["t"][-1])
@@ -120,9 +118,7 @@ def energies(recording: Recording, times: ArrayLike) -> dict[str, Floats]:
         particles that stay in the scene (of all, if it is negative otherwise): it can be stacked.
     """
     times = np.atleast_1d(np.asarray(times, dtype=np.float64))
-    size = max(1, CHUNK // max(recording.count, 1))
-    parts = [recording.energy_at(times[i : i + size]) for i in range(0, len(times), size)]
-    books = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    books = recording.energy_at(times)
     first, _ = recording.ends()
     order = np.argsort(first["t"], kind="stable")
     at_release = np.concatenate([[0.0], np.cumsum(sum(recording.energies(first[order])))])

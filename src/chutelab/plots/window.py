@@ -120,6 +120,8 @@ def _path(recording: Recording) -> tuple[NDArray[np.float64], NDArray[np.float64
     if len(mine):
         end = float(mine["t"][-1])
     struck = struck_by_nominal(recording)
+    # What it struck before, on the way to the end of a ramp, is not where it goes.
+    struck = struck[struck["t"] > begin]
     landed = struck["t"][struck["kind"] == Kind.LANDING]
     last = landed[0] if len(landed) else struck["t"][-1] if len(struck) else end
     times = track_times(recording, begin, end)

@@ -1,0 +1,80 @@
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from PIL import Image
+
+from chutelab import scene
+from chutelab.plots import strobe
+from chutelab.simulation import simulate
+from test_plots import BELT_TIME, EXACT, by_hand, expected, seen
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.figure import Figure
+    from matplotlib.text import Annotation
+
+
+def times_of(figure: Figure) -> list[Annotation]:
+    return [text for text in figure.axes[0].texts if text.get_gid() == "time"]  # type: ignore[misc]
+
+
+def test_times_stand_beside_the_dots_they_belong_to() -> None:
+    figure = strobe(by_hand())
+    (dots,) = [line for line in figure.axes[0].lines if line.get_gid() == "strobe"]
+    labels = times_of(figure)
+    assert len(labels) > 10
+    for label in labels:
+        t = float(label.get_text())
+        assert t == pytest.approx(0.05 * round(t / 0.05), abs=1e-12)
+        assert np.abs(np.asarray(dots.get_xydata()) - label.xy).sum(axis=1).min() < 1e-12
+        if t > BELT_TIME:
+            known = expected(np.array([t - BELT_TIME]))[0][0]
+            assert np.asarray(label.xy) == pytest.approx(known, abs=1e-12)
+        box, (x, y) = label.get_window_extent(), figure.axes[0].transData.transform(label.xy)
+        away = np.hypot(max(box.x0 - x, x - box.x1, 0.0), max(box.y0 - y, y - box.y1, 0.0))
+        assert 2.0 < away / figure.dpi * 72.0 < 10.0
+        places = figure.axes[0].transData.transform(np.asarray(dots.get_xydata()))
+        middle = (0.5 * (box.x0 + box.x1), 0.5 * (box.y0 + box.y1))
+        nearest = places[np.hypot(*(places - middle).T).argmin()]
+        assert nearest == pytest.approx((x, y), abs=1e-9)
+    assert all(float(a.get_text()) < float(b.get_text()) for a, b in pairwise(labels))
+
+
+@pytest.mark.parametrize("name", [*EXACT, "free-fall"])
+def test_no_text_is_cut_off_overlapping_or_small(name: str) -> None:
+    figure = strobe(simulate(scene.load(name)))
+    FigureCanvasAgg(figure).draw()
+    texts = seen(figure)
+    width, height = figure.bbox.size
+    boxes = [(text, text.get_window_extent()) for text in texts]
+    for text, box in boxes:
+        assert text.get_fontsize() >= 9.0
+        assert min(box.x0, box.y0) >= 0.0, text
+        assert box.x1 <= width, text
+        assert box.y1 <= height, text
+    for i, (text, box) in enumerate(boxes):
+        for other, near in boxes[:i]:
+            overlap = min(box.x1, near.x1) - max(box.x0, near.x0)
+            above = min(box.y1, near.y1) - max(box.y0, near.y0)
+            assert min(overlap, above) < 4.5, (text, other)
+    track = [line for line in figure.axes[0].lines if line.get_gid() in ("track", "surface plate")]
+    for label in times_of(figure):
+        for line in track:
+            path = line.get_path().transformed(line.get_transform())
+            assert not path.intersects_bbox(label.get_window_extent(), filled=False), label
+
+
+def test_still_is_sharp_enough_for_print(tmp_path: Path) -> None:
+    strobe(by_hand(), path=tmp_path / "strobe.png")
+    with Image.open(tmp_path / "strobe.png") as image:
+        assert image.size == (2700, 1680)
+        assert image.info["dpi"] == pytest.approx((300.0, 300.0), abs=0.1)
+    assert [file.name for file in tmp_path.iterdir()] == ["strobe.png"]
+    with pytest.raises(FileNotFoundError):
+        strobe(by_hand(), path=tmp_path / "nowhere" / "strobe.png")

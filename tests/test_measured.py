@@ -1,0 +1,545 @@
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import binom
+
+from chutelab import load, measured
+from chutelab.cli import main
+from chutelab.measured import MeasuredError, example
+from chutelab.measured.clock import best_t0
+from chutelab.measured.diagnosis import advice
+from chutelab.measured.files import COLUMNS
+from chutelab.measured.result import plus_minus
+
+KEYS = ("plate.restitution", "incoming.speed")
+TRUTH = np.array([0.62, 1.9])
+
+
+@pytest.fixture(scope="module")
+def film():
+    return measured.read("perpendicular-track")
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return load("perpendicular")
+
+
+@pytest.fixture(scope="module")
+def real():
+    return load("perpendicular", ["plate.restitution=0.62", "incoming.speed=1.9"])
+
+
+@pytest.fixture(scope="module")
+def found(scene, film):
+    return measured.fit(scene, film, KEYS)
+
+
+def written(tmp_path, text, name="film.txt", encoding="utf-8"):
+    path = tmp_path / name
+    path.write_bytes(text.encode(encoding))
+    return path
+
+
+# Reading
+
+POINTS = [(0.0, 0.1, 0.2), (0.5, -0.15, 1e-3), (1.0, 0.2, -30.0)]
+
+
+def rows(separator, comma=False, end=""):
+    lines = [separator.join(f"{value:.9E}" for value in point) + end for point in POINTS]
+    return "\n".join(lines).replace(".", "," if comma else ".")
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        ("mass_A\nt\tx\ty\n" + rows("\t"), "mass_A"),
+        ("mass A\nt,x,y\n" + rows(","), "mass A"),
+        ("\tmass A\t\t\nt\tx\ty\t\n" + rows("\t", end="\t"), "mass A"),
+        (",A,,\nt,x,y,\n" + rows(",", end=","), "A"),
+        ("t;x;y\n" + rows(";", comma=True), ""),
+        ("Ball\nt\tx\ty\n" + rows("\t", comma=True), "Ball"),
+        ("cm_A\nt      x      y\n" + rows("   "), "cm_A"),
+        ('mass_A\nt,x,y\n"0,0","0,1","0,2"\n"0,5","-0,15","0,001"\n"1","0,2","-30"\n', "mass_A"),
+        ("mass_A\nt (s)\tx (m)\ty (m)\n" + rows("\t"), "mass_A"),
+        ("mass_A\nTime,X,Y\n\n# a remark\n" + rows(",") + "\n\n", "mass_A"),
+        ("mass_A\nt\tx\ty\n0\t.1\t.2\n0.5\t−0.15\t1e-3\n1\t.2\t-30.\n", "mass_A"),
+    ],
+    ids=[
+        "tabs", "commas", "tracker 6", "tracker 6 commas", "semicolons and decimal commas",
+        "decimal commas", "spaces", "quoted", "units", "blank lines", "other numbers",
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_reads_what_programs_write(tmp_path, text, name, encoding, newline):
+    track = measured.read(written(tmp_path, text.replace("\n", newline), encoding=encoding))
+    assert track.name == name
+    assert np.column_stack([track.t, track.position]) == pytest.approx(np.array(POINTS), abs=1e-15)
+    assert track.skipped == 0
+
+
+def test_ignores_other_columns_and_counts_frames_without_a_mark(tmp_path):
+    text = (
+        "A\nframe,t,v_{x},y,r,x\n" + "1,0,,2,9,1\n2,1,5,,9,1\n3,2,5,4,9,3\n4,3,5,NaN,9,\n5,4,,6,,5"
+    )
+    track = measured.read(written(tmp_path, text))
+    assert track.position.tolist() == [[1, 2], [3, 4], [5, 6]]
+    assert track.lines.tolist() == [3, 5, 7]
+    assert track.skipped == 2
+    assert "2 lines without a position" in str(track)
+    assert [row[0] for row in track.sheet().rows] == ["time, s", "x, m", "y, m"]
+
+
+MULTI = "#multi:\n\tcm A\t\tcm B\t\t\nt\tx\ty\tx\ty\t\n" + "".join(
+    f"{i}\t{i}\t{2 * i}\t{3 * i}\t{4 * i}\t\n" for i in range(4)
+)
+
+
+def test_chooses_among_several_tracks(tmp_path):
+    path = written(tmp_path, MULTI)
+    for name, factors in (("cm A", (1, 2)), ("cm B", (3, 4))):
+        track = measured.read(path, track=name)
+        assert track.name == name
+        assert track.points[3].tolist() == [3 * factor for factor in factors]
+    with pytest.raises(MeasuredError, match='line 3: holds 2 tracks; choose one of "cm A", "cm B"'):
+        measured.read(path)
+    with pytest.raises(MeasuredError, match='"cm C": no such track; there are "cm A", "cm B"'):
+        measured.read(path, track="cm C")
+
+
+def test_places_points_in_the_world(tmp_path):
+    pixels = written(tmp_path, "A\nt,x (px),y (px)\n2,100,50\n3,110,50\n4,110,70\n")
+    track = measured.read(pixels, scale=0.01, origin=(100.0, 40.0), flip_y=True, t0=1.5)
+    # x = scale (x_file - X), y = -scale (y_file - Y), t = t_file - t0
+    assert track.position == pytest.approx(np.array([[0.0, -0.1], [0.1, -0.1], [0.1, -0.3]]))
+    assert track.t.tolist() == [0.5, 1.5, 2.5]
+    with pytest.raises(MeasuredError, match="line 2: x and y are in pixels: a scale"):
+        measured.read(pixels)
+    centimetres = written(tmp_path, "A\nt (ms),x [cm],y_cm\n0,1,2\n500,3,4\n1000,5,6\n", "cm.csv")
+    track = measured.read(centimetres)
+    assert track.position[2] == pytest.approx([0.05, 0.06])
+    assert track.t[1] == pytest.approx(0.5)
+    assert measured.read(centimetres, scale=2.0).x[0] == 2.0
+
+
+HEAD = "A\nt,x,y\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "empty; no line names the columns t, x, y"),
+        ("0,1,2\n1,2,3\n2,3,4\n", 'line 1 = "0,1,2": no line names the columns t, x, y'),
+        ("A\nt,x,z\n0,1,2\n", "line 2: no column y; t, x, y are needed"),
+        (HEAD + "0,1,2\n1,two,3\n", 'line 4, column x = "two": must be a number from'),
+        (HEAD + "0,1,2\n1,inf,3\n", 'line 4, column x = "inf": must be a number from'),
+        (HEAD + "0,1,2\n1,1e400,3\n", 'line 4, column x = "1e400": must be a number from'),
+        (HEAD + "0,1,2\n1,1_0,3\n", 'line 4, column x = "1_0": must be a number from'),
+        (HEAD + "0,1,2\n1,2,3\n", "2 points with a time and a position; at least 3"),
+        (HEAD + "0,1,2\n1,2,3\n1,2,3\n", "line 5, column t = 1.0: times must increase; the point"),
+        (HEAD + "0,1,2\n1,2,3\n0.5,2,3\n", "before has 1 (line 4)"),
+        (HEAD + "0,0,1,0,2,0\n", '"0,0,1,0,2,0": 6 cells under 3 columns; with decimal commas'),
+        ("t;x;y\n0,1;1;2\n0.2;3;4\n1;1;1\n", "line 3 = "),
+        ("t (s),x (m),y (cm)\n0,1,2\n1,1,2\n2,1,2\n", "line 1: x and y have different units"),
+        ("A\0\nt,x,y", "not a text file"),
+    ],
+)  # fmt: skip
+def test_says_what_is_wrong_with_a_file(tmp_path, text, said):
+    path = written(tmp_path, text)
+    with pytest.raises(MeasuredError) as error:
+        measured.read(path)
+    assert str(error.value).startswith(f"{path}: ")
+    assert said in str(error.value)
+
+
+@given(st.lists(st.text("tTxy,;\t .0123e+-'\"\n\r#\ufeff", max_size=30), max_size=8))
+def test_any_text_is_a_track_or_refused_with_words(tmp_path_factory, lines):
+    path = tmp_path_factory.getbasetemp() / "any.txt"
+    path.write_text("\n".join(["t,x,y", *lines]), encoding="utf-8")
+    try:
+        track = measured.read(path)
+    except MeasuredError as error:
+        refused = error
+    else:
+        refused = None
+        assert (np.diff(track.t) > 0.0).all()
+        assert np.isfinite(track.position).all()
+    assert refused is None or str(path) in str(refused)
+
+
+def test_says_which_shipped_track_may_have_been_meant(tmp_path):
+    with pytest.raises(MeasuredError, match=r"no such file.*did you mean perpendicular-track"):
+        measured.read("perpendicular-trak.csv")
+    with pytest.raises(MeasuredError, match="cannot be read: Is a directory"):
+        measured.read(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("placement", "said"),
+    [({"scale": 0.0}, "scale = 0.0"), ({"scale": float("nan")}, "scale = nan"),
+     ({"t0": float("inf")}, "t0 = inf"), ({"origin": (0.0, float("nan"))}, "origin = ")],
+)  # fmt: skip
+def test_refuses_a_placement_that_is_none(placement, said):
+    with pytest.raises(MeasuredError, match=said):
+        measured.read("perpendicular-track", **placement)
+
+
+# Residuals
+
+
+def test_residuals_are_measured_minus_parabola(real):
+    """Before the pulley x = v t - 1 m; then y falls by ½ g t²; the errors are put in by hand."""
+    t = np.array([0.25, 1.0 / 1.9 + 0.2])
+    track = measured.Track(
+        "A", "<test>", np.array([*t, 0.9]), np.zeros((3, 2)), np.array([3, 4, 5])
+    )
+    clean = measured.residuals(real, track)
+    x = 1.9 * t - 1.0
+    y = [0.104, 0.104 - 0.5 * 9.81 * 0.2**2]
+    assert clean.simulated[:2] == pytest.approx(np.column_stack([x, y]), abs=1e-14)
+    errors = np.array([[0.003, 0.0], [0.0, -0.004], [0.0, 0.0]])
+    moved = measured.Track("A", "<test>", track.seconds, clean.simulated + errors, track.lines)
+    found = measured.residuals(real, moved)
+    assert found.values == pytest.approx(errors, abs=1e-14)
+    assert found.rms == pytest.approx((0.003 / 3**0.5, 0.004 / 3**0.5))
+    assert found.mean == pytest.approx((0.001, -0.004 / 3))
+    assert found.worst == 1
+    rows = {name: cells for name, *cells in found.sheet().rows}
+    assert rows["RMS"] == ["1.73 mm", "2.31 mm", "2.89 mm"]
+    assert rows["worst point"][1:] == ["-4 mm", "4 mm"]
+    assert "3 of 3 points compared; the worst one is line 4: 0.7263 s, x = 0.38 m" in str(found)
+
+
+def test_points_outside_the_simulated_time_are_named_and_left_out(real):
+    track = example.filmed(real).placed(t0=0.1)
+    found = measured.residuals(real, track)
+    early = int((track.t < -1e-9).sum())
+    assert early == 12
+    assert found.left_out() == "12 points before the release at 0 s (lines 3 to 14)"
+    assert np.isnan(found.values[:early]).all()
+    assert np.isfinite(found.values[early:]).all()
+    late = measured.residuals(real, track.placed(t0=-0.009))
+    assert late.left_out() == f"1 point after the end at 0.9739 s (line {track.lines[-1]})"
+    with pytest.raises(MeasuredError, match="column t: 0 of 117 points lie within"):
+        measured.residuals(real, track.placed(t0=9.0))
+
+
+def test_follows_particle_0_of_a_stream():
+    stream = load("stream-independent")
+    alone = load("stream-independent", ["stream.count=1"])
+    track = example.filmed(alone, noise=0.0, frames=50.0)
+    assert measured.residuals(stream, track).rms == pytest.approx((0.0, 0.0), abs=5e-5)
+
+
+# Fits
+
+
+def test_the_shipped_track_is_what_its_generator_makes(film):
+    assert Path(film.source).read_text(encoding="utf-8") == example.shipped_text()
+    assert "simulated" in film.name
+
+
+def test_fit_recovers_the_answer_of_the_shipped_track(found):
+    assert tuple(example.TRUTH[key] for key in KEYS) == tuple(TRUTH)
+    assert (np.abs(found.values - TRUTH) < 2.0 * found.errors).all()
+    assert (found.low < TRUTH).all()
+    assert (found.high > TRUTH).all()
+    # A fit that says it knows nothing would pass the lines above.
+    assert (found.errors < [0.003, 0.0003]).all()
+    assert found.scatter == pytest.approx(example.NOISE, rel=0.2)
+    assert found.notes == ()
+    assert found.after.used.all()
+    assert not found.before.used.all()
+    assert sum(found.after.rms) < 0.05 * sum(found.before.rms)
+
+
+def test_uncertainty_of_a_belt_speed_is_the_textbook_one(real):
+    """On the belt x = v t - 1 and y is fixed, so σ_v = s / √Σt², s² = Σr² / (2n - 1)."""
+    track = example.filmed(real, frames=60.0, seed=7)
+    track = measured.Track("A", "<belt>", track.seconds[:30], track.points[:30], track.lines[:30])
+    fitted = measured.fit(load("perpendicular"), track, ["incoming.speed"])
+    t = track.t
+    speed = float((track.x + 1.0) @ t / (t @ t))
+    off = np.concatenate([track.x + 1.0 - speed * t, track.y - 0.104])
+    assert fitted.values[0] == pytest.approx(speed, abs=1e-9)
+    sigma = np.sqrt(off @ off / (2 * 30 - 1) / (t @ t))
+    assert fitted.errors[0] == pytest.approx(sigma, rel=1e-6)
+    assert fitted.freedom == 59
+
+
+def test_uncertainties_cover_the_truth_as_often_as_they_say(scene, real):
+    """Of 32 fits to other noise, 68 % and 95 % lie within 1 and 2 standard deviations.
+
+    The counts of each parameter lie in the central 99.8 % of their binomial distributions.
+    """
+    off = []
+    for seed in range(32):
+        track = example.filmed(real, frames=60.0, seed=1000 + seed, begin=0.4)
+        fitted = measured.fit(scene, track, KEYS)
+        off.append(np.abs(fitted.values - TRUTH) / fitted.errors)
+    for within, share in ((1.0, 0.6827), (2.0, 0.9545)):
+        low, high = binom.interval(0.998, 32, share)
+        for count in (np.array(off) < within).sum(axis=0):
+            assert low <= count <= high
+
+
+def test_points_without_noise_give_the_parameters_exactly(scene, real):
+    track = example.filmed(real, noise=0.0)
+    exact = measured.residuals(real, track).simulated
+    track = measured.Track("A", "<exact>", track.seconds, exact, track.lines)
+    fitted = measured.fit(scene, track, KEYS)
+    assert fitted.values == pytest.approx(TRUTH, abs=1e-9)
+    assert (fitted.errors < 1e-9).all()
+
+
+def test_finds_the_clock_from_anywhere(scene, real):
+    track = example.filmed(real, begin=0.45, seed=3).placed(t0=-40.0)
+    fitted = measured.fit(scene, track, [*KEYS, "t0"])
+    assert fitted.values == pytest.approx([*TRUTH, 0.0], abs=0.01)
+    assert (np.abs(fitted.values - [*TRUTH, 0.0]) < 3.0 * fitted.errors).all()
+    assert fitted.after.track.placement.t0 == fitted.values[2]
+    assert any("correlated" in note for note in fitted.notes)
+    assert best_t0(measured.residuals(real, example.filmed(real)).recording, track) == (
+        pytest.approx(0.0, abs=0.002)
+    )
+
+
+def test_fits_how_the_points_lie(real):
+    track = example.filmed(real, seed=5)
+    # As a camera would have it: pixels of 2 mm, from the upper left, y downward.
+    pixels = track.points * [500.0, -500.0] + [310.0, 95.0]
+    camera = measured.Track(
+        "A", "<camera>", track.seconds, pixels, track.lines,
+        measured.Placement(scale=0.0021, origin=(300.0, 100.0), flip_y=True),
+    )  # fmt: skip
+    fitted = measured.fit(real, camera, ["scale", "origin.x", "origin.y"])
+    truth = np.array([0.002, 310.0, 95.0])
+    assert (np.abs(fitted.values - truth) < 3.0 * fitted.errors).all()
+    assert fitted.errors == pytest.approx([0.0, 0.2, 0.2], abs=0.2)
+    assert fitted.errors[0] < 1e-6
+
+
+def test_a_robust_fit_believes_an_outlier_less(scene, real):
+    track = example.filmed(real, seed=6, begin=0.4)
+    points = track.points.copy()
+    points[[20, 60]] += [[0.3, 0.0], [0.0, 0.25]]
+    spoilt = measured.Track("A", "<spoilt>", track.seconds, points, track.lines)
+    plain = measured.fit(scene, spoilt, KEYS)
+    robust = measured.fit(scene, spoilt, KEYS, robust=True)
+    assert any("line 23 (0.3 m), line 63" in note for note in plain.notes)
+    assert (np.abs(robust.values - TRUTH) < 3.0 * robust.errors).all()
+    assert (robust.errors < 0.3 * plain.errors).all()
+    assert (np.abs(robust.values - TRUTH) < np.abs(plain.values - TRUTH)).all()
+    assert robust.scatter == pytest.approx(0.001, rel=0.3)
+
+
+def test_stays_within_what_the_scene_allows(scene):
+    real = load("perpendicular", ["plate.restitution=1.0"])
+    at_the_edge = 0
+    for seed in range(6):
+        track = example.filmed(real, seed=seed, noise=0.01)
+        fitted = measured.fit(scene, track, ["plate.restitution"])
+        assert fitted.values[0] <= 1.0
+        if fitted.values[0] > 1.0 - 1e-6:
+            at_the_edge += 1
+            assert any("edge of what is allowed" in note for note in fitted.notes)
+    assert at_the_edge > 0
+
+
+def test_names_what_the_points_cannot_tell(scene, film):
+    for keys, said in (
+        (["particle.mass"], "fit: particle.mass does not move the particle"),
+        (["plate.restitution", "run.max_time"], "run.max_time does not move the particle"),
+        (["t0", "incoming.length"], "t0 and incoming.length cannot be told apart"),
+        (["outgoing.friction"], "outgoing.friction does not move"),
+    ):
+        with pytest.raises(MeasuredError, match=said) as error:
+            measured.fit(scene, film, keys)
+        assert str(error.value).startswith(film.source)
+
+
+def test_says_when_the_model_is_not_what_was_filmed(scene, film):
+    fitted = measured.fit(scene, film, ["plate.restitution"])
+    assert any("neighbouring residuals are alike" in note for note in fitted.notes)
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ([], "name at least one key"),
+        (["plate.restitutoin"], "did you mean plate.restitution"),
+        (["restitution"], "did you mean .*plate.restitution"),
+        (["stream.count"], "1 is not a number that can vary continuously"),
+        (["incoming.friction"], '"adhesion" is not a number'),
+        (["particle.spin"], "false is not a number"),
+        (["title"], "is not a number"),
+        (["plate"], "is not a number"),
+        (["plate.below"], "has no value in this scene; give one to start from, --set plate.below="),
+        (["stream.at[0]"], r"give one to start from, --set stream.at\[0\]="),
+        (["surface[0].speed"], r"the scene has no \[surface\]"),
+        (["t0", "t0"], "fit t0: given twice"),
+        (["", "."], "2 faults"),
+    ],
+)  # fmt: skip
+def test_says_which_keys_cannot_be_fitted(scene, film, keys, said):
+    with pytest.raises(MeasuredError, match=said):
+        measured.fit(scene, film, keys)
+
+
+@pytest.mark.parametrize("off", [0.01, -0.02])
+def test_gets_over_a_jump(off):
+    """From 1 cm beside, the particle bounces once less on the ramp, and there is a minimum."""
+    plain = load("free-fall")
+    real = example.filmed(plain, noise=0.001, seed=2)
+    start = load("free-fall", [f"stream.at=[{plain.stream.at[0] + off}, {plain.stream.at[1]}]"])
+    fitted = measured.fit(start, real, ["stream.at[0]"])
+    assert abs(fitted.values[0] - plain.stream.at[0]) < 3.0 * fitted.errors[0]
+
+
+def test_refuses_to_follow_one_of_a_crowd(film):
+    with pytest.raises(MeasuredError, match=r"stream.interact = true: must be false for a fit"):
+        measured.fit(load("stream"), film, ["incoming.speed"])
+
+
+def test_shows_itself(found, film):
+    text = str(found)
+    assert "0.6178 ± 0.0019" in text
+    assert "0.6141 to 0.6214" in text
+    assert "RMS residual 0.963 mm in" in text
+    for shown, said in ((found, "incoming.speed"), (found.after, "worst point")):
+        assert f">{said}</td>" in shown._repr_html_()
+    assert "69 points" in film._repr_html_()
+    assert plus_minus(123.456, 9.99) == "123 ± 10"
+
+
+# The command
+
+
+def run(*arguments):
+    return CliRunner().invoke(main, ["compare", *map(str, arguments)])
+
+
+ARGUMENTS = ("perpendicular", "--data", "perpendicular-track")
+
+
+def test_prints_residuals():
+    result = run(*ARGUMENTS)
+    assert result.exit_code == 0
+    for said in ("65 of 69", "55.7 mm", "worst point", "lines 68 to 71"):
+        assert said in result.output
+    assert "Fit" not in result.output
+
+
+def test_advises_a_clock_that_fits():
+    result = run("perpendicular", "--data", "perpendicular-track", "--t0", "0.3", "--set",
+                 "plate.restitution=0.62", "--set", "incoming.speed=1.9")  # fmt: skip
+    assert result.exit_code == 0
+    t0 = re.search(r"0\.3 s apart: with t0 = (-?[\d.]+)", result.output)
+    assert abs(float(t0[1])) < 1e-3
+
+
+def test_doubts_points_that_lie_far_from_everything(scene, film):
+    """As when a scale is forgotten: the numbers are millimetres."""
+    found = measured.residuals(scene, film.placed(scale=1000.0))
+    assert re.match(r"the points lie \d+ times as far off .*: look at scale", advice(found))
+    assert advice(measured.residuals(scene, film)) == ""
+    with pytest.raises(MeasuredError, match=r"fit: nothing was found .* look at scale, origin"):
+        measured.fit(scene, film.placed(scale=1000.0), ["t0"])
+    fitted = measured.fit(scene, film.placed(origin=(50.0, 0.0)), ["incoming.speed"])
+    assert fitted.notes[0].startswith("the points lie")
+
+
+def test_writes_a_picture_the_points_and_the_fit(tmp_path, found):
+    out = tmp_path / "new" / "out"
+    result = run(*ARGUMENTS, "--fit", ",".join(KEYS), "--out", out, "--json")
+    assert result.exit_code == 0, result.output
+    assert {path.name for path in out.iterdir()} == {"compare.png", "points.csv", "fit.json"}
+    told = json.loads(result.stdout)
+    assert told == json.loads((out / "fit.json").read_text(encoding="utf-8"))
+    fitted = told["fit"]["parameters"]["plate.restitution"]
+    assert fitted["value"] == found.values[0]
+    assert fitted["error"] == found.errors[0]
+    assert told["fit"]["correlation"][0][1] == found.correlation[0, 1]
+    assert told["residuals"]["rms_x"] == found.after.rms[0]
+    lines = (out / "points.csv").read_text(encoding="utf-8").splitlines()
+    assert lines[0] == ",".join(COLUMNS)
+    assert len(lines) == 70
+    table = np.genfromtxt(lines[1:], delimiter=",")
+    assert table[:, 6:] == pytest.approx(table[:, 2:4] - table[:, 4:6], abs=1e-8)
+    assert table[:, 6:] == pytest.approx(found.after.values, abs=1e-8)
+
+
+def test_draws_points_tracks_and_residuals(found):
+    from chutelab.plots.measured import measured as draw
+
+    figure = draw(found.after, found)
+    view, *panels = figure.axes
+    drawn = {line.get_gid(): line.get_xydata() for line in view.lines}
+    assert drawn["measured"] == pytest.approx(found.after.track.position)
+    assert {"track", "analytic", "before"} <= drawn.keys()
+    for axis, panel in enumerate(panels):
+        (points,) = [line for line in panel.lines if (line.get_gid() or "").startswith("residual")]
+        assert points.get_ydata() == pytest.approx(1e3 * found.after.values[:, axis])
+        assert "mm" in panel.get_ylabel()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--data", "nowhere.csv"), "nowhere.csv: no such file, and no shipped track"),
+        (("--scale", "0"), "scale = 0.0: must be a number > 0"),
+        (("--scale", "x"), "'x' is not a valid float"),
+        (("--origin", "1"), "two numbers X,Y"),
+        (("--fit", "plate.restitutoin"), "did you mean plate.restitution"),
+        (("--fit", "plate.restitution,,incoming.speed"), "unknown key"),
+        (("--robust",), "name what to fit with --fit"),
+        (("--t0", "99"), "points lie within the simulated time"),
+        (("--track", "B"), 'no such track; there are "simulated_with_noise"'),
+        (("--set", "plate.restitution=2"), "plate.restitution = 2"),
+    ],
+)
+def test_refuses_with_words_and_writes_nothing(tmp_path, arguments, said):
+    out = tmp_path / "out"
+    result = run(*ARGUMENTS, *arguments, "--out", out)
+    assert result.exit_code == 2
+    assert said in result.output
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_name_taken_by_a_folder_leaves_everything_as_it_was(tmp_path):
+    (tmp_path / "points.csv").mkdir()
+    result = run(*ARGUMENTS, "--out", tmp_path)
+    assert result.exit_code == 2
+    assert "points.csv is a folder, not a file" in result.output
+    assert [path.name for path in tmp_path.iterdir()] == ["points.csv"]
+
+
+def test_without_scipy_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "scipy.optimize", None)
+    result = run(*ARGUMENTS, "--fit", "plate.restitution")
+    assert result.exit_code == 2
+    assert 'pip install "chutelab[fit]"' in result.output
+    assert run(*ARGUMENTS).exit_code == 0
+
+
+def test_comparing_in_text_imports_neither_pictures_nor_scipy():
+    code = (
+        "import sys; from chutelab.cli import main\n"
+        "words = ['compare', 'perpendicular', '--data', 'perpendicular-track']\n"
+        "main(words, standalone_mode=False)\n"
+        "print({'matplotlib', 'scipy', 'pymunk'} & set(sys.modules), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr.strip() == "set()"

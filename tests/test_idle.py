@@ -245,6 +245,38 @@ def test_a_sleeper_is_woken_by_a_neighbour_that_leaves():
         assert ends[n, 1] < 1.001 * R or apart.min() < 2.005 * R
 
 
+def test_a_sleeper_is_woken_when_the_one_it_lies_on_is_struck_away(both_ways):
+    # The second lies on the first between walls that end above it. Under them a third comes fast
+    # and nearly stops at the first one, which is gone before the next step looks.
+    walls = "".join(
+        f"""
+[[surface]]
+name = "wall{side}"
+from = [{1.05 * side * R}, {2.2 * R}]
+to = [{1.05 * side * R}, 0.2]
+"""
+        for side in (-1, 1)
+    )
+    top = R + sqrt(4.0 - 0.05**2) * R
+    machine = machine_of(
+        FLOOR + "friction = 0.5" + walls,
+        [(0.0, R), (0.05 * R, top), (0.5, R)],
+        [(0, 0), (0, 0), (-20.0, 0)],
+        [0.0, 0.0, 0.8],
+        restitution=0.9,
+        until=0.9,
+    )
+    sleeping, _, most = both_ways(machine)
+    assert most >= 2
+    hits = sleeping.select(Kind.COLLISION)
+    hit = hits[hits["t"] > 0.8][0]
+    assert {hit["particle"], hit["other"]} == {0, 2}
+    fall = 0.005
+    (before, after), _ = sleeping.at(np.array([0.8, hit["t"] + fall]))
+    assert before[1] == pytest.approx([0.05 * R, top], abs=0.01 * R)
+    assert before[1, 1] - after[1, 1] == pytest.approx(0.5 * G * fall**2, abs=G * fall * DT)
+
+
 def test_one_that_comes_at_the_instant_of_a_step_is_not_stepped_before_its_time():
     # While the first sleeps steps go on; the second is released in contact, sliding.
     machine = machine_of(

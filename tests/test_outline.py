@@ -259,12 +259,23 @@ def test_too_slow_for_the_top_of_the_pulley_it_sinks_in_at_once():
 
 
 @settings(max_examples=60)
-@given(x=st.floats(-1.5, 1.5), y=st.floats(-0.5, 0.5), within=st.floats(0.0, 0.02))
-def test_the_clearance_is_the_distance_to_the_nearest_beyond(x, y, within):
+@given(
+    x=st.floats(-1.5, 1.5),
+    y=st.floats(-0.5, 0.5),
+    velocity=st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0)),
+)
+def test_the_gaps_around_a_disk_and_how_fast_they_close(x, y, velocity):
     lines = FLOOR, ((-1.2, -0.3), (0.4, 0.4))
-    gaps = [float(gap_to_slab(line, (0.3, 5.0), x, y)) for line in lines]
-    assume(min(abs(gap - within) for gap in gaps) > 1e-9)
-    assume(min(gaps) > -R)  # with the centre inside, there is no distance to speak of
-    expected = min((gap for gap in gaps if gap > within), default=inf)
-    found = outline(*lines).clearance(np.array([[x, y]]), within)
-    assert found == pytest.approx([expected], abs=1e-12)
+    found = outline(*lines).around(x, y, *velocity)
+    step = 1e-7
+    for line, (gap, closing) in zip(lines, found, strict=True):
+        here, before, after = (
+            float(gap_to_slab(line, (0.3, 5.0), x + s * velocity[0], y + s * velocity[1]))
+            for s in (0.0, -step, step)
+        )
+        assume(here > 1e-3 - R)  # with the centre inside, there is no distance to speak of
+        assert gap == pytest.approx(here, abs=1e-12)
+        assert closing == pytest.approx((before - after) / (2.0 * step), abs=1e-3)
+        # However far it goes on.
+        later = float(gap_to_slab(line, (0.3, 5.0), x + 0.2 * velocity[0], y + 0.2 * velocity[1]))
+        assert later > gap - 0.2 * closing - 1e-12 or later <= -R

@@ -7,7 +7,7 @@ to negative is a contact; the other one is a departure.
 from __future__ import annotations
 
 import itertools
-from math import comb
+from math import comb, inf, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -48,6 +48,24 @@ def closing_time(gap: ArrayLike, rate: ArrayLike, acceleration: ArrayLike) -> Fl
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         t = descent(*(np.asarray(a, dtype=np.float64) for a in (gap, rate, acceleration)))
     return np.where(np.isfinite(t), t, np.inf)
+
+
+def crossing(gap: float, rate: float, acceleration: float) -> float:
+    """Return when one gap closes, as `closing_time`, but inf where that was in the past.
+
+    In plain numbers, for who asks for one after another.
+    """
+    square = rate * rate - 2.0 * acceleration * gap
+    if square < 0.0:
+        return inf
+    span = abs(rate) + sqrt(square)
+    if rate > 0.0:
+        t = -span / acceleration if acceleration != 0.0 else inf
+    elif span == 0.0:
+        t = 0.0 if gap == 0.0 and acceleration < 0.0 else inf
+    else:
+        t = 2.0 * gap / span
+    return t if t >= 0.0 else inf
 
 
 def descent(gap: Values, rate: Values, acceleration: Values) -> Floats:

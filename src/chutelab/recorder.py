@@ -68,12 +68,15 @@ class Recorder:
         Number of particles N.
     surfaces : tuple of str
         Names of the surfaces, without ``"particles"``, which is added last.
+    apart : bool
+        Whether the books of each particle are kept apart: `by_surface` is (N, S, 3) then.
     """
 
-    def __init__(self, count: int, surfaces: tuple[str, ...]) -> None:
+    def __init__(self, count: int, surfaces: tuple[str, ...], *, apart: bool = False) -> None:
         self.surfaces = (*surfaces, PARTICLES)
         self.entries = np.zeros((count, 3))
-        self.by_surface = np.zeros((len(self.surfaces), 3))
+        self.apart = apart
+        self.by_surface = np.zeros((*((count,) if apart else ()), len(self.surfaces), 3))
         self.ended = np.zeros(count, dtype=np.int8)
         self.contacts = 0
         self.sizes = np.zeros(count, dtype=np.int64)
@@ -115,11 +118,9 @@ class Recorder:
     ) -> None:
         """Book ledger entries (J) on particles (k,), each once, and on the surfaces they met."""
         owner = np.atleast_1d(np.asarray(particle, dtype=np.int64))
-        entry = np.stack(
-            [np.broadcast_to(e, owner.shape) for e in (belt_work, restitution_loss, friction_loss)],
-            axis=-1,
-        )
-        np.add.at(self.entries, owner, entry)
+        entry = np.empty((len(owner), 3))
+        entry[:, 0], entry[:, 1], entry[:, 2] = belt_work, restitution_loss, friction_loss
+        self.entries[owner] += entry
         np.add.at(self.by_surface, np.broadcast_to(surface, owner.shape), entry)
 
     def events(

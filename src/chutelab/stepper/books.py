@@ -44,48 +44,40 @@ SLIPS = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
-    """Velocities (N, 2) and ω (N,) that pymunk had of all particles before and after a step."""
-
-    before: Floats
-    after: Floats
-    spin_before: Floats
-    spin_after: Floats
-
-
-@dataclass(frozen=True, eq=False)
 class Deeds:
-    """What the M contacts of a step did, in the frames of their normals.
+    """What the M contacts of a step did, in the frames of their normals, to P particles.
 
     Attributes
     ----------
-    j_n, j_t : ndarray, (M,)
-        Impulses on the first, N s.
     belt : ndarray, (M,)
         Speed of the surface, m/s.
-    before_t, after_n, after_t : ndarray, (M,)
-        Slip before, normal speed and slip after, m/s.
+    before_n, before_t, after_n, after_t : ndarray, (M,)
+        Normal speed and slip before and after, m/s.
+    pace : ndarray, (M,)
+        The greater of both after, m/s.
     rounded : ndarray of bool, (M,)
         Whether the solid is round there.
-    uses : ndarray, (N,)
-        Number of contacts of each particle.
-    change, turn : ndarray, (N, 2) and (N,)
-        By how much velocity and ω of each particle changed, m/s and rad/s.
+    uses : ndarray, (N + K,)
+        Number of contacts of each particle, and of each solid.
+    who : ndarray, (P,)
+        Particles in contact, not carried.
+    change : ndarray, (P, 3)
+        By how much vx, vy (m/s) and ω (rad/s) of each changed.
     """
 
-    j_n: Floats
-    j_t: Floats
     belt: Floats
+    before_n: Floats
     before_t: Floats
     after_n: Floats
     after_t: Floats
+    pace: Floats
     rounded: NDArray[np.bool_]
     uses: Ints
+    who: Ints
     change: Floats
-    turn: Floats
 
 
-def settle_books(run: Run, contacts: Contacts, x: Floats, motion: Motion, t: float) -> None:
+def settle_books(run: Run, contacts: Contacts, x: Floats, motion: Floats, t: float) -> None:
     """Book the contacts of a step, write knots and events, and keep the particles in contact.
 
     Parameters
@@ -94,198 +86,188 @@ def settle_books(run: Run, contacts: Contacts, x: Floats, motion: Motion, t: flo
         The first of a pair is never carried.
     x : ndarray, (N, 2)
         Positions after the step, m.
+    motion : ndarray, (2, N + K, 3)
+        vx, vy and ω that pymunk had before and after the step; 0 for solids.
     """
-    k, n = run.tracks, contacts.normal
-    # Led round the pulley along a chord, a particle only seems to press outwards.
-    i = contacts.first
-    led = ((k.aim[i] != k.w[i]).any(axis=1)).nonzero()[0]
-    motion.before[i[led]] -= _dot(motion.before[i[led]], n[led])[:, None] * n[led]
-    deeds, before_n = _deeds(run, contacts, x, motion)
-    who = ((deeds.uses > 0) & (k.mode != CARRIED)).nonzero()[0]
-    was_flying = k.mode[who] == FLYING
-    jump = np.abs(deeds.change[who]).max(axis=1)
-    shock = was_flying | (jump > SHOCK + 4.0 * run.machine.gravity * run.dt)
-    _knots_before(run, who, shock, was_flying, x, motion, t)
-    _book(run, contacts, deeds, before_n, motion)
-    hit = who[shock]
-    k.knot(hit, t, x[hit], motion.after[hit], motion.spin_after[hit])
-    _events(run, contacts, deeds, x, motion, t)
+    k, (before, after) = run.tracks, motion
+    if np.count_nonzero(run.bend):
+        # Led round the pulley along a chord, a particle only seems to press outwards.
+        led = (run.bend[contacts.first] > 0.0).nonzero()[0]
+        i, n = contacts.first[led], contacts.normal[led]
+        before[i, :2] -= (before[i, :2] * n).sum(axis=1)[:, None] * n
+    deeds = _deeds(run, contacts, x, motion)
+    who = deeds.who
+    flew = k.mode[who] == FLYING
+    shock = flew | (
+        np.abs(deeds.change[:, :2]).max(axis=1) > SHOCK + 4.0 * run.machine.gravity * run.dt
+    )
+    smooth = ~shock
+    bend, hit = who[smooth], who[shock]
+    k.go_smoothly(bend, t, x[bend], after[bend] - 0.5 * deeds.change[smooth])
+    if len(hit):
+        # A flight comes in with the true velocity, half a step on from pymunk's.
+        came = before[hit]
+        came[:, :2] += 0.5 * run.dt * run.gravity * flew[shock, None]
+        k.close(hit)
+        k.knot(hit, t, x[hit], came[:, :2], came[:, 2])
+    _book(run, contacts, deeds, after)
+    k.knot(hit, t, x[hit], after[hit, :2], after[hit, 2])
+    _events(run, contacts, deeds, x, before, after, t)
 
-    k.rest(who[was_flying])
-    k.leave(who, x[who], motion.after[who], motion.spin_after[who])
+    k.rest(who[flew])
+    k.leave(who, x[who], after[who, :2], after[who, 2])
     run.bent[who], run.bend[who] = run.bend[who], 0.0
-    flew = np.zeros(run.count, dtype=bool)
-    flew[who[was_flying]] = True
-    _surfaces(run, contacts, who, flew, deeds, x, motion, t)
-    _calm(run, contacts, who, deeds)
+    _surfaces(run, contacts, deeds, hit[flew[shock]], x, after, t)
+    _calm(run, contacts, deeds)
     if run.machine.align:
-        run.idle.settle(contacts, who, deeds)
+        run.idle.settle(contacts, deeds)
     if run.machine.until == "landed":
         run.finish(who[run.landed[who]], "landed")
 
 
-def _deeds(run: Run, contacts: Contacts, x: Floats, motion: Motion) -> tuple[Deeds, Floats]:
-    """Return what the contacts did, and the normal speeds before."""
-    i, solid = contacts.first, contacts.other - run.count
-    pairs = solid < 0
-    rows = pairs.nonzero()[0]
-    j, fixed = contacts.other[rows], (~pairs).nonzero()[0]
-    nx, ny = contacts.normal[:, 0], contacts.normal[:, 1]
-    push_x, push_y = contacts.impulse[:, 0], contacts.impulse[:, 1]
+def _deeds(run: Run, contacts: Contacts, x: Floats, motion: Floats) -> Deeds:
+    """Return what the contacts did."""
+    i, j, fixed = contacts.first, contacts.other, contacts.fixed
+    solid = j[fixed] - run.count
     belt, rounded = np.zeros(len(i)), np.zeros(len(i), dtype=bool)
-    belt[fixed] = run.solids.belt(solid[fixed], contacts.normal[fixed])
-    rounded[fixed] = run.solids.rounded(solid[fixed], x[i[fixed]])
-
-    def parts(v: Floats, omega: Floats) -> tuple[Floats, Floats]:
-        relative, rim = v[i], omega[i]
-        relative[rows] -= v[j]
-        rim[rows] += omega[j]
-        u, w = relative[:, 0], relative[:, 1]
-        return u * nx + w * ny, u * ny - w * nx + run.radius * rim - belt
-
-    before_n, before_t = parts(motion.before, motion.spin_before)
-    after_n, after_t = parts(motion.after, motion.spin_after)
-    uses = np.bincount(i, minlength=run.count) + np.bincount(j, minlength=run.count)
+    belt[fixed] = run.solids.belt(solid, contacts.normal[fixed])
+    rounded[fixed] = run.solids.rounded(solid, x[i[fixed]])
+    nx, ny = contacts.normal.T
+    mine, theirs = motion[:, i], motion[:, j]
+    (u, v), rim = (mine - theirs)[..., :2].transpose(2, 0, 1), mine[..., 2] + theirs[..., 2]
+    before_n, after_n = u * nx + v * ny
+    before_t, after_t = u * ny - v * nx + run.radius * rim - belt
+    uses = np.bincount(np.concatenate([i, j]), minlength=motion.shape[1])
+    who = ((uses[: run.count] > 0) & (run.tracks.mode != CARRIED)).nonzero()[0]
     return Deeds(
-        push_x * nx + push_y * ny, push_x * ny - push_y * nx, belt, before_t, after_n, after_t,
-        rounded, uses, motion.after - motion.before, motion.spin_after - motion.spin_before,
-    ), before_n  # fmt: skip
+        belt, before_n, before_t, after_n, after_t, np.maximum(np.abs(after_n), np.abs(after_t)),
+        rounded, uses, who, motion[1, who] - motion[0, who],
+    )  # fmt: skip
 
 
-def _dot(a: Floats, b: Floats) -> Floats:
-    return np.asarray(np.einsum("md,md->m", a, b))
-
-
-def _knots_before(
-    run: Run, who: Ints, shock: NDArray[np.bool_], flying: NDArray[np.bool_], x: Floats,
-    motion: Motion, t: float,
-) -> None:  # fmt: skip
-    """Write what tracks need before the step's entries are booked; remember smooth steps."""
-    k = run.tracks
-    bend = who[~shock]
-    mean = 0.5 * (motion.before + motion.after)[bend]
-    spin = 0.5 * (motion.spin_before + motion.spin_after)[bend]
-    k.foretold(bend, t, x[bend], mean, spin)
-    k.hold(bend, t, x[bend], mean, spin)
-    kink = who[shock]
-    k.close(kink)
-    # A flight comes in with the true velocity, half a step on from the one pymunk moved it with.
-    v = motion.before[kink] + 0.5 * run.dt * run.gravity * flying[shock][:, None]
-    k.knot(kink, t, x[kink], v, motion.spin_before[kink])
-
-
-def _book(run: Run, contacts: Contacts, deeds: Deeds, before_n: Floats, motion: Motion) -> None:
+def _book(run: Run, contacts: Contacts, deeds: Deeds, after: Floats) -> None:
     """Book contacts; what two particles lose is shared, what a carried one gives is belt work."""
-    i, other = contacts.first, contacts.other
-    pairs = other < run.count
-    carried = pairs & (run.tracks.mode[np.where(pairs, other, 0)] == CARRIED)
-    both = (pairs & ~carried).nonzero()[0]
-    entries = np.empty((len(i) + len(both), 3))
-    share = np.where(pairs & ~carried, -0.25, -0.5)
-    first = entries[: len(i)]
-    first[:, 0] = deeds.j_t * deeds.belt
-    first[:, 1] = share * deeds.j_n * (before_n + deeds.after_n)
-    first[:, 2] = share * deeds.j_t * (deeds.before_t + deeds.after_t)
-    entries[len(i) :] = first[both]
-    surface = np.full(len(entries), run.particles)
-    fixed = (~pairs).nonzero()[0]
-    surface[fixed] = run.solids.surface[other[fixed] - run.count]
-    run.recorder.book(run.ids[np.concatenate([i, other[both]])], surface, *entries.T)
-    if carried.any():
-        given = _dot(contacts.impulse[carried], motion.after[other[carried]])
-        run.recorder.book(run.ids[i[carried]], 0, given)
+    i, j, count = contacts.first, contacts.other, run.count
+    carried = run.tracks.mode == CARRIED
+    share = np.full(len(i), -0.5)
+    held = carried[j[contacts.pairs]]
+    share[contacts.pairs[~held]] = -0.25
+    entries = np.empty((len(i), 3))
+    entries[:, 0] = contacts.j_t * deeds.belt
+    entries[:, 1] = share * contacts.j_n * (deeds.before_n + deeds.after_n)
+    entries[:, 2] = share * contacts.j_t * (deeds.before_t + deeds.after_t)
+    # Twice each: for the first, and for the partner.
+    sums = np.bincount(
+        (3 * np.concatenate([i, j])[:, None] + np.arange(3)).ravel(),
+        np.concatenate([entries, entries]).ravel(),
+        3 * len(after),
+    ).reshape(-1, 3)
+    book = run.recorder
+    if np.count_nonzero(held):
+        rows = contacts.pairs[held]
+        sums[carried.nonzero()[0]] = 0.0
+        (nx, ny), (u, v, _) = contacts.normal[rows].T, after[j[rows]].T
+        given = contacts.j_n[rows] * (u * nx + v * ny) + contacts.j_t[rows] * (u * ny - v * nx)
+        book.book(run.ids[i[rows]], 0, given)
+    book.entries[run.ids] += sums[:count]
+    on_solids = sums[count:]
+    np.add.at(book.by_surface, run.solids.surface, on_solids)
+    book.by_surface[run.particles] += sums[:count].sum(axis=0) - on_solids.sum(axis=0)
 
 
 def _events(
-    run: Run, contacts: Contacts, deeds: Deeds, x: Floats, motion: Motion, t: float
+    run: Run, contacts: Contacts, deeds: Deeds, x: Floats, before: Floats, after: Floats, t: float
 ) -> None:
     """Write impacts and collisions: contacts that were not there a step ago, and hit."""
-    i, j = contacts.first, contacts.other
-    begun = run.begun(i, j)
-    if not begun.any():
+    rows = run.begun(contacts.keys).nonzero()[0]
+    if not len(rows):
         return
-    pairs = j < run.count
-    before = motion.before.copy()
-    before[run.tracks.mode == FLYING] += 0.5 * run.dt * run.gravity
-    relative = before[i] - np.where(pairs[:, None], before[np.where(pairs, j, 0)], 0.0)
-    approach = -_dot(relative, contacts.normal)
-    told = begun & (approach > run.soft)
-    kind = np.where(pairs, Kind.COLLISION, Kind.IMPACT)
-    s = (~pairs).nonzero()[0]
-    solid = j[s] - run.count
-    told[s] |= (approach[s] > FAINT * run.soft) & ~run.met[i[s], solid]
-    run.met[i[s], solid] = True
-    landing = (run.solids.surface[solid] == run.machine.landing) & ~run.landed[i[s]]
-    kind[s[landing]], told[s[landing]] = Kind.LANDING, True
-    run.landed[i[s[landing]]] = True
-    if not told.any():
+    i, j = contacts.first[rows], contacts.other[rows]
+    fixed = (j >= run.count).nonzero()[0]
+    # In flight the true velocity is half a step of gravity on from pymunk's.
+    flown = np.zeros(len(before))
+    flown[: run.count] = (run.tracks.mode == FLYING) * 0.5 * run.dt * run.machine.gravity
+    approach = (flown[i] - flown[j]) * contacts.normal[rows, 1] - deeds.before_n[rows]
+    told = approach > run.soft
+    kind, surface = np.full(len(rows), Kind.COLLISION), np.full(len(rows), run.particles)
+    solid = j[fixed] - run.count
+    kind[fixed], surface[fixed] = Kind.IMPACT, run.solids.surface[solid]
+    told[fixed] |= (approach[fixed] > FAINT * run.soft) & ~run.met[i[fixed], solid]
+    run.met[i[fixed], solid] = True
+    landing = fixed[(surface[fixed] == run.machine.landing) & ~run.landed[i[fixed]]]
+    kind[landing], told[landing] = Kind.LANDING, True
+    run.landed[i[landing]] = True
+    if not np.count_nonzero(told):
         return
-    who = i[told]
-    surface = np.full(len(i), run.particles)
-    surface[s] = run.solids.surface[solid]
+    who, rows, other = i[told], rows[told], j[told]
+    came = before[who]
+    came[:, 1] -= flown[who]
     run.event(
-        kind[told], who, t, x[who], motion.after[who], motion.spin_after[who], surface[told],
-        np.where(pairs, run.ids[np.where(pairs, j, 0)], -1)[told],
-        velocity_before=before[who], omega_before=motion.spin_before[who],
-        impulse=(deeds.j_n[told], deeds.j_t[told]),
+        kind[told], who, t, x[who], after[who, :2], after[who, 2], surface[told],
+        np.where(other < run.count, run.ids[np.where(other < run.count, other, 0)], -1),
+        velocity_before=came[:, :2], omega_before=came[:, 2],
+        impulse=(contacts.j_n[rows], contacts.j_t[rows]),
     )  # fmt: skip
-    run.recorder.contacts += int(np.count_nonzero(told))
+    run.recorder.contacts += len(who)
 
 
 def _surfaces(
-    run: Run, contacts: Contacts, who: Ints, flew: NDArray[np.bool_], deeds: Deeds, x: Floats,
-    motion: Motion, t: float,
-) -> None:  # fmt: skip
+    run: Run, contacts: Contacts, deeds: Deeds, flew: Ints, x: Floats, after: Floats, t: float
+) -> None:
     """Keep account of which single surface particles lie on, and whether they slip there."""
-    fixed = contacts.other >= run.count
     surface = np.full(run.count, -1)
-    rows = (fixed & (deeds.uses[contacts.first] == 1)).nonzero()[0]
+    rows = contacts.fixed[deeds.uses[contacts.first[contacts.fixed]] == 1]
     alone = contacts.first[rows]
     surface[alone] = run.solids.surface[contacts.other[rows] - run.count]
-    run.stays.arrive(who, surface[who], t)
+    run.stays.arrive(deeds.who, surface[deeds.who], t)
     speed = np.abs(deeds.after_t[rows])
     slipping = run.stays.slipping[alone]
     # A blow out of flight that ends the slip is no sticking yet.
-    stops = slipping & ~flew[alone] & (speed < SETTLED[0])
+    stops = slipping & (speed < SETTLED[0])
+    if len(flew):
+        stops &= ~np.isin(alone, flew)
     starts = ~slipping & (speed > SLIPS)
     run.stays.slipping[alone] = (slipping & ~stops) | starts
-    _lie(run, contacts, deeds, fixed.nonzero()[0])
-    for kind, these in ((Kind.STICK, alone[stops]), (Kind.SLIP, alone[starts])):
-        run.event(
-            kind, these, t, x[these], motion.after[these], motion.spin_after[these],
-            surface[these],
-        )  # fmt: skip
+    _lie(run, contacts, deeds)
+    for kind, which in ((Kind.STICK, stops), (Kind.SLIP, starts)):
+        these = alone[which]
+        run.event(kind, these, t, x[these], after[these, :2], after[these, 2], surface[these])
 
 
-def _lie(run: Run, contacts: Contacts, deeds: Deeds, rows: Ints) -> None:
+def _lie(run: Run, contacts: Contacts, deeds: Deeds) -> None:
     """Note the normals of surfaces that particles lie on, one or several in line; follow curves."""
-    i, n, uses = contacts.first[rows], contacts.normal[rows], deeds.uses
-    total = np.stack(
-        [np.bincount(i, weights=n[:, axis], minlength=run.count) for axis in (0, 1)], axis=-1
-    )
-    length = np.hypot(total[:, 0], total[:, 1])
-    in_line = (uses > 0) & (length > (1.0 - IN_LINE) * uses)
-    who = in_line.nonzero()[0]
-    run.tracks.upon[who] = total[who] / length[who, None]
-    flat = ((uses[i] == 1) & ~deeds.rounded[rows]).nonzero()[0]
-    run.tracks.face[i[flat]] = contacts.other[rows[flat]] - run.count
-    curved = in_line[i] & deeds.rounded[rows]
-    for row in curved.nonzero()[0].tolist():
+    k, rows = run.tracks, contacts.fixed
+    i, n, uses = contacts.first[rows], contacts.normal[rows], deeds.uses[contacts.first[rows]]
+    rounded = deeds.rounded[rows]
+    one = uses == 1
+    k.upon[i[one]] = n[one]
+    flat = one & ~rounded
+    k.face[i[flat]] = contacts.other[rows[flat]] - run.count
+    in_line = one.copy()
+    several = ~one & (np.bincount(i, minlength=run.count)[i] == uses)
+    for row in several.nonzero()[0].tolist():
+        same = i == i[row]
+        total = n[same].sum(axis=0)
+        length = float(np.hypot(*total))
+        in_line[row] = length > (1.0 - IN_LINE) * uses[row]
+        if in_line[row]:
+            k.upon[i[row]] = total / length
+    for row in (in_line & rounded).nonzero()[0].tolist():
         solid = contacts.other[rows[row]] - run.count
         follow(run, int(i[row]), n[row], float(run.solids.reach[solid]) + run.radius)
 
 
-def _calm(run: Run, contacts: Contacts, who: Ints, deeds: Deeds) -> None:
+def _calm(run: Run, contacts: Contacts, deeds: Deeds) -> None:
     """Count steps in a row in which particles lay still on what they can settle on."""
+    who = deeds.who
     limit = STILL[0] if run.machine.interact else SETTLED[0]
-    pairs = contacts.other < run.count
-    restless = np.maximum(np.abs(deeds.after_n), np.abs(deeds.after_t)) > limit
-    solid = contacts.other[~pairs] - run.count
-    restless[~pairs] |= ~run.settles_on[solid]
-    stirred = np.zeros(run.count, dtype=bool)
+    restless = deeds.pace > limit
+    fixed = contacts.fixed
+    restless[fixed] |= ~run.settles_on[contacts.other[fixed] - run.count]
+    stirred = np.zeros(len(deeds.uses), dtype=bool)
     stirred[contacts.first[restless]] = True
-    stirred[contacts.other[restless & pairs]] = True
+    stirred[contacts.other[restless]] = True
     if not run.machine.interact:
         # Rolling down a slope is not lying on it.
-        stirred[who] |= np.abs(deeds.change[who]).max(axis=1) > limit
+        stirred[who] |= np.abs(deeds.change[:, :2]).max(axis=1) > limit
     run.calm[who] = np.where(stirred[who], 0, run.calm[who] + 1)

@@ -78,6 +78,8 @@ class Crowd:
 
     def _forget(self, t: float) -> None:
         """Halve what was counted with each step that is over."""
+        if t < self._until - 1e-3 * self._run.dt:
+            return
         tick = self._run.next_tick(t)
         if tick > self._until:
             self.impacts >>= min(round((tick - self._until) / self._run.dt), 60)
@@ -89,17 +91,19 @@ class Crowd:
         run = self._run
         if run.count == 1:
             return
+        if not (self._load or np.count_nonzero(self.stepped)):
+            return
         stepped = self.impacts * self._pressure > MANY
         out = (self.stepped & ~stepped & (run.tracks.mode == FLYING)).nonzero()[0]
         self.stepped = stepped
-        if len(out):
-            run.changed(out)
+        for n in out.tolist():
+            run.changed(n)
 
     def is_in(self, impacts: int) -> bool:
         """Tell whether that many impacts lately make a crowd."""
         return impacts * self._pressure > MANY
 
-    def calm(self, impacts: ArrayLike) -> Any:
+    def least_approach(self, impacts: ArrayLike) -> Any:
         """Return what approaches too slowly to be foretold where all are stepped, m/s."""
         p = self._pressure
         return self._run.slow * (p * np.maximum(np.asarray(impacts) * p / MANY, 1.0)) ** 2

@@ -64,5 +64,5 @@ def leave(run: Run, i: int, t: float) -> bool:
     then = t + (2.0 * rho * turn / (speed + faster) if turn else 0.0)
     k.give_up(i, then)
     k.mark(i, then, x, y, faster * my, -faster * mx, float(k.spin[i]))
-    k.fly(np.array([i]))
+    k.fly(i)
     return True

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from heapq import heapify, heappop, heappush
-from math import ceil, inf, sqrt
+from math import inf
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -22,7 +22,7 @@ from chutelab.stepper.kick import kick
 from chutelab.stepper.outline import Outline
 from chutelab.stepper.report import Report
 from chutelab.stepper.solids import Solids, solids
-from chutelab.stepper.state import HAIR, Run
+from chutelab.stepper.state import Run
 from chutelab.stepper.tracks import CARRIED, DONE, FLYING, RESTING, WAITING
 
 if TYPE_CHECKING:
@@ -120,13 +120,7 @@ class _Loop:
         if len(ids) == 1 and 0 in self.rides:
             # Nothing to step before it is let go.
             start = min(self.rides[0].until, machine.end_time)
-        dt = machine.dt
-        if machine.align and machine.gravity > 0.0:
-            dt = min(dt, sqrt(HAIR * machine.particle.radius / machine.gravity))
-        if machine.end_time > start:
-            # The last step ends with the run.
-            dt = (machine.end_time - start) / ceil((machine.end_time - start) / dt - 1e-9)
-        self.run_state = Run(machine, shapes, recorder, ids, start, dt, clashes)
+        self.run_state = Run(machine, shapes, recorder, ids, start, clashes)
         self.forecast = Forecast(self.run_state, outline)
         self.agenda = [
             (float(t), n, self._release) for n, t in enumerate(self.release) if t < machine.end_time
@@ -165,15 +159,11 @@ class _Loop:
         r, mode = self.run_state, self.run_state.tracks.mode
         if not r.fresh and self.tick < inf:
             return
-        flying, resting = (mode == FLYING).any(), (mode == RESTING).any()
-        if self.machine.align:
-            alive = resting or (
-                flying
-                and self.machine.interact
-                and ((mode == CARRIED).any() or r.crowd.stepped.any())
+        alive = bool((mode == RESTING).any())
+        if not alive and (mode == FLYING).any():
+            alive = not self.machine.align or (
+                self.machine.interact and bool((mode == CARRIED).any() or r.crowd.stepped.any())
             )
-        else:
-            alive = flying or resting
         if not alive:
             self.tick = inf
         elif self.tick == inf:
@@ -210,7 +200,9 @@ class _Loop:
         mode = r.tracks.mode
         if not self.machine.align:
             kick(r, mode == CARRIED, self.last, t)
-        elif (((mode == RESTING) & ~r.idle.asleep) | ((mode == FLYING) & r.crowd.stepped)).any():
+        elif np.count_nonzero(
+            ((mode == RESTING) & ~r.idle.asleep) | ((mode == FLYING) & r.crowd.stepped)
+        ):
             kick(r, self.forecast.beside & (mode == CARRIED), self.last, t)
         self.steps += 1
         r.crowd.look(t)
@@ -256,7 +248,7 @@ class _Loop:
         k.knot(one, t, x, v, 0.0)
         r.event(Kind.RELEASE, one, t, x, v, 0.0)
         if n not in self.rides:
-            r.take_off(one)
+            r.take_off(n)
             return
         k.mode[n] = CARRIED
         if self.rides[n].speed == 0.0 and self.machine.until == "settled" and r.count == 1:
@@ -266,7 +258,7 @@ class _Loop:
         if self.rides[n].until < self.machine.end_time:
             heappush(self.agenda, (self.rides[n].until, n, self._separate))
         self._carry(t)
-        r.changed(one)
+        r.changed(n)
 
     def _separate(self, n: int, t: float) -> None:
         r, k, one = self.run_state, self.run_state.tracks, np.array([n])
@@ -275,7 +267,7 @@ class _Loop:
         if r.inside[n]:
             r.world.remove(n)
             r.inside[n] = False
-        r.take_off(one)
+        r.take_off(n)
 
     def _close_ride(self, n: int, ride: Carriage, until: float) -> None:
         """Write the knots of a ride, and the work by which the belt lets the particle down."""

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from heapq import heappop, heappush
 from itertools import count
 from math import hypot, inf
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from chutelab.ballistics import crossing
 from chutelab.stepper.crowd import MOST
 from chutelab.stepper.meetings import meeting, neighbours
 from chutelab.stepper.tracks import CARRIED, DONE, FLYING, RESTING, WAITING
@@ -21,16 +21,20 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 ROUNDING = 1e-13
 """Share of their speeds below which two disks do not approach, but rounding says so."""
 
 NEAR = 1e-3
-"""Share of the radius within which a solid is left to pymunk's steps."""
+"""Share of the radius within which a solid that is approached slowly is left to pymunk's steps."""
 
 
-@dataclass(frozen=True)
-class Appointment:
+AT_ONCE = 100_000
+"""Pairs of which it is asked in one expression when they meet; more would not fit the caches."""
+
+
+class Appointment(NamedTuple):
     """An impact foretold.
 
     Attributes
@@ -56,7 +60,9 @@ class Forecast:
         self._run, self._outline = run, outline
         self._heap: list[tuple[float, int, Appointment]] = []
         self._number = count()
+        # Until when who is in contact can meet no other solid; who slept then, if it sleeps on.
         self._safe_until = np.full(run.count, -inf)
+        self._slept = np.zeros(run.count, dtype=bool)
         self._fastest = float(np.abs(run.solids.speed).max(initial=0.0))
         self._crowd = run.machine.interact and run.count > 1
         self.beside = np.zeros(run.count, dtype=bool)
@@ -85,7 +91,7 @@ class Forecast:
     def refresh(self, now: float, tick: float) -> None:
         """Foretell the impacts of particles on new paths."""
         run, k = self._run, self._run.tracks
-        everybody = None
+        who, spans = [], []
         for i in dict.fromkeys(run.fresh):
             mode = k.mode[i]
             if mode in (WAITING, DONE):
@@ -93,13 +99,17 @@ class Forecast:
             until = min(float(k.exit[i]) if mode == FLYING else tick, run.machine.end_time)
             if mode != CARRIED:
                 until = min(until, self._solid(i, now, until - now))
-            if self._crowd:
-                if everybody is None:
-                    everybody = k.all_at(now)
-                self._row(i, everybody, now, until, tick)
+            who.append(i)
+            spans.append(until - now)
         run.fresh.clear()
+        if self._crowd and who:
+            everybody = k.all_at(now)
+            some = max(1, AT_ONCE // run.count)
+            for n in range(0, len(who), some):
+                self._rows(who[n : n + some], spans[n : n + some], everybody, now, tick)
 
     def _solid(self, i: int, now: float, span: float) -> float:
+        """Foretell what solid a particle meets; return when, or inf."""
         k = self._run.tracks
         x, y, vx, vy = k.state(i, now)
         touch = self._outline.first(x, y, vx, vy, span)
@@ -113,30 +123,36 @@ class Forecast:
         self._push(now + touch.t, i, -1, touch)
         return now + touch.t
 
-    def _row(
-        self, i: int, everybody: tuple[Floats, ...], now: float, until: float, tick: float
+    def _rows(
+        self,
+        who: list[int],
+        spans: list[float],
+        everybody: tuple[Floats, ...],
+        now: float,
+        tick: float,
     ) -> None:
-        """Foretell what one particle meets, of all there are."""
-        run, mode = self._run, self._run.tracks.mode
-        x, y, u, v = (a - a[i] for a in everybody)
+        """Foretell what some particles meet within their spans, of all there are."""
+        run, k = self._run, self._run.tracks
+        x, y, u, v = (np.subtract.outer(-a[who], -a) for a in everybody)
         t, approach = meeting(x, y, u, v, 2.0 * run.radius)
-        soon = (t <= until - now).nonzero()[0]
-        if not len(soon):
+        rows, columns = (t <= np.array(spans)[:, None]).nonzero()
+        if not len(rows):
             return
-        rounding = ROUNDING * (hypot(everybody[2][i], everybody[3][i]) + run.soft)
-        impacts, crowd = run.crowd.impacts, run.crowd.stepped
-        stepped, carried = mode[i] != FLYING or crowd[i], mode[i] == CARRIED
-        for j in soon.tolist():
+        crowd, impacts, mode = run.crowd.stepped, run.crowd.impacts, k.mode
+        found = t[rows, columns].tolist(), approach[rows, columns].tolist()
+        for n, j, t_j, speed in zip(rows.tolist(), columns.tolist(), *found, strict=True):
+            i = who[n]
             if mode[j] == WAITING or mode[j] == DONE:
                 continue
             held = mode[j] != FLYING
-            if held and (now + t[j] > tick or (carried and mode[j] == CARRIED)):
+            if held and (now + t_j > tick or (mode[j] == CARRIED and mode[i] == CARRIED)):
                 continue
-            floor = rounding
-            if stepped and (held or crowd[j]):
-                floor = run.crowd.calm(max(impacts[i], impacts[j]))
-            if approach[j] > floor:
-                self._pair(now + float(t[j]), i, j)
+            if (mode[i] != FLYING or crowd[i]) and (held or crowd[j]):
+                floor = run.crowd.least_approach(max(impacts[i], impacts[j]))
+            else:
+                floor = ROUNDING * (hypot(everybody[2][i], everybody[3][i]) + run.soft)
+            if speed > floor:
+                self._pair(now + t_j, i, j)
 
     def _pair(self, t: float, i: int, j: int) -> None:
         if max(self._run.crowd.impacts[i], self._run.crowd.impacts[j]) > MOST:
@@ -148,58 +164,63 @@ class Forecast:
     def window(self, now: float, tick: float) -> None:
         """Foretell up to the next step what those meet that do not fly, and pairs with them."""
         run, k = self._run, self._run.tracks
-        resting = (k.mode == RESTING).nonzero()[0]
-        if len(resting):
-            self._solids(resting, now, tick)
+        resting = k.mode == RESTING
+        self._solids(resting, now, tick)
         self.beside[:] = False
-        if not self._crowd:
+        carried, flying = k.mode == CARRIED, k.mode == FLYING
+        some = np.count_nonzero
+        if not self._crowd or not (some(resting) or (some(carried) and some(flying))):
             return
-        who = ((k.mode != WAITING) & (k.mode != DONE)).nonzero()[0]
-        modes = k.mode[who]
-        if (modes == FLYING).all() or (modes == CARRIED).all():
-            return
+        who = (resting | carried | flying).nonzero()[0]
         x, v = k.flight(who, now)
         span = tick - now
-        way = span * v + 0.5 * span * span * run.gravity
+        way = span * (v + 0.5 * span * run.gravity)
         margin = run.radius * (1.0 + NEAR)
-        margin2 = 2.0 * margin
-        a, b = neighbours(np.minimum(x, x + way) - margin, np.maximum(x, x + way) + margin)
-        both = modes[a] * 8 + modes[b]
-        asked = (both != FLYING * 9) & (both != CARRIED * 9)
-        a, b, both = a[asked], b[asked], both[asked]
-        if not len(a):
+        low = np.minimum(way, 0.0) + x
+        a, b = neighbours(low - margin, low + np.abs(way) + margin)
+        i, j = who[a], who[b]
+        # Two in flight were foretold when they took off; two on the belt never meet.
+        asked = (~(flying[i] & flying[j]) & ~(carried[i] & carried[j])).nonzero()[0]
+        if not len(asked):
             return
-        dx, dv = x[b] - x[a], v[b] - v[a]
-        t, approach = meeting(dx[:, 0], dx[:, 1], dv[:, 0], dv[:, 1], 2.0 * run.radius)
-        flies = (modes == FLYING) & ~run.crowd.stepped[who]
-        flies = flies[a] | flies[b]
-        impacts = run.crowd.impacts[who]
-        calm = run.crowd.calm(np.maximum(impacts[a], impacts[b]))
-        floor = np.where(flies, ROUNDING * run.soft, calm)
+        a, b, i, j = a[asked], b[asked], i[asked], j[asked]
+        (dx, dy), (du, dv) = (x[b] - x[a]).T, (v[b] - v[a]).T
+        t, approach = meeting(dx, dy, du, dv, 2.0 * run.radius)
+        free = flying & ~run.crowd.stepped
+        flies = free[i] | free[j]
+        impacts = run.crowd.impacts
+        least = run.crowd.least_approach(np.maximum(impacts[i], impacts[j]))
+        floor = np.where(flies, ROUNDING * run.soft, least)
         for n in ((t <= span) & (approach > floor)).nonzero()[0].tolist():
-            self._pair(now + float(t[n]), int(who[a[n]]), int(who[b[n]]))
-        carried = (modes[a] == CARRIED) | (modes[b] == CARRIED)
-        touching = (~flies & ~carried & (np.hypot(dx[:, 0], dx[:, 1]) <= margin2)).nonzero()[0]
-        run.idle.stir(
-            who[a[touching]], who[b[touching]], np.where(t <= span, approach, 0.0)[touching]
-        )
-        self.beside[who[a[carried & ~flies]]] = self.beside[who[b[carried & ~flies]]] = True
+            self._pair(now + float(t[n]), int(i[n]), int(j[n]))
+        held = carried[i] | carried[j]
+        touching = (~flies & ~held & (dx * dx + dy * dy <= 4.0 * margin * margin)).nonzero()[0]
+        run.idle.stir(i[touching], j[touching], np.where(t <= span, approach, 0.0)[touching])
+        beside = (held & ~flies).nonzero()[0]
+        self.beside[i[beside]] = self.beside[j[beside]] = True
 
-    def _solids(self, resting: Ints, now: float, tick: float) -> None:
+    def _solids(self, resting: Mask, now: float, tick: float) -> None:
         """Foretell impacts on solids of those in contact; most are far from any other solid."""
         run, k = self._run, self._run.tracks
-        due = resting[self._safe_until[resting] < tick]
-        if not len(due):
-            return
-        x, v = k.flight(due, now)
-        gap = self._outline.clearance(x, NEAR * run.radius)
-        speed = np.maximum(np.hypot(v[:, 0], v[:, 1]), self._fastest)
-        pace = speed + np.sqrt(run.machine.gravity * gap)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            safe = np.where(gap < inf, gap / np.where(pace > 0.0, pace, 1.0), inf)
-        self._safe_until[due] = now + safe
-        close = due[now + safe < tick]
-        # What is asleep is not stepped: nothing would stop it there.
-        run.idle.wake(close)
-        for i in close.tolist():
-            self._solid(i, now, tick - now)
+        due = resting & ((self._safe_until < tick) | (self._slept & ~run.idle.asleep))
+        for i in due.nonzero()[0].tolist():
+            path = k.state(i, now)
+            self._slept[i] = run.idle.asleep[i]
+            self._safe_until[i] = now + self._undisturbed(i, path)
+            if self._safe_until[i] < tick:
+                if run.idle.asleep[i]:
+                    # What is asleep is not stepped: nothing would stop it there.
+                    run.idle.wake(np.array([i]))
+                self._solid(i, now, tick - now)
+
+    def _undisturbed(self, i: int, path: tuple[float, float, float, float]) -> float:
+        """Return for how long a particle in contact can meet no other solid, s."""
+        run, out = self._run, inf
+        pace = max(hypot(*path[2:]), self._fastest)
+        asleep, pull = run.idle.asleep[i], run.idle.acceleration(i)
+        for gap, approach in self._outline.around(*path):
+            if gap <= NEAR * run.radius and approach <= run.soft:
+                continue
+            rate = (approach, pull) if asleep else (pace, run.machine.gravity)
+            out = min(out, crossing(max(gap, 0.0), -rate[0], -rate[1]))
+        return out

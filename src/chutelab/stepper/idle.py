@@ -8,6 +8,7 @@ comes to lie on them, or their support or their slip ends.
 
 from __future__ import annotations
 
+from math import hypot
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -51,59 +52,57 @@ class Idle:
         self.asleep = np.zeros(count, dtype=bool)
         self._alike = np.zeros(count, dtype=np.int64)
         self._until = np.full(count, np.inf)
-        # Per step: change of velocity and ω; belt work, friction loss and what that changes by.
-        self._change, self._turn = np.zeros((count, 2)), np.zeros(count)
+        # Per step: change of vx, vy and ω; belt work, friction loss and what that changes by.
+        self._change = np.zeros((count, 3))
+        self._lever = np.array([1.0, 1.0, run.radius])
         self._dues = np.zeros((count, 3))
-        self._slides = np.zeros(count, dtype=bool)
+        self._slides, self._pays = np.zeros((2, count), dtype=bool)
         # What a belt pays on a slope it pays for good.
         solids = run.solids
         self._slope = (solids.speed != 0.0) & (np.abs(solids.tangent[:, 1]) > 0.0)
         self._length = np.hypot(*(solids.b - solids.a).T)
 
-    def settle(self, contacts: Contacts, who: Ints, deeds: Deeds) -> None:
+    def settle(self, contacts: Contacts, deeds: Deeds) -> None:
         """Put to sleep what was the same for some steps.
 
         Parameters
         ----------
         contacts : Contacts
             Of the step.
-        who : ndarray, (k,)
-            Particles in them, not carried.
         deeds : Deeds
             What the contacts did.
         """
-        run, k = self._run, self._run.tracks
-        i, j = contacts.first, contacts.other
-        pairs = j < run.count
-        flat = (~pairs & (deeds.uses[i] == 1)).nonzero()[0]
-        flat = flat[~deeds.rounded[flat]]
-        change, turn = deeds.change[who], deeds.turn[who]
-        off = np.abs(change - self._change[who]).max(axis=1)
-        off = np.maximum(off, run.radius * np.abs(turn - self._turn[who]))
-        self._change[who], self._turn[who] = change, turn
-        restless = np.zeros(run.count, dtype=bool)
-        restless[who] = np.maximum(np.abs(change).max(axis=1), run.radius * np.abs(turn)) > QUIET
-        loud = np.maximum(np.abs(deeds.after_n), np.abs(deeds.after_t)) > QUIET
-        loud[~pairs] |= self._slope[j[~pairs] - run.count] | deeds.rounded[~pairs]
-        loud[pairs] |= k.mode[j[pairs]] == CARRIED
-        restless[i[loud]] = True
-        restless[j[loud & pairs]] = True
-        alone = np.zeros(run.count, dtype=bool)
+        run, k, who = self._run, self._run.tracks, deeds.who
+        i, j, pairs, fixed = contacts.first, contacts.other, contacts.pairs, contacts.fixed
+        lone = (deeds.uses[i[fixed]] == 1) & ~deeds.rounded[fixed]
+        flat = fixed[lone]
+        alone = np.zeros(len(deeds.uses), dtype=bool)
         alone[i[flat]] = True
-        restless[i[flat]] = np.abs(deeds.after_n[flat]) > QUIET
-        restless[who[alone[who] & (off > ALIKE)]] = True
+        # Who lies alone may slide, but always alike; of the others none may move.
+        loud = deeds.pace > QUIET
+        loud[fixed] |= deeds.rounded[fixed] | self._slope[j[fixed] - run.count]
+        loud[pairs] |= k.mode[j[pairs]] == CARRIED
+        loud[flat] = np.abs(deeds.after_n[flat]) > QUIET
+        single = alone[who]
+        before = self._change[who] * single[:, None]
+        news = (np.abs(deeds.change - before) * self._lever).max(axis=1)
+        self._change[who] = deeds.change
+        restless = np.zeros(len(deeds.uses), dtype=bool)
+        restless[who] = news > np.where(single, ALIKE, QUIET)
+        restless[i[loud]] = True
+        restless[j[loud]] = True
         self._alike[who] = np.where(restless[who], 0, self._alike[who] + 1)
         awake = self._alike < STEPS
+        if np.count_nonzero(awake[who]) == len(who):
+            return
         spread(awake, i[pairs], j[pairs])
         new = who[~awake[who]]
         if not len(new):
             return
-        self.asleep[new], self._slides[new] = True, False
+        self.asleep[new], self._slides[new], self._pays[new] = True, False, False
         self._until[new] = np.inf
-        self._dues[new] = 0.0
-        crowd = new[~alone[new]]
-        self._change[crowd], self._turn[crowd] = 0.0, 0.0
-        supported = (~pairs & ~awake[i]).nonzero()[0]
+        self._change[new[~alone[new]]] = 0.0
+        supported = fixed[~awake[i[fixed]]]
         left = self._way_left(i[supported], j[supported] - run.count)
         np.minimum.at(self._until, i[supported], left)
         self._slide(contacts, flat[~awake[i[flat]]], deeds)
@@ -111,7 +110,7 @@ class Idle:
     def _slide(self, contacts: Contacts, rows: Ints, deeds: Deeds) -> None:
         """Note what sliding costs, and when it ends."""
         run = self._run
-        who, slip, push = contacts.first[rows], deeds.after_t[rows], deeds.j_t[rows]
+        who, slip, push = contacts.first[rows], deeds.after_t[rows], contacts.j_t[rows]
         brakes = deeds.after_t[rows] - deeds.before_t[rows]
         moving = np.abs(slip) > QUIET
         self._slides[who] = moving
@@ -121,6 +120,7 @@ class Idle:
         self._dues[who, 0] = push * deeds.belt[rows]
         self._dues[who, 1] = -push * (slip + 0.5 * brakes)
         self._dues[who, 2] = -push * brakes
+        self._pays[who] = self._dues[who].any(axis=1)
 
     def _way_left(self, who: Ints, solid: Ints) -> Floats:
         """Return when particles will come to the ends of what they lie on, s."""
@@ -128,7 +128,7 @@ class Idle:
         line = (s.b[solid] - s.a[solid]) / self._length[solid, None]
         foot = np.einsum("md,md->m", k.at[who] - s.a[solid], line)
         pace = np.einsum("md,md->m", k.w[who], line)
-        push = np.einsum("md,md->m", self._change[who], line) / self._run.dt
+        push = np.einsum("md,md->m", self._change[who, :2], line) / self._run.dt
         # The speed it will have at most on the way, if it gains any.
         way = np.where(pace > 0.0, self._length[solid] - foot, foot)
         fastest = np.sqrt(pace**2 + 2.0 * np.abs(push) * self._length[solid])
@@ -137,24 +137,27 @@ class Idle:
 
     def move(self, t: float, tick: float) -> None:
         """Move sleepers on to t; wake those who need the step that ends at `tick`."""
-        who = self.asleep.nonzero()[0]
-        if not len(who):
+        if not np.count_nonzero(self.asleep):
             return
         run, k = self._run, self._run.tracks
-        resumed = who[k.from_t[who] < t]
-        k.at[resumed] = k.from_x[resumed] + run.dt * k.w[resumed]
-        k.w[resumed] += self._change[resumed]
-        k.aim[resumed] = k.w[resumed]
-        k.spin[resumed] += self._turn[resumed]
-        k.go_on(resumed, t, run.dt)
-        run.version[resumed] += 1
-        run.calm[resumed[~self._slides[resumed]]] += 1
-        pays = resumed[self._dues[resumed].any(axis=1)]
+        resumed = self.asleep & (k.from_t < t)
+        both = resumed[:, None]
+        np.copyto(k.at, k.from_x + run.dt * k.w, where=both)
+        np.add(k.w, self._change[:, :2], out=k.w, where=both)
+        np.copyto(k.aim, k.w, where=both)
+        np.add(k.spin, self._change[:, 2], out=k.spin, where=resumed)
+        run.go_on(resumed, t)
+        run.calm += resumed & ~self._slides
+        pays = (resumed & self._pays).nonzero()[0]
         if len(pays):
             dues = self._dues[pays]
             run.recorder.book(run.ids[pays], run.stays.on[pays], dues[:, 0], 0.0, dues[:, 1])
             self._dues[pays, 1] += dues[:, 2]
-        self.wake(who[self._until[who] <= tick])
+        self.wake((self.asleep & (self._until <= tick)).nonzero()[0])
+
+    def acceleration(self, i: int) -> float:
+        """Return by how much the velocity of a sleeper changes, m/s²."""
+        return hypot(*self._change[i, :2].tolist()) / self._run.dt
 
     def wake(self, who: Ints) -> None:
         """Have pymunk step particles again, from where they are."""
@@ -165,8 +168,8 @@ class Idle:
             self._alike[who] = 0
             run.moved[who] = True
             # Seen from halfway between two steps, as what is stepped.
-            w = k.w[who] - 0.5 * self._change[who]
-            k.hold(who, k.from_t[who], k.from_x[who], w, k.spin[who] - 0.5 * self._turn[who])
+            motion = np.column_stack([k.w[who], k.spin[who]]) - 0.5 * self._change[who]
+            k.hold(who, k.from_t[who], k.from_x[who], motion)
 
     def disturb(self, i: int) -> None:
         """Wake a particle that is hit, and what touches it."""
@@ -180,7 +183,7 @@ class Idle:
     def stir(self, first: Ints, second: Ints, approach: Floats) -> None:
         """Wake whoever touches somebody awake, or approaches somebody, of pairs in contact (k,)."""
         run = self._run
-        if not self.asleep.any():
+        if not np.count_nonzero(self.asleep):
             return
         awake = run.crowd.stepped | ((run.tracks.mode == RESTING) & ~self.asleep)
         awake[first[approach > QUIET]] = True

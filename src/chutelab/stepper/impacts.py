@@ -5,16 +5,15 @@ Plain numbers throughout: an impact concerns one or two particles, and there are
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import copysign, hypot
-from typing import TYPE_CHECKING
+from math import hypot
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from chutelab.recording import Kind
 from chutelab.stepper.crowd import MOST
 from chutelab.stepper.outline import PARALLEL, Touch
-from chutelab.stepper.solids import DEEP
+from chutelab.stepper.solids import DEEP, SLOP
 from chutelab.stepper.tracks import CARRIED, FLYING, RESTING
 
 if TYPE_CHECKING:
@@ -22,12 +21,15 @@ if TYPE_CHECKING:
 
 Vector = tuple[float, float]
 
+SHALLOW = 0.5 * SLOP
+"""Share of the radius by which what is struck may sink into the face it lies on until the next step
+parts them: less than pymunk leaves alone, so that many of them make no deep overlap."""
+
 FAINT = 0.01
 """Share of a step's worth of gravity below which even a first approach is no impact."""
 
 
-@dataclass(frozen=True)
-class Partner:
+class Partner(NamedTuple):
     """The other side of an impact.
 
     Attributes
@@ -96,7 +98,7 @@ def strike(run: Run, i: int, partner: Partner, t: float) -> None:
     impacts = run.crowd.count(i, j if partner.free else i, t)
     calm = run.soft if partner.supported else 0.0
     if run.crowd.is_in(impacts):
-        calm = run.crowd.calm(impacts)
+        calm = run.crowd.least_approach(impacts)
     if j >= 0 and -approach <= calm:
         _join(run, i, partner, t)
         return
@@ -131,7 +133,7 @@ def strike(run: Run, i: int, partner: Partner, t: float) -> None:
     for n, state, omega, _ in who:
         if k.mode[n] == RESTING:
             run.idle.disturb(n)
-            k.close(np.array([n]))
+            k.close_one(n)
         k.mark(n, t, *state, omega)
         paid = j_t * belt if partner.solid >= 0 else 0.0
         run.book(n, surface, paid, share * lost[0], share * lost[1])
@@ -164,7 +166,7 @@ def _lean(run: Run, n: int, partner: Partner, sign: float, t: float) -> None:
     nx, ny = partner.normal
     deep = sign * _deeper(run, partner)
     run.rest(n, sunk=(-deep * nx, -deep * ny))
-    run.stays.arrive(np.array([n]), np.array([-1]), t)
+    run.stays.arrive_one(n, -1, t)
 
 
 def _lie_down(run: Run, i: int, partner: Partner, surface: int, t: float) -> None:
@@ -180,11 +182,13 @@ def _lie_down(run: Run, i: int, partner: Partner, surface: int, t: float) -> Non
     j_n = 0.5 * run.mass * pressed * span
     slip = speed + run.radius * omega - belt
     # The next step rubs for a whole dt, half of it for the time before: for span, not for dt.
-    grip = run.clashes.grip(partner.solid) * run.mass * pressed * (span - 0.5 * run.dt)
+    short = span - 0.5 * run.dt
+    grip = run.clashes.grip(partner.solid) * run.mass * pressed * abs(short)
     stop = -run.rolling_mass * slip
-    j_t = min(max(stop, -grip), grip) if grip >= 0.0 else copysign(-grip, slip)
-    if grip < 0.0 and abs(stop) <= -grip:
-        j_t = 0.0
+    j_t = min(max(stop, -grip), grip)
+    if short < 0.0:
+        # That much too long: it is given back, unless the slip ends in that step anyhow.
+        j_t = -j_t if abs(stop) > grip else 0.0
     run.book(
         i, surface, j_t * belt, -0.5 * j_n**2 / run.mass,
         -j_t * (slip + 0.5 * j_t / run.rolling_mass),
@@ -193,22 +197,23 @@ def _lie_down(run: Run, i: int, partner: Partner, surface: int, t: float) -> Non
     k.mark(i, t, x, y, vx, vy, omega + run.turned(j_t))
     deep = _deeper(run, partner)
     run.rest(i, partner.normal, partner.solid, partner.curvature, (-deep * nx, -deep * ny))
-    run.stays.arrive(np.array([i]), np.array([surface]), t)
+    run.stays.arrive_one(i, surface, t)
 
 
 def _part(
     run: Run, i: int, partner: Partner, t: float, stays: bool, kind: Kind | None, surface: int
 ) -> None:
     """Send everybody on their way after an impact."""
-    k, one = run.tracks, np.array([i])
+    k = run.tracks
     who = [i, partner.particle] if partner.free else [i]
     if kind is not None and not stays:
-        run.stays.tell_separation(np.array(who))
-        run.stays.on[who] = -1
+        for n in who:
+            run.stays.tell_separation(n)
+            run.stays.on[n] = -1
     if kind is Kind.LANDING:
         run.landed[i] = True
         if run.machine.until == "landed":
-            run.finish(one, "landed")
+            run.finish(np.array([i]), "landed")
             return
     if stays and partner.solid >= 0:
         _lie_down(run, i, partner, surface, t)
@@ -221,15 +226,20 @@ def _part(
             if n not in rested:
                 _lean(run, n, partner, 1.0 if n == i else -1.0, t)
         who = rested
-    faces = [(n, int(k.face[n]), k.upon[n].tolist()) for n in who if k.mode[n] == RESTING]
-    if who:
-        run.take_off(np.array(who))
-    for n, face, (nx, ny) in faces:
-        # Pushed against the face it lies on, it is held by it at once.
-        if face >= 0 and k.v[n, 0] * nx + k.v[n, 1] * ny < 0.0:
-            strike(
-                run, n, solid_partner(run, Touch(0.0, face, (nx, ny), gap=-DEEP * run.radius)), t
-            )
+    for n in who:
+        face = int(k.face[n]) if k.mode[n] == RESTING else -1
+        if face < 0:
+            run.take_off(n)
+            continue
+        normal = nx, ny = tuple(k.upon[n].tolist())
+        off = float(k.v[n, 0]) * nx + float(k.v[n, 1]) * ny
+        if abs(off) <= run.soft and 0.0 <= run.sinks(off, ny, t) <= SHALLOW * run.radius:
+            run.rest(n)
+            continue
+        run.take_off(n)
+        if off < 0.0:
+            # Pushed against the face it lies on, it is held by it at once.
+            strike(run, n, solid_partner(run, Touch(0.0, face, normal, gap=-DEEP * run.radius)), t)
 
 
 def _kind(run: Run, i: int, partner: Partner, approach: float) -> Kind | None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from math import hypot
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.stepper.books import Motion, settle_books
+from chutelab.stepper.books import settle_books
 from chutelab.stepper.tracks import CARRIED, FLYING, RESTING
 
 if TYPE_CHECKING:
@@ -16,9 +17,10 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 
-def kick(run: Run, carried: NDArray[np.bool_], t0: float, t: float) -> None:
+def kick(run: Run, carried: Mask, t0: float, t: float) -> None:
     """Step the particles in contact from t0 to t.
 
     Parameters
@@ -27,30 +29,29 @@ def kick(run: Run, carried: NDArray[np.bool_], t0: float, t: float) -> None:
         Carried particles that may push others.
     """
     k = run.tracks
-    free = (k.mode == RESTING) & ~run.idle.asleep
-    free |= (k.mode == FLYING) & (run.crowd.stepped if run.machine.align else True)
+    resting, flying = (k.mode == RESTING) & ~run.idle.asleep, k.mode == FLYING
+    if run.machine.align:
+        flying &= run.crowd.stepped
     run.now = t
-    _enter(run, free, carried, t)
+    _enter(run, resting | flying, carried, t)
     run.world.step(run.dt)
     contacts = run.world.contacts()
-    touched = np.zeros(run.count, dtype=bool)
+    lost = resting.copy()
     if contacts is not None:
-        touched[contacts.first] = True
-        touched[contacts.other[contacts.other < run.count]] = True
-    run.lift((free & (k.mode == RESTING) & ~touched).nonzero()[0], t0)
+        lost[contacts.first] = False
+        lost[contacts.other[contacts.pairs]] = False
+    if np.count_nonzero(lost):
+        run.lift(lost.nonzero()[0], t0)
     if contacts is None:
         run.touching = np.empty(0, dtype=np.int64)
         return
-    _resolve(run, contacts, t)
-    resting = ((k.mode == RESTING) & free).nonzero()[0]
-    k.go_on(resting, t, run.dt)
-    run.version[resting] += 1
+    _resolve(run, contacts, flying | lost, t)
+    run.go_on((k.mode == RESTING) & (resting | flying), t)
 
 
-def _enter(run: Run, free: NDArray[np.bool_], carried: NDArray[np.bool_], t: float) -> None:
+def _enter(run: Run, free: Mask, carried: Mask, t: float) -> None:
     """Have pymunk's own move bring every body to where its path is at t."""
-    k, world = run.tracks, run.world
-    want = free | carried
+    world, want = run.world, free | carried
     for n in (run.inside & ~want).nonzero()[0].tolist():
         world.remove(n)
     new = (want & ~run.inside).nonzero()[0]
@@ -58,47 +59,52 @@ def _enter(run: Run, free: NDArray[np.bool_], carried: NDArray[np.bool_], t: flo
         world.add(n, carried=bool(carried[n]))
     run.inside = want
     run.moved[new] = True
-    who = (want & run.moved).nonzero()[0]
-    run.moved[who] = False
-    pushed = carried.nonzero()[0]
-    if not len(who) and not len(pushed):
-        return
-    x, v = k.flight(who, t)
-    x[k.mode[who] == RESTING] += run.sunk[who][k.mode[who] == RESTING]
-    run.sunk[who] = 0.0
-    w = v - 0.5 * run.dt * run.gravity
-    laid = k.upon[who].any(axis=1) & (k.mode[who] == RESTING)
-    normal = k.upon[who]
-    turns = (laid & (run.bend[who] > 0.0)).nonzero()[0]
-    if len(turns):
-        # Round a curve the normal turns with the way gone.
-        them = who[turns]
-        turned = normal[turns] + run.bend[them, None] * (x[turns] - k.from_x[them])
-        normal[turns] = turned / np.hypot(turned[:, 0], turned[:, 1])[:, None]
-    w -= np.where(laid, (w * normal).sum(axis=1), 0.0)[:, None] * normal
-    k.aim[who] = k.w[who] = w
-    turn = np.where(k.mode[who] == RESTING, k.spin[who], k.omega[who])
-    for n, a, b, c in zip(
-        who.tolist(), (x - run.dt * w).tolist(), w.tolist(), turn.tolist(), strict=True
-    ):
-        world.place(n, tuple(a), tuple(b), c)
-    x0, x1 = k.flight(pushed, t - run.dt)[0], k.flight(pushed, t)[0]
-    for n, a, b in zip(pushed.tolist(), x0.tolist(), ((x1 - x0) / run.dt).tolist(), strict=True):
-        world.place(n, tuple(a), tuple(b))
+    for n in (free & run.moved).nonzero()[0].tolist():
+        _place(run, n, t)
+    run.moved[want] = False
+    for n in carried.nonzero()[0].tolist():
+        x0, y0, _, _ = run.tracks.state(n, t - run.dt)
+        x1, y1, _, _ = run.tracks.state(n, t)
+        world.place(n, (x0, y0), ((x1 - x0) / run.dt, (y1 - y0) / run.dt))
 
 
-def _resolve(run: Run, contacts: Contacts, t: float) -> None:
+def _place(run: Run, n: int, t: float) -> None:
+    """Put the body of a particle a step before the point where its path is at t."""
+    k, dt = run.tracks, run.dt
+    x, y, vx, vy = k.state(n, t)
+    wx, wy = vx, vy + 0.5 * dt * run.machine.gravity
+    if k.mode[n] == RESTING:
+        (nx, ny), (deep_x, deep_y) = k.upon[n].tolist(), run.sunk[n].tolist()
+        x, y = x + deep_x, y + deep_y
+        if run.bend[n] > 0.0:
+            # Round a curve the normal turns with the way gone.
+            (x0, y0), bend = k.from_x[n].tolist(), float(run.bend[n])
+            nx, ny = nx + bend * (x - x0), ny + bend * (y - y0)
+            size = hypot(nx, ny)
+            nx, ny = nx / size, ny / size
+        off = wx * nx + wy * ny
+        wx, wy = wx - off * nx, wy - off * ny
+    run.sunk[n] = 0.0
+    k.aim[n] = k.w[n] = wx, wy
+    run.world.place(n, (x - dt * wx, y - dt * wy), (wx, wy), k.turn(n))
+
+
+def _resolve(run: Run, contacts: Contacts, flying: Mask, t: float) -> None:
     """Book what a step did, and remember who touches whom."""
     k = run.tracks
-    x, v, spin = run.world.states()
-    carried = k.mode == CARRIED
-    first_carried = carried[contacts.first]
-    if first_carried.any():
-        contacts = contacts.turned(first_carried)
-    flying = ((k.mode == FLYING) & run.inside).nonzero()[0]
-    before, spin_before = k.aim.copy(), k.spin.copy()
-    before[flying] = k.flight(flying, t)[1] - 0.5 * run.dt * run.gravity
-    before[carried], spin_before[flying] = v[carried], k.omega[flying]
-    spin_before[carried] = 0.0
-    settle_books(run, contacts, x, Motion(before, v, spin_before, spin), t)
-    run.touching = np.sort(run.keys(contacts.first, contacts.other))
+    x, after = run.world.states()
+    motion = np.zeros((2, *after.shape))
+    before = motion[0]
+    before[: run.count, :2], before[: run.count, 2], motion[1] = k.aim, k.spin, after
+    if np.count_nonzero(flying):
+        who = flying.nonzero()[0]
+        before[who, :2] = k.flight(who, t)[1] - 0.5 * run.dt * run.gravity
+        before[who, 2] = k.omega[who]
+    carried = (k.mode == CARRIED).nonzero()[0]
+    if len(carried):
+        before[carried, :2], before[carried, 2] = after[carried, :2], 0.0
+        rows = k.mode[contacts.first] == CARRIED
+        if np.count_nonzero(rows):
+            contacts = contacts.turned(rows)
+    settle_books(run, contacts, x, motion, t)
+    run.touching = contacts.keys

@@ -14,23 +14,24 @@ def meeting(x: Floats, y: Floats, u: Floats, v: Floats, reach: float) -> tuple[F
 
     Parameters
     ----------
-    x, y, u, v : ndarray, (k,)
+    x, y, u, v : ndarray
         Position and velocity of one disk relative to another, m and m/s.
     reach : float
         Sum of their radii, m.
 
     Returns
     -------
-    t, approach : ndarray, (k,)
+    t, approach : ndarray
         s, inf if they never meet and 0 if they overlap and approach; m/s.
     """
     closing = -(x * u + y * v)
     # closing² - square gap, without cancellation where they graze.
     across = x * v - y * u
-    under = reach * reach * (u * u + v * v) - across * across
-    t, approach = np.full(len(x), np.inf), np.zeros(len(x))
-    meets = ((closing > 0.0) & (under > 0.0)).nonzero()[0]
-    if len(meets):
+    under = (reach * reach) * (u * u + v * v) - across * across
+    t, approach = np.empty(x.shape), np.zeros(x.shape)
+    t.fill(np.inf)
+    meets = ((closing > 0.0) & (under > 0.0)).nonzero()
+    if len(meets[0]):
         xm, ym, closing = x[meets], y[meets], closing[meets]
         gap = xm * xm + ym * ym - reach * reach
         root = np.where(gap > 0.0, np.sqrt(under[meets]), closing)

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import hypot, inf, sqrt
+from math import hypot, inf
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.ballistics import first_descent
+from chutelab.ballistics import crossing, first_descent
 from chutelab.stepper.solids import HALF_THICKNESS, Solids
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 Floats = NDArray[np.float64]
 
@@ -25,8 +29,7 @@ END = 1e-9
 """Share of the radius within which a touch is at the very end of a face."""
 
 
-@dataclass(frozen=True)
-class Touch:
+class Touch(NamedTuple):
     """A contact between a disk and the outline.
 
     Attributes
@@ -51,6 +54,10 @@ class Touch:
 
 
 NOTHING = Touch(inf)
+
+
+_Box = tuple[float, float, float, float]
+"""Least x and y, largest x and y, m."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +103,7 @@ class Outline:
 
     def __init__(self, solids: Solids, rim: float, radius: float, gravity: float) -> None:
         self._radius, self._gravity = radius, gravity
-        self._slabs: list[_Slab] = []
+        self._slabs: list[tuple[_Slab, _Box]] = []
         circles: list[tuple[float, float, float, int]] = []
         for k, (a, b, behind) in enumerate(
             zip(solids.a.tolist(), solids.b.tolist(), solids.behind.tolist(), strict=True)
@@ -109,9 +116,10 @@ class Outline:
             tangent = (b[0] - a[0]) / length, (b[1] - a[1]) / length
             out = -behind[0] / thickness, -behind[1] / thickness
             slab = _Slab(k, tuple(a), tangent, out, length, thickness)
-            self._slabs.append(slab)
-            circles += [(*c, radius, k) for c in slab.corners()]
-        self._circles = circles
+            corners = slab.corners()
+            self._slabs.append((slab, _box(corners, radius * (1.0 + END))))
+            circles += [(*c, radius, k) for c in corners]
+        self._circles = [(c, _box([c[:2]], c[2])) for c in circles]
 
     def first(self, x: float, y: float, vx: float, vy: float, until: float) -> Touch:
         """Return the first touch of a flight, at once where a disk that overlaps moves inwards.
@@ -124,18 +132,20 @@ class Outline:
             s from now.
         """
         first = NOTHING
-        for slab in self._slabs:
-            first = self._faces(slab, (x, y, vx, vy), until, first)
-        until = min(until, first.t)
         left, right = _range(x, vx, 0.0, until)
         bottom, top = _range(y, vy, -self._gravity, until)
+        for slab, (west, south, east, north) in self._slabs:
+            # What touches the box of a slab from outside may touch the slab.
+            if left <= east and right >= west and bottom <= north and top >= south:
+                first = self._faces(slab, (x, y, vx, vy), until, first)
+        if first.t < until:
+            until = first.t
+            left, right = _range(x, vx, 0.0, until)
+            bottom, top = _range(y, vy, -self._gravity, until)
         near = [
-            c
-            for c in self._circles
-            if left < c[0] + c[2]
-            and right > c[0] - c[2]
-            and bottom < c[1] + c[2]
-            and top > c[1] - c[2]
+            circle
+            for circle, (west, south, east, north) in self._circles
+            if left < east and right > west and bottom < north and top > south
         ]
         if near:
             return self._round(np.array([x, y]), np.array([vx, vy]), near, until, first)
@@ -162,7 +172,7 @@ class Outline:
                 continue
             # A disk a hair inside a face touches it: it neither sinks further nor falls through.
             inside = -r <= gap < 0.0 and 0.0 <= foot <= wide
-            t = closing_time(0.0 if inside else gap, rate, pull)
+            t = crossing(0.0 if inside else gap, rate, pull)
             if 0.0 <= t <= until and t < first.t:
                 there, speed = foot + t * (pace + 0.5 * t * turn), pace + t * turn
                 # Moving out over the very end is not a touch of the face.
@@ -210,44 +220,30 @@ class Outline:
         depth = min(size - near[best][2], 0.0)
         return Touch(s, near[best][3], (nx / size, ny / size), 1.0 / near[best][2], depth)
 
-    def clearance(self, x: Floats, within: float) -> Floats:
-        """Return how far disks at (P, 2) are from the nearest solid, (P,), m.
+    def around(self, x: float, y: float, vx: float, vy: float) -> list[tuple[float, float]]:
+        """Return for each solid its gap to a disk (m), and how fast that closes (m/s).
 
-        Solids closer than `within` are left out; inf if there is no other.
+        All are convex: at a constant velocity no gap ever closes faster than now.
         """
-        out = np.full(len(x), inf)
-        for slab in self._slabs:
-            d = x - slab.a
-            u = d @ slab.t
-            w = d @ slab.n
-            across = u - np.minimum(np.maximum(u, 0.0), slab.length)
-            deep = w - np.minimum(np.maximum(w, -slab.thickness), 0.0)
-            gap = np.hypot(across, deep) - self._radius
-            out = np.minimum(out, np.where(gap > within, gap, inf))
-        for cx, cy, reach, _ in self._circles[4 * len(self._slabs) :]:
-            gap = np.hypot(x[:, 0] - cx, x[:, 1] - cy) - reach
-            out = np.minimum(out, np.where(gap > within, gap, inf))
+        out = []
+        for slab, _ in self._slabs:
+            (ax, ay), (tx, ty), (nx, ny) = slab.a, slab.t, slab.n
+            u, w = (x - ax) * tx + (y - ay) * ty, (x - ax) * nx + (y - ay) * ny
+            u, w = u - min(max(u, 0.0), slab.length), w - min(max(w, -slab.thickness), 0.0)
+            far = hypot(u, w)
+            away = u * (vx * tx + vy * ty) + w * (vx * nx + vy * ny)
+            out.append((far - self._radius, -away / far if far > 0.0 else 0.0))
+        for (cx, cy, reach, _), _ in self._circles[4 * len(self._slabs) :]:
+            far = hypot(x - cx, y - cy)
+            away = (x - cx) * vx + (y - cy) * vy
+            out.append((far - reach, -away / far if far > 0.0 else 0.0))
         return out
 
 
-def closing_time(gap: float, rate: float, pull: float) -> float:
-    """Return when gap + rate t + pull t²/2 crosses zero downwards, inf if not from now on.
-
-    The same root as `ballistics.closing_time`, of one gap.
-    """
-    square = rate * rate - 2.0 * pull * gap
-    if square < 0.0:
-        return inf
-    root = sqrt(square)
-    if rate <= 0.0:
-        if root - rate == 0.0:
-            return 0.0 if gap == 0.0 and pull < 0.0 else inf
-        t = 2.0 * gap / (root - rate)
-    elif pull == 0.0:
-        return inf
-    else:
-        t = -(rate + root) / pull
-    return t if t >= 0.0 else inf
+def _box(points: Sequence[tuple[float, float]], margin: float) -> _Box:
+    """Return the box around points and a margin."""
+    x, y = zip(*points, strict=True)
+    return min(x) - margin, min(y) - margin, max(x) + margin, max(y) + margin
 
 
 def _range(x: float, v: float, a: float, until: float) -> tuple[float, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -94,9 +95,17 @@ class Solids:
 
     def rounded(self, solid: NDArray[np.int64], points: Floats) -> NDArray[np.bool_]:
         """Tell where disks around points (M, 2) touch the pulley or the end of a face, (M,)."""
-        line = self.b[solid] - self.a[solid]
-        along = ((points - self.a[solid]) * line).sum(axis=1)
-        return np.asarray((along <= 0.0) | (along >= (line**2).sum(axis=1)))
+        line, from_a = self._line[solid], points - self.a[solid]
+        along = from_a[:, 0] * line[:, 0] + from_a[:, 1] * line[:, 1]
+        return np.asarray((along <= 0.0) | (along >= self._square[solid]))
+
+    @cached_property
+    def _line(self) -> Floats:
+        return self.b - self.a
+
+    @cached_property
+    def _square(self) -> Floats:
+        return np.asarray((self._line**2).sum(axis=1))
 
 
 def solids(machine: Machine) -> Solids:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import floor
+from math import ceil, floor, sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,6 +30,14 @@ HAIR = 2e-3
 bounds the step where `run.dt` is coarse or particles are small: gravity must not do more, g dt²."""
 
 
+def step(machine: Machine, start: float) -> float:
+    """Return the length of the steps from `start` (s) on, s; the last one ends with the run."""
+    dt, whole = machine.dt, machine.end_time - start
+    if machine.align and machine.gravity > 0.0:
+        dt = min(dt, sqrt(HAIR * machine.particle.radius / machine.gravity))
+    return whole / ceil(whole / dt - 1e-9) if whole > 0.0 else dt
+
+
 class Run:
     """One world, its particles and their books.
 
@@ -48,7 +56,7 @@ class Run:
     calm : ndarray, (N,)
         Steps in a row without slip on a surface to settle on.
     touching : ndarray
-        Keys, particle times (N + K) plus partner, of the contacts a step ago.
+        Keys of the contacts a step ago, sorted.
     settles_on : ndarray of bool, (K,)
         Solids at rest, and the outgoing belt.
     start, now : float
@@ -82,12 +90,11 @@ class Run:
         recorder: Recorder,
         ids: Ints,
         start: float,
-        dt: float,
         clashes: Clashes,
     ) -> None:
         count = len(ids)
         self.machine, self.solids, self.recorder, self.ids = machine, solids, recorder, ids
-        self.start, self.dt, self.now = start, dt, start
+        self.start, self.dt, self.now = start, step(machine, start), start
         self.clashes = clashes
         self._world: World | None = None
         self.tracks = Tracks(machine, recorder, ids)
@@ -106,8 +113,8 @@ class Run:
         self.version = np.zeros(count, dtype=np.int64)
         self.fresh: list[int] = []
         self.moved = np.zeros(count, dtype=bool)
-        self.soft = machine.gravity * dt
-        self.slow = max(self.soft, HAIR * p.radius / dt)
+        self.soft = machine.gravity * self.dt
+        self.slow = max(self.soft, HAIR * p.radius / self.dt)
         self.bend, self.bent = np.zeros((2, count))
         self.sunk = np.zeros((count, 2))
         self.idle = Idle(self)
@@ -129,15 +136,8 @@ class Run:
         """Number of particles in this world."""
         return len(self.ids)
 
-    def keys(self, first: Ints, other: Ints) -> Ints:
-        """Name pairs by one number each."""
-        return np.asarray(first * (self.count + self.met.shape[1]) + other)
-
-    def begun(self, first: Ints, other: Ints) -> NDArray[np.bool_]:
-        """Tell which contacts were not there a step ago, (M,)."""
-        keys = self.keys(first, other)
-        if len(keys) == len(self.touching) and (keys == self.touching).all():
-            return np.zeros(len(keys), dtype=bool)
+    def begun(self, keys: Ints) -> NDArray[np.bool_]:
+        """Tell which contacts, by their sorted keys (M,), were not there a step ago."""
         known = self.touching
         if not len(known):
             return np.ones(len(keys), dtype=bool)
@@ -173,13 +173,13 @@ class Run:
 
     def finish(self, who: Ints, reason: str) -> None:
         """End tracks at their last knots and take the particles out."""
-        self.stays.tell_separation(who)
         self.tracks.finish(who, reason)
-        self.changed(who)
-        if self.inside[who].any():
-            for particle in who[self.inside[who]].tolist():
-                self.world.remove(particle)
-            self.inside[who] = False
+        for i in who.tolist():
+            self.stays.tell_separation(i)
+            self.changed(i)
+        for i in who[self.inside[who]].tolist():
+            self.world.remove(i)
+        self.inside[who] = False
 
     def next_tick(self, t: float) -> float:
         """Return the time of the next step after t, s."""
@@ -187,6 +187,19 @@ class Run:
         tick = self.start + (floor((t - self.start) / self.dt + 1e-6) + 1) * self.dt
         end = self.machine.end_time
         return end if abs(tick - end) < 1e-6 * self.dt and end > t else tick
+
+    def sinks(self, off: float, upright: float, t: float) -> float:
+        """Return how deep the next step finds what leaves a face at t, m; negative if it is off.
+
+        Parameters
+        ----------
+        off : float
+            Its speed along the normal, m/s.
+        upright : float
+            The normal's part upwards.
+        """
+        span = self.next_tick(t) - t
+        return span * (0.5 * span * self.machine.gravity * upright - off)
 
     def turned(self, push: float) -> float:
         """Return the change of ω by a tangential impulse (N s), rad/s."""
@@ -210,18 +223,18 @@ class Run:
         sunk : tuple of float
             By how much the next step is to find it deeper in what it rests on, m.
         """
-        k, who = self.tracks, np.array([i])
-        k.rest(who)
-        k.leave(who, k.x[who], k.v[who], k.omega[who])
+        k = self.tracks
+        k.rest(i)
+        k.leave(i, k.x[i], k.v[i], k.omega[i])
         k.from_t[i], k.from_x[i], k.from_v[i] = k.t[i], k.x[i], k.v[i]
         k.upon[i], self.bend[i], self.sunk[i] = normal, curvature, sunk
         k.face[i] = solid if curvature == 0.0 else -1
-        self.changed(who)
+        self.changed(i)
 
-    def take_off(self, who: Ints) -> None:
-        """Let particles fly from their last knots."""
-        self.tracks.fly(who)
-        self.changed(who)
+    def take_off(self, i: int) -> None:
+        """Let a particle fly from its last knot."""
+        self.tracks.fly(i)
+        self.changed(i)
 
     def book(self, i: int, surface: int, belt: float, restitution: float, friction: float) -> None:
         """Book ledger entries (J) on one particle, and on the surface it met."""
@@ -255,19 +268,23 @@ class Run:
         self.tracks.flush()
         self.recorder.tell(np.array(self._told, dtype=EVENT))
 
-    def changed(self, who: Ints) -> None:
-        """Note that particles are on new paths."""
-        self.version[who] += 1
-        self.moved[who] = True
-        self.fresh.extend(who.tolist())
+    def changed(self, i: int) -> None:
+        """Note that a particle is on a new path."""
+        self.version[i] += 1
+        self.moved[i] = True
+        self.fresh.append(i)
+
+    def go_on(self, who: NDArray[np.bool_], t: float) -> None:
+        """Put particles (N,) in contact on their paths to the step after t."""
+        self.tracks.go_on(who, t, self.dt)
+        self.version += who
 
     def lift(self, who: Ints, t: float) -> None:
         """Let go what is in contact no more; whether it separated, its flight will tell."""
-        if not len(who):
-            return
         k = self.tracks
         curved = (self.bend[who] > 0.0) & (k.from_t[who] == t)
         left = [i for i in who[curved].tolist() if leave(self, i, t)]
-        k.lift(who[~np.isin(who, left)], t, self.dt)
-        self.changed(who)
+        k.lift(np.setdiff1d(who, left) if left else who, t, self.dt)
+        for i in who.tolist():
+            self.changed(i)
         self.stays.left(who, t)

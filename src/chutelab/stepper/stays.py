@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isnan
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -55,20 +56,27 @@ class Stays:
 
     def arrive(self, who: Ints, surface: Ints, t: float) -> None:
         """Note contacts of particles with one surface each, -1 for several or another particle."""
-        same = surface == self.on[who]
-        hop = same & (t - self._left[who] < HOP * self._run.dt)
-        self._left[who[hop]] = np.nan
-        new = who[~hop & ~(same & (self._run.tracks.mode[who] == RESTING))]
-        self.tell_separation(new)
-        self._since[new] = t
-        self.slipping[new] = True
-        self.on[who] = surface
+        same = (surface == self.on[who]) & (self._run.tracks.mode[who] == RESTING)
+        news = (~same | ~np.isnan(self._left[who])).nonzero()[0]
+        for i, on in zip(who[news].tolist(), surface[news].tolist(), strict=True):
+            self.arrive_one(i, on, t)
 
-    def tell_separation(self, who: Ints) -> None:
-        """Write the separations of flights that turned out to be none but hops."""
-        who = who[~np.isnan(self._left[who])]
-        s = self._left_state[who]
-        self._run.event(
-            Kind.SEPARATION, who, self._left[who], s[:, :2], s[:, 2:4], s[:, 4], self.on[who]
-        )
-        self._left[who] = np.nan
+    def arrive_one(self, i: int, surface: int, t: float) -> None:
+        """Note the contact of one particle with a surface, -1 for another particle."""
+        same = surface == self.on[i]
+        if same and t - self._left[i] < HOP * self._run.dt:
+            self._left[i] = np.nan
+        elif not (same and self._run.tracks.mode[i] == RESTING):
+            self.tell_separation(i)
+            self._since[i] = t
+            self.slipping[i] = True
+        self.on[i] = surface
+
+    def tell_separation(self, i: int) -> None:
+        """Write the separation of a flight that turned out to be none but a hop."""
+        left = self._left[i]
+        if isnan(left):
+            return
+        who, s = np.array([i]), self._left_state[i]
+        self._run.event(Kind.SEPARATION, who, left, s[:2], s[2:4], s[4], self.on[who])
+        self._left[i] = np.nan

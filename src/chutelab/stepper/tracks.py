@@ -7,14 +7,15 @@ parabola that the last ones foretold, so memory grows with what happens, not wit
 
 from __future__ import annotations
 
+from array import array
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chutelab.ballistics import crossing
 from chutelab.recording import KNOT, REASONS
-from chutelab.stepper.outline import closing_time
 
 if TYPE_CHECKING:
     from chutelab.machine import Machine
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 KNOT_POSITION = 1e-3
 """Share of the radius by which a track in contact may deviate from the curve between its knots."""
@@ -66,46 +68,46 @@ class Tracks:
         self._recorder = recorder
         self._g = np.array([0.0, -machine.gravity])
         self.mode = np.full(count, WAITING, dtype=np.int8)
-        self.t, self.omega, self.spin = np.zeros((3, count))
-        self.x, self.v, self.at, self.w, self.aim = np.zeros((5, count, 2))
+        self._radius = machine.particle.radius
+        self._lever = np.array([1.0, 1.0, self._radius])
+        self._knot = np.zeros((count, 6))
+        self.t, self.omega = self._knot[:, 0], self._knot[:, 5]
+        self.x, self.v = self._knot[:, 1:3], self._knot[:, 3:5]
+        self.spin, self.at, self.w, self.aim = np.zeros(count), *np.zeros((3, count, 2))
         self.from_t, self.from_x, self.from_v = np.zeros(count), *np.zeros((2, count, 2))
         self.upon = np.zeros((count, 2))
         self.face = np.full(count, -1)
         self.exit = np.full(count, np.inf)
         self._held = np.zeros(count, dtype=bool)
-        self._held_t, self._held_omega = np.zeros((2, count))
-        self._held_x, self._held_v = np.zeros((2, count, 2))
+        self._held_t, self._held_x, self._held_v = (
+            np.zeros(count), np.zeros((count, 2)), np.zeros((count, 3))
+        )  # fmt: skip
         self._box = machine.exit_box
-        self._marks: list[tuple[int, tuple[Any, ...]]] = []
-        self._bend = np.zeros((count, 2))
-        self._bend_omega = np.zeros(count)
+        self._owners, self._knots = array("q"), array("d")
+        self._bend = np.zeros((count, 3))
         self._bend_known = np.zeros(count, dtype=bool)
 
     def knot(self, who: Ints, t: ArrayLike, x: ArrayLike, v: ArrayLike, omega: ArrayLike) -> None:
         """Write a knot for each of some particles; it becomes their last."""
-        if len(who):
-            self.flush()
-            self.t[who], self.x[who], self.v[who], self.omega[who] = t, x, v, omega
-            self._recorder.knots(
-                self.ids[who], self.t[who], self.x[who], self.v[who], self.omega[who]
-            )
+        rows = np.empty((len(who), 6))
+        rows[:, 0], rows[:, 1:3], rows[:, 3:5], rows[:, 5] = t, x, v, omega
+        for i, row in zip(who.tolist(), rows.tolist(), strict=True):
+            self.mark(i, *row)
 
     def mark(
         self, i: int, t: float, x: float, y: float, vx: float, vy: float, omega: float
     ) -> None:
         """Write a knot for one particle."""
-        self.t[i], self.omega[i] = t, omega
-        self.x[i], self.v[i] = (x, y), (vx, vy)
+        self._knot[i] = t, x, y, vx, vy, omega
         n = int(self.ids[i])
-        entries = tuple(self._recorder.entries[n].tolist())
-        self._marks.append((n, (t, (x, y), (vx, vy), omega, entries)))
+        self._owners.append(n)
+        self._knots.extend((t, x, y, vx, vy, omega, *self._recorder.entries[n].tolist()))
 
     def flush(self) -> None:
-        """Hand over the knots written one by one."""
-        if self._marks:
-            owners, knots = zip(*self._marks, strict=True)
-            self._recorder.add(np.array(owners), np.array(list(knots), dtype=KNOT))
-            self._marks.clear()
+        """Hand over the knots written."""
+        owners = np.array(self._owners, dtype=np.int64)
+        self._recorder.add(owners, np.array(self._knots).view(KNOT))
+        self._owners, self._knots = array("q"), array("d")
 
     def flight(self, who: Ints | slice, t: float) -> tuple[Floats, Floats]:
         """Return positions and velocities, (k, 2), on the present paths at a time."""
@@ -136,12 +138,11 @@ class Tracks:
         """Return ω of a particle, rad/s."""
         return float(self.spin[i] if self.mode[i] == RESTING else self.omega[i])
 
-    def fly(self, who: Ints) -> None:
-        """Let particles go from their last knots."""
-        self.mode[who] = FLYING
-        self.from_t[who], self.from_x[who], self.from_v[who] = self.t[who], self.x[who], self.v[who]
-        for i in who.tolist():
-            self.exit[i] = self.t[i] + self._way_out(*self.x[i].tolist(), *self.v[i].tolist())
+    def fly(self, i: int) -> None:
+        """Let a particle go from its last knot."""
+        self.mode[i] = FLYING
+        self.from_t[i], self.from_x[i], self.from_v[i] = self.t[i], self.x[i], self.v[i]
+        self.exit[i] = self.t[i] + self._way_out(*self.x[i].tolist(), *self.v[i].tolist())
 
     def _way_out(self, x: float, y: float, vx: float, vy: float) -> float:
         """Return when a flight leaves the scene, s; at once if it is beyond the edge already."""
@@ -149,93 +150,96 @@ class Tracks:
             return inf
         left, right, bottom, top = self._box
         if self._machine.gravity > 0.0:
-            return closing_time(max(y - bottom, 0.0), vy, -self._machine.gravity)
+            return crossing(max(y - bottom, 0.0), vy, -self._machine.gravity)
         return min(
-            closing_time(max(gap, 0.0), rate, 0.0)
+            crossing(max(gap, 0.0), rate, 0.0)
             for gap, rate in ((x - left, vx), (right - x, -vx), (y - bottom, vy), (top - y, -vy))
         )
 
-    def rest(self, who: Ints) -> None:
+    def rest(self, who: Ints | int) -> None:
         """Keep particles in contact from their last knots on."""
         self.mode[who], self.exit[who] = RESTING, np.inf
         self._held[who] = self._bend_known[who] = False
 
-    def leave(self, who: Ints, x: ArrayLike, w: ArrayLike, omega: ArrayLike) -> None:
+    def leave(self, who: Ints | int, x: ArrayLike, w: ArrayLike, omega: ArrayLike) -> None:
         """Note the states in which pymunk leaves particles in contact."""
         self.at[who], self.w[who], self.aim[who], self.spin[who] = x, w, w, omega
         self.upon[who], self.face[who] = 0.0, -1
 
-    def go_on(self, who: Ints, t: float, dt: float) -> None:
-        """Put particles in contact on the paths to the next step, dt later, from where they are.
+    def go_on(self, who: Mask, t: float, dt: float) -> None:
+        """Put particles (N,) in contact on the paths to the next step, dt later.
 
         Half a step of gravity is given back at once, the other half is lost until then: a hop.
         """
-        self.from_t[who], self.from_x[who] = t, self.at[who]
-        self.from_v[who] = self.aim[who] - 0.5 * dt * self._g
+        both = who[:, None]
+        np.copyto(self.from_t, t, where=who)
+        np.copyto(self.from_x, self.at, where=both)
+        np.subtract(self.aim, 0.5 * dt * self._g, out=self.from_v, where=both)
 
     def lift(self, who: Ints, t: float, dt: float) -> None:
         """Let particles go that were in contact a step ago, at t, and are no more.
 
         Off a surface they go along the tangent; only along it is w half a step of gravity ahead.
         """
-        fresh = self.from_t[who] > t
-        self.fly(who[fresh])
-        who = who[~fresh]
-        n = self.upon[who]
+        stood = who[self.from_t[who] <= t]
+        n = self.upon[stood]
         lead = 0.5 * dt * (self._g - (n @ self._g)[:, None] * n)
-        self._write_held(who)
-        self.knot(who, t, self.at[who], self.w[who] - lead, self.spin[who])
-        self.fly(who)
+        self.close(stood)
+        self.knot(stood, t, self.at[stood], self.w[stood] - lead, self.spin[stood])
+        for i in who.tolist():
+            self.fly(i)
 
-    def foretold(self, who: Ints, t: float, x: Floats, v: Floats, omega: Floats) -> None:
-        """Note a step in smooth contact; write the state before it where the curve deviates."""
+    def go_smoothly(self, who: Ints, t: float, x: Floats, motion: Floats) -> None:
+        """Note a step in contact, to vx, vy and ω (k, 3) at places (k, 2).
+
+        Where the curve deviates from the one foretold, the state before is written.
+        """
         if not len(who):
             return
-        s = t - self.t[who]
-        new = who[~self._bend_known[who]]
+        last = self._knot[who]
+        s, change = t - last[:, :1], motion - last[:, 3:]
+        new = (~self._bend_known[who]).nonzero()[0]
         if len(new):
-            self._bend[new] = ((v - self.v[who]) / s[:, None])[~self._bend_known[who]]
-            self._bend_omega[new] = ((omega - self.omega[who]) / s)[~self._bend_known[who]]
-            self._bend_known[new] = True
-        speed = s[:, None] * self._bend[who]
-        off_x = x - self.x[who] - s[:, None] * (self.v[who] + 0.5 * speed)
-        off_v = v - self.v[who] - speed
-        r = self._machine.particle.radius
-        off_rim = r * np.abs(omega - self.omega[who] - s * self._bend_omega[who])
-        off = (np.abs(off_x).max(axis=1) > KNOT_POSITION * r) | (
-            np.maximum(np.abs(off_v).max(axis=1), off_rim) > KNOT_SPEED
-        )
-        turn = (off & self._held[who]).nonzero()[0]
-        if len(turn):
+            self._bend[who[new]] = change[new] / s[new]
+            self._bend_known[who[new]] = True
+        bend = s * self._bend[who]
+        off_v = change - bend
+        off_x = x - last[:, 1:3] - s * (last[:, 3:5] + 0.5 * bend[:, :2])
+        off = (np.abs(off_x) > KNOT_POSITION * self._radius).any(axis=1)
+        off |= (np.abs(off_v) * self._lever > KNOT_SPEED).any(axis=1)
+        if np.count_nonzero(off):
+            turn = (off & self._held[who]).nonzero()[0]
             them = who[turn]
-            self._write_held(them)
-            step = t - self.t[them]
-            self._bend[them] = (v[turn] - self.v[them]) / step[:, None]
-            self._bend_omega[them] = (omega[turn] - self.omega[them]) / step
+            self.close(them)
+            last = self._knot[them]
+            self._bend[them] = (motion[turn] - last[:, 3:]) / (t - last[:, :1])
+        self.hold(who, t, x, motion)
 
-    def hold(self, who: Ints, t: ArrayLike, x: Floats, v: Floats, omega: Floats) -> None:
+    def hold(self, who: Ints, t: ArrayLike, x: Floats, motion: Floats) -> None:
         """Remember states as knots that may not be needed."""
-        self._held[who], self._held_t[who] = True, t
-        self._held_x[who], self._held_v[who], self._held_omega[who] = x, v, omega
+        self._held[who] = True
+        self._held_t[who], self._held_x[who], self._held_v[who] = t, x, motion
 
     def give_up(self, i: int, t: float) -> None:
         """Write the last state of a particle in contact if it is from before t, else forget it."""
         if self._held_t[i] < t:
-            self._write_held(np.array([i]))
+            self.close_one(i)
         self._held[i] = False
 
     def close(self, who: Ints) -> None:
         """Write the last states of particles in contact, if they are not knots yet."""
-        self._write_held(who)
+        for i in who[self._held[who]].tolist():
+            self.close_one(i)
+
+    def close_one(self, i: int) -> None:
+        """Write the last state of one particle in contact, if it is not a knot yet."""
+        if self._held[i]:
+            self._held[i] = False
+            self.mark(
+                i, float(self._held_t[i]), *self._held_x[i].tolist(), *self._held_v[i].tolist()
+            )
 
     def finish(self, who: Ints, reason: str) -> None:
         """End tracks at their last knots."""
         self.mode[who], self.exit[who] = DONE, np.inf
         self._recorder.ended[self.ids[who]] = REASONS.index(reason)
-
-    def _write_held(self, who: Ints) -> None:
-        them = who[self._held[who]]
-        self._held[them] = False
-        self.knot(
-            them, self._held_t[them], self._held_x[them], self._held_v[them], self._held_omega[them]
-        )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, sqrt
 from typing import TYPE_CHECKING
 
@@ -11,6 +11,7 @@ import pymunk
 from numpy.typing import NDArray
 from pymunk import batch
 
+from chutelab.stepper.clash import move
 from chutelab.stepper.solids import SLOP, Solids
 
 if TYPE_CHECKING:
@@ -35,43 +36,56 @@ _ARBITER = (
     | batch.ArbiterFields.TOTAL_IMPULSE
     | batch.ArbiterFields.NORMAL
 )
-_BODY = batch.BodyFields.POSITION | batch.BodyFields.VELOCITY | batch.BodyFields.ANGULAR_VELOCITY
+_BODY = (
+    batch.BodyFields.BODY_ID
+    | batch.BodyFields.POSITION
+    | batch.BodyFields.VELOCITY
+    | batch.BodyFields.ANGULAR_VELOCITY
+)
+
+
+_Disk = tuple[pymunk.Body, pymunk.Circle]
 
 
 @dataclass(frozen=True, eq=False)
 class Contacts:
-    """Contacts of one step that pressed, sorted by particle and partner.
+    """Contacts of one step that pressed, sorted by their keys.
 
     Attributes
     ----------
+    keys : ndarray, (M,)
+        A number for each pair, the same in every step.
     first : ndarray, (M,)
         Particle.
     other : ndarray, (M,)
-        Partner: a particle with a higher number, or the number of particles plus a solid's index.
-    normal, impulse : ndarray, (M, 2)
-        Unit normal towards, and impulse (N s) of the whole step on, the first.
+        Partner: another particle, or the number of particles plus a solid's index.
+    normal : ndarray, (M, 2)
+        Unit normal towards the first.
+    j_n, j_t : ndarray, (M,)
+        Impulses of the whole step on the first, along the normal n and along (n_y, -n_x), N s.
+    pairs, fixed : ndarray
+        Rows of contacts with particles, and with solids.
     """
 
+    keys: Ints
     first: Ints
     other: Ints
     normal: Floats
-    impulse: Floats
+    j_n: Floats
+    j_t: Floats
+    pairs: Ints
+    fixed: Ints
 
     def __len__(self) -> int:
         return len(self.first)
 
-    def take(self, keep: NDArray[np.bool_]) -> Contacts:
-        """Return some of the contacts."""
-        return Contacts(self.first[keep], self.other[keep], self.normal[keep], self.impulse[keep])
-
     def turned(self, rows: NDArray[np.bool_]) -> Contacts:
         """Return the contacts with the two particles of some rows exchanged."""
-        sign = np.where(rows, -1.0, 1.0)[:, None]
-        return Contacts(
-            np.where(rows, self.other, self.first),
-            np.where(rows, self.first, self.other),
-            sign * self.normal,
-            sign * self.impulse,
+        return replace(
+            self,
+            first=np.where(rows, self.other, self.first),
+            other=np.where(rows, self.first, self.other),
+            normal=np.where(rows, -1.0, 1.0)[:, None] * self.normal,
         )
 
 
@@ -98,12 +112,15 @@ class World:
             self._friction = sqrt(max(machine.pair_friction, SMALLEST_SHARE))
         self._bodies: dict[int, pymunk.Body] = {}
         self._shapes: dict[int, pymunk.Circle] = {}
+        # Bodies to use again, of free and of carried particles: a new one costs more than a step.
+        self._spare: tuple[list[_Disk], list[_Disk]] = [], []
         self._fixed = [self._solid(solids, k) for k in range(len(solids.reach))]
-        self._codes_of = {body.id: count + k for k, body in enumerate(self._fixed)}
         self._buffer = batch.Buffer()
-        self._stale = True
+        # Sorted ids of all bodies, and which particle or, beyond them, solid each stands for.
         self._ids = np.empty(0, dtype=np.uintp)
-        self._codes = self._order = np.empty(0, dtype=np.int64)
+        self._codes = np.empty(0, dtype=np.int64)
+        for code, body in enumerate(self._fixed, count):
+            self._enrol(body, code)
 
     def _solid(self, solids: Solids, k: int) -> pymunk.Body:
         speed, reach = float(solids.speed[k]), float(solids.reach[k])
@@ -126,6 +143,18 @@ class World:
 
     def add(self, particle: int, *, carried: bool = False) -> None:
         """Put a particle in, to be placed; a carried one pushes but is not pushed."""
+        spare = self._spare[carried]
+        body, shape = spare.pop() if spare else self._disk(carried=carried)
+        self._space.add(body, shape)
+        self._bodies[particle], self._shapes[particle] = body, shape
+        self._codes[self._ids.searchsorted(body.id)] = particle
+
+    def _enrol(self, body: pymunk.Body, code: int) -> None:
+        place = self._ids.searchsorted(body.id)
+        self._ids = np.insert(self._ids, place, body.id)
+        self._codes = np.insert(self._codes, place, code)
+
+    def _disk(self, *, carried: bool) -> _Disk:
         p = self._machine.particle
         if carried:
             body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
@@ -138,17 +167,15 @@ class World:
             if carried
             else pymunk.ShapeFilter(categories=FREE)
         )
-        self._space.add(body, shape)
-        self._bodies[particle], self._shapes[particle] = body, shape
-        self._codes_of[body.id] = particle
-        self._stale = True
+        self._enrol(body, -1)
+        return body, shape
 
     def remove(self, particle: int) -> None:
         """Take a particle out."""
-        body = self._bodies.pop(particle)
-        del self._codes_of[body.id]
-        self._space.remove(body, self._shapes.pop(particle))
-        self._stale = True
+        body, shape = self._bodies.pop(particle), self._shapes.pop(particle)
+        self._space.remove(body, shape)
+        body.force = 0.0, 0.0
+        self._spare[body.body_type == pymunk.Body.KINEMATIC].append((body, shape))
 
     def place(
         self,
@@ -159,7 +186,8 @@ class World:
     ) -> None:
         """Overwrite the state of a particle."""
         body = self._bodies[particle]
-        body.position, body.velocity, body.angular_velocity = position, velocity, omega
+        body.position = position
+        move(body, velocity, omega)
 
     def steer(
         self, particle: int, velocity: tuple[float, float], force: tuple[float, float]
@@ -180,41 +208,37 @@ class World:
         if not len(raw):
             return None
         ids, values = np.frombuffer(raw, dtype=np.uintp), np.frombuffer(self._buffer.float_buf())
-        if self._stale:
-            # Numbering reuses the buffer.
-            ids, values = ids.copy(), values.copy()
-            self._number()
-        pair = self._codes[np.searchsorted(self._ids, ids)].reshape(-1, 2)
-        impulse, normal = values.reshape(-1, 2, 2).transpose(1, 0, 2)
+        a, b = self._codes[self._ids.searchsorted(ids)].reshape(-1, 2).T
         # Pymunk's impulse acts on body A, its normal points from A to B.
-        swap = np.where(pair[:, 0] <= pair[:, 1], 1.0, -1.0)[:, None]
-        first, other = pair.min(axis=1), pair.max(axis=1)
-        order = np.lexsort((other, first))
-        out = Contacts(first[order], other[order], (-swap * normal)[order], (swap * impulse)[order])
-        pressing = (out.impulse != 0.0).any(axis=1)
-        return out if pressing.all() else out.take(pressing) if pressing.any() else None
+        px, py, nx, ny = values.reshape(-1, 4).T
+        span = self.count + len(self._fixed)
+        keys = np.minimum(a, b) * span + np.maximum(a, b)
+        order = keys.argsort()
+        order = order[((px != 0.0) | (py != 0.0))[order]]
+        if not len(order):
+            return None
+        keys = keys[order]
+        first, other = np.divmod(keys, span)
+        toward = np.where(a <= b, -1.0, 1.0)
+        normal = (toward * np.stack([nx, ny])).T[order]
+        solid = other >= self.count
+        return Contacts(
+            keys, first, other, normal, -(px * nx + py * ny)[order], (py * nx - px * ny)[order],
+            (~solid).nonzero()[0], solid.nonzero()[0],
+        )  # fmt: skip
 
-    def states(self) -> tuple[Floats, Floats, Floats]:
-        """Return positions (N, 2), velocities (N, 2) and ω (N,); NaN for particles not inside."""
-        if self._stale:
-            self._number()
+    def states(self) -> tuple[Floats, Floats]:
+        """Return positions (N, 2) and motions (N + K, 3): vx, vy (m/s) and ω (rad/s).
+
+        Particles that are not inside have NaN, solids have 0: what a surface moves with is its
+        belt's.
+        """
         self._buffer.clear()
         batch.get_space_bodies(self._space, _BODY, self._buffer)
+        ids = np.frombuffer(self._buffer.int_buf(), dtype=np.uintp)
         out = np.full((self.count + len(self._fixed), 5), np.nan)
-        out[self._order] = np.frombuffer(self._buffer.float_buf()).reshape(-1, 5)
-        out = out[: self.count]
-        return out[:, 0:2], out[:, 2:4], out[:, 4]
-
-    def _number(self) -> None:
-        """Learn anew which body stands where in pymunk's lists: body ids are reused addresses."""
-        known = self._codes_of
-        ids = np.fromiter(known, dtype=np.uintp, count=len(known))
-        order = np.argsort(ids)
-        self._ids = ids[order]
-        codes = np.fromiter(known.values(), dtype=np.int64, count=len(known))
-        self._codes = codes[order]
-        self._buffer.clear()
-        batch.get_space_bodies(self._space, batch.BodyFields.BODY_ID, self._buffer)
-        listed = np.frombuffer(self._buffer.int_buf(), dtype=np.uintp)
-        self._order = self._codes[np.searchsorted(self._ids, listed)]
-        self._stale = False
+        out[self._codes[self._ids.searchsorted(ids)]] = np.frombuffer(
+            self._buffer.float_buf()
+        ).reshape(-1, 5)
+        out[self.count :] = 0.0
+        return out[: self.count, :2], out[:, 2:]

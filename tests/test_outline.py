@@ -263,12 +263,14 @@ def test_too_slow_for_the_top_of_the_pulley_it_sinks_in_at_once():
     x=st.floats(-1.5, 1.5),
     y=st.floats(-0.5, 0.5),
     velocity=st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0)),
+    growth=st.floats(-9.0, 9.0),
 )
-def test_the_gaps_around_a_disk_and_how_fast_they_close(x, y, velocity):
+def test_the_gaps_around_a_disk_and_how_fast_they_close(x, y, velocity, growth):
     lines = FLOOR, ((-1.2, -0.3), (0.4, 0.4))
-    found = outline(*lines).around(x, y, *velocity)
+    along = (growth * velocity[0], growth * velocity[1])
+    found = outline(*lines).around(x, y, velocity, along)
     step = 1e-7
-    for line, (gap, closing) in zip(lines, found, strict=True):
+    for line, (gap, closing, pull) in zip(lines, found, strict=True):
         here, before, after = (
             float(gap_to_slab(line, (0.3, 5.0), x + s * velocity[0], y + s * velocity[1]))
             for s in (0.0, -step, step)
@@ -276,6 +278,8 @@ def test_the_gaps_around_a_disk_and_how_fast_they_close(x, y, velocity):
         assume(here > 1e-3 - R)  # with the centre inside, there is no distance to speak of
         assert gap == pytest.approx(here, abs=1e-12)
         assert closing == pytest.approx((before - after) / (2.0 * step), abs=1e-3)
-        # However far it goes on.
-        later = float(gap_to_slab(line, (0.3, 5.0), x + 0.2 * velocity[0], y + 0.2 * velocity[1]))
-        assert later > gap - 0.2 * closing - 1e-12 or later <= -R
+        assert pull == pytest.approx(growth * closing, rel=1e-9, abs=1e-12)
+        # However far it goes on, on a straight way.
+        way = 0.2 + 0.5 * growth * 0.2**2
+        later = float(gap_to_slab(line, (0.3, 5.0), x + way * velocity[0], y + way * velocity[1]))
+        assert later > gap - 0.2 * closing - 0.5 * pull * 0.2**2 - 1e-12 or later <= -R

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from chutelab.ledger import ledger
 from chutelab.machine import build
+from chutelab.recorder import StalledError
 from chutelab.recording import REASONS, Kind
 from chutelab.scene import find, load, parse
 from chutelab.stepper import HALF_THICKNESS, run
@@ -645,3 +646,35 @@ restitution = 0.9
     assert len(instants) > 20
     assert sums.max() < 1e-6 * M * G * 0.08
     assert sums.sum() < -0.5 * M * G * 0.08
+
+
+def test_a_disk_driven_into_a_wedge_is_said_to_be_wedged():
+    # Two belts at 40° to each other draw it in; friction holds it there against any push out.
+    wedge = """
+[particle]
+radius = 0.05
+spin = true
+[stream]
+at = [0.0, 1.2]
+velocity = [0.0, 0.0]
+[run]
+until = 3.0
+[[surface]]
+name = "left"
+from = [-0.37, 1.0]
+to = [-0.01, 0.0]
+friction = 0.6
+speed = 0.7
+[[surface]]
+name = "right"
+from = [0.37, 1.0]
+to = [0.01, 0.0]
+friction = 0.6
+speed = 0.7
+"""
+    with pytest.raises(StalledError) as caught:
+        simulated(wedge)
+    stalled = caught.value
+    assert stalled.particle == 0
+    assert any(f'm into "{name}" between surfaces' in stalled.reason for name in ("left", "right"))
+    assert stalled.recording.track(0)[-1]["t"] <= stalled.t

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from chutelab.ballistics import crossing
 from chutelab.stepper.crowd import MOST
+from chutelab.stepper.idle import QUIET
 from chutelab.stepper.meetings import meeting, neighbours
+from chutelab.stepper.solids import WEDGED
 from chutelab.stepper.tracks import CARRIED, DONE, FLYING, RESTING, WAITING
 
 if TYPE_CHECKING:
@@ -112,6 +114,10 @@ class Forecast:
         """Foretell what solid a particle meets; return when, or inf."""
         k = self._run.tracks
         x, y, vx, vy = k.state(i, now)
+        short = hypot(vx, vy) * self._run.dt < WEDGED * self._run.radius
+        if short and k.mode[i] == RESTING and self._run.crowd.impacts[i] > MOST:
+            # Two faces that drive it into each other are left to the step.
+            return inf
         touch = self._outline.first(x, y, vx, vy, span)
         if k.mode[i] == RESTING:
             self._safe_until[i] = -inf
@@ -202,7 +208,7 @@ class Forecast:
     def _solids(self, resting: Mask, now: float, tick: float) -> None:
         """Foretell impacts on solids of those in contact; most are far from any other solid."""
         run, k = self._run, self._run.tracks
-        due = resting & ((self._safe_until < tick) | (self._slept & ~run.idle.asleep))
+        due = resting & ((self._safe_until < tick) | (self._slept != run.idle.asleep))
         for i in due.nonzero()[0].tolist():
             path = k.state(i, now)
             self._slept[i] = run.idle.asleep[i]
@@ -216,11 +222,16 @@ class Forecast:
     def _undisturbed(self, i: int, path: tuple[float, float, float, float]) -> float:
         """Return for how long a particle in contact can meet no other solid, s."""
         run, out = self._run, inf
-        pace = max(hypot(*path[2:]), self._fastest)
-        asleep, pull = run.idle.asleep[i], run.idle.acceleration(i)
-        for gap, approach in self._outline.around(*path):
-            if gap <= NEAR * run.radius and approach <= run.soft:
-                continue
-            rate = (approach, pull) if asleep else (pace, run.machine.gravity)
-            out = min(out, crossing(max(gap, 0.0), -rate[0], -rate[1]))
+        x, y, *velocity = path
+        asleep, near = run.idle.asleep[i], NEAR * run.radius
+        force = run.idle.acceleration(i) if asleep else (0.0, 0.0)
+        pace = max(hypot(*velocity), self._fastest)
+        for gap, approach, pull in self._outline.around(x, y, (velocity[0], velocity[1]), force):
+            if asleep:
+                # What it lies on it neither leaves nor approaches.
+                if gap <= near and abs(approach) <= QUIET and abs(pull) * run.dt <= QUIET:
+                    continue
+                out = min(out, crossing(max(gap, 0.0), -approach, -pull))
+            elif gap > near or approach > run.soft:
+                out = min(out, crossing(max(gap, 0.0), -pace, -run.machine.gravity))
         return out

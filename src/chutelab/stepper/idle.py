@@ -8,7 +8,6 @@ comes to lie on them, or their support or their slip ends.
 
 from __future__ import annotations
 
-from math import hypot
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -155,9 +154,10 @@ class Idle:
             self._dues[pays, 1] += dues[:, 2]
         self.wake((self.asleep & (self._until <= tick)).nonzero()[0])
 
-    def acceleration(self, i: int) -> float:
+    def acceleration(self, i: int) -> tuple[float, float]:
         """Return by how much the velocity of a sleeper changes, m/s²."""
-        return hypot(*self._change[i, :2].tolist()) / self._run.dt
+        x, y = (self._change[i, :2] / self._run.dt).tolist()
+        return x, y
 
     def wake(self, who: Ints) -> None:
         """Have pymunk step particles again, from where they are."""

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from chutelab.recorder import StalledError
 from chutelab.stepper.books import settle_books
+from chutelab.stepper.solids import WEDGED
 from chutelab.stepper.tracks import CARRIED, FLYING, RESTING
 
 if TYPE_CHECKING:
@@ -36,6 +38,8 @@ def kick(run: Run, carried: Mask, t0: float, t: float) -> None:
     _enter(run, resting | flying, carried, t)
     run.world.step(run.dt)
     contacts = run.world.contacts()
+    if contacts is not None and run.machine.align:
+        _refuse_wedged(run, contacts, t)
     lost = resting.copy()
     if contacts is not None:
         lost[contacts.first] = False
@@ -47,6 +51,29 @@ def kick(run: Run, carried: Mask, t0: float, t: float) -> None:
         return
     _resolve(run, contacts, flying | lost, t)
     run.go_on((k.mode == RESTING) & (resting | flying), t)
+
+
+def _refuse_wedged(run: Run, contacts: Contacts, t: float) -> None:
+    """Refuse what no rigid disk can follow: surfaces that drive it into each other.
+
+    Raises
+    ------
+    StalledError
+        If a particle is in a solid by more than `WEDGED` of its radius.
+    """
+    deep = contacts.depth[contacts.fixed]
+    if not len(deep) or deep.max() <= WEDGED * run.radius:
+        return
+    row = contacts.fixed[deep.argmax()]
+    i, solid = int(contacts.first[row]), int(contacts.other[row]) - run.count
+    name = run.machine.surfaces[run.solids.surface[solid]]
+    x, y, _, _ = run.tracks.state(i, t)
+    reason = (
+        f'it is pressed {contacts.depth[row]:.3g} m into "{name}" between surfaces that move or '
+        "grip so that no rigid disk could pass, where a real drive would stall; change their "
+        "speeds, friction or angle"
+    )
+    raise StalledError(int(run.ids[i]), t, (x, y), reason)
 
 
 def _enter(run: Run, free: Mask, carried: Mask, t: float) -> None:

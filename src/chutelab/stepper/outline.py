@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 Floats = NDArray[np.float64]
+Vector = tuple[float, float]
 
 GRAZING = 1e-9
 """Share of a reach, or of a speed, within which a disk leaves a circle along its tangent, and is
@@ -220,23 +221,29 @@ class Outline:
         depth = min(size - near[best][2], 0.0)
         return Touch(s, near[best][3], (nx / size, ny / size), 1.0 / near[best][2], depth)
 
-    def around(self, x: float, y: float, vx: float, vy: float) -> list[tuple[float, float]]:
-        """Return for each solid its gap to a disk (m), and how fast that closes (m/s).
+    def around(
+        self, x: float, y: float, velocity: Vector, acceleration: Vector
+    ) -> list[tuple[float, float, float]]:
+        """Return for each solid its gap to a disk (m), how fast that closes, and ever faster.
 
-        All are convex: at a constant velocity no gap ever closes faster than now.
+        All are convex: on a straight way no gap is ever less than these three have it (m, m/s and
+        m/s²).
         """
+        (vx, vy), (ax, ay) = velocity, acceleration
         out = []
         for slab, _ in self._slabs:
-            (ax, ay), (tx, ty), (nx, ny) = slab.a, slab.t, slab.n
-            u, w = (x - ax) * tx + (y - ay) * ty, (x - ax) * nx + (y - ay) * ny
+            (x0, y0), (tx, ty), (nx, ny) = slab.a, slab.t, slab.n
+            u, w = (x - x0) * tx + (y - y0) * ty, (x - x0) * nx + (y - y0) * ny
             u, w = u - min(max(u, 0.0), slab.length), w - min(max(w, -slab.thickness), 0.0)
-            far = hypot(u, w)
-            away = u * (vx * tx + vy * ty) + w * (vx * nx + vy * ny)
-            out.append((far - self._radius, -away / far if far > 0.0 else 0.0))
+            dx, dy = u * tx + w * nx, u * ty + w * ny
+            far = hypot(dx, dy)
+            if far > 0.0:
+                dx, dy = dx / far, dy / far
+            out.append((far - self._radius, -dx * vx - dy * vy, -dx * ax - dy * ay))
         for (cx, cy, reach, _), _ in self._circles[4 * len(self._slabs) :]:
             far = hypot(x - cx, y - cy)
-            away = (x - cx) * vx + (y - cy) * vy
-            out.append((far - reach, -away / far if far > 0.0 else 0.0))
+            dx, dy = (x - cx) / far, (y - cy) / far
+            out.append((far - reach, -dx * vx - dy * vy, -dx * ax - dy * ay))
         return out
 
 

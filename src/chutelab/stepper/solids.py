@@ -31,6 +31,9 @@ DEEP = 5e-6
 contact. The pulley is smaller by twice as much: what lies a hair inside the belt must not feel it
 behind x = 0."""
 
+WEDGED = 0.1
+"""Share of the radius; impacts end steps, so that nothing but a wedge brings a disk so deep."""
+
 
 @dataclass(frozen=True, eq=False)
 class Solids:

@@ -35,6 +35,7 @@ _ARBITER = (
     | batch.ArbiterFields.BODY_B_ID
     | batch.ArbiterFields.TOTAL_IMPULSE
     | batch.ArbiterFields.NORMAL
+    | batch.ArbiterFields.DISTANCE_1
 )
 _BODY = (
     batch.BodyFields.BODY_ID
@@ -63,6 +64,8 @@ class Contacts:
         Unit normal towards the first.
     j_n, j_t : ndarray, (M,)
         Impulses of the whole step on the first, along the normal n and along (n_y, -n_x), N s.
+    depth : ndarray, (M,)
+        How far the two are in each other, m.
     pairs, fixed : ndarray
         Rows of contacts with particles, and with solids.
     """
@@ -73,6 +76,7 @@ class Contacts:
     normal: Floats
     j_n: Floats
     j_t: Floats
+    depth: Floats
     pairs: Ints
     fixed: Ints
 
@@ -210,7 +214,7 @@ class World:
         ids, values = np.frombuffer(raw, dtype=np.uintp), np.frombuffer(self._buffer.float_buf())
         a, b = self._codes[self._ids.searchsorted(ids)].reshape(-1, 2).T
         # Pymunk's impulse acts on body A, its normal points from A to B.
-        px, py, nx, ny = values.reshape(-1, 4).T
+        px, py, nx, ny, distance = values.reshape(-1, 5).T
         span = self.count + len(self._fixed)
         keys = np.minimum(a, b) * span + np.maximum(a, b)
         order = keys.argsort()
@@ -224,7 +228,7 @@ class World:
         solid = other >= self.count
         return Contacts(
             keys, first, other, normal, -(px * nx + py * ny)[order], (py * nx - px * ny)[order],
-            (~solid).nonzero()[0], solid.nonzero()[0],
+            -distance[order], (~solid).nonzero()[0], solid.nonzero()[0],
         )  # fmt: skip
 
     def states(self) -> tuple[Floats, Floats]:

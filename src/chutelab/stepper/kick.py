@@ -59,12 +59,16 @@ def _refuse_wedged(run: Run, contacts: Contacts, t: float) -> None:
     Raises
     ------
     StalledError
-        If a particle is in a solid by more than `WEDGED` of its radius.
+        If a particle is in a solid by more than `WEDGED` of its radius, and no other presses it.
     """
-    deep = contacts.depth[contacts.fixed]
-    if not len(deep) or deep.max() <= WEDGED * run.radius:
+    rows = contacts.fixed[contacts.depth[contacts.fixed] > WEDGED * run.radius]
+    if not len(rows):
         return
-    row = contacts.fixed[deep.argmax()]
+    pushed = np.concatenate([contacts.first[contacts.pairs], contacts.other[contacts.pairs]])
+    rows = rows[~np.isin(contacts.first[rows], pushed)]
+    if not len(rows):
+        return
+    row = rows[0]
     i, solid = int(contacts.first[row]), int(contacts.other[row]) - run.count
     name = run.machine.surfaces[run.solids.surface[solid]]
     x, y, _, _ = run.tracks.state(i, t)

@@ -32,7 +32,7 @@ contact. The pulley is smaller by twice as much: what lies a hair inside the bel
 behind x = 0."""
 
 WEDGED = 0.1
-"""Share of the radius; impacts end steps, so that nothing but a wedge brings a lone disk so deep."""
+"""Share of the radius; impacts end steps, so that only a wedge brings a lone disk so deep."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,17 +9,21 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from math import atan2, cos, degrees, hypot, isfinite, nan, radians, sin
+from math import degrees, isfinite, nan
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from chutelab import scene as scenes
 from chutelab.ledger import ledger
-from chutelab.recording import REASONS, Kind
+from chutelab.recording import EVENT, REASONS, Kind
 from chutelab.sheet import Sheet, Shown, number
 from chutelab.theory import predict
 
 if TYPE_CHECKING:
-    from chutelab.recording import Recording
+    from numpy.typing import ArrayLike, NDArray
+
+    from chutelab.recording import Floats, Recording
     from chutelab.scene import Scene
     from chutelab.theory import Transfer
 
@@ -139,66 +143,109 @@ def relative_error(simulated: float, theory: float, scale: float) -> float:
 
     A scale of NaN counts as 0; where the theory is 0 as well, the difference itself is returned.
     """
-    size = max(abs(theory), scale if isfinite(scale) else 0.0)
-    return abs(simulated - theory) / size if size > 0.0 else abs(simulated - theory)
+    return float(relative_errors(simulated, theory, scale))
 
 
-def scales(scene: Scene, prediction: Transfer) -> dict[str, float]:
-    """Return the scale of each kind of quantity in a scene; NaN where the theory has none."""
-    v2, t2, t3 = (float(getattr(prediction, name)) for name in ("v2", "t2", "t3"))
-    energy = 0.5 * scene.particle.mass * v2**2
-    d1 = nan
+def relative_errors(simulated: ArrayLike, theory: ArrayLike, scale: ArrayLike) -> Floats:
+    """Return what `relative_error` does, of arrays."""
+    off = np.abs(np.subtract(simulated, theory))
+    size = np.fmax(np.abs(theory), np.where(np.isfinite(scale), scale, 0.0))
+    return np.asarray(off / np.where(size > 0.0, size, 1.0))
+
+
+def scales(scene: Scene, prediction: Transfer) -> dict[str, Any]:
+    """Return the scale of each kind of quantity in a scene; NaN where the theory has none.
+
+    Floats, or arrays (N,) where scene and prediction have such.
+    """
+    v2, t2, t3 = prediction.v2, prediction.t2, prediction.t3
+    energy = 0.5 * scene.particle.mass * (v2 * v2)
+    d1: Any = nan
     if scene.incoming is not None and scene.plate is not None:
         d1 = scene.incoming.pulley_radius + scene.plate.distance
-    return {
+    found = {
         "length": d1,
         "speed": v2,
-        "time": t2 + t3 if isfinite(t3) else t2,
+        "time": np.where(np.isfinite(t3), t2 + t3, t2),
         "angle": 1.0,
         "energy": energy,
         "power": energy * scene.stream.rate,
     }
+    return {kind: float(size) if np.ndim(size) == 0 else size for kind, size in found.items()}
 
 
 def observed(recording: Recording, scene: Scene) -> dict[str, float]:
-    """Return the `QUANTITIES` of particle 0 as the recording has them, in the paper's frame.
-
-    x2, y2 are counted from the separation point, y down; x3 and v3x back from the plate.
-    """
+    """Return the `QUANTITIES` of particle 0 as the recording has them, see `from_events`."""
     out = dict.fromkeys(QUANTITIES, nan)
     own = recording.events[recording.events["particle"] == 0]
     left = _first(recording, own, "incoming", Kind.SEPARATION)
     hit = _first(recording, own, "plate", Kind.IMPACT)
     down = _first(recording, own, "outgoing", Kind.LANDING)
-    if left is not None:
-        out["phi1"] = atan2(*left["position"])
-    if hit is not None and left is not None and scene.plate is not None:
-        alpha = radians(scene.plate.angle_deg)
-        before, after = hit["velocity_before"], hit["velocity_after"]
-        out["t2"] = float(hit["t"] - left["t"])
-        out["x2"] = float(hit["position"][0] - left["position"][0])
-        out["y2"] = float(left["position"][1] - hit["position"][1])
-        out["v2"], out["v2r"] = hypot(*before), hypot(*after)
-        for name, (vx, vy), sign in (("phi2", before, 1.0), ("phi2r", after, -1.0)):
-            into = sign * (vx * cos(alpha) + vy * sin(alpha))
-            out[name] = atan2(into, vx * sin(alpha) - vy * cos(alpha))
-    if down is not None and hit is not None and scene.outgoing is not None:
-        vx, vy = (float(component) for component in down["velocity_before"])
-        mass = recording.particle.mass
-        out["t3"] = float(down["t"] - hit["t"])
-        out["x3"] = float(hit["position"][0] - down["position"][0])
-        out["y3"] = float(hit["position"][1] - down["position"][1])
-        out["v3x"], out["v3y"], out["v3"] = -vx, -vy, hypot(vx, vy)
-        top = scene.incoming.pulley_radius if scene.incoming is not None else nan
-        out["d3"] = top + recording.particle.radius - float(down["position"][1])
-        out["dEk"] = 0.5 * mass * (vx**2 + scene.outgoing.speed**2)
-        out["P"] = out["dEk"] * scene.stream.rate
+    hit = hit if left is not None else None
+    down = down if hit is not None else None
+    events = (_NEVER if event is None else event for event in (left, hit, down))
+    out |= {name: float(value) for name, value in from_events(scene, *events).items()}
     # What the belt pays until there is no slip is known only of a particle that got there.
     if recording.count == 1 and REASONS[recording.ended[0]] == "settled":
         entries = ledger(recording).by_surface.get("outgoing")
         if entries is not None:
             out["belt_work"], out["slip_heat"] = entries["belt_work"], entries["friction_loss"]
     return out
+
+
+def from_events(scene: Scene, left: Any, hit: Any, down: Any) -> dict[str, Any]:
+    """Return what separation, impact and landing tell of the `QUANTITIES`, in the paper's frame.
+
+    x2, y2 are counted from the separation point, y down; x3 and v3x back from the plate.
+
+    Parameters
+    ----------
+    scene : Scene
+        One, or a family of them, see `chutelab.scene.family`.
+    left, hit, down : of dtype `EVENT`
+        One of each, or arrays (N,); with NaN, as `never` has it, where one did not happen.
+    """
+    plate, top, belt = scene.plate, nan, nan
+    if scene.incoming is not None:
+        top = scene.incoming.pulley_radius
+    if scene.outgoing is not None:
+        belt = scene.outgoing.speed
+    alpha = np.radians(nan if plate is None else plate.angle_deg)
+    (x1, y1), (x2, y2), (x3, y3) = (np.moveaxis(e["position"], -1, 0) for e in (left, hit, down))
+    (ux, uy), (wx, wy) = (np.moveaxis(hit[f"velocity_{w}"], -1, 0) for w in ("before", "after"))
+    vx, vy = np.moveaxis(down["velocity_before"], -1, 0)
+    sine, cosine = np.sin(alpha), np.cos(alpha)
+    energy = 0.5 * scene.particle.mass * (vx * vx + belt * belt)
+    return {
+        "phi1": np.arctan2(x1, y1),
+        "t2": hit["t"] - left["t"],
+        "x2": x2 - x1,
+        "y2": y1 - y2,
+        "v2": np.hypot(ux, uy),
+        "v2r": np.hypot(wx, wy),
+        "phi2": np.arctan2(ux * cosine + uy * sine, ux * sine - uy * cosine),
+        "phi2r": np.arctan2(-(wx * cosine + wy * sine), wx * sine - wy * cosine),
+        "t3": down["t"] - hit["t"],
+        "x3": x2 - x3,
+        "y3": y2 - y3,
+        "v3x": -vx,
+        "v3y": -vy,
+        "v3": np.hypot(vx, vy),
+        "d3": top + scene.particle.radius - y3,
+        "dEk": energy,
+        "P": energy * scene.stream.rate,
+    }
+
+
+def never(count: int) -> NDArray[Any]:
+    """Return events (count,) that did not happen: NaN throughout."""
+    events = np.zeros(count, dtype=EVENT)
+    for name in ("t", "position", "velocity_before", "velocity_after"):
+        events[name] = nan
+    return events
+
+
+_NEVER = never(1)[0]
 
 
 def _first(recording: Recording, events: Any, surface: str, kind: Kind) -> Any | None:

@@ -1,14 +1,18 @@
-"""The nominal particle up to the plate's line: what the machine's geometry is measured from."""
+"""The nominal particle up to the plate's line: what the machine's geometry is measured from.
+
+Of a family of scenes, the nominal particles of all: numbers are arrays (N,) then.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import cos, hypot, inf, radians, sin, sqrt
+from math import cos, inf, nan, radians, sin
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from chutelab.ballistics import closing_time, descent
+from chutelab.many import Value, each, ratio, root, smaller, where
 from chutelab.releases import on_belt, release_point, release_velocity
 from chutelab.ride import Circle, Outcome, advance, grip_slip, normal_force
 
@@ -16,6 +20,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from chutelab.scene import Scene
+
+    Floats = NDArray[np.float64]
 
 
 STEPS = 100_000
@@ -25,110 +31,124 @@ fall off the very top 2,000."""
 
 @dataclass(frozen=True)
 class Discharge:
-    """Where free flight begins: position (m) and velocity (m/s), two floats each."""
+    """Where free flight begins: position (m) and velocity (m/s), two numbers each.
 
-    position: tuple[float, float]
-    velocity: tuple[float, float]
-
-
-def discharge(scene: Scene) -> Discharge | None:
-    """Follow the nominal particle along belt and pulley until it flies.
-
-    Returns
-    -------
-    Discharge or None
-        None if it never leaves forwards (a belt at rest, or one that throws it off backwards).
+    NaN if the particle never leaves forwards (a belt at rest, or one that throws it off backwards).
     """
+
+    position: tuple[Value, Value]
+    velocity: tuple[Value, Value]
+
+
+def discharge(scene: Scene) -> Discharge:
+    """Follow the nominal particle along belt and pulley until it flies."""
     position, velocity = release_point(scene), release_velocity(scene)
     if scene.incoming is None or not on_belt(scene) or velocity[1] != 0.0:
         return Discharge(position, velocity)
     rho = scene.incoming.pulley_radius + scene.particle.radius
-    if scene.incoming.friction == "adhesion":
+    if isinstance(scene.incoming.friction, str):
         return _let_go(scene, rho)
-    pace = _along_belt(scene, velocity[0], -position[0])
-    return None if pace is None else _round_pulley(scene, rho, *pace)
+    return _slip_round(scene, rho, velocity[0], -position[0])
 
 
-def _let_go(scene: Scene, rho: float) -> Discharge | None:
+def _let_go(scene: Scene, rho: Value) -> Discharge:
     """Leave by adhesion where cos φ1 = v²/(g ρ), at the top if that is 1 or more (Eq. (2))."""
     assert scene.incoming is not None
-    speed = scene.incoming.speed
-    if speed == 0.0:
-        return None
-    grip = speed**2 / (scene.gravity * rho) if scene.gravity > 0.0 else inf
-    if grip >= 1.0:
-        return Discharge((0.0, rho), (speed, 0.0))
-    sine = sqrt((1.0 - grip) * (1.0 + grip))
-    return Discharge((rho * sine, rho * grip), (speed * grip, -speed * sine))
+    speed: Value = scene.incoming.speed
+    grip = where(speed > 0.0, smaller(ratio(speed * speed, scene.gravity * rho), 1.0), nan)
+    sine = root((1.0 - grip) * (1.0 + grip))
+    return Discharge((rho * sine, rho * grip), (speed * grip, 0.0 - speed * sine))
 
 
-def _along_belt(scene: Scene, w: float, distance: float) -> tuple[float, float] | None:
-    """Return speed and r ω at the top of the pulley after slipping along the belt."""
+def _slip_round(scene: Scene, rho: Value, speed: Value, distance: Value) -> Discharge:
+    """Go along belt and pulley with Coulomb friction."""
     assert scene.incoming is not None
-    belt, z = scene.incoming, 0.0
-    drag = float(belt.friction) * scene.gravity
-    slip = w - belt.speed
-    if slip != 0.0 and drag > 0.0:
-        pull = -drag if slip > 0.0 else drag
-        until_grip = abs(slip) / (drag * (3.0 if scene.particle.spin else 1.0))
-        reach = float(closing_time(distance, -w, -pull))
-        t = min(until_grip, reach)
-        distance -= w * t + 0.5 * pull * t * t
-        w += pull * t
-        z = 2.0 * pull * t if scene.particle.spin else 0.0
-        if reach <= until_grip:
-            return w, z
-    return (w, z) if w > 0.0 else None
-
-
-def _round_pulley(scene: Scene, rho: float, w: float, z: float) -> Discharge | None:
-    assert scene.incoming is not None
-    belt = scene.incoming
-
-    def one(value: float) -> NDArray[np.float64]:
-        return np.array([value])
-
-    circle = Circle(
-        phi=one(0.0), w=one(w), z=one(z), rho=one(rho), gravity=one(scene.gravity),
-        friction=one(float(belt.friction)), belt=one(belt.speed), slip=one(0.0),
-        turns=np.array([scene.particle.spin]), low=one(-1e-9), high=one(inf),
+    given = (
+        rho, speed, distance, scene.gravity, scene.incoming.friction, scene.incoming.speed,
     )  # fmt: skip
-    slip = w + z - belt.speed
-    circle = replace(circle, slip=grip_slip(circle) if slip == 0.0 else one(np.sign(slip)))
+    rho, speed, distance, gravity, friction, belt = (
+        array.copy() for array in np.broadcast_arrays(*map(np.atleast_1d, given))
+    )
+    turns = np.full(len(rho), scene.particle.spin)
+    w, z = _along_belt(speed, distance, friction * gravity, belt, turns)
+    nothing = np.zeros(len(rho))
+    circle = Circle(
+        phi=nothing, w=w, z=z, rho=rho, gravity=gravity, friction=friction, belt=belt,
+        slip=nothing, turns=turns, low=nothing - 1e-9, high=nothing + inf,
+    )  # fmt: skip
+    slip = w + z - belt
+    circle = replace(circle, slip=np.where(slip == 0.0, grip_slip(circle), np.sign(slip)))
+    phi, w = _round_pulley(circle)
+    sine, cosine = each(sin, phi), each(cos, phi)
+    found = (rho * sine, rho * cosine), (w * cosine, -w * sine)
+    if scene.members is None:
+        found = tuple((float(x[0]), float(y[0])) for x, y in found)  # type: ignore[assignment]
+    return Discharge(*found)
+
+
+def _along_belt(
+    w: Floats, distance: Floats, drag: Floats, belt: Floats, turns: NDArray[np.bool_]
+) -> tuple[Floats, Floats]:
+    """Return speed and r ω at the top of the pulley after slipping along the belt, NaN if never."""
+    slip = w - belt
+    slips = (slip != 0.0) & (drag > 0.0)
+    pull = np.where(slip > 0.0, -drag, drag)
+    lever = np.where(turns, 3.0, 1.0)
+    until_grip = np.where(slips, np.abs(slip) / np.where(slips, drag * lever, 1.0), 0.0)
+    reach = closing_time(distance, -w, -pull)
+    t = np.minimum(until_grip, reach)
+    pace = np.where(slips, w + pull * t, w)
+    z = np.where(slips & turns, 2.0 * pull * t, 0.0)
+    arrives = np.where(slips & (reach <= until_grip), True, pace > 0.0)
+    return np.where(arrives, pace, nan), z
+
+
+def _round_pulley(circle: Circle) -> tuple[Floats, Floats]:
+    """Return angle from the top and speed where particles lift off the pulley, NaN if never."""
+    phi, w = np.full((2, len(circle.phi)), nan)
+    who = np.flatnonzero(np.isfinite(circle.w))
+    circle = _some(circle, who)
     for _ in range(STEPS):
-        if normal_force(circle)[0] <= 0.0:
+        lifts = normal_force(circle) <= 0.0
+        phi[who[lifts]], w[who[lifts]] = circle.phi[lifts], circle.w[lifts]
+        if lifts.any():
+            who, circle = who[~lifts], _some(circle, ~lifts)
+        if not len(who):
             break
-        step = advance(circle, one(inf))
-        if not np.isfinite(step.dt[0]) or step.outcome[0] == Outcome.LOW:
-            return None
+        step = advance(circle, np.full(len(who), inf))
+        gone = step.outcome == Outcome.LIFT
+        phi[who[gone]], w[who[gone]] = step.phi[gone], step.w[gone]
+        goes_on = ~gone & np.isfinite(step.dt) & (step.outcome != Outcome.LOW)
         circle = replace(circle, phi=step.phi, w=step.w, z=step.z)
-        if step.outcome[0] == Outcome.LIFT:
-            break
-        if step.outcome[0] in (Outcome.GRIP, Outcome.ONSET):
-            pull = grip_slip(circle)
-            onset = step.outcome[0] == Outcome.ONSET
-            circle = replace(circle, slip=np.sign(np.sin(circle.phi)) if onset else pull)
-    else:
-        return None
-    phi, w = float(circle.phi[0]), float(circle.w[0])
-    return Discharge((rho * sin(phi), rho * cos(phi)), (w * cos(phi), -w * sin(phi)))
+        onset = np.sign(np.sin(circle.phi))
+        slip = np.where(step.outcome == Outcome.GRIP, grip_slip(circle), circle.slip)
+        circle = replace(circle, slip=np.where(step.outcome == Outcome.ONSET, onset, slip))
+        if not goes_on.all():
+            who, circle = who[goes_on], _some(circle, goes_on)
+    return phi, w
 
 
-def plate_hit(scene: Scene, start: Discharge | None) -> tuple[float, float] | None:
-    """Return the centre (m) as it meets the struck face of the unbounded plate, or None.
+def _some(circle: Circle, which: NDArray[np.int64] | NDArray[np.bool_]) -> Circle:
+    return Circle(**{name: array[which] for name, array in vars(circle).items()})
+
+
+def plate_hit(scene: Scene, start: Discharge) -> tuple[Value, Value]:
+    """Return the centre (m) as it meets the struck face of the unbounded plate; NaN if never.
 
     The face's normal is (-cos α, -sin α); contact is when the centre is r in front of it.
     """
-    if scene.plate is None or scene.incoming is None or start is None:
-        return None
-    alpha = radians(scene.plate.angle_deg)
-    nx, ny = -cos(alpha), -sin(alpha)
+    if scene.plate is None or scene.incoming is None:
+        return nan, nan
+    alpha = each(radians, scene.plate.angle_deg)
+    nx, ny = -each(cos, alpha), -each(sin, alpha)
     pivot_x = scene.incoming.pulley_radius + scene.plate.distance
-    pivot_y = scene.plate.pivot_height or 0.0
+    pivot_y: Value = scene.plate.pivot_height
     (x, y), (vx, vy) = start.position, start.velocity
     gap = (x - pivot_x) * nx + (y - pivot_y) * ny - scene.particle.radius
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        t = float(descent(np.float64(gap), np.float64(vx * nx + vy * ny), -scene.gravity * ny))
-    if gap < 0.0 or not 0.0 <= t < inf or hypot(vx, vy) == 0.0 == scene.gravity:
-        return None
+        t: Value = descent(np.asarray(gap), np.asarray(vx * nx + vy * ny), -scene.gravity * ny)
+    if scene.members is None:
+        t = float(t)
+    still = (vx == 0.0) & (vy == 0.0) & (scene.gravity == 0.0)
+    t = where((gap >= 0.0) & (t >= 0.0) & (t < inf) & ~np.bool_(still), t, nan)
     return x + vx * t, y + vy * t - 0.5 * scene.gravity * t * t

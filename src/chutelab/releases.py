@@ -71,6 +71,8 @@ def on_belt(scene: Scene) -> bool:
     """Tell whether the stream is released on the incoming belt."""
     if scene.incoming is None:
         return False
+    if scene.stream.at is None:
+        return True
     x, y = release_point(scene)
     riding = scene.incoming.pulley_radius + scene.particle.radius
     return y == riding and -scene.incoming.length <= x <= 0.0
@@ -79,6 +81,8 @@ def on_belt(scene: Scene) -> bool:
 def draw(scene: Scene) -> Releases:
     """Draw the releases of a scene; the same scene and seed give the same numbers.
 
+    Of a family each scene has one particle.
+
     Raises
     ------
     SceneError
@@ -86,12 +90,16 @@ def draw(scene: Scene) -> Releases:
     """
     stream, count = scene.stream, scene.stream.count
     crowded = stream.interact and count > 1
-    t = np.arange(count) / stream.rate
+    if scene.members is not None:
+        count = scene.members
+        t = np.zeros(count)
+    else:
+        t = np.arange(count) / stream.rate
     velocity = np.empty((count, 2))
-    velocity[:] = release_velocity(scene)
+    velocity[:, 0], velocity[:, 1] = release_velocity(scene)
     height = np.zeros(count)
-    # Making a generator takes as long as all other preparations for a single particle.
-    if stream.bed_height > 0.0 or stream.speed_spread > 0.0 or crowded:
+    # The first one has no spread. Making a generator takes as long as all other preparations.
+    if stream.count > 1 and (stream.bed_height > 0.0 or stream.speed_spread > 0.0 or crowded):
         rng = np.random.default_rng(stream.seed)
         height = stream.bed_height * rng.random(count)
         height[0] = 0.0
@@ -101,13 +109,13 @@ def draw(scene: Scene) -> Releases:
         speed = float(np.hypot(x, y))
         velocity += spread[:, None] * ((x / speed, y / speed) if speed > 0.0 else (1.0, 0.0))
     rides = on_belt(scene)
-    adheres = rides and scene.incoming is not None and scene.incoming.friction == "adhesion"
+    adheres = rides and scene.incoming is not None and isinstance(scene.incoming.friction, str)
     if crowded:
         fall = 0.0 if adheres else 0.5 * scene.gravity
         floor = 0.0 if rides else -inf
         _spread_apart(scene, t, height, velocity, fall, floor, rng)
     position = np.empty((count, 2))
-    position[:] = release_point(scene)
+    position[:, 0], position[:, 1] = release_point(scene)
     position[:, 1] += height
     carried = np.zeros(count, dtype=bool)
     carried[:] = adheres

@@ -169,7 +169,7 @@ def _finding(
     prediction: Transfer,
     scale: float | None,
 ) -> Finding:
-    unit = unit_of(expect.quantity, _surfaces(scene))
+    unit = unit_of(expect.quantity, scene.surfaces)
     assert unit is not None
     expected = (
         _predicted(prediction, expect.quantity)
@@ -199,8 +199,3 @@ def _finding(
         tolerance=None if allowed is None else allowed[0],
         relative=relative,
     )
-
-
-def _surfaces(scene: Scene) -> list[str]:
-    tables = [name for name in ("incoming", "plate", "outgoing") if getattr(scene, name)]
-    return [*tables, *(free.name for free in scene.surface)]

@@ -17,10 +17,13 @@ PATIENCE = 1.0
 
 
 class Meter:
-    """A task that may take long: `update` it with the share that is done, 0 to 1."""
+    """A task that may take long: `update` it with the share that is done, 0 to 1.
 
-    def __init__(self, what: str) -> None:
-        self.what = what
+    With `left`, the bar also tells how long it may still take.
+    """
+
+    def __init__(self, what: str, *, left: bool = False) -> None:
+        self.what, self.left = what, left
         self.share: float | None = None
         self.bar: Progress | None = None
 
@@ -33,12 +36,19 @@ class Meter:
     def appear(self) -> None:
         """Start drawing."""
         from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+        from rich.progress import (
+            BarColumn,
+            Progress,
+            TextColumn,
+            TimeElapsedColumn,
+            TimeRemainingColumn,
+        )
 
         bar = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
             TimeElapsedColumn(),
+            *([TextColumn("left:"), TimeRemainingColumn()] if self.left else []),
             console=Console(stderr=True),
             transient=True,
         )
@@ -51,12 +61,14 @@ class Meter:
 
 
 @contextmanager
-def progress(what: str, *, quiet: bool = False) -> Iterator[Callable[[float], None] | None]:
+def progress(
+    what: str, *, quiet: bool = False, left: bool = False
+) -> Iterator[Callable[[float], None] | None]:
     """Give a callable that takes the share of the task that is done; None if nobody looks."""
     if quiet or not sys.stderr.isatty():
         yield None
         return
-    meter = Meter(what)
+    meter = Meter(what, left=left)
     timer = Timer(PATIENCE, meter.appear)
     timer.daemon = True
     timer.start()

@@ -13,9 +13,11 @@ particles.
 - `touch`, `grip`: what a contact does: blows and rest, grip and slip.
 - `round`, `straight`: the two kinds of motion.
 - `engine`: the rounds, block by block.
+- `alike`: which machines of a family can run together.
 """
 
+from chutelab.exact.alike import kinds
 from chutelab.exact.corner import CornerError
 from chutelab.exact.engine import run
 
-__all__ = ["CornerError", "run"]
+__all__ = ["CornerError", "kinds", "run"]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from chutelab.exact.obstacles import NONE, Floats, Ints, Obstacles, dot, pick, rows_of
+from chutelab.many import Value, of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -71,7 +72,7 @@ class Bounds:
 
 
 def bounds(
-    obstacles: Obstacles, rows: Ints, circle: Ints, rho: Floats, phi: Floats, radius: float
+    obstacles: Obstacles, rows: Ints, circle: Ints, rho: Floats, phi: Floats, radius: Value
 ) -> Bounds:
     """Find what stops rides round circles in both directions.
 
@@ -83,7 +84,7 @@ def bounds(
         Particles, and the circles (obstacle number less S) they ride.
     rho, phi : ndarray, (k,)
         Radius of the centre's path (m) and angle now, from the top, clockwise (rad).
-    radius : float
+    radius : float, or ndarray, (k,)
         r, m.
     """
     found = Bounds.free(len(rows))
@@ -116,7 +117,7 @@ def bounds(
         # The gap to a circle grows with -cos(φ - tilt).
         apart = rows_of(obstacles.center[:, other], rows) - center
         distance = np.hypot(apart[0], apart[1])
-        distinct = (circle != other) & (distance > obstacles.touch)
+        distinct = (circle != other) & (distance > of(obstacles.touch, rows))
         reach = rows_of(obstacles.rho[other], rows)
         level = (rho**2 + distance**2 - reach**2) / np.where(distinct, 2.0 * rho * distance, 1.0)
         met = distinct & (np.abs(level) < 1.0)

@@ -9,6 +9,7 @@ import numpy as np
 from chutelab.ballistics import first_descent
 from chutelab.exact.motion import PARALLEL
 from chutelab.exact.obstacles import Floats, Ints, Obstacles, dot, length_of, pick, rows_of
+from chutelab.many import of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -59,9 +60,10 @@ def first_circle(
     gap[3] = dot(v, a)
     gap[4] = 0.25 * dot(a, a)
     leaving = motion.left[who] == circle + obstacles.segments
-    touching = np.abs(distance - rho) <= obstacles.touch
+    touch = of(obstacles.touch, rows)
+    touching = np.abs(distance - rho) <= touch
     # The direction from the centre is as uncertain as the places are, over ρ.
-    uncertain = 2.0 * (PARALLEL * rho + obstacles.touch) * length_of(v)
+    uncertain = 2.0 * (PARALLEL * rho + touch) * length_of(v)
     grazing = touching & (np.abs(gap[1]) <= uncertain)
     gap[1] = np.where(grazing & ~leaving, 0.0, gap[1])
     order = np.where(leaving, motion.order[who], np.where(touching & (gap[1] >= 0.0), 1, 0))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chutelab.exact.obstacles import dot
+from chutelab.many import Value, of
 from chutelab.recording import Kind
 
 if TYPE_CHECKING:
@@ -49,14 +50,14 @@ def hold(
             "a spinning disk is held between two surfaces of which one moves; the exact engine"
             ' cannot follow that: run it with engine = "pymunk"'
         )
-    v = s.v.take(who, axis=1)
-    kinetic = 0.5 * s.mass * (dot(v, v) + 0.5 * s.z[who] ** 2)
+    v, mass = s.v.take(who, axis=1), of(s.mass, who)
+    kinetic = 0.5 * mass * (dot(v, v) + 0.5 * s.z[who] ** 2)
     s.v[:, who], s.z[who] = 0.0, 0.0
     s.book(who, b.surface, 0.0, kinetic, 0.0)
     s.knots(who)
-    loads, locked = _corner_loads(s, a, b)
-    stays = locked | np.all(loads >= -WEIGHTLESS * s.gravity, axis=0)
-    onto = ~stays & (loads[0] < 0.0) & (s.weight_on(b.normal) > 0.0)
+    loads, locked = _corner_loads(of(s.gravity, who), a, b)
+    stays = locked | np.all(loads >= -WEIGHTLESS * of(s.gravity, who), axis=0)
+    onto = ~stays & (loads[0] < 0.0) & (s.weight_on(who, b.normal) > 0.0)
     falls = ~stays & ~onto
     s.fly(who[falls], other[0][falls], other[1][falls], 2)
     rest = stays & ~moving & (s.machine.until == "settled")
@@ -66,7 +67,7 @@ def hold(
     time = s.stop[who] - s.age[who]
     for c, load in zip((a, b), loads, strict=True):
         heat = np.where(
-            waits & ~locked, s.mass * _grip(c) * np.abs(c.belt) * np.maximum(load, 0.0) * time, 0.0
+            waits & ~locked, mass * _grip(c) * np.abs(c.belt) * np.maximum(load, 0.0) * time, 0.0
         )
         s.book(who, c.surface, heat, 0.0, heat)
     s.age[who[waits]] = s.stop[who[waits]]
@@ -80,17 +81,16 @@ def _grip(c: Contact) -> Floats:
     return np.where((c.belt == 0.0) | np.isinf(c.friction), 0.0, c.friction)
 
 
-def _corner_loads(s: Swarm, a: Contact, b: Contact) -> tuple[Floats, NDArray[np.bool_]]:
+def _corner_loads(gravity: Value, a: Contact, b: Contact) -> tuple[Floats, NDArray[np.bool_]]:
     """Return the two normal forces per mass that hold a particle, (2, k), and where it locks."""
     first, second = (c.normal + (np.sign(c.belt) * _grip(c)) * c.tangent for c in (a, b))
     determinant = first[0] * second[1] - first[1] * second[0]
-    loads = s.gravity * np.stack([-second[0], first[0]]) / determinant
+    loads = gravity * np.stack([-second[0], first[0]]) / determinant
     loads = np.where(np.isfinite(loads), loads, -1.0)
     inwards = np.zeros(len(determinant), dtype=bool)
     for c, against in ((a, b), (b, a)):
         drawn = np.sign(c.belt) * dot(c.tangent, against.normal) < 0.0
         inwards |= drawn & (
-            np.isinf(c.friction)
-            | (loads < -WEIGHTLESS * s.gravity).any(axis=0) & (c.friction > 0.0)
+            np.isinf(c.friction) | (loads < -WEIGHTLESS * gravity).any(axis=0) & (c.friction > 0.0)
         )
     return loads, inwards

@@ -10,6 +10,8 @@ from chutelab.ballistics import descent
 from chutelab.exact.circles import first_circle, hidden, touched
 from chutelab.exact.motion import PARALLEL, Motion
 from chutelab.exact.obstacles import Floats, Ints, Obstacles, dot, length_of, rows_of
+from chutelab.many import Value
+from chutelab.many import of as some_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,7 +26,7 @@ FEW = 4
 
 
 def first_contact(
-    motion: Motion, obstacles: Obstacles, radius: float, until: Floats
+    motion: Motion, obstacles: Obstacles, radius: Value, until: Floats
 ) -> tuple[Floats, Ints, Floats]:
     """Return time from now, obstacle and side of the first contact before `until`, each (k,).
 
@@ -37,7 +39,7 @@ def first_contact(
         k particles.
     obstacles : Obstacles
         What they can meet.
-    radius : float
+    radius : float, or ndarray, (k,)
         r, m.
     until : ndarray, (k,)
         Finite time after which nothing matters, s.
@@ -112,7 +114,7 @@ def _reached(
 
 
 def _faces(
-    motion: Motion, obstacles: Obstacles, radius: float, until: Floats, segments: Ints
+    motion: Motion, obstacles: Obstacles, radius: Value, until: Floats, segments: Ints
 ) -> tuple[Floats, Ints, Floats]:
     """Return time, segment and side of the first face met up to `until`, (k,); time inf if none.
 
@@ -140,7 +142,7 @@ def _faces(
 
     leaving = motion.left == segments[:, None, None]
     same = leaving & (motion.left_side == sides)
-    touching = np.abs(gap) <= obstacles.touch
+    touching = np.abs(gap) <= some_of(obstacles.touch, motion.rows)
     touching |= same
     grazing: Bools | None = None
     if np.count_nonzero(touching):

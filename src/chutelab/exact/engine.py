@@ -12,6 +12,7 @@ from chutelab.exact.round import ride
 from chutelab.exact.straight import carry, fly, slide
 from chutelab.exact.swarm import Mode, Swarm
 from chutelab.exact.world import World
+from chutelab.many import at
 from chutelab.recorder import Recorder, StalledError
 from chutelab.recording import Kind
 
@@ -46,7 +47,11 @@ m/s, are 200 times as far apart."""
 
 
 def run(
-    machine: Machine, progress: Progress | None = None, began: float | None = None
+    machine: Machine,
+    progress: Progress | None = None,
+    began: float | None = None,
+    *,
+    apart: bool = False,
 ) -> Recording:
     """Run a machine whose particles do not interact.
 
@@ -58,6 +63,9 @@ def run(
         Called with the share of particles that have ended, after every round.
     began : float, optional
         Reading of `time.perf_counter` from which `Recording.seconds` counts; now by default.
+    apart : bool
+        Keep the books of the particles apart: `Recording.by_surface` is (N, S, 3) then. For a
+        family of machines, alike in what `chutelab.exact.kinds` tells apart.
 
     Returns
     -------
@@ -76,7 +84,7 @@ def run(
     if machine.interact:
         raise ValueError("the exact engine has no contacts between particles")
     begin = perf_counter() if began is None else began
-    recorder = Recorder(machine.count, machine.surfaces)
+    recorder = Recorder(machine.count, machine.surfaces, apart=apart)
     rounds = 0
 
     def recording() -> Recording:
@@ -151,7 +159,7 @@ def _release(s: Swarm) -> None:
     state = s.now(who)
     s.journal.knots(who, state)
     s.journal.events(int(Kind.RELEASE), who, NONE, state, velocity=state[3:5], omega=state[5])
-    if s.machine.until == "settled" and s.machine.pulley and s.machine.pulley.speed == 0.0:
+    if s.machine.until == "settled" and s.machine.pulley and at(s.machine.pulley.speed, 0) == 0.0:
         rests = who[s.mode[who] == Mode.CARRIED]
         s.event(int(Kind.SETTLE), rests, s.machine.pulley.surface)
         s.finish(rests, "settled")

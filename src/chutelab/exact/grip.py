@@ -11,7 +11,7 @@ from chutelab.recording import Kind
 
 def load_on(s: Swarm, who: Ints, obstacle: Ints, c: Contact) -> Floats:
     """Return the normal force per mass that would keep a particle on an obstacle, m/s²."""
-    load = s.weight_on(c.normal)
+    load = s.weight_on(who, c.normal)
     curved = (obstacle >= s.obstacles.segments).nonzero()[0]
     if len(curved):
         rho = pick(s.obstacles.rho, who[curved], obstacle[curved] - s.obstacles.segments)
@@ -38,7 +38,7 @@ def settle_law(s: Swarm, who: Ints) -> None:
     else:
         w = np.where(still, c.belt, w)
     s.v[:, who] = w * c.tangent
-    pull, load = s.weight_along(c.normal), load_on(s, who, s.on[who], c)
+    pull, load = s.weight_along(who, c.normal), load_on(s, who, s.on[who], c)
     grips = still & below(s.share * np.abs(pull), c.friction, load)
     begins = grips & (s.slip[who] != 0.0)
     s.slip[who] = np.where(grips, 0.0, np.where(still, np.sign(pull), np.sign(slip)))
@@ -66,7 +66,7 @@ def end_slip(s: Swarm, who: Ints) -> None:
 
 def face_force(s: Swarm, who: Ints, c: Contact) -> tuple[Floats, Floats]:
     """Return acceleration (2, k) and friction force per mass along the tangent (k,) on a face."""
-    pull, load = s.weight_along(c.normal), s.weight_on(c.normal)
+    pull, load = s.weight_along(who, c.normal), s.weight_on(who, c.normal)
     slip = s.slip[who]
     gripping = slip == 0.0
     finite = np.where(np.isinf(c.friction) | gripping, 0.0, c.friction)

@@ -110,10 +110,11 @@ class Journal:
             owner, entries, surface = (_joined(books, n) for n in range(3))
             if self.count > 1:
                 order = _by_particle(owner)
-                surface, entries = surface[order], entries[:, order]
+                owner, surface, entries = owner[order], surface[order], entries[:, order]
+            place = (owner + self.first, surface) if recorder.apart else surface
             for column, row in enumerate(entries):
                 # One after the other, not pairwise: the sum does not depend on the blocks.
-                np.add.at(recorder.by_surface[:, column], surface, row)
+                np.add.at(recorder.by_surface[..., column], place, row)
 
     def _laid_out(self) -> NDArray[Any]:
         """Return the events, chunk by chunk, (E,)."""

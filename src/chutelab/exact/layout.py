@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from sys import float_info
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from chutelab.exact.obstacles import NONE, Floats, Ints, Obstacles
+from chutelab.many import Value, at
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -34,19 +35,21 @@ BOX_TOUCHES = 64.0
 def obstacles(machine: Machine, origin: tuple[float, float] = (0.0, 0.0)) -> Obstacles:
     """Resolve a machine's surfaces into obstacles, in coordinates from an origin.
 
-    How segments join is read off the first row where each particle has its own. Of segments that
+    How segments join, and whether particles are points, is read off the first row where each
+    particle has its own: see `chutelab.exact.kinds`. Of segments that
     lie on each other the first one counts, as it does when two are met at once.
     """
     seg, r, wheel = machine.segments, machine.particle.radius, machine.pulley
-    start, tangent, length = _vectors(seg.start), _vectors(seg.tangent), _scalars(seg.length)
-    far, places = max(map(abs, origin)), machine.releases.position
+    tangent, length = _vectors(seg.tangent), _scalars(seg.length)
+    far = max(map(abs, origin))
+    corners, places = corners_of(machine), machine.releases.position
     if far > 0.0:
-        start, places = start - np.reshape(origin, (2, 1, 1)), places - origin
-    corners = np.concatenate([start, start + length * tangent], axis=1)
-    size = max(float(np.abs(corners).max(initial=0.0)), float(np.abs(places).max()))
-    # Far away the scene's own numbers are rounded, each by half a last place.
-    touch = float_info.epsilon * (TOUCH_ULPS * size + GIVEN_ULPS * far)
-    spots = _spots(corners[..., 0], JOINT * size)
+        start = _vectors(seg.start) - np.reshape(origin, (2, 1, 1))
+        corners = np.concatenate([start, start + length * tangent], axis=1)
+        places = places - origin
+    size = size_of(corners, places)
+    touch = touch_of(size, far)
+    spots = spots_of(corners[..., 0], JOINT * at(size, 0))
     material, surface = _material(seg, tangent), seg.surface
     kept = _distinct(spots)
     if len(kept) < len(spots):
@@ -56,19 +59,21 @@ def obstacles(machine: Machine, origin: tuple[float, float] = (0.0, 0.0)) -> Obs
 
     # Segments, then their ends, then the pulley.
     flat, width = length.shape
-    ends, end_circle = _ends(spots, wheel is not None) if r > 0.0 else _points(flat)
+    disks = at(r, 0) > 0.0
+    ends, end_circle = _ends(spots, wheel is not None) if disks else _points(flat)
     owner = np.array([s for s, _ in ends], dtype=np.int64)
     center = corners.take(np.array([s + e * flat for s, e in ends], dtype=np.int64), axis=1)
     rho = np.full((len(ends), width), r)
     material = np.concatenate([material, material.take(owner, axis=1)], axis=1)
     surface = np.concatenate([surface, surface.take(owner)])
     owns = _owned(end_circle, len(ends))
-    pulley, pulley_speed = NONE, 0.0
+    pulley, pulley_speed = NONE, cast("Value", 0.0)
     if wheel is not None:
         pulley, pulley_speed = flat + len(ends), wheel.speed
         end_circle[0, 1] = pulley
-        own = np.array([0.0, 0.0, wheel.restitution, wheel.friction])
-        material = _more(material, own[:, None])
+        own = np.zeros((4, width))
+        own[2], own[3] = wheel.restitution, wheel.friction
+        material = _more(material, own)
         center, rho = _more(center, 0.0), _more(rho, wheel.radius + r)
         surface = np.append(surface, wheel.surface)
         owns = np.concatenate([owns, np.zeros((1, flat), dtype=bool)])
@@ -101,6 +106,26 @@ def obstacles(machine: Machine, origin: tuple[float, float] = (0.0, 0.0)) -> Obs
     )
 
 
+def corners_of(machine: Machine) -> Floats:
+    """Return all first ends of the segments, then all second ones, (2, 2 S, n), m."""
+    start = _vectors(machine.segments.start)
+    along = _scalars(machine.segments.length) * _vectors(machine.segments.tangent)
+    return np.concatenate([start, start + along], axis=1)
+
+
+def touch_of(size: Value, far: float = 0.0) -> Value:
+    """Return `Obstacles.touch` of a scene of a size, counted from a point that far away, m."""
+    # Far away the scene's own numbers are rounded, each by half a last place.
+    return float_info.epsilon * (TOUCH_ULPS * size + GIVEN_ULPS * far)
+
+
+def size_of(corners: Floats, places: Floats) -> Value:
+    """Return the largest coordinate, m; for each particle, (N,), where each has its own corners."""
+    if corners.shape[-1] == 1:
+        return max(float(np.abs(corners).max(initial=0.0)), float(np.abs(places).max()))
+    return np.maximum(np.abs(corners).max(axis=(0, 1), initial=0.0), np.abs(places).max(axis=1))
+
+
 def _material(segments: Segments, tangent: Floats) -> Floats:
     """Return `Obstacles.material` of the segments, (4, S, n)."""
     material = np.empty((4, *tangent.shape[1:]))
@@ -126,7 +151,7 @@ def _scalars(array: Floats) -> Floats:
     return array[:, None] if array.ndim == 1 else array.T.copy()
 
 
-def _spots(ends: Floats, tolerance: float) -> list[tuple[int, int]]:
+def spots_of(ends: Floats, tolerance: float) -> list[tuple[int, int]]:
     """Return numbers of the places where segments begin and end; within the tolerance one place.
 
     `ends` is (2, 2 S): all the first ones, then all the second ones.

@@ -16,6 +16,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from chutelab.many import Value, of
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
@@ -63,9 +65,9 @@ class Obstacles:
         Of which segments a circle is an end.
     pulley : int
         Obstacle number of the pulley, or -1.
-    pulley_speed : float
+    pulley_speed : float, or ndarray, (n,)
         Speed of the pulley's rim, clockwise, m/s.
-    touch : float
+    touch : float, or ndarray, (n,)
         m; gaps smaller than this are rounding.
     """
 
@@ -83,8 +85,8 @@ class Obstacles:
     end_circle: Ints
     owns: NDArray[np.bool_]
     pulley: int
-    pulley_speed: float
-    touch: float
+    pulley_speed: Value
+    touch: Value
 
     @property
     def segments(self) -> int:
@@ -153,7 +155,10 @@ class Obstacles:
             return self
         assert {f.name for f in fields(self)}.issuperset(PER_PARTICLE)
         return replace(
-            self, **{name: getattr(self, name)[..., first:last] for name in PER_PARTICLE}
+            self,
+            **{name: getattr(self, name)[..., first:last] for name in PER_PARTICLE},
+            pulley_speed=of(self.pulley_speed, slice(first, last)),
+            touch=of(self.touch, slice(first, last)),
         )
 
     def normal_at(self, rows: Ints, obstacle: Ints, side: Floats, position: Floats) -> Floats:
@@ -170,7 +175,7 @@ class Obstacles:
         return np.asarray(normal)
 
     def snapped(
-        self, rows: Ints, obstacle: Ints, side: Floats, position: Floats, r: float
+        self, rows: Ints, obstacle: Ints, side: Floats, position: Floats, r: Value
     ) -> Floats:
         """Positions, (2, k), put exactly at contact distance, so that rounding cannot add up.
 

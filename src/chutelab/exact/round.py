@@ -9,6 +9,7 @@ from chutelab.exact.grip import end_slip, settle_law
 from chutelab.exact.obstacles import Floats, Ints, dot, pick
 from chutelab.exact.swarm import Mode, Swarm
 from chutelab.exact.touch import rest_on, strike
+from chutelab.many import of
 from chutelab.recording import Kind
 from chutelab.ride import STEP_ANGLE, Circle, Outcome, advance, normal_force
 
@@ -21,7 +22,7 @@ def ride_on(s: Swarm, who: Ints, circle: Ints) -> None:
     c = s.contact(who, circle, np.zeros_like(side))
     rho = pick(s.obstacles.rho, who, circle - s.obstacles.segments)
     w = dot(s.v.take(who, axis=1), c.tangent)
-    stays = s.weight_on(c.normal) - w**2 / rho > 0.0
+    stays = s.weight_on(who, c.normal) - w**2 / rho > 0.0
     rest_on(s, who[stays], circle[stays], np.zeros_like(side[stays]), np.zeros(int(stays.sum())))
     off = ~stays
     s.part(who[off], surface[off])
@@ -43,12 +44,12 @@ def carry_round(s: Swarm, who: Ints) -> None:
     s.p[0, who] = 0.0
     rho, v = s.p[1, who], s.v[0, who]
     left = s.stop[who] - s.age[who]
-    cosine = np.minimum(v**2 / (s.gravity * rho), 1.0)
+    cosine = np.minimum(v**2 / (of(s.gravity, who) * rho), 1.0)
     end = np.arctan2(np.sqrt((1.0 - cosine) * (1.0 + cosine)), cosine)
     struck, found = np.zeros(len(who), dtype=bool), None
     if np.count_nonzero(end):
         pulley = np.full(len(who), o.pulley - o.segments)
-        found = bounds(o, who, pulley, rho, np.zeros(len(who)), s.radius)
+        found = bounds(o, who, pulley, rho, np.zeros(len(who)), of(s.radius, who))
         struck = ~found.high_handover & (found.high < end)
         end = np.where(struck, found.high, end)
         end = np.where(end * rho / v > left, left * v / rho, end)
@@ -74,7 +75,7 @@ def _ease_round(s: Swarm, who: Ints, rho: Floats, v: Floats, end: Floats) -> Non
         s.age[riders] = start[on] + rho[on] * part / v[on]
         # The belt lets the particle down: F v = -m g v sin φ, summed from the last knot.
         height = rho[on] * np.cos(part)
-        work = -s.mass * s.gravity * (above[on] - height)
+        work = -of(s.mass, riders) * of(s.gravity, riders) * (above[on] - height)
         s.book(riders, np.full(len(riders), surface), work)
         above[on] = height
         s.knots(riders)
@@ -90,7 +91,7 @@ def ride(s: Swarm, who: Ints) -> None:
         w=dot(s.v.take(who, axis=1), c.tangent),
         z=s.z[who],
         rho=rho,
-        gravity=np.full(len(who), s.gravity),
+        gravity=np.full(len(who), of(s.gravity, who)),
         friction=c.friction,
         belt=s.belt[who],
         slip=s.slip[who],
@@ -107,12 +108,13 @@ def ride(s: Swarm, who: Ints) -> None:
     center = s.p.take(who, axis=1) - rho * c.normal
     _place(s, who[go], rho[go], step.phi[go], step.w[go], center[:, go])
     s.z[who[go]] = step.z[go]
+    mass = of(s.mass, who)
     s.book(
         who[go],
         c.surface[go],
-        (s.mass * step.work * s.belt[who])[go],
+        (mass * step.work * s.belt[who])[go],
         0.0,
-        (s.mass * step.heat)[go],
+        (mass * step.heat)[go],
     )
     s.knots(who[go])
 

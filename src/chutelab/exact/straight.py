@@ -10,10 +10,11 @@ from chutelab.ballistics import descent
 from chutelab.exact.detect import FEW, first_contact
 from chutelab.exact.grip import end_slip, face_force, settle_law
 from chutelab.exact.motion import Motion
-from chutelab.exact.obstacles import NONE, Floats, Ints, dot, pick
+from chutelab.exact.obstacles import NONE, Floats, Ints, dot, pick, rows_of
 from chutelab.exact.round import carry_round, ride_on
 from chutelab.exact.swarm import Mode
 from chutelab.exact.touch import strike
+from chutelab.many import of
 from chutelab.recording import Kind
 
 if TYPE_CHECKING:
@@ -35,10 +36,10 @@ AT_REST = np.zeros((2, 1))
 
 def fly(s: Swarm, who: Ints) -> None:
     """Move particles in flight on to their next event and resolve it."""
-    motion = _motion(s, who, s.fall)
+    motion = _motion(s, who, rows_of(s.fall, who))
     stops, leaves = s.stop[who] - s.age[who], None
     # What falls meets surfaces before it leaves the scene: when that is matters to few.
-    if s.gravity == 0.0 or s.obstacles.segments > FEW:
+    if not s.falls or s.obstacles.segments > FEW:
         leaves = _exit(s, motion)
     dt, hits, meeting = _next(s, motion, stops if leaves is None else np.minimum(leaves, stops))
     free = ~hits
@@ -86,9 +87,10 @@ def slide(s: Swarm, who: Ints) -> None:
     stops = s.stop[who] - s.age[who]
     dt, hits, meeting = _next(s, motion, np.minimum(np.minimum(grips, ends), stops))
     mean = np.where(s.slip[who] == 0.0, 0.0, slip + 0.5 * rate * dt)
-    s.book(who, c.surface, s.mass * force * c.belt * dt, 0.0, -s.mass * force * mean * dt)
+    mass = of(s.mass, who)
+    s.book(who, c.surface, mass * force * c.belt * dt, 0.0, -mass * force * mean * dt)
     _move(s, motion, dt)
-    s.p[:, who] = s.obstacles.snapped(who, on, side, s.p, s.radius)
+    s.p[:, who] = s.obstacles.snapped(who, on, side, s.p, of(s.radius, who))
     if s.spins:
         s.z[who] += 2.0 * force * dt
     # What was left at the beginning is some way off now.
@@ -119,7 +121,7 @@ def _next(s: Swarm, motion: Motion, until: Floats) -> tuple[Floats, Bools, tuple
 
     Not longer than `until`; a contact at that very time comes first.
     """
-    time, obstacle, side = first_contact(motion, s.obstacles, s.radius, until)
+    time, obstacle, side = first_contact(motion, s.obstacles, of(s.radius, motion.rows), until)
     hits = time <= until
     dt = np.minimum(time, until)
     s.count_idle(motion.rows, dt)
@@ -133,7 +135,8 @@ def _move(s: Swarm, motion: Motion, dt: Floats) -> None:
     s.p[:, at] = place = motion.after(dt)
     if s.past is not None:
         middle = motion.after(0.5 * dt)
-        away = (np.abs(place - middle) > CLEAR * s.obstacles.touch).any(axis=0)
+        touch = of(s.obstacles.touch, motion.rows)
+        away = (np.abs(place - middle) > CLEAR * touch).any(axis=0)
         s.past.place[:, motion.rows[away]] = middle[:, away]
     s.v[:, at] = motion.velocity + dt * motion.acceleration
 
@@ -174,12 +177,13 @@ def _exit(s: Swarm, motion: Motion) -> Floats:
     """Time until a flight leaves the scene; never in a run that lasts a number of seconds."""
     if s.machine.until == "time":
         return np.full(len(motion.rows), np.inf)
-    left, right, bottom, top = s.world.exit_box
+    left, right, bottom, top = (of(side, motion.rows) for side in s.exit_box)
     (x, y), (vx, vy) = motion.position, motion.velocity
-    time = _when(y - bottom, vy, s.fall[1])
-    if s.gravity == 0.0:
+    fall = rows_of(s.fall, motion.rows)
+    time = _when(y - bottom, vy, fall[1])
+    if not s.falls:
         for gap, rate in ((x - left, vx), (right - x, -vx), (top - y, -vy)):
-            time = np.minimum(time, _when(gap, rate, s.fall[0]))
+            time = np.minimum(time, _when(gap, rate, fall[0]))
     return time
 
 

@@ -13,6 +13,7 @@ from chutelab.exact.journal import STATE, Journal
 from chutelab.exact.motion import Past
 from chutelab.exact.obstacles import NONE, Floats, Ints, along, dot, pick
 from chutelab.impact import DISK_SHARE
+from chutelab.many import Value, at, of
 from chutelab.recorder import StalledError
 from chutelab.recording import REASONS, Kind
 
@@ -63,6 +64,10 @@ class Swarm:
         Age (s), position (m), velocity and r ω (m/s), ledger entries (J): a knot, but for the time.
     age, p, v, z, entries : ndarray, (k,), (2, k) or (3, k)
         Views of it.
+    radius, mass, gravity : float, or ndarray, (k,)
+        m, kg, m/s²; arrays in a family of machines.
+    falls, spins : bool
+        Whether there is gravity, and whether the particles are free disks.
     past : Past or None
         See `detect.Motion`.
     mode : ndarray, (k,)
@@ -93,10 +98,12 @@ class Swarm:
         self.obstacles = world.obstacles.of(first, last)
         self.origin = np.reshape(world.origin, (2, 1)) if any(world.origin) else None
         self.journal = Journal(first, count)
-        self.radius, self.mass = machine.particle.radius, machine.particle.mass
-        self.gravity = machine.gravity
-        self.fall = np.array([[0.0], [-machine.gravity]])
-        self.spins = machine.particle.inertia > 0.0
+        mine, particle = slice(first, last), machine.particle
+        self.radius, self.mass = of(particle.radius, mine), of(particle.mass, mine)
+        self.gravity = of(machine.gravity, mine)
+        self.fall = np.zeros((2, np.size(self.gravity)))
+        np.negative(self.gravity, out=self.fall[1])
+        self.falls, self.spins = bool(self.fall[1, 0]), bool(at(particle.inertia, 0) > 0.0)
         self.share = DISK_SHARE if self.spins else 1.0
         start = machine.releases
         self.released = start.t[first:last]
@@ -112,14 +119,22 @@ class Swarm:
         self.order, self.idle, self.crawls = np.zeros((3, count), dtype=np.int64)
         self.side, self.left_side, self.belt, self.slip = np.zeros((4, count))
         self.slip += 1.0
-        self.stop = machine.end_time - self.released
+        self.stop = of(machine.end_time, mine) - self.released
         self.landed = np.zeros(count, dtype=bool)
         self.past: Past | None = None
-        if self.radius <= self.obstacles.touch:
+        if at(self.radius, 0) <= at(self.obstacles.touch, 0):
             self.past = Past(np.full(count, NONE), np.zeros(count), self.p.copy())
         self.idling = self.crawling = False
         self.ended = np.zeros(count, dtype=np.int8)
         self.first, self.rounds = first, 0
+
+    @cached_property
+    def exit_box(self) -> tuple[Value, Value, Value, Value]:
+        """Left, right, bottom and top beyond which each particle has left the scene, m."""
+        left, right, bottom, top = (
+            of(side, slice(self.first, self.first + len(self.mode))) for side in self.world.exit_box
+        )
+        return left, right, bottom, top
 
     @cached_property
     def bounds(self) -> Bounds:
@@ -164,7 +179,7 @@ class Swarm:
 
     def omega(self, who: Ints) -> Floats:
         """Angular velocities, rad/s."""
-        return self.z[who] / self.radius if self.spins else np.zeros(len(who))
+        return self.z[who] / of(self.radius, who) if self.spins else np.zeros(len(who))
 
     def contact(self, who: Ints, obstacle: Ints, side: Floats) -> Contact:
         """Return what a contact with an obstacle is like where the particles are now."""
@@ -172,8 +187,9 @@ class Swarm:
         normal = o.normal_at(who, obstacle, side, self.p)
         tangent, material = along(normal), pick(o.material, who, obstacle)
         belt = dot(material[:2], tangent)
-        if o.pulley_speed != 0.0:
-            belt[obstacle == o.pulley] = o.pulley_speed
+        if at(o.pulley_speed, 0) != 0.0:
+            round_ = (obstacle == o.pulley).nonzero()[0]
+            belt[round_] = of(o.pulley_speed, who[round_])
         return Contact(normal, tangent, belt, material[3], material[2], o.surface[obstacle])
 
     def at(self, who: Ints) -> Ints | slice:
@@ -188,7 +204,7 @@ class Swarm:
         if self.origin is not None:
             state[1:3] += self.origin
         if self.spins:
-            state[5] /= self.radius
+            state[5] /= self.radius if everyone else of(self.radius, who)
         return state
 
     def knots(self, who: Ints) -> None:
@@ -234,13 +250,13 @@ class Swarm:
         """Tell that particles leave a surface."""
         self.event(int(Kind.SEPARATION), who, surface)
 
-    def weight_on(self, normal: Floats) -> Floats:
+    def weight_on(self, who: Ints, normal: Floats) -> Floats:
         """Component of gravity into a surface of that normal, m/s²."""
-        return np.asarray(self.gravity * normal[1])
+        return np.asarray(of(self.gravity, who) * normal[1])
 
-    def weight_along(self, normal: Floats) -> Floats:
+    def weight_along(self, who: Ints, normal: Floats) -> Floats:
         """Component of gravity along (n_y, -n_x), m/s²."""
-        return np.asarray(self.gravity * normal[0])
+        return np.asarray(of(self.gravity, who) * normal[0])
 
     def slip_of(self, who: Ints, contact: Contact, w: Floats) -> Floats:
         """Slip of the contact point against the surface at a pace w, (k,), m/s.

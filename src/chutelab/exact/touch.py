@@ -13,6 +13,7 @@ from chutelab.exact.grip import face_force, load_on, settle_law
 from chutelab.exact.obstacles import NONE, Floats, Ints, dot, length_of, pick
 from chutelab.exact.swarm import COLLAPSE, Contact, Mode, Swarm
 from chutelab.impact import impulses, limited
+from chutelab.many import of
 from chutelab.recording import Kind
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ def strike(s: Swarm, who: Ints, obstacle: Ints, side: Floats) -> None:
     carried = s.mode[who] == Mode.CARRIED
     if np.count_nonzero(carried):
         s.part(who[carried], 0)
-    s.p[:, s.at(who)] = s.obstacles.snapped(who, obstacle, side, s.p, s.radius)
+    s.p[:, s.at(who)] = s.obstacles.snapped(who, obstacle, side, s.p, of(s.radius, who))
     c = s.contact(who, obstacle, side)
     before = s.v.take(who, axis=1)
     approach = np.maximum(-dot(before, c.normal), 0.0)
@@ -136,19 +137,19 @@ def _blow(
     s.v[:, s.at(who)] = rebound * c.normal + (along + tangential) * c.tangent
     if s.spins:
         s.z[who] += 2.0 * tangential
-    after = slip + tangential / s.share
+    after, mass = slip + tangential / s.share, of(s.mass, who)
     s.book(
         who,
         c.surface,
-        s.mass * tangential * c.belt,
-        0.5 * s.mass * (approach - rebound) * (approach + rebound),
-        -0.5 * s.mass * tangential * (slip + after),
+        mass * tangential * c.belt,
+        0.5 * mass * (approach - rebound) * (approach + rebound),
+        -0.5 * mass * tangential * (slip + after),
     )
     state = s.now(who)
     s.journal.knots(who, state)
     told = (approach > NEGLIGIBLE) | landing | (tangential != 0.0)
     kind = np.where(landing, int(Kind.LANDING), int(Kind.IMPACT))
-    surface, push, rub = c.surface, s.mass * normal, s.mass * tangential
+    surface, push, rub = c.surface, mass * normal, mass * tangential
     count = int(np.count_nonzero(told))
     s.journal.contacts += count
     if count < len(told):
@@ -211,7 +212,7 @@ def _last_bounces(s: Swarm, who: Ints, obstacle: Ints, side: Floats, rebound: Fl
     if not len(who):
         return
     c = s.contact(who, obstacle, side[hops])
-    weight, pull = s.weight_on(c.normal), s.weight_along(c.normal)
+    weight, pull = s.weight_on(who, c.normal), s.weight_along(who, c.normal)
     # Without loss the series never ends; its motion is below what is resolved, so it is dropped.
     lost = np.where(c.restitution < 1.0, 1.0 - c.restitution, np.inf)
     time = np.minimum(2.0 * u / (weight * lost), s.stop[who] - s.age[who])
@@ -227,12 +228,13 @@ def _last_bounces(s: Swarm, who: Ints, obstacle: Ints, side: Floats, rebound: Fl
     s.v[:, who] = (w + tangential) * c.tangent
     if s.spins:
         s.z[who] += 2.0 * tangential
+    mass = of(s.mass, who)
     s.book(
         who,
         c.surface,
-        s.mass * tangential * c.belt,
-        0.5 * s.mass * u * u,
-        -0.5 * s.mass * tangential * (2.0 * slip + tangential / s.share),
+        mass * tangential * c.belt,
+        0.5 * mass * u * u,
+        -0.5 * mass * tangential * (2.0 * slip + tangential / s.share),
     )
     s.knots(who)
 
@@ -246,6 +248,6 @@ def _ride(s: Swarm, who: Ints) -> None:
     circle = s.on[who] - s.obstacles.segments
     phi = np.arctan2(c.normal[0], c.normal[1])
     rho = pick(s.obstacles.rho, who, circle)
-    found = bounds(s.obstacles, who, circle, rho, phi, s.radius)
+    found = bounds(s.obstacles, who, circle, rho, phi, of(s.radius, who))
     for field in fields(found):
         getattr(s.bounds, field.name)[who] = getattr(found, field.name)

@@ -12,6 +12,7 @@ from chutelab.machine import origin
 if TYPE_CHECKING:
     from chutelab.exact.obstacles import Obstacles
     from chutelab.machine import Machine
+    from chutelab.many import Value
 
 
 @dataclass(eq=False)
@@ -39,7 +40,7 @@ class World:
         return cls(machine, place, obstacles(machine, place))
 
     @cached_property
-    def exit_box(self) -> tuple[float, float, float, float]:
+    def exit_box(self) -> tuple[Value, Value, Value, Value]:
         """Left, right, bottom and top of `Machine.exit_box`, from the origin, m."""
         left, right, bottom, top = self.machine.exit_box
         x, y = self.origin

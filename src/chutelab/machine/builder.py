@@ -14,14 +14,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chutelab.machine.clearance import cleared
+from chutelab.machine.family import RefusedError
 from chutelab.machine.parts import Machine, Pulley, Segments
+from chutelab.many import Value, at, each, larger, smaller, some
 from chutelab.nominal import Discharge, discharge, plate_hit
 from chutelab.recording import Particle
 from chutelab.releases import draw
 from chutelab.scene import Fault, SceneError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
 
     from chutelab.scene import Scene
 
@@ -36,7 +40,13 @@ CLEARANCE_RADII = 3.0
 
 
 def build(scene: Scene) -> Machine:
-    """Resolve a validated scene.
+    """Resolve a validated scene, or a family of them.
+
+    Parameters
+    ----------
+    scene : Scene
+        Of a family (see `chutelab.scene.family`) each is resolved as it would be by itself, to the
+        bit; the machine has one particle for each, with surfaces of its own.
 
     Raises
     ------
@@ -44,11 +54,12 @@ def build(scene: Scene) -> Machine:
         If the geometry contradicts itself: the nominal flight misses the plate whose impact should
         place the outgoing belt, the impact lies off the finite plate, a particle starts inside a
         surface, or interacting particles cannot be released without overlap.
+    RefusedError
+        Likewise of a family: which of them, and why.
     """
     builder = _Builder(scene)
-    start = discharge(scene)
-    belt_height = builder.incoming_and_plate(start)
-    if scene.outgoing is not None and belt_height is not None:
+    belt_height = builder.incoming_and_plate(discharge(scene))
+    if scene.outgoing is not None:
         out = scene.outgoing
         builder.add(
             "outgoing",
@@ -68,112 +79,147 @@ class _Builder:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self.names: list[str] = []
-        self.rows: list[tuple[float, ...]] = []
+        self.rows: list[tuple[Value, ...]] = []
         self.owner: list[int] = []
         self.warnings: list[str] = []
 
     def add(
         self,
         name: str,
-        points: Sequence[tuple[float, float]],
-        speed: float,
-        restitution: float,
-        friction: float,
+        points: Sequence[tuple[Value, Value]],
+        speed: Value,
+        restitution: Value,
+        friction: Value,
     ) -> None:
         self.names.append(name)
         for (x0, y0), (x1, y1) in pairwise(points):
             self.rows.append((x0, y0, x1, y1, speed, restitution, friction))
             self.owner.append(len(self.names) - 1)
 
-    def incoming_and_plate(self, start: Discharge | None) -> float | None:
+    def incoming_and_plate(self, start: Discharge) -> Value | None:
         """Add the belt and the plate; return the height of the outgoing belt's surface."""
         scene = self.scene
         if scene.incoming is None:
             return None
         belt = scene.incoming
-        top = belt.pulley_radius
-        grip = inf if belt.friction == "adhesion" else float(belt.friction)
-        self.add("incoming", [(-belt.length, top), (0.0, top)], belt.speed, belt.restitution, grip)
+        top: Value = belt.pulley_radius
+        self.add("incoming", [(-belt.length, top), (0.0, top)], belt.speed, belt.restitution,
+                 _grip(belt.friction))  # fmt: skip
         plate, out, r = scene.plate, scene.outgoing, scene.particle.radius
-        hit = plate_hit(scene, start) if plate is not None and start is not None else None
-        height: float | None = None
+        hit = plate_hit(scene, start)
+        missed = hit[1] != hit[1]  # NaN
+        height: Value | None = None
         if out is not None and out.drop_from == "top":
             height = top - out.drop
         elif out is not None:
-            if hit is None:
-                raise self._fault(
-                    "outgoing.drop_from",
-                    "impact",
+            self._refuse(
+                missed,
+                "outgoing.drop_from",
+                "impact",
+                lambda _: (
                     "the nominal particle never meets the plate, so there is no impact to measure"
-                    ' from; set outgoing.drop_from = "top"',
-                )
+                    ' from; set outgoing.drop_from = "top"'
+                ),
+            )
             height = hit[1] - out.drop - r
         if plate is None:
             return height
-        alpha = radians(plate.angle_deg)
-        x, y = top + plate.distance, float(plate.pivot_height or 0.0)
+        alpha = each(radians, plate.angle_deg)
+        sine, cosine = each(sin, alpha), each(cos, alpha)
+        x, y = top + plate.distance, plate.pivot_height
+        below: Value
         if plate.below is not None:
             below = plate.below
         elif height is None:
             below = REACH_WITHOUT_BELT
         else:
-            below = max(0.0, (y - height - max(CLEARANCE, CLEARANCE_RADII * r)) / cos(alpha))
-        if below + plate.above <= 0.0:
-            raise self._fault("plate.above", plate.above, "above + below must be more than 0 m")
-        # Upwards, so that the struck face (-cos α, -sin α) lies to the left of the tangent.
-        low, high = (
-            (x - reach * sin(alpha), y + reach * cos(alpha)) for reach in (-below, plate.above)
+            below = larger((y - height - larger(CLEARANCE, CLEARANCE_RADII * r)) / cosine, 0.0)
+        self._refuse(
+            below + plate.above <= 0.0,
+            "plate.above",
+            plate.above,
+            lambda _: "above + below must be more than 0 m",
         )
+        # Upwards, so that the struck face (-cos α, -sin α) lies to the left of the tangent.
+        low, high = ((x - reach * sine, y + reach * cosine) for reach in (-below, plate.above))
         self.add("plate", [low, high], 0.0, plate.restitution, plate.friction)
-        if hit is None:
+        if some(missed):
             self.warnings.append("plate: the nominal particle never meets the plate's line")
-        else:
-            self._check_hit((y - hit[1]) * -cos(alpha) + (x - hit[0]) * sin(alpha), below)
+        self._check_hit((y - hit[1]) * -cosine + (x - hit[0]) * sine, below)
         return height
 
-    def _check_hit(self, along: float, below: float) -> None:
-        """Look whether a hit that far above the pivot, m, is on the plate."""
+    def _check_hit(self, along: Value, below: Value) -> None:
+        """Look whether a hit that far above the pivot, m, is on the plate; NaN is no hit."""
         scene = self.scene
         assert scene.plate is not None
-        if -below <= along <= scene.plate.above:
+        above: Value = scene.plate.above
+        off = (along < -below) | (along > above)
+        if not some(off):
             return
-        where = (
-            f"the nominal particle meets the plate's line {abs(along):.4g} m"
-            f" {'above' if along > 0 else 'below'} the pivot"
-        )
-        if scene.outgoing is not None and scene.outgoing.drop_from == "impact":
-            key = "plate.above" if along > 0 else "plate.below"
-            value = scene.plate.above if along > 0 else below
-            enough = ceil(1e4 * abs(along)) / 1e4
-            raise self._fault(
-                key,
-                value,
-                f"{where}, off the finite plate: lengthen it to at least {enough:g} m,"
-                ' or set outgoing.drop_from = "top"',
-            )
-        self.warnings.append(f"plate: {where}, off the finite plate")
 
-    def _fault(self, key: str, value: object, allowed: str) -> SceneError:
-        return SceneError(self.scene.source, [Fault(key, value, allowed)])
+        def told(place: int) -> str:
+            where = at(along, place)
+            return (
+                f"the nominal particle meets the plate's line {abs(where):.4g} m"
+                f" {'above' if where > 0 else 'below'} the pivot, off the finite plate"
+            )
+
+        def allowed(place: int) -> str:
+            enough = ceil(1e4 * abs(at(along, place))) / 1e4
+            return (
+                f"{told(place)}: lengthen it to at least {enough:g} m,"
+                ' or set outgoing.drop_from = "top"'
+            )
+
+        if scene.outgoing is not None and scene.outgoing.drop_from == "impact":
+            self._refuse(off & (along > 0.0), "plate.above", above, allowed)
+            self._refuse(off & (along < 0.0), "plate.below", below, allowed)
+        elif scene.members is None:
+            self.warnings.append(f"plate: {told(0)}")
+
+    def _refuse(self, bad: Value, key: str, value: Value, allowed: Callable[[int], str]) -> None:
+        """Raise if something is wrong; of a family, with those of which it is."""
+        if not some(bad):
+            return
+        if self.scene.members is None:
+            raise SceneError(self.scene.source, [Fault(key, value, allowed(0))])
+        raise RefusedError(
+            {
+                place: str(Fault(key, at(value, place), allowed(place)))
+                for place in np.flatnonzero(np.broadcast_to(bad, self.scene.members)).tolist()
+            }
+        )
+
+    def _columns(self) -> NDArray[np.float64]:
+        """Return ends, speed, restitution and friction of the segments, (7, S) or (7, S, N)."""
+        count = self.scene.members
+        if count is None:
+            return np.array(self.rows, dtype=np.float64).reshape(-1, 7).T.copy()
+        columns = np.empty((7, len(self.rows), count))
+        for s, row in enumerate(self.rows):
+            for column, value in zip(columns, row, strict=True):
+                column[s] = value
+        return columns
 
     def machine(self) -> Machine:
         scene = self.scene
-        columns = np.array(self.rows, dtype=np.float64).reshape(-1, 7).T.copy()
+        columns = self._columns()
         speed, restitution, friction = columns[4:]
         along = columns[2:4] - columns[0:2]
         length = np.hypot(along[0], along[1])
         particle = Particle(
             radius=scene.particle.radius,
             mass=scene.particle.mass,
-            inertia=0.5 * scene.particle.mass * scene.particle.radius**2
+            inertia=0.5 * scene.particle.mass * (scene.particle.radius * scene.particle.radius)
             if scene.particle.spin
             else 0.0,
         )
         pulley = None
         if scene.incoming is not None:
             belt = scene.incoming
-            grip = inf if belt.friction == "adhesion" else float(belt.friction)
-            pulley = Pulley(belt.pulley_radius, belt.speed, grip, belt.restitution, 0)
+            pulley = Pulley(
+                belt.pulley_radius, belt.speed, _grip(belt.friction), belt.restitution, 0
+            )
         releases = cleared(scene, draw(scene), self.rows, self.owner, self.names)
         bound = float(releases.t[-1]) + scene.run.max_time
         until = scene.run.until
@@ -186,17 +232,17 @@ class _Builder:
             segments=Segments(
                 start=columns[0:2].T,
                 tangent=(along / length).T,
-                length=length,
-                speed=speed,
-                restitution=restitution,
-                friction=friction,
+                length=length.T,
+                speed=speed.T,
+                restitution=restitution.T,
+                friction=friction.T,
                 surface=np.array(self.owner, dtype=np.int64),
             ),
             pulley=pulley,
             releases=releases,
             landing=self.names.index("outgoing") if "outgoing" in self.names else -1,
             until=until if isinstance(until, str) else "time",
-            end_time=bound if isinstance(until, str) else min(bound, until),
+            end_time=bound if isinstance(until, str) else smaller(bound, until),
             dt=scene.run.dt,
             align=scene.run.align,
             interact=scene.stream.interact and scene.stream.count > 1,
@@ -205,3 +251,7 @@ class _Builder:
             engine=scene.run.engine,
             plate_warnings=tuple(self.warnings),
         )
+
+
+def _grip(friction: Value) -> Value:
+    return inf if isinstance(friction, str) else friction

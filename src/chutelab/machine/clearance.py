@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chutelab.machine.family import RefusedError
+from chutelab.many import Value, larger, smaller, some
 from chutelab.releases import ON_BELT, Releases, release_point
 from chutelab.scene import Fault, SceneError
 
@@ -19,7 +21,7 @@ if TYPE_CHECKING:
     from chutelab.scene import Scene
 
     Floats = NDArray[np.float64]
-    Row = tuple[float, ...]
+    Row = tuple[Value, ...]
 
 ROUNDING = 64.0 * float_info.epsilon
 """Share of the largest coordinate by which a contact may seem to overlap: the engines see to it."""
@@ -43,7 +45,7 @@ def cleared(
     releases : Releases
         As drawn.
     rows : sequence of tuple of float
-        Each segment's ends x0, y0, x1, y1, and more.
+        Each segment's ends x0, y0, x1, y1, and more; arrays (N,) in a family.
     owner, names : sequence of int and of str
         Which surface a segment belongs to, and what surfaces are called.
 
@@ -51,26 +53,38 @@ def cleared(
     ------
     SceneError
         If a particle starts further inside a surface.
+    RefusedError
+        If a particle of a family starts near one: each such scene has to be looked at by itself.
     """
-    r = scene.particle.radius
-    if r == 0.0:
+    r: Value = scene.particle.radius
+    if not some(r > 0.0):
         return releases
     # All start in one column, above the release point.
     x, low = release_point(scene)
-    high = float(releases.position[:, 1].max())
+    high = low if scene.members is not None else float(releases.position[:, 1].max())
     carried = bool(releases.carried[0])
     for n, (x0, y0, x1, y1, *_) in enumerate(rows):
-        apart = (
-            max(x0, x1) <= x - r or min(x0, x1) >= x + r
-            or max(y0, y1) <= low - r or min(y0, y1) >= high + r
+        near = (
+            (larger(x0, x1) > x - r) & (smaller(x0, x1) < x + r)
+            & (larger(y0, y1) > low - r) & (smaller(y0, y1) < high + r)
         )  # fmt: skip
-        if not apart and not (carried and owner[n] == 0):
+        if some(near) and not (carried and owner[n] == 0):
+            _one_by_one(scene, near)
             releases = _out(scene, releases, (x0, y0), (x1, y1), r, names[owner[n]])
     if scene.incoming is not None and not carried:
         reach = scene.incoming.pulley_radius + r
-        if abs(x) < reach and low < reach and high > -reach:
+        near = (abs(x) < reach) & (low < reach) & (high > -reach)
+        if some(near):
+            _one_by_one(scene, near)
             releases = _out(scene, releases, (0.0, 0.0), (0.0, 0.0), reach, "incoming")
     return releases
+
+
+def _one_by_one(scene: Scene, near: Value) -> None:
+    """Refuse to look closer at scenes of a family."""
+    if scene.members is not None:
+        places = np.flatnonzero(np.broadcast_to(near, scene.members))
+        raise RefusedError(dict.fromkeys(places.tolist(), ""))
 
 
 def _out(

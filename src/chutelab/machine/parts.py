@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from chutelab.machine.crossings import crossings
+from chutelab.many import Value, larger, smaller
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -71,6 +72,8 @@ class Pulley:
         Pair values; friction is inf with adhesion.
     surface : int
         Index into `Machine.surfaces`.
+
+    Numbers are arrays (N,) in a family, see `Machine`.
     """
 
     radius: float
@@ -83,6 +86,9 @@ class Pulley:
 @dataclass(frozen=True, eq=False)
 class Machine:
     """Everything an engine needs to run.
+
+    A family of machines, one for each particle, is one machine in which segments, gravity, radius
+    and mass of the particle, the pulley's numbers and the end time have a value for each, (N,).
 
     Attributes
     ----------
@@ -160,22 +166,20 @@ class Machine:
         return (*self.plate_warnings, *crossings(self.surfaces, ends, owner, radius))
 
     @property
-    def exit_box(self) -> tuple[float, float, float, float]:
+    def exit_box(self) -> tuple[Value, Value, Value, Value]:
         """Left, right, bottom and top (m) beyond which a particle has left the scene.
 
-        With gravity only the bottom is finite: what flies up comes back.
+        With gravity only the bottom is finite: what flies up comes back. In a family, all have
+        gravity or none.
         """
         start, end = self.segments.start, self.segments.end
         if not start.size:
             start = end = self.releases.position
         wheel = self.pulley.radius if self.pulley is not None else -inf
-        (left, right), (bottom, top) = (
-            (
-                min(float(start[..., axis].min()), float(end[..., axis].min()), -wheel),
-                max(float(start[..., axis].max()), float(end[..., axis].max()), wheel),
-            )
-            for axis in (0, 1)
-        )
-        if self.gravity > 0.0:
+        ends = np.concatenate([start, end], axis=-2)
+        low, high = ends.min(axis=-2), ends.max(axis=-2)
+        left, bottom = (smaller(low[..., axis], -wheel) for axis in (0, 1))
+        right, top = (larger(high[..., axis], wheel) for axis in (0, 1))
+        if np.all(np.greater(self.gravity, 0.0)):
             return -inf, inf, bottom - EXIT_MARGIN, inf
         return left - EXIT_MARGIN, right + EXIT_MARGIN, bottom - EXIT_MARGIN, top + EXIT_MARGIN

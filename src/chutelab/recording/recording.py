@@ -72,7 +72,8 @@ class Recording(Shown):
     events : ndarray, shape (E,), dtype `EVENT`
         Sorted by time; at one time by particle, and of one particle as they came.
     by_surface : ndarray, shape (len(surfaces), 3)
-        Ledger entries (J) of each surface, summed over particles.
+        Ledger entries (J) of each surface, summed over particles. Of a family of machines (see
+        `chutelab.exact.run`), and of none else, those of each particle, (N, len(surfaces), 3).
     steps : int
         Steps (pymunk) or rounds (exact) taken.
     contacts : int

@@ -11,6 +11,7 @@
 - `overrides`: ``KEY=VALUE`` texts, as ``--set`` takes them, laid over a scene.
 - `loading`: read, parse, override, validate.
 - `editor`: the JSON Schema, for editors that complete scene files.
+- `family`: many scenes that differ in numbers, as one.
 - `library`: the shipped scenes, found by name; the starter scene.
 """
 

@@ -75,7 +75,7 @@ def from_dict(
     SceneError
         With all faults.
     """
-    document: dict[str, Any] = _plain(mapping)
+    document: dict[str, Any] = plain(mapping)
     faults, given = _overrides.apply(document, overrides)
     empty = not document
     if source != "<scene>":
@@ -99,13 +99,13 @@ def to_dict(scene: Scene) -> dict[str, Any]:
     return scene.model_dump(by_alias=True, exclude_unset=True)
 
 
-def _plain(value: object) -> Any:
+def plain(value: object) -> Any:
     """Copy a mapping as `tomllib` would have made it: of dicts and lists, with texts as keys."""
     match value:
         case Mapping():
-            return {str(key): _plain(content) for key, content in value.items()}
+            return {str(key): plain(content) for key, content in value.items()}
         case list() | tuple():
-            return [_plain(item) for item in value]
+            return [plain(item) for item in value]
     return value
 
 

@@ -221,6 +221,7 @@ class Scene(Table):
     expect: tuple[Expect, ...] = Field((), max_length=MOST_EXPECTATIONS)
 
     _source: str = PrivateAttr("<scene>")
+    _members: int | None = PrivateAttr(None)
 
     @classmethod
     def tables(cls) -> dict[str, type[Table]]:
@@ -241,6 +242,17 @@ class Scene(Table):
         """The file the scene was read from, or ``<scene>``; for messages."""
         return self._source
 
+    @property
+    def surfaces(self) -> tuple[str, ...]:
+        """Names of its surfaces, as the ledger has them."""
+        tables = [name for name in ("incoming", "plate", "outgoing") if getattr(self, name)]
+        return (*tables, *(free.name for free in self.surface))
+
+    @property
+    def members(self) -> int | None:
+        """How many scenes a family holds, see `chutelab.scene.family`; None for one scene."""
+        return self._members
+
     def __eq__(self, other: object) -> bool:
         # The same machine from another file is the same scene.
         return self.__dict__ == other.__dict__ if isinstance(other, Scene) else NotImplemented
@@ -250,11 +262,14 @@ class Scene(Table):
         faults = list(conflicts(Look(self.model_dump(by_alias=True, warnings=False), Scene)))
         if faults:
             raise ConflictError(faults)
+        self._fill_defaults()
+        return self
+
+    def _fill_defaults(self) -> None:
         self._fill_table("run", "until", "landed" if self.outgoing else "settled")
         if self.incoming:
             self._fill_table("plate", "pivot_height", self.incoming.pulley_radius)
             self._fill_table("outgoing", "speed", self.incoming.speed)
-        return self
 
     def _fill_table(self, table: str, key: str, value: object) -> None:
         given = getattr(self, table)

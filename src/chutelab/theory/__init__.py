@@ -8,7 +8,8 @@ chute with the damping plate", Mech. Sci. 7, 167-177, 2016, doi:10.5194/ms-7-167
 - `reasons`: `Reason`, why there is no answer.
 - `stages`: separate, fly, rebound, fall; one method each, the equations tagged.
 - `separation`: how the pulley is left: adhesion, slip at finite friction, a rolling disk.
-- `predict`: particle 0 of a scene, or the reason why the closed form does not hold for it.
+- `predict`: particle 0 of a scene, or the reason why the closed form does not hold for it;
+  `unbounded`: the same without looking at the finite machine.
 - `course`: a scene's numbers and its finite machine, for `predict`.
 - `obstacles`: first contacts of a disk with finite surfaces.
 - `tables`: the paper's tables beside what the equations give; `printed`: their digits.
@@ -16,7 +17,7 @@ chute with the damping plate", Mech. Sci. 7, 167-177, 2016, doi:10.5194/ms-7-167
 Only NumPy and `chutelab.scene` are imported.
 """
 
-from chutelab.theory.predict import predict
+from chutelab.theory.predict import predict, unbounded
 from chutelab.theory.reasons import Reason
 from chutelab.theory.results import STAGES, Transfer
 from chutelab.theory.tables import TABLES, Table, table
@@ -32,4 +33,5 @@ __all__ = [
     "predict",
     "table",
     "transfer",
+    "unbounded",
 ]

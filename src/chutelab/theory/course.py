@@ -17,7 +17,7 @@ from chutelab.theory.obstacles import Flight
 from chutelab.theory.transfer import transfer
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from chutelab.scene import Incoming, Plate, Scene
     from chutelab.theory.results import Transfer
@@ -45,16 +45,27 @@ class Course:
         self.plate: Plate = scene.plate
         self.radius = scene.particle.radius
         self.ride_radius = self.belt.pulley_radius + self.radius
-        self.angle = float(np.radians(self.plate.angle_deg))
-        self.up = np.array([-np.sin(self.angle), np.cos(self.angle)])
-        self.normal = np.array([-np.cos(self.angle), -np.sin(self.angle)])
-        self.pivot = np.array(
-            [self.belt.pulley_radius + self.plate.distance, self.plate.pivot_height]
-        )
+        self.angle = np.radians(self.plate.angle_deg)
+
+    @cached_property
+    def up(self) -> NDArray[np.float64]:
+        """Unit vector up along the plate, (2,)."""
+        return np.array([-np.sin(self.angle), np.cos(self.angle)])
+
+    @cached_property
+    def normal(self) -> NDArray[np.float64]:
+        """Unit vector out of the struck face, (2,)."""
+        return np.array([-np.cos(self.angle), -np.sin(self.angle)])
+
+    @cached_property
+    def pivot(self) -> NDArray[np.float64]:
+        """Where the plate is hung, (2,), m."""
+        ahead = self.belt.pulley_radius + self.plate.distance
+        return np.array([ahead, self.plate.pivot_height], dtype=np.float64)
 
     @cached_property
     def found(self) -> Transfer:
-        """What the equations say about unbounded plate and belt."""
+        """What the equations say about unbounded plate and belt; of a family, arrays (N,)."""
         out = self.scene.outgoing
         if out is None:
             return self._transfer(drop=0.0, belt_speed=0.0)
@@ -63,9 +74,9 @@ class Course:
         impact = self._transfer(drop=0.0, belt_speed=out.speed)
         # Eq. (16) solved for d2; `predict` refuses a belt above the impact
         sunk = self.ride_radius * (1.0 - np.cos(impact.phi1)) + impact.y2
-        return self._transfer(drop=max(float(out.drop - sunk), 0.0), belt_speed=out.speed)
+        return self._transfer(drop=np.maximum(out.drop - sunk, 0.0), belt_speed=out.speed)
 
-    def _transfer(self, **outgoing: float) -> Transfer:
+    def _transfer(self, **outgoing: ArrayLike) -> Transfer:
         scene = self.scene
         grip = self.belt.friction
         return transfer(
@@ -78,7 +89,7 @@ class Course:
             particle_radius=self.radius,
             mass=scene.particle.mass,
             gravity=scene.gravity,
-            friction=np.inf if grip == "adhesion" else float(grip),
+            friction=np.inf if isinstance(grip, str) else grip,
             spin=scene.particle.spin,
             plate_friction=self.plate.friction,
             interval=1.0 / scene.stream.rate,

@@ -59,6 +59,25 @@ def predict(scene: Scene, rebound: Rebound = "corrected") -> Transfer:
     return _answer(Course(scene, rebound))
 
 
+def unbounded(scene: Scene) -> Transfer:
+    """Return what the equations say of a scene if nothing else were in the way.
+
+    Plate and outgoing belt are without ends, the pulley is met no more, and what the scene says of
+    releases is not looked at.
+
+    Parameters
+    ----------
+    scene : Scene
+        With an incoming conveyor and a plate; or a family of such, see `chutelab.scene.family`.
+
+    Returns
+    -------
+    Transfer
+        0-d arrays; of a family, (N,).
+    """
+    return Course(scene, "corrected").found
+
+
 def _outside(scene: Scene) -> str:
     """Return what makes the scene another problem than the paper's, "" if nothing does."""
     if scene.incoming is None:

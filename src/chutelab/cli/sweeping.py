@@ -1,0 +1,244 @@
+"""``sweep``: many variants of a scene, a row for each."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+from click.shell_completion import CompletionItem
+
+from chutelab.cli.parameters import complete_scene, set_option
+from chutelab.cli.program import RefusedError
+
+if TYPE_CHECKING:
+    from chutelab.sweep import Plan, Sweep
+
+PICTURES = (".png", ".svg", ".pdf")
+
+
+def _complete_column(
+    _ctx: click.Context, _parameter: click.Parameter, incomplete: str
+) -> list[CompletionItem]:
+    from chutelab.sweep import NUMBERS
+
+    return [
+        CompletionItem(name, help=what)
+        for name, (what, _) in NUMBERS.items()
+        if name.startswith(incomplete)
+    ]
+
+
+@click.command(short_help="Simulate many variants of a scene; a row for each.")
+@click.argument("scene", shell_complete=complete_scene)
+@click.option(
+    "--vary",
+    "varies",
+    metavar="KEY=FROM:TO:COUNT",
+    multiple=True,
+    help="A key of the scene and its values, such as plate.angle_deg=0:60:61 or"
+    " incoming.speed=2,4. May be repeated: all combinations are simulated.",
+)
+@click.option(
+    "--uncertainty",
+    "uncertain",
+    metavar="KEY=VALUE±SPREAD",
+    multiple=True,
+    help="Instead of --vary: what is not exactly known, such as plate.restitution=0.5±0.05. Says"
+    " how far that makes landing and belt work uncertain, and which key matters most.",
+)
+@click.option(
+    "--sample",
+    metavar="N",
+    type=int,
+    help="Draw N samples from ranges, --vary KEY=FROM:TO, instead of a grid.",
+)
+@click.option(
+    "--design",
+    type=click.Choice(["lhs", "sobol"]),
+    default="lhs",
+    help="How samples are drawn: a Latin hypercube, or Sobol points.",
+)
+@click.option("--seed", type=int, default=0, help="Seed of the samples.", show_default=True)
+@click.option(
+    "--engine",
+    type=click.Choice(["auto", "exact", "pymunk"]),
+    help="Same as --set run.engine=...",
+)
+@set_option
+@click.option(
+    "--out",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="Write all rows into this file, .csv or .parquet.",
+)
+@click.option(
+    "--resume", is_flag=True, help="Go on with an interrupted sweep that was to write this file."
+)
+@click.option(
+    "--plot",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="Draw one or two varied keys into this file: lines, or a heat map.",
+)
+@click.option(
+    "--of",
+    "column",
+    metavar="COLUMN",
+    default="landing.vx",
+    show_default=True,
+    shell_complete=_complete_column,
+    help="What to draw.",
+)
+@click.option(
+    "--jobs",
+    metavar="N",
+    type=click.IntRange(min=0),
+    default=1,
+    help="Spread the work over N processes; 0 is one for each processor.",
+)
+@click.option("--scheduler", metavar="ADDRESS", help="Spread it over a Dask cluster instead.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object with all columns.")
+@click.option("--quiet", "-q", is_flag=True, help="Print no summary and no progress bar.")
+def sweep(
+    scene: str,
+    varies: tuple[str, ...],
+    uncertain: tuple[str, ...],
+    sample: int | None,
+    design: str,
+    seed: int,
+    engine: str | None,
+    overrides: tuple[str, ...],
+    out: Path | None,
+    resume: bool,
+    plot: Path | None,
+    column: str,
+    jobs: int,
+    scheduler: str | None,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Simulate all variants of SCENE and say what came of each.
+
+    A variant that cannot be, or misses the outgoing belt, is a row with its reason. Rows that are
+    finished are kept beside --out FILE until all are: --resume goes on after an interruption, and
+    writes the same file as a sweep that was not interrupted.
+
+    Columns are the varied keys, then, in SI units: landing.x, landing.y, landing.vx, landing.vy
+    (mean over the particles; x, vx and vy also with _spread, the standard deviation), landing.t and
+    time (from the release to the landing, and to the end), belt_work and slip_heat (of the outgoing
+    belt), restitution_loss, power (belt work at the stream's rate), misses, residual (of the
+    ledger), error (against the theory), and reason (why there are no numbers, or not all).
+    """
+    from chutelab.cli import console
+    from chutelab.scene import load
+    from chutelab.scene.overrides import Setting
+    from chutelab.sweep import (
+        LostWorkersError,
+        PartError,
+        SampleError,
+        TableError,
+        WorkersError,
+        planned,
+    )
+    from chutelab.variation import VaryError
+
+    if bool(varies) == bool(uncertain):
+        raise click.UsageError("Give either --vary, what to vary, or --uncertainty.")
+    if scheduler is not None and jobs != 1:
+        raise click.UsageError("--jobs and --scheduler: give one of them.")
+    if resume and out is None:
+        raise click.UsageError("--resume goes on with the file of --out: give --out too.")
+    if uncertain:
+        from chutelab.cli.uncertain import propagate
+
+        if resume or scheduler is not None or jobs != 1:
+            raise click.UsageError("--resume, --jobs and --scheduler go with --vary only.")
+        engines = [Setting(f"run.engine={engine}", f"--engine {engine}")] if engine else []
+        loaded = load(scene, [*overrides, *engines])
+        propagate(
+            loaded, uncertain, samples=sample, seed=seed, out=out, plot=plot,
+            as_json=as_json, quiet=quiet,
+        )  # fmt: skip
+        return
+    loaded = load(scene, overrides)
+    try:
+        plan = planned(loaded, varies, sample=sample, design=design, seed=seed, engine=engine)
+        _check_plot(plan, plot, column)
+        found = _carried_out(plan, out, resume, jobs, scheduler, quiet=quiet)
+    except (VaryError, SampleError, TableError, PartError, WorkersError) as error:
+        raise RefusedError(str(error)) from error
+    except LostWorkersError as error:
+        raise click.ClickException(_and_resume(str(error), out)) from error
+    if plot is not None:
+        from chutelab.plots.sweep import sweep_figure
+
+        sweep_figure(found, column, path=plot)
+    if as_json:
+        console.show_json(_plain(found))
+    elif not quiet:
+        click.echo(str(found))
+        for path in (out, plot):
+            if path is not None:
+                click.echo(f"wrote {path}")
+
+
+def _carried_out(
+    plan: Plan, out: Path | None, resume: bool, jobs: int, scheduler: str | None, *, quiet: bool
+) -> Sweep:
+    from chutelab.cli.progress import progress
+    from chutelab.sweep import crew, sweep_to, swept_by
+
+    what = f"{plan.count:,} variants"
+    try:
+        with crew(jobs, scheduler) as team, progress(what, quiet=quiet, left=True) as update:
+            if out is None:
+                return swept_by(plan, team, progress=update)
+            return sweep_to(plan, out, team, resume=resume, progress=update)
+    except KeyboardInterrupt:
+        if said := _and_resume("", out):
+            click.echo(f"\n{said}", err=True)
+        raise
+    except OSError as error:
+        if out is None:
+            raise
+        raise RefusedError(f"--out {out}: {error.strerror or error}") from error
+
+
+def _and_resume(said: str, out: Path | None) -> str:
+    """Add where the finished rows are, if there are some."""
+    from chutelab.sweep.part import part_of
+
+    if out is None or not part_of(out).exists():
+        return said
+    return f"{said} {part_of(out)} has the finished rows; --resume goes on.".strip()
+
+
+def _check_plot(plan: Plan, plot: Path | None, column: str) -> None:
+    """Refuse, before anything runs, a picture that cannot be drawn."""
+    from chutelab.sweep import NUMBERS
+
+    if column not in NUMBERS:
+        raise RefusedError(f"--of {column}: one of {', '.join(NUMBERS)}")
+    if plot is None:
+        return
+    if plot.suffix.lower() not in PICTURES:
+        raise RefusedError(f"--plot {plot}: the name of a picture ends with {', '.join(PICTURES)}")
+    if plot.is_dir() or not plot.parent.is_dir():
+        raise RefusedError(f"--plot {plot}: it is a folder, or there is no folder {plot.parent}")
+    varied = sum(len(set(vary.values)) > 1 for vary in plan.varies)
+    if varied > 2:
+        raise RefusedError(f"--plot draws one or two varied keys, not {varied}")
+
+
+def _plain(found: Sweep) -> dict[str, object]:
+    """Return all columns as lists, None for what there is not."""
+    from math import isfinite
+
+    from chutelab.sweep import REASON
+
+    columns = {
+        name: [value if name == REASON or isfinite(value) else None for value in values.tolist()]
+        for name, values in found.columns.items()
+    }
+    return {"format": 1, "scene": found.title, "variants": len(found), "columns": columns}

@@ -1,0 +1,590 @@
+"""Sweeps: every row is the one of a single run to the bit, whoever does the work, and when."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import chutelab
+from chutelab.cli import main
+from chutelab.compare import compare
+from chutelab.exact import CornerError, kinds, run
+from chutelab.ledger import ledger
+from chutelab.machine import build
+from chutelab.recording import Kind
+from chutelab.scene import SceneError, load, parse, to_dict
+from chutelab.scene.family import accepted, family, is_plain, judged_by
+from chutelab.simulation import simulate
+from chutelab.sweep import (
+    MOST_VARIANTS,
+    NUMBERS,
+    REASON,
+    SampleError,
+    planned,
+    sweep,
+)
+from chutelab.sweep.alone import alone
+from chutelab.sweep.batch import Batch
+from chutelab.sweep.block import Block
+from chutelab.sweep.columns import joined
+from chutelab.variation import Vary, VaryError, parse_range, quantity
+from chutelab.variation import parse as parse_vary
+
+JOINED = """
+[incoming]
+speed = 2.0
+pulley_radius = 0.1
+[outgoing]
+drop = 0.5
+drop_from = "top"
+start = 0.5
+friction = 0.2
+[[surface]]
+name = "ramp"
+from = [0.2, -0.2]
+to = [0.5, -0.4]
+restitution = 0.0
+friction = 0.1
+[run]
+until = "settled"
+max_time = 5.0
+"""
+"""With outgoing.drop = 0.5 the ramp ends where the belt begins."""
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def call(*arguments, code=0):
+    result = CliRunner().invoke(main, [str(argument) for argument in arguments])
+    assert result.exit_code == code, result.output
+    return result
+
+
+def block_of(scene, varies, **options):
+    plan = planned(scene, varies, **options)
+    paths = tuple(quantity.path for quantity in plan.quantities)
+    values = plan.values(0, plan.count)
+    return Block(plan.document, plan.source, plan.keys, paths, values, plan.engine)
+
+
+def assert_same(found, expected):
+    assert list(found) == list(expected)
+    for name in expected:
+        if name == REASON:
+            assert found[name].tolist() == expected[name].tolist()
+        else:
+            assert found[name].tobytes() == expected[name].tobytes(), name
+
+
+# the batch against single runs -------------------------------------------------------------------
+
+
+FAMILIES = """
+perpendicular | | plate.angle_deg=-20:80:11 incoming.speed=0:4:7 plate.restitution=0,0.5,1
+perpendicular | outgoing.drop_from=top | particle.radius=0:0.05:4 particle.mass=0.01,1 gravity=0,1,9.81
+perpendicular | run.until=settled | outgoing.drop=0.05:0.6:4 outgoing.speed=-1:2:3 outgoing.friction=0,1
+perpendicular | outgoing.drop_from=top | plate.above=0:0.2:3 plate.below=0:0.2:3 plate.angle_deg=0,30,80
+perpendicular | | run.until=0.1:2:5 run.max_time=0.5,1 run.dt=0.001,0.01
+perpendicular | stream.velocity=[2.0,0.0] | incoming.speed=0:2:3 plate.restitution=0,1
+perpendicular | stream.at=[-0.2,0.204] | incoming.pulley_radius=0.1:0.2:3
+perpendicular | stream.at=[-0.2,0.3] | incoming.speed=1,2 particle.radius=0,0.1
+perpendicular | particle.spin=true run.engine=exact | particle.radius=0:0.01:3 plate.friction=0.3,1
+belt-landing | | plate.restitution=0:1.2:4 outgoing.friction=0.1,0.5 outgoing.restitution=0,0.4
+low-speed | | incoming.speed=0:1:5 incoming.pulley_radius=0.05,0.2
+slip | | incoming.speed=0.1:1:3 incoming.friction=0:1:3
+slip | particle.spin=true | incoming.speed=0.3,1 incoming.friction=0.2,0.5
+free-fall | stream.count=1 | gravity=0,9.81 surface.ramp.restitution=0,0.5 surface.floor.speed=-1,1
+"""  # noqa: E501
+"""A scene, what is set, what is varied."""
+
+
+@pytest.mark.parametrize("line", FAMILIES.strip().splitlines())
+def test_rows_of_a_batch_are_those_of_single_runs_to_the_bit(line):
+    name, settings, varies = (part.split() for part in line.split("|"))
+    block = block_of(load(*name, settings), varies)
+    singles = joined([alone(block, row) for row in range(len(block.values))])
+    assert_same(Batch(block).swept(), singles)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_samples_over_many_keys_are_single_runs_to_the_bit(seed):
+    ranges = [
+        "plate.angle_deg=-40:70", "incoming.speed=0.2:5", "plate.distance=0.05:1",
+        "outgoing.drop=0.1:1", "particle.radius=0.001:0.02", "plate.friction=0:1",
+        "plate.restitution=0:1", "incoming.pulley_radius=0.05:0.3", "particle.mass=0.001:1",
+        "gravity=1:20", "outgoing.speed=-3:3", "outgoing.restitution=0:0.9",
+    ]  # fmt: skip
+    scene = load("perpendicular", ["run.until=settled", "run.max_time=5.0"])
+    block = block_of(scene, ranges, sample=60, seed=seed)
+    singles = joined([alone(block, row) for row in range(len(block.values))])
+    found = Batch(block).swept()
+    assert_same(found, singles)
+    assert np.isfinite(found["landing.x"]).sum() > 10
+
+
+def test_a_batch_does_not_run_its_variants_one_by_one(monkeypatch):
+    def never(*_):
+        raise AssertionError("ran alone")
+
+    monkeypatch.setattr("chutelab.sweep.batch.alone", never)
+    swept = sweep(load("perpendicular"), ["plate.angle_deg=-10:10:50", "incoming.speed=0.5,2,4"])
+    assert np.isfinite(swept.columns["landing.x"]).sum() > 100
+
+
+def test_surfaces_that_join_in_some_variants_only_are_told_apart():
+    scene = parse(JOINED)
+    block = block_of(scene, ["outgoing.drop=0.3,0.5,0.6", "surface.ramp.friction=0:0.4:3"])
+    heights = np.array([0.3, 0.5, 0.6])
+    alike = kinds(build(family(scene, {"outgoing.drop": heights})))
+    assert sorted(map(len, alike)) == [1, 2]
+    assert [1] in [part.tolist() for part in alike]
+    found = Batch(block).swept()
+    singles = joined([alone(block, row) for row in range(len(block.values))])
+    assert_same(found, singles)
+    # Across the joint the particle slides onto the belt; beside it, it falls onto or under it.
+    assert len(np.unique(found["landing.vy"][[0, 3, 6]].round(6))) > 1
+
+
+def test_a_machine_whose_ends_join_in_a_chain_runs_by_itself():
+    # It creeps off the pulley and falls 10 km: 1e-12 of that is about the gap between the ends.
+    chained = parse(
+        JOINED.replace('drop_from = "top"\n', "").replace(
+            "[outgoing]", "[plate]\ndistance=0.5\n[outgoing]"
+        )
+        + """
+[[surface]]
+name = "steps"
+points = [[5.0, 0.0], [6.0, 0.0]]
+[[surface]]
+name = "more"
+points = [[6.000000007, 0.0], [7.0, 0.0]]
+[[surface]]
+name = "most"
+points = [[6.000000014, 0.0], [6.0, 1.0]]
+"""
+    )
+    varies = ["incoming.speed=0.22,0.23,2", "plate.restitution=0,1"]
+    block = block_of(chained, varies)
+    singles = joined([alone(block, row) for row in range(len(block.values))])
+    assert_same(Batch(block).swept(), singles)
+
+
+def test_one_that_the_exact_engine_cannot_follow_spoils_no_other(monkeypatch):
+    # A spinning disk that a belt presses into a corner: pymunk follows it.
+    corner = """
+[particle]
+spin = true
+[[surface]]
+name = "floor"
+from = [-1.0, 0.0]
+to = [1.0, 0.0]
+[[surface]]
+name = "wall"
+from = [0.5, -0.1]
+to = [0.5, 1.0]
+[stream]
+at = [0.3, 0.1]
+velocity = [0.0, 0.0]
+[run]
+max_time = 2.0
+"""
+    block = block_of(parse(corner), ["surface.floor.speed=0:1:5", "surface.wall.restitution=0,0.3"])
+    singles = joined([alone(block, row) for row in range(len(block.values))])
+    refused = []
+
+    def watched(*given, **options):
+        try:
+            return run(*given, **options)
+        except CornerError:
+            refused.append(given[0].count)
+            raise
+
+    monkeypatch.setattr("chutelab.sweep.batch.run", watched)
+    assert_same(Batch(block).swept(), singles)
+    assert refused[0] == 10
+    assert 1 <= refused.count(1) < 10
+
+
+# what a row holds --------------------------------------------------------------------------------
+
+
+def test_a_row_holds_what_the_run_shows():
+    swept = sweep(load("belt-landing"), ["plate.restitution=0.25,0.5", "stream.rate=100,200"])
+    for row in range(len(swept)):
+        restitution, rate = (float(swept.columns[key][row]) for key in swept.quantities)
+        scene = load(
+            "belt-landing", [f"plate.restitution={restitution}", f"stream.rate={int(rate)}"]
+        )
+        recording = simulate(scene)
+        books, (down,) = ledger(recording), recording.select(Kind.LANDING)
+        outgoing = books.by_surface["outgoing"]
+        expected = {
+            "landing.x": down["position"][0], "landing.x_spread": 0.0,
+            "landing.y": down["position"][1],
+            "landing.vx": down["velocity_before"][0], "landing.vx_spread": 0.0,
+            "landing.vy": down["velocity_before"][1], "landing.vy_spread": 0.0,
+            "landing.t": down["t"], "time": recording.knots["t"][-1],
+            "belt_work": outgoing["belt_work"], "slip_heat": outgoing["friction_loss"],
+            "restitution_loss": books.restitution_loss, "power": outgoing["belt_work"] * rate,
+            "misses": 0.0, "residual": books.residual,
+        }  # fmt: skip
+        assert {name: swept.columns[name][row] for name in expected} == expected
+        assert set(expected) | {"error"} == set(NUMBERS)
+
+
+def test_a_stream_has_means_and_spreads():
+    scene = load("stream-independent", ["stream.count=40", "stream.bed_height=0.05"])
+    swept = sweep(scene, ["incoming.speed=1,2"])
+    for row, speed in enumerate((1, 2)):
+        recording = simulate(load("stream-independent", [
+            "stream.count=40", "stream.bed_height=0.05", f"incoming.speed={speed}"
+        ]))  # fmt: skip
+        down = recording.first(recording.select(Kind.LANDING))
+        flights = down["t"] - down["particle"] / scene.stream.rate
+        x, vx = down["position"][:, 0], down["velocity_before"][:, 0]
+        found = {name: swept.columns[name][row] for name in NUMBERS}
+        assert found["landing.x"] == pytest.approx(x.mean(), rel=1e-14)
+        assert found["landing.x_spread"] == pytest.approx(x.std(), rel=1e-12)
+        assert found["landing.vx_spread"] == pytest.approx(vx.std(), rel=1e-12, abs=1e-15)
+        assert found["landing.t"] == pytest.approx(flights.mean(), rel=1e-13)
+        work = ledger(recording).by_surface["outgoing"]["belt_work"]
+        assert found["belt_work"] == work
+        assert found["power"] == pytest.approx(work / 40 * scene.stream.rate, rel=1e-15)
+        assert found["misses"] == 40 - len(down)
+
+
+@pytest.mark.parametrize(
+    ("name", "varies"),
+    [
+        ("perpendicular", ["plate.angle_deg=-30:60:7", "incoming.speed=0.5,1,4"]),
+        ("slip", ["incoming.speed=0.3,0.9", "incoming.friction=0.1,0.5"]),
+        ("belt-landing", ["plate.restitution=0:1:5"]),
+        ("inclined-60", ["plate.distance=0.05:0.1:3", "outgoing.drop=0.1,1"]),
+    ],
+)
+def test_the_error_is_that_of_a_comparison(name, varies):
+    scene = load(name)
+    swept, told = sweep(scene, varies), 0
+    for row in range(len(swept)):
+        values = {key: float(swept.columns[key][row]) for key in swept.quantities}
+        try:
+            expected = compare(simulate(load(name, [f"{k}={v!r}" for k, v in values.items()]))).max
+        except SceneError:
+            expected = None
+        error = swept.columns["error"][row]
+        if expected is None:
+            assert np.isnan(error)
+        else:
+            told += 1
+            assert error == pytest.approx(expected, abs=1e-15)
+    assert told >= 3
+
+
+def test_a_variant_that_cannot_be_or_misses_is_a_row_with_its_reason():
+    scene = load("perpendicular", ["outgoing.drop_from=top", "outgoing.start=0.3"])
+    swept = sweep(scene, ["plate.restitution=0.5,2", "outgoing.drop=0.95,1.5,5"])
+    reasons = swept.columns[REASON].tolist()
+    assert reasons[0] == ""
+    assert "it missed the outgoing belt: left the scene" in reasons
+    assert all("plate.restitution = 2" in reason for reason in reasons[3:])
+    assert all("must be a number from 0 to 1" in reason for reason in reasons[3:])
+    assert np.isnan(swept.columns["landing.x"][3:]).all()
+    missed = reasons.index("it missed the outgoing belt: left the scene")
+    assert swept.columns["misses"][missed] == 1.0
+    assert np.isnan(swept.columns["landing.x"][missed])
+    assert swept.columns["restitution_loss"][missed] > 0.0
+
+
+def test_a_run_that_gets_stuck_is_a_row(monkeypatch):
+    from chutelab.recorder import StalledError
+
+    def stuck(*_args, **_options):
+        raise StalledError(0, 1.0, (0.0, 0.5), "it hangs")
+
+    monkeypatch.setattr("chutelab.sweep.alone.simulate", stuck)
+    monkeypatch.setattr("chutelab.sweep.batch.run", stuck)
+    reasons = sweep(load("perpendicular"), ["plate.restitution=0,1"]).columns[REASON]
+    assert ["it hangs" in reason for reason in reasons] == [True, True]
+
+
+# validating many at once -------------------------------------------------------------------------
+
+
+def test_a_column_of_values_is_judged_as_each_by_itself():
+    values = np.array([-91.0, -90.0, -89.9, 0.0, 89.9, 90.0, 1e9])
+    judged = accepted("plate.angle_deg", values)
+    for value, good in zip(values.tolist(), judged.tolist(), strict=True):
+        try:
+            load("perpendicular", [f"plate.angle_deg={value}", "outgoing.drop_from=top"])
+            fine = True
+        except SceneError:
+            fine = False
+        assert good == fine
+
+
+def test_plain_numbers_are_known():
+    assert all(map(is_plain, ("gravity", "plate.below", "incoming.friction", "surface[0].speed")))
+    others = ("title", "stream.count", "stream.at[0]", "surface[0].points[0][1]", "run.engine")
+    assert not any(map(is_plain, others))
+
+
+def test_rules_are_asked_which_keys_they_look_at():
+    document = to_dict(load("perpendicular"))
+    assert "plate.restitution" not in judged_by(document)
+    assert "incoming.speed" not in judged_by(document)
+    given = judged_by(document, ["incoming.friction=0.3", "stream.velocity=[2.0,0.0]"])
+    assert "incoming.speed" not in given
+    assert {"particle.radius", "incoming.friction"} <= given
+    assert "incoming.speed" in judged_by(document, ["stream.velocity=[2.0,0.0]"])
+
+
+def test_a_family_fills_defaults_that_are_other_keys():
+    scene = load("perpendicular")
+    speed, radius = np.array([1.0, 3.0]), np.array([0.1, 0.2])
+    many = family(scene, {"incoming.speed": speed, "incoming.pulley_radius": radius})
+    assert many.members == 2
+    assert many.plate.pivot_height is radius
+    assert many.outgoing.speed is speed
+    assert scene.members is None
+    own = family(load("perpendicular", ["outgoing.speed=1.5"]), {"incoming.speed": speed})
+    assert own.outgoing.speed == 1.5
+
+
+# what is refused before anything runs ------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("varies", "allowed"),
+    [
+        (["plate.angel_deg=0:60:3"], "did you mean plate.angle_deg?"),
+        (["hood.speed=1,2"], "unknown key"),
+        (["surface.hood.speed=1,2"], "no [[surface]]"),
+        (["plate.angle_deg=3:3:4"], "the range is empty"),
+        (["plate.angle_deg=0:60:0"], "a whole number from 1"),
+        (["plate.angle_deg=0:60"], "must be KEY=FROM:TO:COUNT"),
+        (["plate.angle_deg=0:0.5mm:4"], "is in degrees, not in m"),
+        (["plate.distance=10:50mm:3"], "one kind of unit"),
+        (["plate.distance=1lightyear,2lightyear"], "is in m, not in lightyear"),
+        (["plate.angle_deg=a,b"], "a is not a number"),
+        (["plate.angle_deg=nan,1"], "nan is not a number"),
+        (["title=1,2"], "only numbers can be varied"),
+        (["stream.count=1.5,2"], "whole numbers only"),
+        (["plate.angle_deg=0:1:1000000000000"], "from 1 to 10000"),
+        (["plate.angle_deg=0:1:10000", "incoming.speed=1:2:10000"], "at most 1000000 are allowed"),
+        (["plate.angle_deg=0,1", "plate.angle_deg=2,3"], "varied already"),
+    ],
+    ids=lambda value: value[0] if isinstance(value, list) else None,
+)
+def test_what_cannot_be_varied_is_refused_with_what_is_allowed(varies, allowed, monkeypatch):
+    monkeypatch.setattr("chutelab.sweep.sweeping.swept", None)
+    options = [option for vary in varies for option in ("--vary", vary)]
+    result = call("sweep", "perpendicular", *options, "--out", "rows.csv", code=2)
+    assert allowed in result.stderr
+    assert varies[-1] in result.stderr
+    assert result.stdout == ""
+    assert not list(Path().iterdir())
+
+
+@pytest.mark.parametrize(
+    ("options", "allowed"),
+    [
+        (["--sample", "0"], "from 1 to 1000000"),
+        (["--sample", "3", "--seed", "-1"], "a whole number from 0"),
+        (["--out", "rows.txt"], ".csv or .parquet"),
+        (["--out", "nowhere/rows.csv"], "No such file or directory"),
+        (["--plot", "rows.csv"], ".png"),
+        (["--plot", "rows.png", "--of", "height"], "landing.vx"),
+        (["--resume"], "--out"),
+        (["--scheduler", "nobody"], "tcp://"),
+    ],
+    ids=" ".join,
+)
+def test_options_that_cannot_be_are_refused_before_anything_runs(options, allowed, monkeypatch):
+    monkeypatch.setattr("chutelab.sweep.sweeping.swept", None)
+    vary = "plate.angle_deg=0:10" if "--sample" in options else "plate.angle_deg=0,10"
+    result = call("sweep", "perpendicular", "--vary", vary, *options, code=2)
+    assert allowed in result.stderr
+    assert not list(Path().iterdir())
+
+
+def test_three_varied_keys_make_no_picture():
+    varies = ["plate.angle_deg=0,1", "incoming.speed=2,3", "plate.restitution=0,1"]
+    options = [option for vary in varies for option in ("--vary", vary)]
+    result = call("sweep", "perpendicular", *options, "--plot", "rows.png", code=2)
+    assert "one or two varied keys, not 3" in result.stderr
+
+
+def test_units_are_read():
+    assert parse_vary("plate.distance=50cm,1m").values == (0.5, 1.0)
+    assert parse_vary("plate.restitution=0:50%:3").values == (0.0, 0.25, 0.5)
+    assert parse_range("particle.mass=1kg:2kg").values == (1.0, 2.0)
+    scene = load("perpendicular")
+    for text in ("plate.angle_deg=0:60°:3", "particle.mass=1kg,2kg", "incoming.speed=20cm/s,1m/s"):
+        quantity(scene, parse_vary(text))
+    with pytest.raises(VaryError, match="in kg, not in g"):
+        quantity(scene, parse_vary("particle.mass=1g"))
+
+
+# grids and samples -------------------------------------------------------------------------------
+
+
+def test_the_last_key_of_a_grid_runs_fastest():
+    swept = sweep(load("perpendicular"), {"incoming.speed": [2.0, 3.0], "plate.angle_deg": [0, 5]})
+    assert swept.columns["incoming.speed"].tolist() == [2.0, 2.0, 3.0, 3.0]
+    assert swept.columns["plate.angle_deg"].tolist() == [0.0, 5.0, 0.0, 5.0]
+    assert swept.shape == (2, 2)
+    with pytest.raises(ValueError, match="read-only"):
+        swept.columns["landing.x"][0] = 0.0
+
+
+def test_a_latin_hypercube_has_one_sample_in_each_row_and_column():
+    plan = planned(
+        load("perpendicular"), ["plate.angle_deg=0:50", "incoming.speed=1:2"], sample=50, seed=3
+    )
+    shares = (plan.values(0, 50) - [0.0, 1.0]) / [50.0, 1.0]
+    for column in shares.T:
+        assert sorted(np.floor(50 * column).tolist()) == list(range(50))
+    again = planned(
+        load("perpendicular"), ["plate.angle_deg=0:50", "incoming.speed=1:2"], sample=50, seed=3
+    )
+    assert again.values(0, 50).tobytes() == plan.values(0, 50).tobytes()
+
+
+def test_sobol_points_fill_the_ranges_evenly():
+    varies = ["plate.angle_deg=0:64", "incoming.speed=1:2"]
+    plan = planned(load("perpendicular"), varies, sample=64, design="sobol")
+    values = plan.values(0, 64)
+    # A scrambled (0, 6, 2)-net: one point in each strip of 1/64.
+    assert sorted(np.floor(values[:, 0]).tolist()) == list(range(64))
+    fewer = planned(load("perpendicular"), varies, sample=40, design="sobol")
+    assert fewer.values(0, 40).tobytes() == values[:40].tobytes()
+
+
+def test_whole_numbers_are_drawn_as_such_with_both_ends():
+    plan = planned(load("stream-independent"), ["stream.seed=3:5"], sample=300)
+    seeds, counts = np.unique(plan.values(0, 300), return_counts=True)
+    assert seeds.tolist() == [3.0, 4.0, 5.0]
+    assert counts.tolist() == [100, 100, 100]
+
+
+def test_samples_need_ranges_and_grids_need_counts():
+    scene = load("perpendicular")
+    with pytest.raises(VaryError, match="samples are drawn between two ends"):
+        planned(scene, ["plate.angle_deg=1,2,3"], sample=4)
+    with pytest.raises(VaryError, match="from ranges"):
+        planned(scene, [Vary("plate.angle_deg", (1.0, 2.0))], sample=4)
+    with pytest.raises(SampleError, match="lhs, sobol"):
+        planned(scene, ["plate.angle_deg=1:2"], sample=4, design="grid")
+    with pytest.raises(SampleError, match=str(MOST_VARIANTS)):
+        planned(scene, ["plate.angle_deg=1:2"], sample=MOST_VARIANTS + 1)
+
+
+# the command, the picture ------------------------------------------------------------------------
+
+
+def test_the_command_prints_a_table_and_writes_files():
+    varies = "--vary", "plate.angle_deg=0:30:4", "--vary", "plate.restitution=0,1"
+    result = call("sweep", "perpendicular", *varies, "--out", "rows.csv", "--plot", "rows.png")
+    assert "8 variants" in result.stdout
+    assert "× outgoing.drop_from" in result.stdout
+    assert {path.name for path in Path().iterdir()} == {"rows.csv", "rows.png"}
+    assert Path("rows.png").read_bytes().startswith(b"\x89PNG")
+    found = json.loads(
+        call("sweep", "perpendicular", "--vary", "plate.angle_deg=0,80", "--json").stdout
+    )
+    assert found["variants"] == 2
+    assert found["columns"]["landing.x"][1] is None
+    assert found["columns"]["landing.vx"][0] == -1.0
+
+
+def test_lines_go_through_the_rows_and_stop_where_there_are_none():
+    from chutelab.plots.sweep import sweep_figure
+
+    swept = sweep(load("perpendicular"), ["plate.angle_deg=0:30:16", "incoming.speed=2,4"])
+    (ax, *_) = sweep_figure(swept, "landing.vx").axes
+    assert len(ax.lines) == 2
+    for line, speed in zip(ax.lines, (2.0, 4.0), strict=True):
+        mine = swept.columns["incoming.speed"] == speed
+        assert line.get_xdata().tolist() == swept.columns["plate.angle_deg"][mine].tolist()
+        expected = swept.columns["landing.vx"][mine]
+        assert np.array_equal(line.get_ydata(), expected, equal_nan=True)
+    assert np.isnan(ax.lines[0].get_ydata()).any()
+    assert ax.get_legend().get_title().get_text() == "incoming.speed, m/s"
+
+
+def test_two_keys_with_many_values_make_a_heat_map():
+    from chutelab.plots.sweep import sweep_figure
+
+    swept = sweep(load("perpendicular"), ["plate.angle_deg=-10:10:9", "incoming.speed=2:4:10"])
+    figure = sweep_figure(swept, "belt_work", path="heat.png")
+    (mesh,) = figure.axes[0].collections
+    expected = 1e3 * swept.columns["belt_work"].reshape(9, 10).T
+    assert np.ma.filled(mesh.get_array(), np.nan) == pytest.approx(expected)
+    assert Path("heat.png").exists()
+
+
+def test_samples_are_dots_and_crosses_where_there_is_nothing():
+    from chutelab.plots.sweep import sweep_figure
+
+    scene = load("perpendicular")
+    swept = sweep(scene, ["plate.angle_deg=0:40", "incoming.speed=1:4"], sample=30)
+    known = np.isfinite(swept.columns["landing.vx"])
+    assert 0 < known.sum() < 30
+    ax = sweep_figure(swept, "landing.vx").axes[0]
+    (dots,), (crosses,) = ax.collections, ax.lines
+    angles = swept.columns["plate.angle_deg"]
+    assert dots.get_offsets()[:, 0].tolist() == angles[known].tolist()
+    assert crosses.get_xdata().tolist() == angles[~known].tolist()
+    one = sweep(scene, ["plate.angle_deg=0:40"], sample=20)
+    ax = sweep_figure(one, "landing.vx").axes[0]
+    assert ax.get_xlim()[1] > one.columns["plate.angle_deg"].max()
+
+
+def test_help_names_the_columns():
+    said = " ".join(call("sweep", "--help").stdout.split())
+    for name in NUMBERS:
+        assert name.removesuffix("_spread") in said
+
+
+def test_a_sweep_shows_itself():
+    swept = sweep(load("perpendicular"), ["plate.angle_deg=0,80"])
+    assert "2 variants" in repr(swept)
+    assert "plate.angle_deg" in swept._repr_html_()
+    assert "never meets the plate" in repr(swept)
+
+
+def test_a_frame_has_the_columns():
+    pytest.importorskip("pandas")
+    swept = sweep(load("perpendicular"), ["plate.angle_deg=0,10"])
+    frame = swept.frame()
+    assert list(frame.columns) == list(swept.columns)
+    assert frame["landing.vx"].tolist() == swept.columns["landing.vx"].tolist()
+
+
+def test_nothing_heavy_is_imported_before_it_is_needed():
+    code = (
+        "import sys, chutelab; from chutelab.sweep import sweep;"
+        "sweep(chutelab.load('perpendicular'), ['plate.angle_deg=0,10']);"
+        "heavy = 'scipy', 'pyarrow', 'distributed', 'pandas', 'matplotlib', 'pymunk', 'rich';"
+        "print([name for name in heavy if name in sys.modules])"
+    )
+    sources = str(Path(chutelab.__file__).parent.parent)
+    found = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, "PYTHONPATH": sources},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+    )
+    assert found.stdout == "[]\n"

@@ -1,0 +1,368 @@
+"""Every known mistake of every question, made by hand: formulas of the student's numbers."""
+
+from math import acos, asin, atan, cos, degrees, hypot, log10, radians, sin, sqrt
+
+G = 9.81
+
+
+def ride(g):
+    return g.R + g.r
+
+
+def u(g):
+    return g.v0**2 / (G * ride(g))
+
+
+def u_of_a_point(g):
+    return g.v0**2 / (G * g.R)
+
+
+def fall_speed(g):
+    return sqrt(2 * G * g.h)
+
+
+def turn(g):
+    return acos(u(g))
+
+
+# Lessons 3 and 7: the plate stands upright, v2y on arrival, time for a fall that begins with it
+
+
+def radius(g):
+    return g.mm / 1000 if "mm" in list(g) else g.r
+
+
+def v2y(g):
+    return G * (g.R + g.d - radius(g)) / g.v0
+
+
+def falling(g, way, first=None):
+    first = v2y(g) if first is None else first
+    return (sqrt(first**2 + 2 * G * way) - first) / G
+
+
+def printed(g):
+    """Components after the plate, back and down, as Eqs. (8) and (9) are printed."""
+    into, along = g.v0, v2y(g)
+    speed, angle = hypot(into, g.e * along), atan(g.e * into / along)
+    return speed * sin(angle), speed * cos(angle)
+
+
+def printed_x3(g, way):
+    back, down = printed(g)
+    return back * falling(g, way, down)
+
+
+# Lesson 4
+
+
+def into(g):
+    return g.v0 * cos(radians(g.alpha)) - g.vy * sin(radians(g.alpha))
+
+
+def along(g):
+    return g.v0 * sin(radians(g.alpha)) + g.vy * cos(radians(g.alpha))
+
+
+def matching(g):
+    return g.v0**2 / (2 * G * (g.R + g.d))
+
+
+# Lessons 5 and 7
+
+
+def mass(g):
+    return g.grams / 1000
+
+
+def back(g):
+    return g.e * g.v0
+
+
+def work(g):
+    return mass(g) * g.vb * (g.vb + back(g))
+
+
+def gained(g):
+    return 0.5 * mass(g) * (g.vb**2 - back(g) ** 2)
+
+
+def heat(g):
+    return 0.5 * mass(g) * (g.vb + back(g)) ** 2
+
+
+def eq14(g):
+    return 0.5 * mass(g) * (back(g) ** 2 + g.vb**2)
+
+
+# Lesson 6
+
+
+def leaves(g):
+    """Angle where a body that slips leaves: u' = 2 sin φ - 2 µ (cos φ - u), in steps."""
+    phi = radians(onset(g))
+    speed, step = u(g), 1e-5
+    while speed < cos(phi):
+        middle = speed + step * (sin(phi) - g.mu * (cos(phi) - speed))
+        half = phi + step / 2
+        speed += 2 * step * (sin(half) - g.mu * (cos(half) - middle))
+        phi += step
+    return degrees(phi)
+
+
+def onset(g, start=None, friction=None):
+    start = u(g) if start is None else start
+    friction = g.mu if friction is None else friction
+    return degrees(atan(friction) - asin(friction * start / sqrt(1 + friction**2)))
+
+
+# Lesson 8
+
+
+def order(g):
+    return log10(g.e1 / g.e2) / log10(g.dt1 / g.dt2)
+
+
+def books(g):
+    return g.start_mJ + g.work_mJ + g.bounce_mJ + g.heat_mJ + g.fall_mJ
+
+
+def share(g, energy):
+    return g.residual_uJ / 1000 / energy
+
+
+MISTAKES = {
+    ("the-parabola", 1): {
+        "square root forgotten": lambda g: 2 * g.h / G,
+        "a 2 forgotten": lambda g: sqrt(g.h / G),
+        "belt speed for the speed of falling": lambda g: g.h / g.v0,
+    },
+    ("the-parabola", 2): {
+        "height for distance": lambda g: g.h,
+        "speed of falling for the belt speed": lambda g: 2 * g.h,
+        "the straight way": lambda g: sqrt(2 * g.v0**2 * g.h / G + g.h**2),
+        "a 2 forgotten": lambda g: g.v0 * sqrt(g.h / G),
+    },
+    ("the-parabola", 3): {
+        "vertical part only": fall_speed,
+        "horizontal part only": lambda g: g.v0,
+        "components added up": lambda g: g.v0 + fall_speed(g),
+        "a 2 forgotten": lambda g: sqrt(g.v0**2 + G * g.h),
+        "square root forgotten": lambda g: g.v0**2 + 2 * G * g.h,
+    },
+    ("the-parabola", 4): {
+        "angle to the vertical": lambda g: degrees(atan(g.v0 / fall_speed(g))),
+        "direction to the landing point": lambda g: degrees(atan(fall_speed(g) / g.v0 / 2)),
+        "the tangent, not the angle": lambda g: fall_speed(g) / g.v0,
+        "tangent with the whole speed": lambda g: degrees(
+            atan(fall_speed(g) / hypot(g.v0, fall_speed(g)))
+        ),
+    },
+    ("letting-go", 1): {
+        "radius forgotten": lambda g: sqrt(G * g.R),
+        "square root forgotten": lambda g: G * ride(g),
+        "a fall for a circle": lambda g: sqrt(2 * G * ride(g)),
+        "divided by the radius": lambda g: sqrt(G / ride(g)),
+    },
+    ("letting-go", 2): {
+        "radius forgotten": lambda g: degrees(acos(u_of_a_point(g))),
+        "angle from the horizontal": lambda g: degrees(asin(u(g))),
+        "square forgotten": lambda g: degrees(acos(g.v0 / sqrt(G * ride(g)))),
+        "sliding for riding": lambda g: degrees(acos((2 + u(g)) / 3)),
+        "the cosine, not the angle": u,
+    },
+    ("letting-go", 3): {
+        "radius forgotten": lambda g: g.R * u(g),
+        "sine for cosine": lambda g: ride(g) * sqrt(1 - u(g) ** 2),
+        "way down for height": lambda g: ride(g) - g.v0**2 / G,
+        "degrees for radians": lambda g: ride(g) * cos(degrees(turn(g))),
+    },
+    ("letting-go", 4): {
+        "sign or direction": lambda g: g.v0 * sin(turn(g)),
+        "sine and cosine exchanged": lambda g: -g.v0 * u(g),
+        "the other component": lambda g: g.v0 * u(g),
+        "degrees for radians": lambda g: -g.v0 * sin(degrees(turn(g))),
+        "sliding for riding": lambda g: (
+            -sqrt(g.v0**2 + 2 * G * ride(g) * (1 - u(g))) * sin(turn(g))
+        ),
+    },
+    ("the-bounce", 1): {
+        "sign or direction": back,
+        "a bounce without loss": lambda g: -g.v0,
+        "the part lost for the part kept": lambda g: g.e * g.v0 - g.v0,
+        "ε taken for a share of the energy": lambda g: -sqrt(g.e) * g.v0,
+        "the equation as printed": lambda g: -printed(g)[0],
+    },
+    ("the-bounce", 2): {
+        "the equation as printed": lambda g: hypot(g.v0, g.e * v2y(g)),
+        "ε on both components": lambda g: g.e * hypot(g.v0, v2y(g)),
+        "a bounce without loss": lambda g: hypot(g.v0, v2y(g)),
+        "the fall forgotten": back,
+        "radius forgotten": lambda g: hypot(g.e * g.v0, G * (g.R + g.d) / g.v0),
+    },
+    ("the-bounce", 3): {
+        "the equation as printed": lambda g: printed_x3(g, g.d2),
+        "a fall from rest": lambda g: back(g) * sqrt(2 * g.d2 / G),
+        "ε forgotten": lambda g: g.v0 * falling(g, g.d2),
+        "the whole fall for a part of it": lambda g: (
+            back(g) * sqrt(2 * (g.d2 + v2y(g) ** 2 / 2 / G) / G)
+        ),
+    },
+    ("the-bounce", 4): {
+        "a missing ½": lambda g: mass(g) * g.v0**2 * (1 - g.e**2),
+        "1 - ε for 1 - ε²": lambda g: 0.5 * mass(g) * g.v0**2 * (1 - g.e),
+        "energy of the velocity lost": lambda g: 0.5 * mass(g) * (g.v0 - back(g)) ** 2,
+        "ε on both components": lambda g: 0.5 * mass(g) * (g.v0**2 + v2y(g) ** 2) * (1 - g.e**2),
+        "what is kept for what is lost": lambda g: 0.5 * mass(g) * back(g) ** 2,
+        "the equation as printed": lambda g: 0.5 * mass(g) * v2y(g) ** 2 * (1 - g.e**2),
+    },
+    ("turning-the-plate", 1): {
+        "both parts into the plate": lambda g: (
+            g.v0 * cos(radians(g.alpha)) + g.vy * sin(radians(g.alpha))
+        ),
+        "sine and cosine exchanged": along,
+        "the fall forgotten": lambda g: g.v0 * cos(radians(g.alpha)),
+        "the plate not turned": lambda g: g.v0,
+        "degrees for radians": lambda g: g.v0 * cos(g.alpha) - g.vy * sin(g.alpha),
+    },
+    ("turning-the-plate", 2): {
+        "ε on both components": lambda g: g.e * hypot(g.v0, g.vy),
+        "the equation as printed": lambda g: hypot(into(g), g.e * along(g)),
+        "a bounce without loss": lambda g: hypot(g.v0, g.vy),
+        "ε on the wrong component": lambda g: hypot(g.e * g.v0, g.vy),
+        "component along the plate forgotten": lambda g: g.e * into(g),
+    },
+    ("turning-the-plate", 3): {
+        "sign or direction": lambda g: (
+            g.e * into(g) * cos(radians(g.alpha)) - along(g) * sin(radians(g.alpha))
+        ),
+        "the plate not turned": lambda g: -g.e * g.v0,
+        "ε forgotten": lambda g: along(g) * sin(radians(g.alpha)) - into(g) * cos(radians(g.alpha)),
+        "ε on the wrong component": lambda g: (
+            g.e * along(g) * sin(radians(g.alpha)) - into(g) * cos(radians(g.alpha))
+        ),
+        "rebound into the plate": lambda g: (
+            along(g) * sin(radians(g.alpha)) + g.e * into(g) * cos(radians(g.alpha))
+        ),
+        "sine and cosine exchanged": lambda g: (
+            along(g) * cos(radians(g.alpha)) - g.e * into(g) * sin(radians(g.alpha))
+        ),
+    },
+    ("turning-the-plate", 4): {
+        "velocity at the pivot's distance": lambda g: degrees(atan(2 * matching(g))),
+        "distance from the wrong place": lambda g: degrees(atan(g.v0**2 / (2 * G * g.d))),
+        "angle from the horizontal": lambda g: degrees(atan(1 / matching(g))),
+        "the tangent, not the angle": matching,
+    },
+    ("landing", 1): {
+        "direction lost": lambda g: mass(g) * g.vb * (g.vb - back(g)),
+        "kinetic energy gained": gained,
+        "the equation as printed": eq14,
+        "heat for work": heat,
+        "belt and particle speed exchanged": lambda g: mass(g) * back(g) * (g.vb + back(g)),
+    },
+    ("landing", 2): {
+        "direction lost": lambda g: 0.5 * mass(g) * (g.vb - back(g)) ** 2,
+        "difference of the squares": gained,
+        "half of the work": lambda g: work(g) / 2,
+        "the equation as printed": eq14,
+    },
+    ("landing", 3): {
+        "direction lost": lambda g: (g.vb - back(g)) / (g.mu * G),
+        "µ forgotten": lambda g: (g.vb + back(g)) / G,
+        "a start from rest": lambda g: g.vb / (g.mu * G),
+        "belt and particle speed exchanged": lambda g: back(g) / (g.mu * G),
+    },
+    ("landing", 4): {
+        "direction lost": lambda g: g.rate * mass(g) * g.vb * (g.vb - back(g)),
+        "the equation as printed": lambda g: g.rate * eq14(g),
+        "energy of one particle": work,
+        "heat for work": lambda g: g.rate * heat(g),
+        "divided by the rate": lambda g: work(g) / g.rate,
+    },
+    ("grip-or-slip", 1): {
+        "radius forgotten": lambda g: degrees(acos(u_of_a_point(g))),
+        "angle from the horizontal": lambda g: degrees(asin(u(g))),
+        "square forgotten": lambda g: degrees(acos(g.v0 / sqrt(G * ride(g)))),
+        "friction's limit for the grip": leaves,
+    },
+    ("grip-or-slip", 2): {
+        "an incline that stands still": lambda g: degrees(atan(g.mu)),
+        "separation for slip": leaves,
+        "pressed on by going round": lambda g: onset(g, start=-u(g)),
+        "a disk that rolls": lambda g: onset(g, (3 * u(g) + 4) / 7, 7 * g.mu),
+        "radius forgotten": lambda g: onset(g, start=u_of_a_point(g)),
+    },
+    ("grip-or-slip", 3): {
+        "the textbook angle": lambda g: degrees(turn(g)),
+        "sliding for rolling": lambda g: degrees(acos((2 + u(g)) / 3)),
+        "a start from rest": lambda g: degrees(acos(4 / 7)),
+        "a hoop for a disk": lambda g: degrees(acos((1 + u(g)) / 2)),
+        "radius forgotten": lambda g: degrees(acos((3 * u_of_a_point(g) + 4) / 7)),
+    },
+    ("grip-or-slip", 4): {
+        "µ where it does not matter": lambda g: sqrt(g.mu * G * ride(g)),
+        "radius forgotten": lambda g: sqrt(G * g.R),
+        "square root forgotten": lambda g: G * ride(g),
+        "a fall for a circle": lambda g: sqrt(2 * G * ride(g)),
+    },
+    ("a-stream", 1): {
+        "mass over rate": lambda g: mass(g) / g.rate,
+        "rate over mass": lambda g: g.rate / mass(g),
+        "tonnes per hour": lambda g: g.rate * mass(g) * 3600 / 1000,
+        "per minute": lambda g: g.rate * mass(g) * 60,
+    },
+    ("a-stream", 2): {
+        "upside down": lambda g: g.rate / g.v0,
+        "multiplied": lambda g: g.rate * g.v0,
+        "gap for distance": lambda g: g.v0 / g.rate - 2 * g.mm / 1000,
+        "belt and particle speed exchanged": lambda g: g.vb / g.rate,
+    },
+    ("a-stream", 3): {
+        "ε forgotten": lambda g: g.v0 * (falling(g, g.d2 + g.bed) - falling(g, g.d2)),
+        "height of the bed for the spread": lambda g: g.bed,
+        "a fall from rest": lambda g: back(g) * (sqrt(2 * (g.d2 + g.bed) / G) - sqrt(2 * g.d2 / G)),
+        "the bed's fall alone": lambda g: back(g) * sqrt(2 * g.bed / G),
+        "the equation as printed": lambda g: printed_x3(g, g.d2 + g.bed) - printed_x3(g, g.d2),
+    },
+    ("a-stream", 4): {
+        "direction lost": lambda g: g.rate * mass(g) * g.vb * (g.vb - back(g)),
+        "the equation as printed": lambda g: g.rate * eq14(g),
+        "kinetic energy gained": lambda g: g.rate * gained(g),
+        "heat for work": lambda g: g.rate * heat(g),
+        "belt and particle speed exchanged": lambda g: g.rate * mass(g) * g.v0 * (g.v0 + back(g)),
+    },
+    ("trust", 1): {
+        "upside down": lambda g: 1 / order(g),
+        "logarithms forgotten": lambda g: g.e1 / g.e2,
+        "ratio of the ratios": lambda g: (g.e1 / g.e2) / (g.dt1 / g.dt2),
+        "the steps forgotten": lambda g: log10(g.e1 / g.e2),
+    },
+    ("trust", 2): {
+        "as if the order were 1": lambda g: g.dt2 * g.wanted / g.e2,
+        "power p for 1/p": lambda g: g.dt2 * (g.wanted / g.e2) ** order(g),
+        "upside down": lambda g: g.dt2 * (g.e2 / g.wanted) ** (1 / order(g)),
+        "step and error of different runs": lambda g: g.dt1 * (g.wanted / g.e2) ** (1 / order(g)),
+    },
+    ("trust", 3): {
+        "share of the energy at the start": lambda g: share(g, g.start_mJ),
+        "potential energy forgotten": lambda g: share(g, books(g) - g.fall_mJ),
+        "gains minus losses": lambda g: share(g, books(g) - 2 * (g.bounce_mJ + g.heat_mJ)),
+        "upside down": lambda g: books(g) / (g.residual_uJ / 1000),
+    },
+    ("trust", 4): {
+        "thickness forgotten": lambda g: g.r_mm / 1000 / g.v,
+        "radius forgotten": lambda g: g.thick_mm / 2000 / g.v,
+        "the whole thickness": lambda g: (g.r_mm + g.thick_mm) / 1000 / g.v,
+        "upside down": lambda g: g.v / ((g.r_mm + g.thick_mm / 2) / 1000),
+    },
+}
+"""By lesson and question: what the mistake is called, and the number that it leads to."""
+
+GENERAL = {
+    "sign or direction": lambda right: -right,
+    "a missing ½": lambda right: 2 * right,
+    "a ½ too many": lambda right: right / 2,
+    "power of ten": lambda right: 1000 * right,
+}
+"""What every question knows, made of the right answer."""

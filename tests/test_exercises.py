@@ -1,0 +1,486 @@
+"""Exercises: numbers from a name, answers from theory, each mistake told from the others."""
+
+from __future__ import annotations
+
+import json
+import re
+from fractions import Fraction
+from html.parser import HTMLParser
+from math import atan, cos, degrees, isfinite, nan, radians, sin
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from chutelab import simulate
+from chutelab.exercises import EXERCISES, LessonError, Values, Verdict, find, lesson
+from chutelab.exercises.drawing import draw, draws, solved
+from chutelab.exercises.values import shown
+from chutelab.recording import Kind
+from chutelab.scene import from_dict
+
+NAMES = list(EXERCISES)
+SOLUTIONS = Path(__file__).parent / "solutions"
+LESSONS = Path(__file__).parent.parent / "lessons"
+FEW = [f"student {i}" for i in range(6)]
+G = 9.81
+
+
+class Handed:
+    """A task as a solution sees it."""
+
+    def __init__(self, given):
+        self.given = given
+
+
+def solution(name, given):
+    """The four answers, from formulas written out under tests/solutions."""
+    names = {"task": Handed(given)}
+    exec((SOLUTIONS / f"{name}.py").read_text(encoding="utf-8"), names)
+    return [names[f"answer_{n}"] for n in (1, 2, 3, 4)]
+
+
+# Parameters from names
+
+
+def test_a_name_draws_the_same_numbers_on_every_machine():
+    found = {name: [lesson(name, "Ada Lovelace").given[key] for key in keys] for name, keys in {
+        "the-parabola": ("v0", "h"),
+        "letting-go": ("v0", "R", "r"),
+        "the-bounce": ("v0", "R", "r", "grams", "d", "e", "d2"),
+        "turning-the-plate": ("v0", "R", "d", "alpha", "e"),
+        "landing": ("v0", "e", "vb", "grams", "mu", "rate"),
+        "grip-or-slip": ("v0", "R", "r", "mu"),
+        "a-stream": ("v0", "R", "rate", "grams", "mm", "bed", "d", "e", "d2", "vb"),
+        "trust": ("dt1", "ratio", "e1", "e2", "wanted"),
+    }.items()}  # fmt: skip
+    assert found == PINNED
+
+
+PINNED = {
+    "the-parabola": [1.6, 0.5],
+    "letting-go": [1.7, 0.4, 0.05],
+    "the-bounce": [3.4, 0.2, 0.05, 20.0, 0.4, 0.4, 0.8],
+    "turning-the-plate": [3.2, 0.06, 0.12, 60.0, 0.4],
+    "landing": [1.5, 0.3, 1.0, 17.0, 0.4, 30.0],
+    "grip-or-slip": [1.4, 0.55, 0.06, 0.3],
+    "a-stream": [3.2, 0.1, 30.0, 9.0, 6.0, 0.04, 0.4, 0.4, 0.5, 2.6],
+    "trust": [0.001, 4.0, 0.0006, 5e-05, 2e-07],
+}
+
+
+def test_a_name_is_a_name_whatever_its_capitals_and_spaces():
+    first = lesson(3, "Zoë  de Vries ").given
+    again = lesson("03-the-bounce", " zoe\u0308 DE vries").given
+    assert list(map(first.__getitem__, first)) == list(map(again.__getitem__, again))
+    assert repr(lesson(3, "Zoe de Vries").given) != repr(first)
+
+
+def test_students_differ_and_so_do_the_lessons_of_one():
+    for name in NAMES:
+        drawn = {repr(lesson(name, student).given) for student in FEW}
+        assert len(drawn) >= len(FEW) - 1
+    assert lesson("letting-go", "x").given.R != lesson("grip-or-slip", "x").given.R
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_most_exercises_accept_one_draw_in_ten(name):
+    exercise = EXERCISES[name]
+    fits = [solved(exercise, draws(exercise, f"draw {i}", 0)) is not None for i in range(80)]
+    assert sum(fits) >= 4
+
+
+def test_draws_stay_where_the_lesson_is():
+    for student in [f"domain {i}" for i in range(25)]:
+        for name in ("letting-go", "grip-or-slip"):
+            given = lesson(name, student).given
+            assert given.v0**2 < G * given.R
+        for name in ("the-bounce", "turning-the-plate"):
+            given = lesson(name, student).given
+            assert given.v0**2 > G * given.R
+        tilted = lesson("turning-the-plate", student).given
+        assert tan_deg(tilted.alpha) < tilted.v0**2 / (2 * G * (tilted.R + tilted.d))
+
+
+def tan_deg(angle):
+    return sin(radians(angle)) / cos(radians(angle))
+
+
+# Answers
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_formulas_written_out_by_hand_are_right(name):
+    for student in FEW:
+        task = lesson(name, student)
+        answers = solution(name, task.given)
+        replies = [task.check(n, answer) for n, answer in enumerate(answers, start=1)]
+        assert [reply.verdict for reply in replies] == [Verdict.RIGHT] * 4
+        assert task.progress().done == 4
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_answers_are_exact_and_the_tolerance_is_the_one_stated(name):
+    task = lesson(name, "tolerance")
+    for number, answer in enumerate(solution(name, task.given), start=1):
+        assert "to within 1 %" in task.question(number).text
+        case = draw(EXERCISES[name], "tolerance")[1][number - 1]
+        assert case.right == pytest.approx(answer, rel=1e-4)  # told numbers have four digits
+        assert task.check(number, case.right * 1.0099).right
+        assert task.check(number, case.right * 0.9901).right
+        assert not task.check(number, case.right * 1.0101).right
+        assert not task.check(number, case.right * 0.9899).right
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_digits_shown_in_the_texts_are_enough(name):
+    for student in FEW:
+        task = lesson(name, student)
+        rounded = Values({key: float(shown(task.given[key])) for key in task.given})
+        for number, answer in enumerate(solution(name, rounded), start=1):
+            assert task.check(number, float(f"{answer:.3g}")).right
+
+
+def test_the_engine_starts_to_slip_where_the_exercise_says():
+    for student in FEW[:4]:
+        task = lesson("grip-or-slip", student)
+        given = task.given
+        scene = from_dict(
+            {
+                "particle": {"radius": given.r},
+                "incoming": {
+                    "speed": given.v0, "pulley_radius": given.R, "friction": given.mu,
+                },
+                "run": {"until": 2.0},
+            }
+        )  # fmt: skip
+        slips = simulate(scene).select(Kind.SLIP)[0]
+        x, y = slips["position"]
+        assert task.check(2, degrees(atan(x / y))).right
+
+
+def test_the_engine_spreads_a_stream_as_far_as_the_exercise_says():
+    for student in FEW[:4]:
+        task = lesson("a-stream", student)
+        given = task.given
+        drop = from_dict({
+            "particle": {"radius": given.mm / 1000},
+            "incoming": {"speed": given.v0, "pulley_radius": given.R},
+            "plate": {"distance": given.d, "restitution": given.e},
+            "outgoing": {"drop": given.d2},
+            "stream": {"count": 400, "bed_height": given.bed},
+        })  # fmt: skip
+        landings = simulate(drop).select(Kind.LANDING)["position"][:, 0]
+        # 400 draws leave some hundredths of the bed's height unused at its top.
+        assert np.ptp(landings) == pytest.approx(solution("a-stream", given)[2], rel=0.03)
+
+
+# Known mistakes
+
+
+def recognised(name, student):
+    """Check every mistake of every question; return their names."""
+    task = lesson(name, student)
+    seen = []
+    for number, case in enumerate(draw(EXERCISES[name], student)[1], start=1):
+        assert task.check(number, case.right).right
+        for trace in case.mistakes:
+            assert isfinite(trace.number)
+            for digits in (trace.number, float(f"{trace.number:.4g}")):
+                reply = task.check(number, digits)
+                assert (reply.verdict, reply.mistake) == (Verdict.MISTAKE, trace.name), (
+                    student, number, trace,
+                )  # fmt: skip
+                assert reply.text == trace.says
+            seen.append(trace.name)
+        known = {mistake.name for mistake in case.question.mistakes}
+        assert len(known) == len(case.question.mistakes) >= 3
+        assert {"sign or direction", "power of ten", "a missing ½"} <= set(seen)
+    return seen
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_mistake_is_recognised_as_itself(name):
+    for i in range(25):
+        recognised(name, f"student {i}")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_every_mistake_is_recognised_as_itself_for_a_whole_school(name):
+    for i in range(400):
+        recognised(name, f"pupil {i}")
+
+
+def by_hand():
+    """The table of mistakes beside the solutions."""
+    names = {}
+    exec((SOLUTIONS / "mistakes.py").read_text(encoding="utf-8"), names)
+    return names["MISTAKES"], names["GENERAL"]
+
+
+MISTAKES, GENERAL = by_hand()
+
+
+def test_every_mistake_of_every_question_is_made_by_hand_below():
+    own = {
+        (name, number): {mistake.name for mistake in question.mistakes}
+        for name, exercise in EXERCISES.items()
+        for number, question in enumerate(exercise.questions, start=1)
+    }
+    assert {key: set(made) for key, made in MISTAKES.items()} == own
+
+
+@pytest.mark.parametrize(("name", "number"), list(MISTAKES))
+def test_a_mistake_made_by_hand_is_named(name, number):
+    for student in FEW[:3]:
+        task = lesson(name, student)
+        for mistake, formula in MISTAKES[name, number].items():
+            assert task.check(number, formula(task.given)).mistake == mistake, (student, mistake)
+        right = solution(name, task.given)[number - 1]
+        for mistake, of in GENERAL.items():
+            assert task.check(number, of(right)).mistake == mistake
+        if EXERCISES[name].questions[number - 1].unit == "degrees":
+            for turned in (radians(right), degrees(right)):
+                assert task.check(number, turned).mistake == "radians for degrees"
+
+
+def test_what_is_no_known_mistake_is_told_how_far_off_it_is():
+    task = lesson("the-parabola", "x")
+    right = solution("the-parabola", task.given)[0]
+    replies = {
+        1.03: "about 3 % too large. Were numbers rounded",
+        0.97: "about 3 % too small",
+        1.23: "about 23 % too large",
+        3.3: "a factor of 3.3 too large",
+        1 / 3.3: "70 % too small",
+        33.0: "more than 10 times too large",
+        1 / 3333.0: "more than 100 times too small",
+        -1.23: "The sign is the other way round",
+        0.0: "It is not 0",
+    }
+    for ratio, text in replies.items():
+        reply = task.check(1, ratio * right)
+        assert reply.verdict is Verdict.OFF
+        assert text in reply.text, (ratio, reply)
+
+
+def test_no_reply_gives_the_answer_away():
+    for name in NAMES:
+        task = lesson(name, "secret")
+        for number, case in enumerate(draw(EXERCISES[name], "secret")[1], start=1):
+            words = [task.check(number, trace.number).text for trace in case.mistakes]
+            words += [task.check(number, 1.3 * case.right).text, task.question(number).text]
+            told = {shown(task.given[key]) for key in task.given} | {"1", "10", "0", "2"}
+            found = set(re.findall(r"(?<![\w.])\d+(?:\.\d+)?(?![\w.])", " ".join(words)))
+            assert shown(abs(case.right)) not in found - told
+
+
+# Kind words
+
+
+class Rude:
+    def __float__(self):
+        raise RuntimeError("no")
+
+    def __repr__(self):
+        raise RuntimeError("no")
+
+
+NOTHING = [None, ..., "", "  ", "...", "?", [], (), np.array([])]
+NO_NUMBER = [
+    ("2 m/s", "unit"), ("2,5", "2.5"), ("-1.5", "-1.5"), ("two", "text"), (b"2", "quotes"),
+    (True, "comparison"), (np.True_, "comparison"), (nan, "NaN"), (np.float64("nan"), "NaN"),
+    (float("inf"), "infinite"), (10**400, "infinite"), (1 + 2j, "complex"),
+    (np.complex128(1), "complex"), ([1.0, 2.0], "2 values"), (np.zeros((2, 2)), "4 values"),
+    ({"a": 1}, "dict"), ({1}, "set"), (len, "function"), (Rude(), "Rude"), (Rude, "function"),
+    ([[1.0, 2.0]], "2 values"), (["2 m"], "unit"), (object(), "object"), ("x" * 10**6, "text"),
+    ("1" * 10**6, "text"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("answer", NOTHING, ids=lambda value: type(value).__name__)
+def test_nothing_attempted_is_said_to_be_so(answer):
+    task = lesson("the-bounce", "blank")
+    reply = task.check(1, answer)
+    assert reply.verdict is Verdict.BLANK
+    assert "not attempted" in str(reply)
+    assert task.progress().rows[0].tries == 0
+
+
+@pytest.mark.parametrize(("answer", "word"), NO_NUMBER, ids=lambda value: type(value).__name__)
+def test_what_is_no_number_is_answered_kindly(answer, word):
+    reply = lesson("the-bounce", "odd").check(1, answer)
+    assert reply.verdict is Verdict.UNREAD
+    assert word in reply.text
+    assert len(str(reply)) < 400
+    assert reply._repr_html_()
+
+
+@pytest.mark.parametrize(
+    "wrap",
+    [
+        np.float32,
+        np.float64,
+        np.longdouble,
+        Fraction,
+        np.array,
+        lambda x: np.array([x]),
+        lambda x: [x],
+    ],
+)
+def test_any_kind_of_number_is_a_number(wrap):
+    task = lesson("the-parabola", "kinds")
+    assert task.check(1, wrap(solution("the-parabola", task.given)[0])).right
+
+
+@pytest.mark.parametrize(
+    "number", [0, 5, -1, 1.5, None, "first", nan, True, [], {}, Rude(), 10**400]
+)
+def test_an_unknown_question_is_answered_kindly(number):
+    task = lesson("the-bounce", "unknown")
+    for ask in (task.question, task.check, task.hint, task.reveal):
+        assert ask() == ask(number)
+        reply = ask(number)
+        assert reply.verdict is Verdict.UNKNOWN
+        assert "1 to 4" in str(reply)
+
+
+def test_a_question_may_be_named_by_its_digit():
+    assert lesson("the-bounce", "digit").question("2").number == 2
+
+
+# Hints, working, progress
+
+
+def test_hints_come_one_by_one_and_the_working_only_when_asked():
+    task = lesson("the-bounce", "hints")
+    hints = [task.hint(2) for _ in range(4)]
+    assert [hint.title[:11] for hint in hints] == [
+        "Hint 1 of 3",
+        "Hint 2 of 3",
+        *["Hint 3 of 3"] * 2,
+    ]
+    assert len({hint.text for hint in hints}) == 3
+    assert "task.reveal(2)" in hints[2].text
+    assert task.revealed == ()
+    answer = solution("the-bounce", task.given)[1]
+    assert f"Answer: {answer:.4g} m/s" in task.reveal(2).text
+    assert task.revealed == (2,)
+    assert task.progress().rows[1].remarks == "3 hints, working shown"
+    assert task.progress().rows[0].remarks == ""
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_text_has_its_numbers_in_it(name):
+    task = lesson(name, "texts")
+    for number in (1, 2, 3, 4):
+        texts = [task.question(number), task.reveal(number)]
+        texts += [task.hint(number) for _ in EXERCISES[name].questions[number - 1].hints]
+        for text in texts:
+            assert not re.search(r"[{}]|\bnan\b|None", str(text)), text
+            assert max(map(len, str(text).splitlines())) <= 88
+    assert [question.number for question in task.questions] == [1, 2, 3, 4]
+    assert EXERCISES[name].title in repr(task)
+
+
+def test_progress_says_what_is_done_in_words_and_in_a_picture():
+    task = lesson("landing", "<script>alert(1)</script>")
+    answers = solution("landing", task.given)
+    task.check(1, answers[0])
+    task.check(2, -answers[1])
+    task.check(3, "soon")
+    progress = task.progress()
+    assert [row.verdict for row in progress.rows] == [
+        Verdict.RIGHT, Verdict.MISTAKE, Verdict.UNREAD, Verdict.BLANK,
+    ]  # fmt: skip
+    assert "1 of 4 done" in str(progress)
+    page = progress._repr_html_()
+    assert page.count("<rect") == 4
+    assert "<script>" not in page + task._repr_html_()
+    task.check(2, answers[1])
+    assert task.progress().done == 2
+    assert task.progress().rows[1].tries == 2
+
+
+class Balanced(HTMLParser):
+    def __init__(self):
+        super().__init__()
+        self.open = []
+
+    def handle_starttag(self, tag, attrs):
+        styles = dict(attrs).get("style", "")
+        assert not re.search(r"background|(?<!-)\bcolor:", styles), styles
+        if tag != "br":
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        pass
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+def test_html_is_whole_and_takes_the_colours_of_the_page():
+    task = lesson("a-stream", "html")
+    for part in (
+        task, task.question(1), task.check(1), task.check(1, 7.0), task.hint(1), task.reveal(1),
+        task.progress(), task.check(99),
+    ):  # fmt: skip
+        parser = Balanced()
+        parser.feed(part._repr_html_())
+        parser.close()
+        assert parser.open == []
+
+
+# Lessons and their notebooks
+
+
+def test_lessons_are_found_by_number_or_name():
+    for ask in (3, "3", "the-bounce", "03-the-bounce", "The Bounce", "03"):
+        assert find(ask).name == "the-bounce"
+    assert [exercise.number for exercise in EXERCISES.values()] == list(range(1, 9))
+    with pytest.raises(LessonError, match="Did you mean 'the-bounce'"):
+        lesson("the-bonce", "x")
+    with pytest.raises(LessonError, match=r"no lesson '9'.* 8 trust"):
+        lesson(9, "x")
+
+
+def test_the_students_numbers_can_be_read_and_not_changed():
+    given = lesson("the-bounce", "given").given
+    assert "v0 = " in repr(given)
+    assert "v0" in dir(given)
+    with pytest.raises(AttributeError, match="no number 'vx' here; there are v0, R"):
+        _ = given.vx
+    with pytest.raises(AttributeError, match="are given"):
+        given.v0 = 3.0
+
+
+def notebook(name):
+    path = LESSONS / f"{EXERCISES[name].number:02}-{name}" / "exercise.ipynb"
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_notebooks_are_shipped_without_outputs_and_ask_every_question(name):
+    found = notebook(name)
+    assert (found["nbformat"], found["nbformat_minor"]) == (4, 5)
+    cells = {cell["id"]: "".join(cell["source"]) for cell in found["cells"]}
+    assert len(cells) == len(found["cells"])
+    for cell in found["cells"]:
+        if cell["cell_type"] == "code":
+            assert (cell["outputs"], cell["execution_count"]) == ([], None)
+    order = ["title", "name", "predict", "run", "compare", "explanation"]
+    for number in (1, 2, 3, 4):
+        assert cells[f"question-{number}"] == f"task.question({number})"
+        assert (
+            cells[f"answer-{number}"]
+            == f"answer_{number} = None\ntask.check({number}, answer_{number})"
+        )
+        order += [f"question-{number}", f"answer-{number}"]
+    order += ["live", "progress"]
+    assert [key for key in cells if key in order] == order
+    assert f'task = lesson("{name}", student=student)' in cells["name"]
+    assert EXERCISES[name].title in cells["title"]
+    for number, case in enumerate(draw(EXERCISES[name], "your name")[1], start=1):
+        assert repr(case.right) not in json.dumps(found), number

@@ -284,19 +284,35 @@ def test_a_stick_right_after_release_is_told_if_the_speed_changed(rode: float, s
     assert words == {f"t = 0.100 s: {sentence(recording, recording.events[2])}"}
 
 
-@given(st.floats(-3.1, 3.1), st.floats(0.1, 5.0), st.floats(-5.0, 5.0), st.floats(0.001, 10.0))
-def test_contact_normal_follows_from_the_impulses(
-    angle: float, normal: float, tangential: float, mass: float
-) -> None:
-    n = np.array([np.cos(angle), np.sin(angle)])
-    pushed = normal * n + tangential * np.array([n[1], -n[0]])
-    event = {
-        "velocity_before": np.zeros(2),
-        "velocity_after": pushed / mass,
-        "normal_impulse": normal,
-        "tangential_impulse": tangential,
-    }
-    assert contact_normal(event, mass) == pytest.approx(n, abs=1e-14)
+@pytest.mark.parametrize(
+    "overrides",
+    [["run.engine=pymunk"], ["run.engine=pymunk", "run.align=false"], ["particle.radius=0"]],
+)
+@pytest.mark.parametrize(("name", "angle"), [("inclined-20", 20.0), ("perpendicular", 0.0)])
+def test_contact_normal_is_that_of_the_plate(name: str, angle: float, overrides: list[str]) -> None:
+    recording = simulate(scene.load(name, [*overrides, "plate.restitution=0.4"]))
+    (hit,) = recording.select(Kind.IMPACT, surface="plate")
+    normal = -np.cos(np.radians(angle)), -np.sin(np.radians(angle))
+    assert contact_normal(machine_of(recording), hit) == pytest.approx(normal, abs=1e-9)
+    said = float(sentence(recording, hit).partition(", ε = ")[2].partition("\n")[0])
+    # A fixed step mixes a step's gravity into the velocities.
+    assert said == pytest.approx(0.4, abs=0.02 if "run.align=false" in overrides else 0.0)
+
+
+def test_contact_normal_points_away_from_a_clipped_end() -> None:
+    # The plate's upper end 5 mm below the flight's height there, less than a radius of 2 cm.
+    recording = simulate(
+        scene.load(
+            "perpendicular",
+            ["particle.radius=0.02", "plate.above=0", "plate.pivot_height=-0.3",
+             "outgoing.drop_from=top", "outgoing.drop=1"],
+        )
+    )  # fmt: skip
+    hit = recording.select(Kind.IMPACT, surface="plate")[0]
+    end = np.array([0.6, -0.3])
+    assert np.hypot(*(hit["position"] - end)) == pytest.approx(0.02, rel=1e-9)
+    expected = (hit["position"] - end) / 0.02
+    assert contact_normal(machine_of(recording), hit) == pytest.approx(expected, abs=1e-9)
 
 
 def test_separation_is_told_by_its_angle(runs: dict[str, Recording]) -> None:

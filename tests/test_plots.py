@@ -3,6 +3,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from dataclasses import replace
+from io import BytesIO
 from math import acos, cos, hypot, sin, sqrt
 from typing import TYPE_CHECKING, Any
 
@@ -602,3 +603,59 @@ def test_quantities_read_back_to_three_digits(value: float) -> None:
     assert float(number) * 10.0 ** powers[unit] == pytest.approx(
         value, rel=0.051 if "e" in number else 0.0051
     )
+
+
+@pytest.mark.parametrize("speed", [2.0, 0.5])
+def test_without_a_plate_the_parabola_is_that_of_a_throw(speed: float) -> None:
+    text = f"""
+[incoming]
+speed = {speed}
+pulley_radius = 0.1
+[outgoing]
+drop = 0.8
+drop_from = "top"
+"""
+    thrown = scene.parse(text)
+    (arc,) = plots.arcs(theory.predict(thrown), thrown)
+    # cos φ1 = v²/(g (R + r)), at most 1; then a fall to the belt, with r between.
+    phi1 = np.arccos(min(1.0, speed**2 / (9.81 * 0.104)))
+    y, vy = 0.104 * np.cos(phi1), -speed * np.sin(phi1)
+    fall = y - (0.1 - 0.8 + 0.004)
+    t = (vy + np.sqrt(vy**2 + 2.0 * 9.81 * fall)) / 9.81
+    landing = simulate(thrown).select(Kind.LANDING)[0]
+    assert arc.end == pytest.approx(t, rel=1e-12)
+    position, velocity = arc.at([arc.end])
+    assert position[0] == pytest.approx(landing["position"], abs=1e-12)
+    assert velocity[0] == pytest.approx(landing["velocity_before"], abs=1e-12)
+
+
+def test_without_a_plate_a_slipping_belt_throws_too() -> None:
+    text = "[incoming]\nspeed = 2.0\npulley_radius = 0.5\nfriction = 0.5\n"
+    thrown = scene.parse(text + '[outgoing]\ndrop = 1.5\ndrop_from = "top"\n')
+    (arc,) = plots.arcs(theory.predict(thrown), thrown)
+    # The slip law's angle and speed for R = 0.5 m, r = 4 mm, 2 m/s, µ = 0.5.
+    assert np.degrees(np.arctan2(*arc.position)) == pytest.approx(22.913, abs=5e-4)
+    assert np.hypot(*arc.velocity) == pytest.approx(2.1340, abs=5e-5)
+    landing = simulate(thrown).select(Kind.LANDING)[0]
+    assert arc.at([arc.end])[0][0] == pytest.approx(landing["position"], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "more",
+    ["start = 5.0", "speed = 1.0\n[[surface]]\nname = 'hood'\nfrom = [0, 1]\nto = [1, 1]"],
+)
+def test_no_parabola_where_something_else_may_be_hit(more: str) -> None:
+    text = (
+        '[incoming]\nspeed = 2.0\npulley_radius = 0.1\n[outgoing]\ndrop = 0.8\ndrop_from = "top"\n'
+    )
+    other = scene.parse(text + more)
+    assert plots.arcs(theory.predict(other), other) == ()
+
+
+def test_a_picture_shows_itself_in_a_notebook(tmp_path: Path) -> None:
+    figure = plots.overlay(simulate(scene.load("perpendicular")), path=tmp_path / "overlay.png")
+    shown = figure._repr_png_()  # type: ignore[attr-defined]
+    with Image.open(BytesIO(shown)) as screen, Image.open(tmp_path / "overlay.png") as written:
+        width, height = figure.get_size_inches()
+        assert screen.size == (round(80 * width), round(80 * height))
+        assert written.width > screen.width

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import atan2, degrees, hypot
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from chutelab.plots.sampling import STRUCK, subset
+from chutelab.plots.scenery import machine_of
 from chutelab.plots.style import quantity
 from chutelab.recording import PARTICLES, Kind
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from chutelab.machine import Machine
     from chutelab.recording import Recording
 
 
@@ -27,18 +30,33 @@ def surface_words(name: str) -> str:
     }.get(name, f"“{name}”")
 
 
-def contact_normal(event: Any, mass: float) -> NDArray[np.float64]:
-    """Return the unit normal of an impact, away from the surface, from the impulses it gave.
+@lru_cache(maxsize=1)
+def _machine(recording: Recording) -> Machine:
+    return machine_of(recording)
 
-    m Δv = J_n n + J_t (n_y, -n_x), solved for n; NaN if there was no impulse.
+
+def contact_normal(machine: Machine, event: Any) -> NDArray[np.float64]:
+    """Return the unit normal of an impact, away from the surface, (2,).
+
+    From where the particle is: a fixed step's velocities have gravity in them, too.
     """
-    pushed = mass * (event["velocity_after"] - event["velocity_before"])
-    normal, tangential = float(event["normal_impulse"]), float(event["tangential_impulse"])
-    size = normal**2 + tangential**2
-    if size == 0.0:
-        return np.full(2, np.nan)
-    x, y = float(pushed[0]), float(pushed[1])
-    return np.array([x * normal - y * tangential, y * normal + x * tangential]) / size
+    position, segments = event["position"], machine.segments
+    mine = segments.surface == event["surface"]
+    start, tangent = segments.start[mine], segments.tangent[mine]
+    along = np.einsum("sd,sd->s", position - start, tangent)
+    foot = start + np.clip(along, 0.0, segments.length[mine])[:, None] * tangent
+    away = position - foot
+    gap = np.hypot(*away.T)
+    pulley, name = machine.pulley, machine.surfaces[event["surface"]]
+    if pulley is not None and name == "incoming":
+        rim = np.hypot(*position)
+        if abs(rim - pulley.radius) < gap.min():
+            return np.asarray(position / rim)
+    nearest = int(np.argmin(gap))
+    if gap[nearest] > 0.5 * machine.particle.radius > 0.0:
+        return np.asarray(away[nearest] / gap[nearest])
+    normal = np.array([-tangent[nearest][1], tangent[nearest][0]])
+    return normal if normal @ event["velocity_before"] < 0.0 else -normal
 
 
 def losses(recording: Recording, event: Any) -> NDArray[np.float64]:
@@ -82,7 +100,7 @@ def _impact(recording: Recording, event: Any, kind: Kind, name: str) -> str:
         return f"hits particle {int(event['other'])} at {before:.3g} m/s"
     verb = "lands on" if kind is Kind.LANDING else "strikes"
     text = f"{verb} {surface_words(name)} at {before:.3g} m/s"
-    normal = contact_normal(event, recording.particle.mass)
+    normal = contact_normal(_machine(recording), event)
     into, off = (abs(float(event[v] @ normal)) for v in ("velocity_before", "velocity_after"))
     if into > 0.0:
         text += f", ε = {round(off / into, 3):g}"

@@ -2,20 +2,23 @@
 
 An arc of free flight is fixed by where it begins, how far it goes and how long it takes, so the
 paper's own quantities suffice: (x2, y2) in t2 from the separation point to the plate, equations
-(3)-(5), and (x3, y3) in t3 from the plate to the outgoing belt, equations (10)-(12).
+(3)-(5), and (x3, y3) in t3 from the plate to the outgoing belt, equations (10)-(12). Without a
+plate the paper has nothing to say; there is one arc, from where the pulley is left.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, isfinite, sin
+from math import cos, isfinite, sin, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chutelab.theory.separation import separation
+
 if TYPE_CHECKING:
-    from chutelab.scene import Scene
+    from chutelab.scene import Incoming, Scene
     from chutelab.theory import Transfer
 
 Floats = NDArray[np.float64]
@@ -60,6 +63,8 @@ def arcs(prediction: Transfer, scene: Scene) -> tuple[Arc, ...]:
         For the radius R + r of the separation point, and for gravity.
     """
     phi1 = float(prediction.phi1)
+    if scene.incoming is not None and scene.plate is None:
+        return _thrown(scene, scene.incoming)
     if scene.incoming is None or not isfinite(phi1):
         return ()
     riding = scene.incoming.pulley_radius + scene.particle.radius
@@ -76,6 +81,31 @@ def arcs(prediction: Transfer, scene: Scene) -> tuple[Arc, ...]:
         found.append(Arc(begin, begin + duration, point, velocity, scene.gravity))
         point, begin = (point[0] + forward, point[1] - down), begin + duration
     return tuple(found)
+
+
+def _thrown(scene: Scene, belt: Incoming) -> tuple[Arc, ...]:
+    """Return the flight from the pulley down to the outgoing belt, where nothing is in the way."""
+    out, g, r = scene.outgoing, scene.gravity, scene.particle.radius
+    if out is None or scene.surface or not g:
+        return ()
+    riding = belt.pulley_radius + r
+    left = separation(
+        speed=np.array([belt.speed]),
+        ride_radius=np.array([riding]),
+        gravity=np.array([g]),
+        friction=np.array([np.inf if belt.friction == "adhesion" else float(belt.friction)]),
+        spin=np.array([scene.particle.spin]),
+    )
+    sine, cosine, speed = (float(part[0]) for part in (left.sin, left.cos, left.v1))
+    point, velocity = (riding * sine, riding * cosine), (speed * cosine, -speed * sine)
+    fall = point[1] - (belt.pulley_radius - out.drop + r)
+    if not fall > 0.0:
+        return ()
+    duration = (velocity[1] + sqrt(velocity[1] ** 2 + 2.0 * g * fall)) / g
+    landing = point[0] + velocity[0] * duration
+    if not out.start <= landing <= out.start + out.length:
+        return ()
+    return (Arc(0.0, duration, point, velocity, g),)
 
 
 def flight(parts: tuple[Arc, ...], times: ArrayLike) -> tuple[Floats, Floats]:

@@ -6,9 +6,6 @@ from pathlib import Path
 from textwrap import shorten
 from typing import TYPE_CHECKING
 
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-
 from chutelab.files import whole
 from chutelab.plots import style
 from chutelab.plots.panels import (
@@ -20,12 +17,14 @@ from chutelab.plots.panels import (
     draw_tracks,
     draw_velocity,
 )
+from chutelab.plots.picture import Picture
 from chutelab.plots.scenery import draw_scene, machine_of, scene_of
 from chutelab.plots.window import window_of
 from chutelab.theory import predict
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from chutelab.plots.analytic import Arc
     from chutelab.recording import Recording
@@ -63,8 +62,7 @@ def overlay(
     """
     if prediction is None:
         prediction = predict(scene_of(recording))
-    figure = Figure(figsize=SIZE, dpi=DPI)
-    FigureCanvasAgg(figure)
+    figure = Picture(figsize=SIZE, dpi=DPI)
     grid = figure.add_gridspec(
         2, 1, height_ratios=(4.2, 1.0), left=0.06, right=0.56, top=0.88, bottom=0.08, hspace=0.28
     )

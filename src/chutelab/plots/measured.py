@@ -7,8 +7,6 @@ from textwrap import shorten
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from chutelab.measured.residuals import length
 from chutelab.measured.result import plus_minus
@@ -16,6 +14,7 @@ from chutelab.measured.track import counted
 from chutelab.plots import style
 from chutelab.plots.figure import DPI, SIZE, save
 from chutelab.plots.panels import analytic_of, draw_analytic
+from chutelab.plots.picture import Picture
 from chutelab.plots.sampling import struck_by_nominal, subset, track_times
 from chutelab.plots.scenery import draw_scene, machine_of, scene_of
 from chutelab.plots.window import FAR, around, window_of
@@ -24,6 +23,7 @@ from chutelab.theory import predict
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from chutelab.measured import Fit, Residuals
     from chutelab.recording import Recording
@@ -51,8 +51,7 @@ def measured(found: Residuals, fit: Fit | None = None, *, path: str | Path | Non
     OSError
         If the file cannot be written.
     """
-    figure = Figure(figsize=SIZE, dpi=DPI)
-    FigureCanvasAgg(figure)
+    figure = Picture(figsize=SIZE, dpi=DPI)
     lines = 0 if fit is None else min(len(fit.parameters), PARAMETERS)
     top = 0.88 - 0.032 * max(0, lines - 1)
     view = figure.add_subplot(

@@ -8,19 +8,19 @@ from textwrap import shorten
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
 from chutelab.plots import style
 from chutelab.plots.figure import draw_view, save
 from chutelab.plots.panels import analytic_of
+from chutelab.plots.picture import Picture
 from chutelab.plots.sampling import round_times, strobe_step, subset
 from chutelab.plots.scenery import HALO, scene_of
 from chutelab.theory import predict
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from matplotlib.path import Path as MplPath
     from matplotlib.text import Annotation
 
@@ -77,8 +77,7 @@ def strobe(
     """
     if prediction is None:
         prediction = predict(scene_of(recording))
-    figure = Figure(figsize=SIZE, dpi=DPI)
-    FigureCanvasAgg(figure)
+    figure = Picture(figsize=SIZE, dpi=DPI)
     ax = figure.add_axes((0.095, 0.09, 0.885, 0.77))
     draw_view(ax, recording, analytic_of(recording, prediction)[0])
     _write_times(ax, recording)

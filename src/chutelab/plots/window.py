@@ -116,8 +116,10 @@ def _path(recording: Recording) -> tuple[NDArray[np.float64], NDArray[np.float64
     """Return particle 0's positions up to landing or last impact, and from there to its end."""
     begin, end = action(recording)
     mine = recording.events[recording.events["particle"] == 0]
-    mine = mine[(mine["kind"] != Kind.EXIT) & (mine["t"] > begin)]
-    if len(mine):
+    gone = mine["kind"] == Kind.EXIT
+    mine = mine[~gone & (mine["t"] > begin)]
+    # Of what leaves the scene nobody needs to see the fall after its last event.
+    if gone.any() and len(mine):
         end = float(mine["t"][-1])
     struck = struck_by_nominal(recording)
     # What it struck before, on the way to the end of a ramp, is not where it goes.

@@ -7,13 +7,12 @@ from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import matplotlib.patheffects as pe
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from chutelab.plots import style
 from chutelab.plots.figure import save
+from chutelab.plots.picture import Picture
 from chutelab.workprecision import METHODS, cases
 from chutelab.workprecision.fit import exponent, points, work_slope
 
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
 
     from chutelab.workprecision.records import Record, Size
 
@@ -254,8 +254,7 @@ def _page(
     below = [max(lines[k : k + columns]) for k in range(0, len(lines), columns)]
     heights = [TITLE + PANEL + LABEL + LINE * count for count in below]
     height = sum(heights) + FOOT
-    figure = Figure(figsize=(WIDTH, height), dpi=DPI)
-    FigureCanvasAgg(figure)
+    figure = Picture(figsize=(WIDTH, height), dpi=DPI)
     width = _width(columns)
     cells = []
     for k in range(len(lines)):

@@ -1,0 +1,250 @@
+"""Pictures of a search over one key, and of how uncertain inputs spread."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from textwrap import fill, shorten
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chutelab.plots import style
+from chutelab.plots.figure import DPI, save
+from chutelab.plots.picture import Picture
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from chutelab.design import Solution, Uncertainty
+
+SIZE = (9.0, 5.6)
+BARS = (style.TRACK, style.STREAM)
+
+
+def scan(solution: Solution, *, path: str | Path | None = None) -> Figure:
+    """Draw what a search over one key looked at: the quantity, its target, answers and jumps.
+
+    Parameters
+    ----------
+    solution : Solution
+        Of one key.
+    path : path, optional
+        Also write the figure there, whole or not at all; the suffix says the format.
+
+    Raises
+    ------
+    ValueError
+        If several keys were varied.
+    OSError
+        If the file cannot be written.
+    """
+    figure = _figure(SIZE)
+    ax = figure.add_axes((0.105, 0.115, 0.865, 0.66))
+    draw_scan(ax, solution)
+    _titles(figure, shorten(solution.base.title, 70, placeholder=" …"), solution.asked)
+    ax.legend(
+        loc="lower left", bbox_to_anchor=(-0.01, 1.0), ncols=4, fontsize=style.SMALL,
+        frameon=False, borderaxespad=0.3, handlelength=2.2,
+    )  # fmt: skip
+    if path is not None:
+        save(figure, Path(path))
+    return figure
+
+
+def draw_scan(ax: Axes, solution: Solution) -> Axes:
+    """Draw the scan of one key: each smooth piece a line, so that jumps are gaps."""
+    found = solution.scan
+    if found is None:
+        raise ValueError("several keys were varied: there is no line to draw")
+    key, (name, *_), (unit, *_) = solution.ranges[0], solution.quantities, solution.units
+    finite = np.abs(found.values[np.isfinite(found.values)])
+    factor, said = _scaled(float(finite.max()) if len(finite) else 0.0, unit)
+    style.dress(ax, _label(key.key, key.unit), _label(name, said))
+    label = name
+    for piece in found.pieces:
+        ax.plot(
+            piece.x, factor * piece.values[:, 0],
+            color=style.TRACK, linewidth=1.8, zorder=4.0, label=label, gid="quantity",
+        )  # fmt: skip
+        label = ""
+    if solution.goal == "solve":
+        ax.plot(
+            found.x, factor * found.values[:, 1],
+            color=style.ANALYTIC, linewidth=1.6, linestyle="--", zorder=3.0, label="target",
+            gid="target",
+        )  # fmt: skip
+    for i, change in enumerate(solution.changes):
+        ax.axvline(
+            change.at, color=style.MUTED, linewidth=1.0, linestyle=":", zorder=1.0,
+            label="" if i else "the particle's way changes",
+        )  # fmt: skip
+    for low, high in solution.everywhere:
+        ax.axvspan(low, high, color=style.STEEL_LIGHT, zorder=0.5, label="all solve it")
+    for jump in solution.jumps:
+        ax.plot(
+            [jump.at] * 2, [factor * jump.before, factor * jump.after],
+            color=style.STRIKE, linewidth=1.2, linestyle=":", zorder=2.0,
+        )  # fmt: skip
+    _mark(ax, solution, factor)
+    return ax
+
+
+def _mark(ax: Axes, solution: Solution, factor: float) -> None:
+    """Mark the answers, and write the key's value beside each."""
+    shown = solution.answers or ((solution.nearest,) if solution.nearest else ())
+    words = {"solve": "solution", "minimize": "least", "maximize": "most"}[solution.goal]
+    for i, answer in enumerate(shown):
+        x, y = answer.values[0], factor * answer.found[0]
+        first = solution.goal == "solve" or i == 0
+        text = words if solution.solved else "nearest"
+        ax.plot(
+            x, y,
+            marker="o" if solution.solved else "X", markersize=9.0 if first else 6.0,
+            linestyle="none", color=style.STRIKE, zorder=6.0,
+            markerfacecolor=style.STRIKE if first else "white",
+            label=text if i == 0 else "", gid=text, clip_on=False,
+        )  # fmt: skip
+        if first:
+            left = x > 0.5 * sum(ax.get_xlim())
+            ax.annotate(
+                f"{x:.6g}", (x, y), xytext=(-9 if left else 9, 8), textcoords="offset points",
+                fontsize=style.NORMAL, horizontalalignment="right" if left else "left", zorder=7.0,
+                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
+            )  # fmt: skip
+
+
+def spread(found: Uncertainty, *, path: str | Path | None = None) -> Figure:
+    """Draw how uncertain inputs spread: distribution, strongest input, and each one's share.
+
+    Parameters
+    ----------
+    found : Uncertainty
+        From `chutelab.design.uncertainty`.
+    path : path, optional
+        Also write the figure there, whole or not at all; the suffix says the format.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    rows = len(found.quantities)
+    figure = _figure((13.0, 1.4 + 3.1 * rows))
+    height = 1.4 + 3.1 * rows
+    grid = figure.add_gridspec(
+        rows, 3, left=0.06, right=0.985, top=1.0 - 1.15 / height, bottom=0.55 / height,
+        hspace=0.42, wspace=0.36, width_ratios=(1.0, 1.0, 1.0),
+    )  # fmt: skip
+    for row in range(rows):
+        draw_distribution(figure.add_subplot(grid[row, 0]), found, row)
+        draw_strongest(figure.add_subplot(grid[row, 1]), found, row)
+        ax = draw_shares(figure.add_subplot(grid[row, 2]), found, row)
+        if row < rows - 1:
+            ax.set_xlabel("")
+    given = ", ".join(
+        f"{one.key} = {one.mean:g} ± {one.spread:.3g} {_short(one.unit)}".rstrip()
+        for one in found.spreads
+    )
+    _titles(figure, shorten(found.scene, 70, placeholder=" …"), given, wide=150)
+    if path is not None:
+        save(figure, Path(path))
+    return figure
+
+
+def draw_distribution(ax: Axes, found: Uncertainty, row: int) -> Axes:
+    """Draw the distribution of a quantity, its mean and its 95 % interval."""
+    values = found.outputs[:, row]
+    values = values[np.isfinite(values)]
+    factor, unit = _scaled(float(np.abs(values).max()) if len(values) else 0.0, found.units[row])
+    name = found.quantities[row]
+    style.dress(ax, _label(name, unit), "samples", name)
+    if not len(values):
+        return ax
+    low, high = factor * found.interval[row]
+    ax.hist(
+        factor * values, bins=40, color=style.STREAM, edgecolor="white", linewidth=0.3, zorder=3.0
+    )
+    ax.axvspan(low, high, color=style.STEEL_LIGHT, zorder=0.5)
+    ax.axvline(factor * found.mean[row], color=style.INK, linewidth=1.4, zorder=4.0)
+    ax.set_title(
+        f"95 %: {low:.4g} to {high:.4g}", fontsize=style.SMALL, loc="right", color=style.MUTED
+    )
+    return ax
+
+
+def draw_strongest(ax: Axes, found: Uncertainty, row: int) -> Axes:
+    """Draw a quantity against the input that explains most of it."""
+    first = np.nan_to_num(found.indices[row].first)
+    k = int(np.argmax(first))
+    one = found.spreads[k]
+    values = found.outputs[:, row]
+    finite = np.abs(values[np.isfinite(values)])
+    factor, unit = _scaled(float(finite.max()) if len(finite) else 0.0, found.units[row])
+    style.dress(
+        ax, _label(one.key, one.unit), _label(found.quantities[row], unit), f"against {one.key}"
+    )
+    ax.plot(
+        found.inputs[:, k], factor * values,
+        linestyle="none", marker=".", markersize=3.0, color=style.TRACK, alpha=0.5, zorder=3.0,
+    )  # fmt: skip
+    return ax
+
+
+def draw_shares(ax: Axes, found: Uncertainty, row: int) -> Axes:
+    """Draw the share of the variance that each input explains, alone and with its interactions."""
+    indices = found.indices[row]
+    name = found.quantities[row]
+    style.dress(ax, "share of the variance, %", "", f"{name}: who is to blame")
+    places = np.arange(len(found.spreads), dtype=np.float64)
+    for offset, label, values, spans, colour in (
+        (-0.19, "alone", indices.first, indices.first_interval, BARS[0]),
+        (0.19, "with interactions", indices.total, indices.total_interval, BARS[1]),
+    ):
+        shown = 100.0 * np.clip(np.nan_to_num(values), 0.0, None)
+        reach = 100.0 * np.clip(np.nan_to_num(spans.T), 0.0, None)
+        errors = np.clip(np.stack([shown - reach[0], reach[1] - shown]), 0.0, None)
+        ax.barh(
+            places + offset, shown, height=0.36, color=colour, zorder=3.0, label=label,
+            xerr=errors, error_kw={"ecolor": style.INK, "elinewidth": 1.0, "capsize": 2.5},
+        )  # fmt: skip
+    ax.set_yticks(places, [fill(one.key, 18, break_long_words=False) for one in found.spreads])
+    ax.invert_yaxis()
+    ax.set_xlim(0.0, max(105.0, ax.get_xlim()[1]))
+    ax.grid(visible=False, axis="y")
+    if row == 0:
+        ax.legend(loc="lower right", fontsize=style.SMALL, frameon=False)
+    return ax
+
+
+def _figure(size: tuple[float, float]) -> Figure:
+    return Picture(figsize=size, dpi=DPI)
+
+
+def _titles(figure: Figure, title: str, text: str, wide: int = 95) -> None:
+    """Write a title, and a line below it."""
+    height = float(figure.get_figheight())
+    figure.text(
+        0.02, 1.0 - 0.28 / height, title,
+        fontsize=style.LARGE, fontweight="bold", verticalalignment="center",
+    )  # fmt: skip
+    figure.text(
+        0.02, 1.0 - 0.47 / height, fill(text, wide),
+        fontsize=style.NORMAL, color=style.MUTED, verticalalignment="top",
+    )  # fmt: skip
+
+
+def _label(name: str, unit: str) -> str:
+    unit = _short(unit)
+    return f"{name}, {unit}" if unit else name
+
+
+def _short(unit: str) -> str:
+    return "°" if unit == "degrees" else unit
+
+
+def _scaled(largest: float, unit: str) -> tuple[float, str]:
+    """Return a factor and the prefixed unit, for units that take prefixes."""
+    if unit in ("J", "W", "m") and largest:
+        return style.scaled(largest, unit)
+    return 1.0, unit

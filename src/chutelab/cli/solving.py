@@ -1,0 +1,193 @@
+"""``solve``: which value of a key makes a quantity what it should be, or least, or largest."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import click
+
+from chutelab.cli.parameters import complete_scene, folder, set_option
+from chutelab.cli.program import RefusedError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from chutelab.design import Solution
+    from chutelab.scene import Scene
+
+FILES = ("overlay.png", "scan.png", "solution.toml", "nearest.toml", "solve.json")
+"""What ``--out`` may write: scan.png with one key, nearest.toml if there is no solution."""
+
+
+@click.command(short_help="Find the angle, speed, distance ... that does what you want.")
+@click.argument("scene", shell_complete=complete_scene)
+@click.option(
+    "--vary",
+    metavar="KEY=FROM:TO",
+    multiple=True,
+    required=True,
+    help="A key of the scene and the range to search, such as plate.angle_deg=0:80. May be"
+    " repeated.",
+)
+@click.option(
+    "--target",
+    "targets",
+    metavar="QUANTITY=VALUE",
+    multiple=True,
+    help="What should be: VALUE is a number, with or without unit, a key of the scene or another"
+    " quantity. May be repeated with as many --vary.",
+)
+@click.option("--minimize", metavar="QUANTITY", help="Make this as small as it gets.")
+@click.option("--maximize", metavar="QUANTITY", help="Make this as large as it gets.")
+@click.option(
+    "--points",
+    metavar="N",
+    type=int,
+    default=181,
+    show_default=True,
+    help="With one --vary: how many values to look at first.",
+)
+@click.option(
+    "--seed",
+    metavar="N",
+    type=int,
+    default=0,
+    show_default=True,
+    help="With several: of the random draws of the search.",
+)
+@set_option
+@click.option(
+    "--out",
+    metavar="DIR",
+    type=click.Path(),
+    callback=folder,
+    help="Write the overlay at the answer, the scene there, a picture of the search and its"
+    " numbers into this folder.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")
+@click.option("--quiet", "-q", is_flag=True, help="Print no answer and no progress bar.")
+def solve(
+    scene: str,
+    vary: tuple[str, ...],
+    targets: tuple[str, ...],
+    minimize: str | None,
+    maximize: str | None,
+    points: int,
+    seed: int,
+    overrides: tuple[str, ...],
+    out: Path | None,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Change SCENE until a quantity is what it should be, or as small or as large as it gets.
+
+    \b
+    chutelab solve inclined-20 --vary plate.angle_deg=0:80 --target landing.vx=1
+    chutelab solve inclined-20 --vary plate.angle_deg=0:80 --minimize belt_work
+    chutelab solve inclined-20 --vary plate.angle_deg=20:60 \\
+        --vary plate.restitution=0.1:0.9 --target landing.vx=1 --target landing.x=0.3
+
+    Quantities are the keys of `chutelab run --json`, such as landing.x, landing.t or
+    ledger.by_surface.plate.restitution_loss, the paper's symbols, such as x3, and belt_work,
+    slip_heat, power (what the outgoing belt pays until nothing slips on it), restitution_loss and
+    friction_loss.
+
+    With one key all solutions in its range are found, and jumps are told from them. The exit code
+    is 1 if there is no solution; the nearest thing to one is shown then. It needs
+    pip install "chutelab[design]".
+    """  # noqa: D301 - click wants the backspace
+    from chutelab.cli.output import destination
+    from chutelab.cli.progress import progress
+    from chutelab.scene import load
+
+    goals = [goal for goal in (targets, minimize, maximize) if goal]
+    if len(goals) != 1:
+        raise click.UsageError("Give one of --target, --minimize and --maximize.")
+    _free(out)
+    loaded = load(scene, overrides)
+    written = []
+    with destination(out, ()) as place:
+        with progress("searching", quiet=quiet) as meter:
+            found = _solved(loaded, vary, targets, minimize, maximize, points, seed, meter)
+        if place is not None:
+            with progress("drawing", quiet=quiet):
+                _write(found, place)
+            written = sorted(file.name for file in place.iterdir())
+    if as_json:
+        _tell_json(found)
+    elif not quiet:
+        _tell(found)
+        if out is not None:
+            click.echo(f"\nwrote into {out}: {', '.join(written)}")
+    if not found.solved:
+        click.get_current_context().exit(1)
+
+
+def _solved(
+    scene: Scene,
+    vary: tuple[str, ...],
+    targets: tuple[str, ...],
+    minimize: str | None,
+    maximize: str | None,
+    points: int,
+    seed: int,
+    meter: object,
+) -> Solution:
+    from chutelab import design
+    from chutelab.variation import VaryError
+
+    options = {"points": points, "seed": seed, "progress": meter}
+    try:
+        if targets:
+            return design.solve(scene, vary, targets, **options)  # type: ignore[arg-type]
+        if minimize:
+            return design.minimize(scene, vary, minimize, **options)  # type: ignore[arg-type]
+        return design.maximize(scene, vary, maximize or "", **options)  # type: ignore[arg-type]
+    except (design.DesignError, VaryError, ImportError) as error:
+        raise RefusedError(str(error)) from error
+
+
+def _free(out: Path | None) -> None:
+    """Refuse a folder in which a name to be written is taken by a folder."""
+    for name in FILES:
+        if out is not None and (out / name).is_dir():
+            raise RefusedError(f"--out {out}: {out / name} is a folder, not a file")
+
+
+def _write(found: Solution, place: Path) -> None:
+    from chutelab.design.answers import as_dict
+    from chutelab.design.documents import to_toml
+    from chutelab.plots import overlay
+    from chutelab.plots.design import scan
+
+    text = json.dumps(as_dict(found), indent=1, allow_nan=False)
+    (place / "solve.json").write_text(text + "\n", encoding="utf-8")
+    if found.scan is not None:
+        scan(found, path=place / "scan.png")
+    if not (found.solved or found.nearest):
+        return
+    name = "solution.toml" if found.solved else "nearest.toml"
+    comment = f"{found.asked}: {'solution' if found.solved else 'no solution, the nearest to one'}."
+    (place / name).write_text(to_toml(found.scene, comment), encoding="utf-8")
+    overlay(found.recording(), path=place / "overlay.png")
+
+
+def _tell_json(found: Solution) -> None:
+    from chutelab.cli import console
+    from chutelab.design.answers import as_dict
+
+    console.show_json(as_dict(found))
+
+
+def _tell(found: Solution) -> None:
+    from rich.text import Text
+
+    from chutelab.cli import console
+    from chutelab.cli.report import drawn
+
+    sheet = found.sheet()
+    notes = [Text(f"\n{note}" if i == 0 else note) for i, note in enumerate(sheet.notes)]
+    console.show(Text(found.base.title, style="bold"), drawn(sheet), *notes)
+    if found.solved:
+        console.show(drawn(found.slopes()))

@@ -1,0 +1,255 @@
+"""What `solve`, `minimize` and `maximize` answer: `Solution`, with the numbers and in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite, isnan
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from chutelab.design.frames import frame
+from chutelab.design.ranges import varied
+from chutelab.design.words import remarks, slopes
+from chutelab.sheet import Sheet, Shown
+from chutelab.simulation import simulate
+
+if TYPE_CHECKING:
+    from chutelab.design.evaluation import Floats
+    from chutelab.design.pieces import Change, Scan
+    from chutelab.design.ranges import Span
+    from chutelab.design.sensitivity import Sensitivity
+    from chutelab.recording import Recording
+    from chutelab.scene import Scene
+
+DIGITS: Final = 10
+"""Significant digits in which an answer is shown; it has more."""
+
+MOST_SHOWN: Final = 6
+"""Jumps and other minima that are listed in words."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One point of the search.
+
+    Attributes
+    ----------
+    values : tuple of float
+        Of the varied keys, in their order.
+    found : tuple of float
+        The quantities asked for: the left sides of the targets, or what is least or largest.
+    wanted : tuple of float
+        The right sides of the targets; empty without targets.
+    course : str
+        Surfaces that particle 0 touches up to its landing.
+    place : str
+        "inside" the range, at an "end" of it, or at a "change" of the course.
+    sensitivities : tuple of Sensitivity
+        What each key does to each quantity here; empty for further answers of no interest.
+    """
+
+    values: tuple[float, ...]
+    found: tuple[float, ...]
+    wanted: tuple[float, ...]
+    course: str
+    place: str = "inside"
+    sensitivities: tuple[Sensitivity, ...] = ()
+
+    @property
+    def off(self) -> tuple[float, ...]:
+        """By how much the targets are missed."""
+        return tuple(f - w for f, w in zip(self.found, self.wanted, strict=True))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Solution(Shown):
+    """What a search over one key or several found.
+
+    Attributes
+    ----------
+    asked : str
+        The question in words.
+    goal : {"solve", "minimize", "maximize"}
+        Its kind.
+    ranges : tuple of Span
+        The varied keys.
+    quantities, units : tuple of str
+        What the numbers of an answer are.
+    answers : tuple of Answer
+        All solutions in order of the key, or all minima, the least first; empty if there is none.
+    nearest : Answer or None
+        Without a solution, where the targets are missed by least.
+    everywhere : tuple of (float, float)
+        Ranges of the key in which every value is a solution.
+    jumps : tuple of Change
+        Where the target is jumped over, which is no solution.
+    changes : tuple of Change
+        All values of the key at which the course changes.
+    best : int
+        Which answer `scene` is at: of several solutions, the one nearest to the scene's own value.
+    runs, seed : int
+        How many variants were run; of the search over several keys.
+    notes : tuple of str
+        What else to know.
+    base : Scene
+        What was varied.
+    scan : Scan or None
+        What was looked at on the way, with one key.
+    """
+
+    asked: str
+    goal: str
+    ranges: tuple[Span, ...]
+    quantities: tuple[str, ...]
+    units: tuple[str, ...]
+    answers: tuple[Answer, ...]
+    nearest: Answer | None
+    everywhere: tuple[tuple[float, float], ...]
+    jumps: tuple[Change, ...]
+    changes: tuple[Change, ...]
+    best: int
+    runs: int
+    seed: int
+    notes: tuple[str, ...]
+    base: Scene
+    scan: Scan | None
+
+    @property
+    def solved(self) -> bool:
+        """Whether there is an answer."""
+        return bool(self.answers)
+
+    @property
+    def answer(self) -> Answer:
+        """The answer that is shown: the best, or else the nearest.
+
+        Raises
+        ------
+        ValueError
+            If there is not even that: no variant has the quantity.
+        """
+        if self.answers:
+            return self.answers[self.best]
+        if self.nearest is None:
+            raise ValueError(f"{self.asked}: no variant in the range has these quantities")
+        return self.nearest
+
+    @property
+    def points(self) -> Floats:
+        """Values of the keys at all answers, shape (answers, keys)."""
+        return np.array([answer.values for answer in self.answers]).reshape(-1, len(self.ranges))
+
+    @property
+    def scene(self) -> Scene:
+        """The scene at the `answer`."""
+        return varied(self.base, [one.key for one in self.ranges], self.answer.values)
+
+    def recording(self) -> Recording:
+        """Run the scene at the `answer`."""
+        return simulate(self.scene)
+
+    def frame(self) -> Any:
+        """Return what was looked at with one key as a pandas DataFrame.
+
+        Raises
+        ------
+        ImportError
+            Without pandas.
+        ValueError
+            If several keys were varied: the search keeps no table.
+        """
+        if self.scan is None:
+            raise ValueError("with several keys the search keeps no table of what it looked at")
+        names = (self.ranges[0].key, *self.quantities)
+        values = self.scan.values[:, : len(self.quantities)]
+        return frame(dict(zip(names, (self.scan.x, *values.T), strict=True)))
+
+    def sheet(self) -> Sheet:
+        """Return the answers in a table, with what to know of them."""
+        shown = self.answers or ((self.nearest,) if self.nearest else ())
+        columns = ["", *(head(one.key, one.unit) for one in self.ranges)]
+        for name, unit in zip(self.quantities, self.units, strict=True):
+            columns.append(head(name, unit))
+        rows = []
+        for i, answer in enumerate(shown):
+            name = "nearest" if not self.solved else self._name(i)
+            numbers = (*answer.values, *answer.found)
+            rows.append((name, *(f"{value:.{DIGITS}g}" for value in numbers), answer.course))
+        return Sheet(self.asked, (*columns, "touches"), tuple(rows), notes=tuple(remarks(self)))
+
+    def slopes(self) -> Sheet:
+        """Return what each key does to each quantity at the answer, and what 1 % of it does."""
+        return slopes(self.answer.sensitivities if self.solved else ())
+
+    def __repr__(self) -> str:
+        parts = (self.sheet(), self.slopes()) if self.solved else (self.sheet(),)
+        return "\n\n".join(map(str, parts))
+
+    def _repr_html_(self) -> str:
+        parts = (self.sheet(), self.slopes()) if self.solved else (self.sheet(),)
+        return "".join(part._repr_html_() for part in parts)
+
+    def _name(self, i: int) -> str:
+        if self.goal == "solve":
+            return "solution" if len(self.answers) == 1 else f"solution {i + 1}"
+        return {"minimize": "least", "maximize": "most"}[self.goal] if i == 0 else "also"
+
+
+def head(name: str, unit: str) -> str:
+    """Return a name with its unit, for the head of a column."""
+    return f"{name}, {'°' if unit == 'degrees' else unit}" if unit else name
+
+
+def finite(value: float) -> float | None:
+    """Return a number as JSON has it: None for NaN and infinities."""
+    return value if isfinite(value) else None
+
+
+def as_dict(solution: Solution) -> dict[str, Any]:
+    """Return a solution as plain lists and floats, for JSON."""
+
+    def answer(one: Answer) -> dict[str, Any]:
+        return {
+            "values": dict(zip((r.key for r in solution.ranges), one.values, strict=True)),
+            "found": dict(zip(solution.quantities, map(finite, one.found), strict=True)),
+            "wanted": [finite(value) for value in one.wanted],
+            "course": one.course,
+            "place": one.place,
+            "sensitivities": [
+                {
+                    "key": s.key, "quantity": s.quantity, "derivative": finite(s.derivative),
+                    "step": s.step, "lower": finite(s.lower), "upper": finite(s.upper),
+                    "courses": list(s.courses),
+                }
+                for s in one.sensitivities
+            ],
+        }  # fmt: skip
+
+    def change(one: Change) -> dict[str, Any]:
+        return {
+            "at": one.at, "before": finite(one.before), "after": finite(one.after),
+            "courses": list(one.courses), "fault": one.fault,
+        }  # fmt: skip
+
+    return {
+        "format": 1,
+        "scene": solution.base.title,
+        "asked": solution.asked,
+        "goal": solution.goal,
+        "solved": solution.solved,
+        "ranges": [
+            {"key": r.key, "unit": r.unit, "low": r.low, "high": r.high, "start": r.start}
+            for r in solution.ranges
+        ],
+        "quantities": dict(zip(solution.quantities, solution.units, strict=True)),
+        "answers": [answer(one) for one in solution.answers],
+        "best": solution.best if solution.solved else None,
+        "nearest": answer(solution.nearest) if solution.nearest else None,
+        "everywhere": [list(span) for span in solution.everywhere],
+        "jumps": [change(one) for one in solution.jumps],
+        "changes": [change(one) for one in solution.changes if not isnan(one.at)],
+        "runs": solution.runs,
+        "seed": solution.seed,
+        "notes": list(solution.notes),
+    }

@@ -1,0 +1,229 @@
+"""What can be aimed at: numbers of a run, keys of the scene and plain numbers, with their units.
+
+>>> from chutelab.scene import load
+>>> wish = target(load("perpendicular"), "landing.vx = outgoing.speed")
+>>> wish.left.unit, wish.right.name
+('m/s', 'outgoing.speed')
+"""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass
+from math import nan
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+from chutelab.agreement.measure import measure
+from chutelab.design.errors import DesignError
+from chutelab.recording import REASONS
+from chutelab.scene import MISSING, measures
+from chutelab.scene.units import read_size
+from chutelab.variation import Vary, VaryError, quantity
+
+if TYPE_CHECKING:
+    from chutelab.recording import Recording
+    from chutelab.scene import Scene
+
+Ending = Literal["any", "scene", "settled"]
+"""How a run must end for a quantity: it does not matter, as the scene says, or without slip."""
+
+SHORT: Final[dict[str, tuple[str, Ending]]] = {
+    "belt_work": ("ledger.by_surface.outgoing.belt_work", "settled"),
+    "slip_heat": ("ledger.by_surface.outgoing.friction_loss", "settled"),
+    "power": ("ledger.by_surface.outgoing.belt_work", "settled"),
+    "restitution_loss": ("ledger.restitution_loss", "scene"),
+    "friction_loss": ("ledger.friction_loss", "scene"),
+}
+"""Short names: what each stands for, and how the run must end. The first three are what the
+outgoing belt pays until nothing slips on it any more, however the scene itself ends; `power` is
+that work per particle times the stream's rate."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A number of a run.
+
+    Attributes
+    ----------
+    name, unit : str
+        As it was asked for, and its unit.
+    key : str
+        Its full name, see `chutelab.scene.measures`.
+    ending : {"any", "scene", "settled"}
+        How the run must end.
+    """
+
+    name: str
+    unit: str
+    key: str
+    ending: Ending
+
+    def of(self, recording: Recording, scene: Scene) -> float:
+        """Return its value; NaN if it did not happen."""
+        if self.ending == "settled" and any(
+            REASONS[reason] != "settled" for reason in recording.ended
+        ):
+            return nan
+        value = measure(recording, self.key, scene)
+        return value * scene.stream.rate / recording.count if self.name == "power" else value
+
+
+@dataclass(frozen=True)
+class Given:
+    """A key of the scene, by its full path."""
+
+    name: str
+    unit: str
+    ending: Ending = "any"
+
+    def of(self, _recording: Recording | None, scene: Scene) -> float:
+        """Return its value in a scene; NaN where it has none."""
+        value = value_in(scene, self.name)
+        return float(value) if isinstance(value, (int, float)) else nan
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """A plain number."""
+
+    value: float
+    unit: str
+    ending: Ending = "any"
+
+    @property
+    def name(self) -> str:
+        """The number as text."""
+        return f"{self.value:.12g} {self.unit}".strip()
+
+    def of(self, _recording: Recording | None, _scene: Scene) -> float:
+        """Return the number."""
+        return self.value
+
+
+Quantity = Measured | Given | Fixed
+
+
+@dataclass(frozen=True)
+class Target:
+    """Two quantities that are to be equal."""
+
+    left: Measured
+    right: Quantity
+
+    def __str__(self) -> str:
+        return f"{self.left.name} = {self.right.name}"
+
+
+def value_in(scene: Scene, path: str) -> Any:
+    """Return what a scene has at a full path such as ``stream.at[0]``, defaults filled in.
+
+    `MISSING` if there is no such thing; an array for a varied key of a family of scenes.
+    """
+    found: Any = scene
+    for part in path.replace("[", ".[").split("."):
+        try:
+            found = found[int(part[1:-1])] if part.startswith("[") else getattr(found, part)
+        except (AttributeError, IndexError, TypeError):
+            return MISSING
+    return found
+
+
+def surfaces(scene: Scene) -> list[str]:
+    """Return the names of a scene's surfaces."""
+    tables = [name for name in ("incoming", "plate", "outgoing") if getattr(scene, name)]
+    return [*tables, *(free.name for free in scene.surface)]
+
+
+def measured(scene: Scene, name: str, typed: str = "") -> Measured:
+    """Return the quantity of a scene that has this name, short or full.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``belt_work``, ``landing.x`` or ``ledger.by_surface.plate.restitution_loss``.
+    typed : str
+        What messages call it.
+
+    Raises
+    ------
+    DesignError
+        If the scene has no such quantity.
+    """
+    known = surfaces(scene)
+    key, ending = SHORT.get(name, (name, _ending(name)))
+    unit = measures.unit_of(key, known)
+    if unit is None:
+        raise DesignError(typed or name, f"no such quantity here; {_suggestion(name, key, known)}")
+    if name == "power":
+        unit = "W"
+    return Measured(name, unit, key, ending)
+
+
+def _ending(name: str) -> Ending:
+    # What comes before the landing, and the landing itself, is there however the run ends.
+    head = name.partition(".")[0]
+    return "any" if head in (*measures.NEEDED, *measures.SYMBOLS) else "scene"
+
+
+def _suggestion(name: str, key: str, known: list[str]) -> str:
+    near = difflib.get_close_matches(name, SHORT, n=1, cutoff=0.75)
+    if near and near[0] != name:
+        return f"did you mean {near[0]}?"
+    said = measures.suggestion(key, known)
+    return said if said.startswith(("did", "it needs")) else f"{said}; short are {', '.join(SHORT)}"
+
+
+def target(scene: Scene, text: str) -> Target:
+    """Read ``QUANTITY=VALUE``: a quantity, and the number, key or quantity that it is to equal.
+
+    Raises
+    ------
+    DesignError
+        If it is not of that form, one of them is unknown, or their units differ.
+    """
+    typed = f"--target {text}"
+    name, equals, given = (part.strip() for part in text.partition("="))
+    if not (name and equals and given):
+        raise DesignError(
+            typed, "must be QUANTITY=VALUE, such as landing.x=1.2 or landing.vx=outgoing.speed"
+        )
+    left = measured(scene, name, typed)
+    right = _right(scene, given, typed, left)
+    if right.unit != left.unit:
+        if not (isinstance(right, Fixed) and right.unit == ""):
+            raise DesignError(
+                typed, f"{left.name} is {_in(left.unit)}, and {right.name} is {_in(right.unit)}"
+            )
+        right = Fixed(right.value, left.unit)
+    if right == left:
+        raise DesignError(typed, "both sides are the same")
+    return Target(left, right)
+
+
+def _in(unit: str) -> str:
+    return f"in {unit}" if unit else "a pure number"
+
+
+def _right(scene: Scene, text: str, typed: str, left: Measured) -> Quantity:
+    try:
+        number, unit = read_size(text)
+    except ValueError as error:
+        if text[0].isdigit() or text[0] in "+-.":
+            raise DesignError(
+                typed, f"{text} is no number of a quantity {_in(left.unit)}; {error}"
+            ) from None
+    else:
+        return Fixed(number, unit)
+    if text in SHORT or measures.unit_of(text, surfaces(scene)) is not None:
+        return measured(scene, text, typed)
+    try:
+        found = quantity(scene, Vary(text, (0.0,), typed))
+    except VaryError as error:
+        allowed = str(error).removeprefix(f"{typed}: ")
+        raise DesignError(
+            typed, f"{text} is neither a number, nor a quantity, nor a key of the scene: {allowed}"
+        ) from None
+    value = value_in(scene, found.path)
+    if value is MISSING or value is None or isinstance(value, (str, bool)):
+        raise DesignError(typed, f"{found.path} has no number as its value in this scene")
+    return Given(found.path, found.unit)

@@ -1,0 +1,704 @@
+"""Solving, optimising and propagating uncertainties, against closed forms written here."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import sys
+from math import cbrt, cos, pi, radians, sin, sqrt, tan
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from PIL import Image
+from scipy.stats import norm
+
+import chutelab
+from chutelab import design, scene
+from chutelab.cli import main
+from chutelab.cli.program import RefusedError
+from chutelab.cli.uncertain import propagate
+from chutelab.design import sobol
+from chutelab.design.documents import to_toml
+from chutelab.design.evaluation import Evaluator
+from chutelab.design.families import suits
+from chutelab.design.quantities import SHORT, measured, target
+from chutelab.design.spreads import limits, spreads
+from chutelab.plots.design import draw_scan, scan, spread
+from chutelab.variation import VaryError
+
+G, V, R, D, DROP, M = 9.81, 2.0, 0.1, 0.5, 0.5, 0.008
+
+
+def machine(**changes):
+    """A mass point; the pivot at the pulley's top, so that d1 = R + D is where the plate begins."""
+    document = {
+        "particle": {"radius": 0.0, "mass": M},
+        "incoming": {"speed": V, "pulley_radius": R},
+        "plate": {"distance": D, "restitution": 0.5},
+        "outgoing": {"drop": DROP, "speed": V, "start": -5.0, "length": 20.0},
+    }
+    for key, value in changes.items():
+        table, _, name = key.partition("__")
+        if value is None:
+            del document[table]
+        else:
+            document[table][name] = value
+    return scene.from_dict(document)
+
+
+def at_plate(alpha, *, v=V, d1=R + D, g=G):
+    """Into the plate and down along it: velocity where a horizontal throw meets its line."""
+    c, s = cos(alpha), sin(alpha)
+    # (x - d1) c + (y - R) s = 0 with x = v t, y - R = -g t²/2
+    t = (v * c - sqrt((v * c) ** 2 - 2.0 * g * s * d1 * c)) / (g * s) if s else d1 / v
+    vx, vy = v, -g * t
+    return vx * c + vy * s, vx * s - vy * c
+
+
+def forward(alpha, restitution, **machine_of):
+    into, down = at_plate(alpha, **machine_of)
+    return down * sin(alpha) - restitution * into * cos(alpha)
+
+
+def ten():
+    """Yield scene, --vary, and the closed form of the value at which landing.vx = belt speed."""
+    a20, a40, a50 = radians(20.0), radians(40.0), radians(50.0)
+    for degrees, restitution in ((20.0, 0.5), (35.0, 0.3)):
+        belt = forward(radians(degrees), restitution, d1=R + 0.1)
+        near = machine(plate__distance=0.1, plate__restitution=restitution, outgoing__speed=belt)
+        yield near, "plate.angle_deg=10:45", degrees
+    near = machine(plate__distance=0.1, plate__angle_deg=20.0)
+    yield near, "outgoing.speed=-3:3", forward(a20, 0.5, d1=R + 0.1)
+
+    into, down = at_plate(a40, v=3.0, d1=R + 0.1)
+    fast = machine(incoming__speed=3.0, plate__distance=0.1, plate__angle_deg=40.0,
+                   outgoing__speed=0.4)  # fmt: skip
+    yield fast, "plate.restitution=0:1", (down * sin(a40) - 0.4) / (into * cos(a40))
+
+    # vx' = v - (1 + ε) into cos α says how fast it falls at the plate, and that how far it flew.
+    belt, restitution = 1.0, 0.4
+    into = (V - belt) / ((1.0 + restitution) * cos(a40))
+    falls = (V * cos(a40) - into) / sin(a40)
+    reach = V * falls / G - 0.5 * falls**2 / G * tan(a40)
+    yield (
+        machine(plate__angle_deg=40.0, plate__restitution=restitution, outgoing__speed=belt),
+        "plate.distance=0.01:0.3",
+        reach - R,
+    )
+    yield (
+        machine(plate__angle_deg=40.0, plate__restitution=restitution, plate__distance=0.05,
+                outgoing__speed=belt),
+        "incoming.pulley_radius=0.01:0.3",
+        reach - 0.05,
+    )  # fmt: skip
+    flight = (R + 0.1) / (V - 0.5 * falls * tan(a40))
+    heavy = machine(plate__angle_deg=40.0, plate__restitution=restitution, plate__distance=0.1,
+                    outgoing__speed=belt)  # fmt: skip
+    yield scene_with_gravity(heavy), "gravity=1:15", falls / flight
+
+    yield machine(outgoing__speed=-0.7), "incoming.speed=1.2:3", 0.7 / 0.5
+
+    # Friction on the plate takes µ (1 + ε) of the blow from what runs along it.
+    into, down = at_plate(a50, d1=R + 0.05)
+    rubbed = (down - (1.5 + 0.1 * into * cos(a50)) / sin(a50)) / (1.1 * into)
+    yield (
+        machine(plate__distance=0.05, plate__angle_deg=50.0, plate__restitution=0.1,
+                outgoing__speed=1.5),
+        "plate.friction=0:1",
+        rubbed,
+    )  # fmt: skip
+
+    # Round the pulley first: cos φ1 = v²/(g R), and v cos φ1 is kept to the belt.
+    slow = machine(plate=None, incoming__speed=0.6, outgoing__speed=0.3, outgoing__drop_from="top",
+                   outgoing__drop=0.6)  # fmt: skip
+    yield slow, "incoming.speed=0.1:0.95", cbrt(G * R * 0.3)
+
+
+def scene_with_gravity(given):
+    return scene.from_dict({**scene.to_dict(given), "gravity": 5.0})
+
+
+TEN = list(ten())
+
+
+@pytest.mark.parametrize(("given", "vary", "expected"), TEN)
+def test_landing_with_the_belts_speed_agrees_with_the_closed_form(given, vary, expected):
+    found = design.solve(given, vary, "landing.vx=outgoing.speed", points=41)
+    assert len(found.answers) == 1
+    assert found.answer.values[0] == pytest.approx(expected, rel=1e-10, abs=1e-10)
+    assert found.answer.off[0] == pytest.approx(0.0, abs=1e-10)
+
+
+def test_ten_scenes():
+    assert len(TEN) == 10
+
+
+TILT = radians(20.0)
+
+
+def inclined(**changes):
+    return machine(plate__distance=0.1, plate__angle_deg=20.0, **changes)
+
+
+def energies():
+    """dEk = ½ m (v3x² + v_b²) has two solutions, v3x and -v3x; v3x is linear in ε."""
+    into, down = at_plate(TILT, d1=R + 0.1)
+    c, s = cos(TILT), sin(TILT)
+    return (lambda vx: (down * s - vx) / (into * c)), (lambda vx: 0.5 * M * (vx**2 + V**2))
+
+
+def test_all_of_several_roots_are_reported():
+    restitution, energy = energies()
+    found = design.solve(inclined(), "plate.restitution=0:1", f"dEk={energy(0.1)!r} J", points=21)
+    expected = sorted([restitution(0.1), restitution(-0.1)])
+    np.testing.assert_allclose(found.points[:, 0], expected, rtol=0.0, atol=1e-10)
+    # The picture is of the one next to ε = 0.5.
+    assert found.answer.values[0] == min(found.points[:, 0], key=lambda x: abs(x - 0.5))
+    assert "2 solutions" in repr(found)
+
+
+def test_two_roots_between_neighbours_of_the_scan_are_found():
+    restitution, energy = energies()
+    found = design.solve(inclined(), "plate.restitution=0:1", f"dEk={energy(0.01)!r}", points=12)
+    assert len(found.answers) == 2
+    assert abs(np.diff(found.points[:, 0])[0]) < 1.0 / 11.0
+    assert found.points[0, 0] == pytest.approx(restitution(0.01), abs=1e-9)
+
+
+def test_a_root_that_only_touches_is_found():
+    restitution, energy = energies()
+    found = design.solve(inclined(), "plate.restitution=0:1", f"dEk={energy(0.0)!r}", points=20)
+    assert found.points.shape == (1, 1)
+    # The energy is flat there: the root is known to the square root of a rounding.
+    assert found.answer.values[0] == pytest.approx(restitution(0.0), abs=1e-7)
+
+
+def test_no_root_says_so_and_shows_the_nearest():
+    found = design.solve(inclined(), "plate.restitution=0:1", "landing.vx=5", points=11)
+    assert not found.solved
+    assert found.points.shape == (0, 1)
+    # Without bounce it keeps most.
+    assert found.nearest.values == (0.0,)
+    assert found.nearest.found[0] == pytest.approx(forward(TILT, 0.0, d1=R + 0.1))
+    assert "No solution in the range" in repr(found)
+
+
+def test_a_jump_over_the_target_is_no_root():
+    given = chutelab.load("inclined-20")
+    found = design.solve(given, "plate.angle_deg=7.97:8.5", "landing.vx=-0.9", points=11)
+    assert not found.solved
+    (jump,) = found.jumps
+    assert jump.before < -0.9 < jump.after
+    assert jump.high - jump.low < 1e-14
+    assert jump.courses == ("plate, incoming, outgoing", "plate, outgoing")
+    assert "jumps over" in repr(found)
+
+
+def test_where_the_plate_is_missed_every_angle_is_a_solution():
+    given = machine(plate__distance=0.1, outgoing__drop_from="top", plate__above=0.2)
+    found = design.solve(given, "plate.angle_deg=20:80", "landing.vx=outgoing.speed", points=61)
+    # A point meets the plate if tan α <= v²/(2 g d1).
+    missed = np.degrees(np.arctan(V**2 / (2.0 * G * (R + 0.1))))
+    ((low, high),) = found.everywhere
+    assert low == pytest.approx(missed, abs=1e-6)
+    assert high == 80.0
+    assert "Every plate.angle_deg from" in repr(found)
+
+
+def test_where_nothing_lands_there_is_nothing_to_show():
+    given = machine(outgoing__start=-9.0, outgoing__length=1.0)
+    found = design.solve(given, "plate.restitution=0:1", "landing.vx=0", points=5)
+    assert not found.solved
+    assert found.nearest is None
+    assert "no variant" in repr(found)
+    with pytest.raises(ValueError, match="no variant"):
+        _ = found.answer
+
+
+def test_minimum_inside_the_range():
+    restitution, energy = energies()
+    found = design.minimize(inclined(), "plate.restitution=0:1", "dEk", points=15)
+    assert found.answer.place == "inside"
+    assert found.answer.values[0] == pytest.approx(restitution(0.0), abs=1e-7)
+    assert found.answer.found[0] == pytest.approx(energy(0.0), rel=1e-12)
+
+
+@pytest.mark.parametrize(("goal", "restitution"), [(design.minimize, 0.0), (design.maximize, 1.0)])
+def test_belt_work_is_least_and_most_at_the_ends(goal, restitution):
+    found = goal(inclined(), "plate.restitution=0:1", "belt_work", points=9)
+    vx = forward(TILT, restitution, d1=R + 0.1)
+    assert found.answer.values == (restitution,)
+    assert found.answer.place == "end"
+    assert found.answer.found[0] == pytest.approx(M * V * (V - vx), rel=1e-12)
+
+
+def test_power_is_the_belt_work_of_a_stream():
+    given = inclined()
+    name = measured(given, "power")
+    assert (name.unit, name.ending) == ("W", "settled")
+    found = design.maximize(given, "plate.restitution=0:1", "power", points=5)
+    vx = forward(TILT, 1.0, d1=R + 0.1)
+    assert found.answer.found[0] == pytest.approx(200.0 * M * V * (V - vx), rel=1e-12)
+
+
+def test_what_does_not_depend_on_the_key_has_no_minimum():
+    found = design.minimize(inclined(), "plate.restitution=0:1", "impact.t", points=5)
+    assert len(found.answers) == 1
+    assert "does not depend" in repr(found)
+
+
+def test_slopes_are_the_derivatives():
+    found = design.solve(inclined(), "plate.restitution=0:1", "landing.vx=0.2", points=9)
+    into, _ = at_plate(TILT, d1=R + 0.1)
+    (slope,) = found.answer.sensitivities
+    value = found.answer.values[0]
+    assert slope.derivative == pytest.approx(-into * cos(TILT), rel=1e-9)
+    assert slope.step == pytest.approx(0.01 * value)
+    expected = forward(TILT, 1.01 * value, d1=R + 0.1)
+    assert slope.upper == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_slope_next_to_a_jump_does_not_reach_over_it():
+    given = chutelab.load("inclined-20")
+    narrow, wide = (
+        design.solve(given, f"plate.angle_deg={span}", "landing.vx=-0.99", points=21)
+        for span in ("7.9:8.2", "2:20")
+    )
+    one, other = (found.answer.sensitivities[0].derivative for found in (narrow, wide))
+    assert one < 0.0
+    assert other == pytest.approx(one, rel=1e-2)
+
+
+KEYS = ["plate.angle_deg=20:60", "plate.restitution=0.1:0.9"]
+
+
+def test_two_targets_and_two_keys():
+    given = chutelab.load("inclined-20")
+    found = design.solve(given, KEYS, ["landing.vx=1", "landing.x=0.3"])
+    assert found.solved
+    assert found.answer.found == pytest.approx((1.0, 0.3), abs=1e-9)
+    again = design.solve(given, KEYS, ["landing.vx=1", "landing.x=0.3"])
+    assert again.answer.values == found.answer.values
+    assert len(found.answer.sensitivities) == 4
+
+
+@pytest.mark.slow
+def test_minimum_over_two_keys():
+    found = design.minimize(chutelab.load("inclined-20"), KEYS, "belt_work")
+    assert found.answer.values == pytest.approx((60.0, 0.1), abs=1e-6)
+    assert found.answer.place == "end"
+
+
+def test_two_keys_and_an_impossible_target():
+    found = design.solve(inclined(), ["plate.restitution=0:1", "particle.mass=0.01:0.02"],
+                         "landing.vx=9", seed=1)  # fmt: skip
+    assert not found.solved
+    assert found.nearest.values[0] == pytest.approx(0.0, abs=1e-6)
+    assert any("many solutions" in note for note in found.notes)
+
+
+NAMES = [
+    "landing.x", "landing.vy", "impact.t", "separation.vx", "x3", "phi2_deg", "dEk", "d3",
+    "belt_work", "slip_heat", "power", "ledger.restitution_loss",
+    "ledger.by_surface.plate.restitution_loss", "impact.vx_after",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "keys", "low", "high"),
+    [
+        ("inclined-20", ("plate.angle_deg", "plate.restitution"), (-10.0, 0.0), (80.0, 1.2)),
+        ("perpendicular", ("incoming.speed", "incoming.pulley_radius"), (0.3, 0.05), (4.0, 0.5)),
+        ("slip", ("incoming.friction", "gravity"), (0.1, 1.0), (2.0, 20.0)),
+    ],
+)
+def test_variants_run_at_once_give_the_bits_of_single_runs(name, keys, low, high):
+    given = chutelab.load(name)
+    known = [one for one in NAMES if _has(given, one)]
+    quantities = [measured(given, one) for one in known]
+    if given.outgoing is not None:
+        quantities.append(target(given, "landing.vx=outgoing.speed").right)
+    draws = np.random.default_rng(5).uniform(low, high, size=(24, 2))
+    together = Evaluator(given, keys, quantities)(draws)
+    alone = Evaluator(given, keys, quantities)
+    singly = [alone(draw[np.newaxis]) for draw in draws]
+    np.testing.assert_array_equal(together.values, np.concatenate([o.values for o in singly]))
+    assert together.courses == [o.courses[0] for o in singly]
+    assert together.faults == [o.faults[0] for o in singly]
+    assert (len(set(together.courses)) > 2) == (name == "inclined-20")
+
+
+def _has(given, name):
+    try:
+        measured(given, name)
+    except design.DesignError:
+        return False
+    return True
+
+
+def test_streams_and_released_particles_run_one_by_one():
+    given = machine()
+    keys, quantities = ["plate.restitution"], [measured(given, "landing.x")]
+    assert suits(given, keys, quantities)
+    assert not suits(given, keys, [measured(given, "contacts")])
+    assert not suits(given, ["stream.at[0]"], quantities)
+    assert not suits(chutelab.load("stream"), keys, quantities)
+
+
+def test_units_and_sides_of_a_target():
+    given = machine()
+    assert target(given, "landing.x = 300 mm").right.of(None, given) == pytest.approx(0.3)
+    assert target(given, "landing.x=0.3").right.unit == "m"
+    assert target(given, "landing.vx=incoming.speed").right.of(None, given) == V
+    assert target(given, "landing.vx=impact.vx").right.key == "impact.vx"
+    for name in SHORT:
+        assert measured(given, name).unit in ("J", "W")
+
+
+SOLVE = ("solve", "inclined-20")
+VARY = ("--vary", "plate.angle_deg=0:60")
+AIM = ("--target", "landing.vx=1")
+BAD = [
+    (("--vary", "plate.angel_deg=0:60", *AIM), "did you mean plate.angle_deg"),
+    (("--vary", "plate.angle_deg=0", *AIM), "must be KEY=FROM:TO"),
+    (("--vary", "plate.angle_deg=0:60:61", *AIM), "must be KEY=FROM:TO"),
+    (("--vary", "plate.angle_deg=60:0", *AIM), "range is empty"),
+    (("--vary", "plate.angle_deg=5:5", *AIM), "range is empty"),
+    (("--vary", "plate.angle_deg=0m:1m", *AIM), "is in degrees, not in m"),
+    (("--vary", "plate.angle_deg=0:a", *AIM), "is not a number"),
+    (("--vary", "plate.angle_deg=0:nan", *AIM), "is not a number"),
+    (("--vary", "plate.angle_deg=0:90", *AIM), "plate.angle_deg = 90"),
+    (("--vary", "plate.restitution=0:1.5", *AIM), "from 0 to 1"),
+    (("--vary", "stream.count=1:5", *AIM), "whole number"),
+    (("--vary", "run.engine=0:1", *AIM), "no number"),
+    (("--vary", "surface.hood.speed=0:1", *AIM), "no [[surface]]"),
+    ((*VARY, *VARY, *AIM), "varied already"),
+    ((*VARY, "--target", "landing.vx"), "must be QUANTITY=VALUE"),
+    ((*VARY, "--target", "landing.vxx=1"), "no such quantity"),
+    ((*VARY, "--target", "landing.vx=1m"), "in m/s"),
+    ((*VARY, "--target", "landing.vx=1 furlong"), "unknown unit"),
+    ((*VARY, "--target", "landing.vx=plate.distance"), "in m/s, and plate.distance is in m"),
+    ((*VARY, "--target", "landing.vx=plate.nothing"), "neither a number, nor a quantity"),
+    ((*VARY, "--target", "landing.vx=landing.vx"), "both sides are the same"),
+    ((*VARY, *AIM, "--target", "landing.x=1"), "need as many keys"),
+    ((*VARY, "--minimize", "belt_wrok"), "did you mean belt_work"),
+    ((*VARY, "--maximize", "impact.hood.t"), "no such quantity"),
+    ((*VARY, *AIM, "--minimize", "belt_work"), "one of --target, --minimize and --maximize"),
+    (VARY, "one of --target, --minimize and --maximize"),
+    (AIM, "--vary"),
+    ((*VARY, *AIM, "--points", "2"), "from 3 to"),
+    ((*VARY, *AIM, "--seed", "-1"), "from 0"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "said"), BAD)
+def test_bad_questions_are_refused_before_anything_runs(arguments, said, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("chutelab.design.evaluation.simulate", None)
+    monkeypatch.setattr("chutelab.design.families.run", None)
+    result = CliRunner().invoke(main, [*SOLVE, *arguments, "--out", "out"])
+    assert result.exit_code == 2, result.output
+    assert said in " ".join(result.output.split())
+    assert not list(tmp_path.iterdir())
+
+
+def test_without_scipy_it_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "scipy.optimize", None)
+    result = CliRunner().invoke(main, [*SOLVE, *VARY, *AIM])
+    assert result.exit_code == 2
+    assert 'pip install "chutelab[design]"' in result.output
+
+
+def test_files_of_a_solution(tmp_path):
+    out = tmp_path / "out"
+    result = CliRunner().invoke(main, [*SOLVE, *VARY, *AIM, "--points", "31", "--out", str(out)])
+    assert result.exit_code == 0, result.output
+    assert sorted(file.name for file in out.iterdir()) == [
+        "overlay.png", "scan.png", "solution.toml", "solve.json",
+    ]  # fmt: skip
+    assert "47.25481227" in result.output
+    assert "Sensitivity" in result.output
+    recording = chutelab.simulate(chutelab.load(out / "solution.toml"))
+    landing = recording.events[recording.events["kind"] == 4][0]
+    assert landing["velocity_before"][0] == pytest.approx(1.0, abs=1e-12)
+    told = json.loads((out / "solve.json").read_text(encoding="utf-8"))
+    assert told["solved"] is True
+    assert told["answers"][0]["values"]["plate.angle_deg"] == pytest.approx(47.25481227)
+    for name in ("scan.png", "overlay.png"):
+        assert len(np.unique(np.asarray(Image.open(out / name)))) > 20
+
+
+def test_no_solution_exits_with_1_and_writes_the_nearest(tmp_path):
+    arguments = (*SOLVE, *VARY, "--target", "landing.vx=9", "--points", "5")
+    result = CliRunner().invoke(main, [*arguments, "--out", str(tmp_path / "out"), "--json"])
+    assert result.exit_code == 1
+    told = json.loads(result.output)
+    assert told["solved"] is False
+    assert told["nearest"]["values"]["plate.angle_deg"] == 60.0
+    assert (tmp_path / "out" / "nearest.toml").exists()
+    assert not (tmp_path / "out" / "solution.toml").exists()
+
+
+def test_scan_shows_pieces_target_and_answer():
+    found = design.solve(chutelab.load("inclined-20"), "plate.angle_deg=0:30", "landing.vx=-0.3")
+    figure = scan(found)
+    gids = [line.get_gid() for line in figure.axes[0].lines]
+    assert gids.count("quantity") == 3
+    assert gids.count("target") == 1
+    assert gids.count("solution") == len(found.answers) == 2
+    several = design.solve(inclined(), ["plate.restitution=0:1", "particle.mass=0.01:0.02"],
+                           "landing.vx=0.2")  # fmt: skip
+    with pytest.raises(ValueError, match="several keys"):
+        draw_scan(figure.axes[0], several)
+
+
+def test_a_scene_survives_as_text():
+    document = {
+        "title": 'Quotes " and \\ and µ',
+        "particle": {"radius": 0.0, "mass": 1e-05},
+        "surface": [
+            {"name": "floor", "from": [-10.0, 0.0], "to": [10.0, 0.0]},
+            {"name": "hood", "points": [[0.1, 2.0], [0.2, 3.0], [0.3, 2.0]], "speed": -1.0},
+        ],
+        "stream": {"at": [0.0, 1.0], "velocity": [2.0, 0.0], "interact": False},
+    }
+    given = scene.from_dict(document)
+    again = scene.parse(to_toml(given, "A comment\nof two lines"))
+    assert again == given
+    assert to_toml(chutelab.load("perpendicular")).count("expect") == 0
+
+
+# x2 = d1 = R + d_okr for a point that leaves at the top: linear in both.
+SR, SD = 0.004, 0.01
+
+
+@pytest.fixture(scope="module")
+def linear():
+    given = [f"incoming.pulley_radius=±{SR}", f"plate.distance={D}+-{SD}"]
+    return design.uncertainty(machine(), given, ["x2"], samples=1024)
+
+
+def test_uncertainty_of_a_linear_quantity(linear):
+    deviation = sqrt(SR**2 + SD**2)
+    assert linear.nominal[0] == pytest.approx(R + D, rel=1e-12)
+    assert linear.mean[0] == pytest.approx(R + D, abs=0.002 * deviation)
+    assert linear.deviation[0] == pytest.approx(deviation, rel=0.005)
+    low, high = norm.interval(0.95, R + D, deviation)
+    np.testing.assert_allclose(linear.interval[0], [low, high], atol=0.05 * deviation)
+    shares = np.array([SR**2, SD**2]) / deviation**2
+    np.testing.assert_allclose(linear.indices[0].first, shares, atol=0.01)
+    np.testing.assert_allclose(linear.indices[0].total, shares, atol=0.01)
+    assert linear.runs == 1024 * 4 + 1
+
+
+def test_the_same_seed_gives_the_same_uncertainty(linear):
+    given = [f"incoming.pulley_radius=±{1000 * SR} mm", f"plate.distance=±{SD}"]
+    again = design.uncertainty(machine(), given, ["x2"], samples=600)
+    np.testing.assert_array_equal(again.outputs, linear.outputs)
+    other = design.uncertainty(machine(), given, ["x2"], samples=1024, seed=1)
+    assert not np.array_equal(other.outputs, linear.outputs)
+
+
+def test_sobol_indices_of_ishigamis_function():
+    a, b = 7.0, 0.1
+
+    def f(x):
+        return (
+            np.sin(x[..., 0]) + a * np.sin(x[..., 1]) ** 2 + b * x[..., 2] ** 4 * np.sin(x[..., 0])
+        )
+
+    # Ishigami and Homma (1990): V1 = ½ (1 + b π⁴/5)², V2 = a²/8, V13 = 8 b² π⁸/225.
+    v1, v2, v13 = 0.5 * (1.0 + b * pi**4 / 5.0) ** 2, a**2 / 8.0, 8.0 * b**2 * pi**8 / 225.0
+    variance = v1 + v2 + v13
+    one, other = (pi * (2.0 * shares - 1.0) for shares in sobol.design(3, 4096, seed=0))
+    found = sobol.indices(f(one), f(other), f(sobol.crossed(one, other)), seed=0)
+    np.testing.assert_allclose(found.first, np.array([v1, v2, 0.0]) / variance, atol=0.01)
+    np.testing.assert_allclose(found.total, np.array([v1 + v13, v2, v13]) / variance, atol=0.01)
+    assert (found.first_interval[:, 0] < found.first + 1e-12).all()
+    assert (found.first_interval[:, 1] > found.first - 1e-12).all()
+
+
+def test_draws_beyond_the_scenes_domain_are_cut_and_said():
+    found = design.uncertainty(machine(), "restitution=0.95±0.05", ["landing.x"], samples=256)
+    (one,) = found.spreads
+    assert one.key == "plate.restitution"
+    assert one.cut == pytest.approx(norm.cdf(-1.0), rel=1e-9)
+    assert found.inputs.max() <= 1.0
+    # The mean of a normal distribution cut one deviation above its mean.
+    assert found.inputs.mean() == pytest.approx(
+        0.95 - 0.05 * norm.pdf(1.0) / norm.cdf(1.0), abs=5e-4
+    )
+    assert "16 % of plate.restitution" in repr(found)
+
+
+def test_samples_that_never_land_are_left_out_and_said():
+    given = chutelab.load("inclined-60")
+    found = design.uncertainty(given, "plate.angle_deg=69±3", ["landing.vx"], samples=64)
+    lost = int(np.isnan(found.outputs).sum())
+    assert 0 < lost == sum(found.lost.values())
+    assert "are left out" in repr(found)
+    assert np.isfinite(found.mean).all()
+
+
+def test_uniform_and_relative_spreads():
+    given = ["incoming.speed=2±10%", "plate.distance=0.5+/-20mm:uniform"]
+    speed, distance = spreads(machine(), given)
+    assert speed.spread == pytest.approx(0.2)
+    assert (distance.law, distance.spread) == ("uniform", pytest.approx(0.02))
+    np.testing.assert_allclose(distance.values(np.array([0.0, 0.5, 1.0])), [0.48, 0.5, 0.52])
+    quartiles = speed.values(np.array([0.25, 0.5, 0.75]))
+    np.testing.assert_allclose(quartiles, norm.ppf([0.25, 0.5, 0.75], 2.0, 0.2), rtol=1e-12)
+    assert limits("plate.restitution") == (0.0, 1.0)
+    assert limits("plate.angle_deg") == (np.nextafter(-90.0, 0.0), np.nextafter(90.0, 0.0))
+    assert limits("stream.at[0]") == (-1e6, 1e6)
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("restitution=0.5", "must be KEY=MEAN±SPREAD"),
+        ("restitution=0.5±0", "more than 0"),
+        ("restitution=0.5±-1", "more than 0"),
+        ("restitution=0.5±a", "no number"),
+        ("restitution=1.5±0.1", "from 0 to 1"),
+        ("restitution=0.5±0.1:gamma", "normal and uniform"),
+        ("plate.distance=0.5±1kg", "unknown unit"),
+        ("plate.distance=0.5±1s", "wrong unit"),
+        ("stream.count=5±1", "whole"),
+        ("nothing=1±1", "nothing"),
+        ("plate.below=±1", "no value"),
+        ([], "say what is uncertain"),
+        (["restitution=0.5±0.1"] * 2, "given already"),
+    ],
+)
+def test_bad_uncertainties_are_refused_before_anything_runs(given, said, monkeypatch):
+    monkeypatch.setattr("chutelab.design.evaluation.simulate", None)
+    monkeypatch.setattr("chutelab.design.families.run", None)
+    with pytest.raises((design.DesignError, VaryError), match=said):
+        design.uncertainty(machine(), given)
+
+
+def test_restitution_dominates_and_the_picture_says_so(tmp_path):
+    given = ["restitution=0.5±0.05", "plate.distance=±5mm", "outgoing.drop=±5mm"]
+    found = design.uncertainty(machine(), given, samples=128)
+    assert found.quantities == ("landing.x", "belt_work")
+    assert all(indices.first[0] > 0.8 for indices in found.indices)
+    figure = spread(found, path=tmp_path / "spread.png")
+    titles = [ax.get_title(loc="left") for ax in figure.axes]
+    assert titles.count("against plate.restitution") == 2
+    assert (tmp_path / "spread.png").stat().st_size > 10_000
+
+
+def test_the_command_behind_sweep_writes_samples_and_picture(tmp_path, capsys):
+    options = {"samples": 64, "seed": 0, "as_json": False, "quiet": False}
+    out, plot = tmp_path / "samples.csv", tmp_path / "spread.png"
+    propagate(machine(), ["restitution=0.5±0.05"], out=out, plot=plot, **options)
+    assert "share of plate.restitution" in capsys.readouterr().out
+    head, *rows = out.read_text(encoding="utf-8").splitlines()
+    assert head == "plate.restitution,landing.x,belt_work"
+    assert len(rows) == 128
+    epsilon, x, work = map(float, rows[0].split(","))
+    # Upright plate: vx = -ε v, and the fall to the belt does not depend on ε.
+    falls = G * (R + D) / V
+    t3 = (sqrt(falls**2 + 2.0 * G * DROP) - falls) / G
+    assert x == pytest.approx(R + D - epsilon * V * t3, rel=1e-12)
+    assert work == pytest.approx(M * V * (V + epsilon * V), rel=1e-12)
+    propagate(machine(), ["restitution=0.5±0.05"], out=None, plot=None, samples=64, seed=0,
+              as_json=True, quiet=False)  # fmt: skip
+    told = json.loads(capsys.readouterr().out)
+    assert told["quantities"]["landing.x"]["first"][0] == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("given", "out", "plot", "said"),
+    [
+        ("restitution=0.5", None, None, "must be KEY=MEAN±SPREAD"),
+        ("restitution=0.5±0.1", "rows.parquet", None, "ends in .csv"),
+        ("restitution=0.5±0.1", None, "picture.gif", "ends in .png or .svg"),
+        ("restitution=0.5±0.1", "not/there.csv", None, "folder does not exist"),
+    ],
+)
+def test_the_command_behind_sweep_refuses_before_it_runs(given, out, plot, said, monkeypatch):
+    monkeypatch.setattr("chutelab.design.evaluation.simulate", None)
+    monkeypatch.setattr("chutelab.design.families.run", None)
+    paths = {"out": out and Path(out), "plot": plot and Path(plot)}
+    with pytest.raises(RefusedError, match=said):
+        propagate(machine(), [given], samples=64, seed=0, as_json=False, quiet=True, **paths)
+
+
+def test_frames_need_pandas_or_say_so(linear, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(ImportError, match="pip install pandas"):
+        linear.frame()
+
+
+LESSON = Path(__file__).parent.parent / "lessons" / "09-design"
+
+
+def test_the_worksheets_commands_run(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    text = (LESSON / "README.md").read_text(encoding="utf-8")
+    commands = re.findall(r"^chutelab (.*)$", text, re.MULTILINE)
+    assert len(commands) == 7
+    said = []
+    for command in commands:
+        result = CliRunner().invoke(main, shlex.split(command))
+        assert result.exit_code == 0, result.output
+        said.append(result.output)
+    assert "28.66" in said[0]
+    assert "47.25" in said[1]
+    assert "0.0063185" in said[2]
+    assert "0.016" in said[3]
+    assert "share of plate.restitution   68" in said[5]
+
+
+def test_the_worksheets_numbers_hold():
+    text = (LESSON / "README.md").read_text(encoding="utf-8")
+    given = chutelab.load("inclined-20")
+    down = design.solve(given, "plate.angle_deg=8:60", "landing.vx=0", points=21).scene
+    # Straight down the belt pays m v_b², at 60° a fifth of it.
+    assert design.value(down, "belt_work") == pytest.approx(M * V**2)
+    assert "32.0 mJ" in text
+    energies = [design.value(chutelab.load(f"inclined-{n}"), "dEk") for n in (20, 40, 60)]
+    assert max(energies) == energies[2]
+    assert "the dearest of the three" in text
+    found = design.uncertainty(
+        chutelab.load("inclined-40"),
+        ["restitution=0.5±0.05", "plate.angle_deg=±0.5", "plate.distance=±2mm",
+         "incoming.speed=±1%"],
+        samples=4096,
+    )  # fmt: skip
+    low, high = found.interval[0]
+    assert 0.5 * (high - low) == pytest.approx(0.024, abs=5e-4)
+    shares = (100.0 * found.indices[0].first).round().astype(int).tolist()
+    assert shares == [68, 19, 11, 1]
+    assert "68 % of its variance" in text
+    assert "19 % that of the angle, 11 % that of the distance and 1 % that of the speed" in text
+
+
+def test_the_notebook_is_shipped_without_outputs():
+    told = json.loads((LESSON / "exercise.ipynb").read_text(encoding="utf-8"))
+    cells = {cell["id"]: cell for cell in told["cells"]}
+    assert len(cells) == len(told["cells"])
+    for cell in cells.values():
+        if cell["cell_type"] == "code":
+            assert (cell["outputs"], cell["execution_count"]) == ([], None)
+    assert {"predict", "run", "compare", "explanation"} <= cells.keys()
+
+
+@pytest.mark.slow
+def test_the_notebook_runs_and_accepts_right_answers(tmp_path):
+    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    book = nbformat.read(LESSON / "exercise.ipynb", as_version=4)
+    for n, right in enumerate((0.5955, 1.2513, 0.0729, 42.575), start=1):
+        cell = next(cell for cell in book.cells if cell["id"] == f"answer-{n}")
+        cell["source"] = cell["source"].replace("= None", f"= {right}")
+    nbclient.NotebookClient(book, resources={"metadata": {"path": str(tmp_path)}}).execute()
+    shown = {cell["id"]: cell.get("outputs", []) for cell in book.cells}
+    for n in (1, 2, 3, 4):
+        assert "right" in shown[f"answer-{n}"][0]["data"]["text/plain"]
+    for name in ("picture", "several", "overlay", "spread"):
+        assert "image/png" in shown[name][0]["data"]

@@ -1,0 +1,186 @@
+"""The paper's figures: printed and corrected equations written out, and the engine beside them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from PIL import Image
+
+import chutelab
+from chutelab.cli import main
+from chutelab.figures import DRAWINGS, NUMBERS, FigureError, figure
+from chutelab.figures.paths import CASES, path
+from chutelab.plots.figures import paper_figure
+from chutelab.recording import Kind
+
+G, EPSILON, FALL, MASS = 9.81, 0.5, 0.5, 0.008
+
+
+@pytest.fixture(scope="module")
+def found():
+    return {number: figure(number) for number in NUMBERS}
+
+
+def paper(v, radius, distance, *, printed):
+    """Eqs. (2) to (12) for an upright plate; returns v2, v2', v3x, t3."""
+    cosine = np.minimum(v**2 / (G * radius), 1.0)
+    sine = np.sqrt(1.0 - cosine**2)
+    t2 = (radius + distance - radius * sine) / (v * cosine)
+    vx, vy = v * cosine, v * sine + G * t2
+    v2, phi2 = np.hypot(vx, vy), np.arctan2(vx, vy)
+    turned = np.arctan(EPSILON * np.tan(phi2))
+    if printed:
+        after = v2 * np.sqrt(np.sin(phi2) ** 2 + EPSILON**2 * np.cos(phi2) ** 2)
+    else:
+        after = v2 * np.sqrt(np.cos(phi2) ** 2 + EPSILON**2 * np.sin(phi2) ** 2)
+    back, down = after * np.sin(turned), after * np.cos(turned)
+    t3 = (-down + np.sqrt(down**2 + 2.0 * G * FALL)) / G
+    return v2, after, back, t3
+
+
+@pytest.mark.parametrize(("number", "speed"), [(6, 2.0), (7, 4.0)])
+@pytest.mark.parametrize("form", ["as-printed", "corrected"])
+@pytest.mark.parametrize("distance", [0.5, 1.0])
+def test_energy_against_the_radius(found, number, speed, form, distance):
+    columns = found[number].columns
+    radius = columns["R, m"]
+    _, _, back, _ = paper(speed, radius, distance, printed=form == "as-printed")
+    expected = 1000.0 * 0.5 * MASS * (back**2 + speed**2)
+    energy = columns[f"ΔE_k, mJ, {form}, d_okr = {distance:g} m"]
+    np.testing.assert_allclose(energy, expected, rtol=1e-12)
+    if form == "as-printed":
+        assert (np.diff(energy) < 0.0).all()
+    elif number == 7:
+        np.testing.assert_allclose(energy, 80.0, rtol=1e-12)
+
+
+def test_the_printed_form_is_what_table_1_was_made_from(found):
+    for number, speed, first in ((8, 2.0, 0.137), (9, 4.0, 0.548)):
+        columns = found[number].columns
+        _, after, back, t3 = paper(speed, columns["R, m"], 0.5, printed=True)
+        assert back[0] * t3[0] == pytest.approx(first, abs=5e-4)
+        np.testing.assert_allclose(columns["v3x, m/s, as-printed"], back, rtol=1e-12)
+        np.testing.assert_allclose(columns["v2', m/s, as-printed"], after, rtol=1e-12)
+
+
+@pytest.mark.parametrize("number", [6, 9])
+def test_the_engine_sides_with_the_corrected_equations(found, number):
+    scene = found[number].scenes[f"figure-{number}"]
+    document = chutelab.scene.to_dict(scene)
+    for radius in (0.05, 0.2, 0.5):
+        given = chutelab.scene.from_dict(
+            document, "<figure>", [f"incoming.pulley_radius={radius!r}"]
+        )
+        recording = chutelab.simulate(given, engine="exact")
+        landing = recording.first(recording.select(Kind.LANDING))[0]
+        _, _, back, _ = paper(scene.incoming.speed, radius, 0.5, printed=False)
+        assert -landing["velocity_before"][0] == pytest.approx(back, rel=1e-12)
+
+
+@pytest.mark.parametrize("number", [11, 12, 13])
+def test_the_engine_runs_the_corrected_paths(found, number):
+    for case, scene in zip(CASES[number], found[number].scenes.values(), strict=True):
+        recording = chutelab.simulate(scene, engine="exact")
+        landing = recording.first(recording.select(Kind.LANDING))[0]
+        radius = scene.incoming.pulley_radius
+        expected = path(case.speed, case.angle, case.ahead, "corrected", radius)
+        np.testing.assert_allclose(
+            landing["position"], expected.second.position[-1], rtol=0.0, atol=1e-12
+        )
+        np.testing.assert_allclose(landing["velocity_before"], expected.landing, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("form", "along", "into"), [("corrected", 1.0, 0.5), ("as-printed", 0, 0)])
+def test_a_path_obeys_the_equations_at_an_inclined_plate(form, along, into):
+    angle = np.radians(20.0)
+    way = path(2.0, 20.0, 0.1, form)
+    down = np.array([np.sin(angle), -np.cos(angle)])
+    away = np.array([-np.cos(angle), -np.sin(angle)])
+    before, after = way.first.velocity[-1], way.second.velocity[0]
+    if form == "corrected":
+        assert after @ down == pytest.approx(along * (before @ down), rel=1e-12)
+        assert after @ away == pytest.approx(-into * (before @ away), rel=1e-12)
+    else:
+        # Printed: size from the swapped sine and cosine, direction from Eq. (8).
+        size = np.hypot(-before @ away, EPSILON * (before @ down))
+        assert np.hypot(*after) == pytest.approx(size, rel=1e-12)
+        tangent = (after @ away) / (after @ down)
+        assert tangent == pytest.approx(EPSILON * (-before @ away) / (before @ down), rel=1e-12)
+    # The plate's line goes through the pivot, 0.1 m ahead at the height of the belt.
+    meet = way.first.position[-1] - np.array([0.1, 0.1])
+    assert meet @ away == pytest.approx(0.0, abs=1e-15)
+    assert way.second.position[-1, 1] == pytest.approx(way.second.position[0, 1] - FALL)
+
+
+def test_words_carry_the_numbers(found):
+    assert "10 % less" in found[6].meaning[0]
+    assert "0.408 m" in found[6].meaning[0]
+    assert "the whole trend is the misprint" in found[7].meaning[0]
+    assert "2.412 m/s instead of 2.877 m/s" in found[8].meaning[0]
+    assert "2.000 m/s throughout" in found[9].meaning[1]
+    assert "0.436 m back from the plate, as printed 0.585 m" in found[11].meaning[0]
+    # Section 5 of the design: +0.29 at 1 m/s, -0.40 at 2 m/s.
+    assert "1 m/s, 20°: +0.29 m/s" in found[12].meaning[0]
+    assert "-0.40 m/s" in found[12].meaning[1]
+    assert "1.71 m/s forward" in found[13].meaning[0]
+    for one in found.values():
+        assert one.missing
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+def test_picture_has_both_forms_on_the_same_axes(found, number):
+    drawn = paper_figure(found[number])
+    panels = [panel for pair in found[number].panels for panel in pair]
+    assert len(drawn.axes) == len(panels)
+    for left, right in zip(drawn.axes[::2], drawn.axes[1::2], strict=True):
+        assert left.get_ylim() == right.get_ylim()
+        assert left.get_xlim() == right.get_xlim()
+        assert "as printed" in left.get_title(loc="left")
+        assert "corrected" in right.get_title(loc="left")
+    said = " ".join(text.get_text() for text in drawn.texts).replace("\n", " ")
+    for text in (*found[number].meaning, *found[number].missing):
+        assert text in said
+
+
+@pytest.mark.parametrize("number", [7, 12])
+def test_command_writes_picture_numbers_and_scenes(number, tmp_path):
+    result = CliRunner().invoke(main, ["figure", str(number), "--out", str(tmp_path / "out")])
+    assert result.exit_code == 0, result.output
+    assert "misprint" in result.output
+    names = {7: ["figure-7"], 12: ["figure-12-left", "figure-12-right"]}[number]
+    assert sorted(file.name for file in (tmp_path / "out").iterdir()) == sorted(
+        [f"figure-{number}.png", f"figure-{number}.csv", *(f"{name}.toml" for name in names)]
+    )
+    for name in names:
+        scene = chutelab.load(tmp_path / "out" / f"{name}.toml")
+        assert scene == figure(number).scenes[name]
+    text = (tmp_path / "out" / f"figure-{number}.csv").read_text(encoding="utf-8")
+    head, *rows = csv.reader(io.StringIO(text))
+    columns = figure(number).columns
+    assert head == list(columns)
+    assert len(rows) == len(next(iter(columns.values())))
+    assert float(rows[5][-1]) == columns[head[-1]][5]
+    picture = np.asarray(Image.open(tmp_path / "out" / f"figure-{number}.png"))
+    assert len(np.unique(picture)) > 50
+
+
+def test_json_of_a_figure():
+    result = CliRunner().invoke(main, ["figure", "9", "--json"])
+    told = json.loads(result.output)
+    assert told["figure"] == 9
+    assert len(told["columns"]["R, m"]) == 93
+
+
+@pytest.mark.parametrize("number", [10, 1, 14, -3])
+def test_figures_without_results_are_refused_with_a_reason(number):
+    result = CliRunner().invoke(main, ["figure", "--", str(number)])
+    assert result.exit_code == 2
+    assert DRAWINGS.get(number, "the paper has no figure") in result.output
+    assert "6, 7, 8, 9, 11, 12, 13" in result.output
+    with pytest.raises(FigureError):
+        figure(number)

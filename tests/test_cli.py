@@ -737,13 +737,19 @@ def test_help_lists_the_commands():
         "run",
         "check",
         "show",
+        "sweep",
+        "solve",
+        "compare",
+        "lesson",
+        "page",
+        "figure",
         "tables",
+        "scenes",
+        "new",
+        "schema",
         "verify",
         "stress",
         "bench",
-        "scenes",
-        "schema",
-        "new",
     ]
     assert call("-h").stdout == text
     for command in commands:

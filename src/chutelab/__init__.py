@@ -9,7 +9,9 @@ True
 - `simulate`, `Recording`: run a scene, keep what happened;
 - `theory`: the paper's equations in closed form;
 - `compare`: simulated against theory;
-- `overlay`, `animate`: pictures.
+- `overlay`, `animate`: pictures;
+- `exercises`, `measured`, `design`, `figures`: questions that answer back, points from a film, what
+  to build, the paper's figures.
 
 Each is imported when it is first asked for, so that text output never waits for matplotlib, nor the
 exact engine for pymunk.
@@ -23,7 +25,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from chutelab import theory
+    from chutelab import design, exercises, figures, measured, theory
     from chutelab.animate import animate
     from chutelab.compare import compare
     from chutelab.plots import overlay
@@ -40,11 +42,17 @@ __all__ = [
     "__version__",
     "animate",
     "compare",
+    "design",
+    "exercises",
+    "figures",
     "load",
+    "measured",
     "overlay",
     "simulate",
     "theory",
 ]
+
+_PACKAGES = {"design", "exercises", "figures", "measured", "theory"}
 
 _HOME = {
     "Recording": "chutelab.recording",
@@ -75,8 +83,8 @@ def __getattr__(name: str) -> Any:
     value: Any
     if name == "__version__":
         value = _version()
-    elif name == "theory":
-        value = import_module("chutelab.theory")
+    elif name in _PACKAGES:
+        value = import_module(f"chutelab.{name}")
     elif name in _HOME:
         value = getattr(import_module(_HOME[name]), name)
     else:

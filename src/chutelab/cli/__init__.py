@@ -5,11 +5,19 @@
 `running`        ``run``
 `checking`       ``check``
 `recordings`     ``show``
+`comparing`      ``compare``
 `paper`          ``tables``
 `scenes`         ``scenes``, ``schema`` and ``new``
 `verifying`      ``verify``
 `stressing`      ``stress``
 `benching`       ``bench``
+`lessons`        ``lesson``: list, show, build, new, page
+`grading`        ``lesson grade``
+`pages`          ``page``
+`sweeping`       ``sweep``
+`solving`        ``solve``
+`figures`        ``figure``
+`uncertain`      what ``sweep --uncertainty`` does
 `parameters`     what several commands take: scenes, overrides, output
 `output`         the files of ``--out``, all of them or none
 `report`         summaries as tables for people
@@ -24,15 +32,38 @@ Modules that take long to import are imported inside the commands that need them
 
 from chutelab.cli.benching import bench
 from chutelab.cli.checking import check
+from chutelab.cli.comparing import compare
+from chutelab.cli.figures import figure
+from chutelab.cli.lessons import lesson
+from chutelab.cli.pages import page
 from chutelab.cli.paper import tables
 from chutelab.cli.program import main
 from chutelab.cli.recordings import show
 from chutelab.cli.running import run
 from chutelab.cli.scenes import new, scenes, schema
+from chutelab.cli.solving import solve
 from chutelab.cli.stressing import stress
+from chutelab.cli.sweeping import sweep
 from chutelab.cli.verifying import verify
 
-for _command in (run, check, show, tables, verify, stress, bench, scenes, schema, new):
+for _command in (
+    run,
+    check,
+    show,
+    sweep,
+    solve,
+    compare,
+    lesson,
+    page,
+    figure,
+    tables,
+    scenes,
+    new,
+    schema,
+    verify,
+    stress,
+    bench,
+):
     main.add_command(_command)
 
 __all__ = ["main"]

@@ -1,0 +1,200 @@
+"""``compare``: measured points over simulation and parabola, and fits to them."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import click
+
+from chutelab.cli.parameters import complete_scene, folder, set_option
+from chutelab.cli.program import RefusedError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from rich.console import RenderableType
+
+    from chutelab.measured import Fit, Residuals, Track
+    from chutelab.scene import Scene
+
+FILES = ("compare.png", "points.csv", "fit.json")
+
+
+def _point(_ctx: click.Context, _parameter: click.Parameter, text: str) -> tuple[float, float]:
+    try:
+        x, y = (float(part) for part in text.split(","))
+    except ValueError:
+        raise click.BadParameter(f"{text!r}: two numbers X,Y, such as 320,95.5") from None
+    return x, y
+
+
+def _keys(
+    _ctx: click.Context, _parameter: click.Parameter, values: tuple[str, ...]
+) -> tuple[str, ...]:
+    return tuple(key.strip() for value in values for key in value.split(","))
+
+
+@click.command(short_help="Lay measured points over a scene; fit the scene to them.")
+@click.argument("scene", shell_complete=complete_scene)
+@click.option(
+    "--data",
+    metavar="FILE",
+    required=True,
+    type=click.Path(),
+    help="A table with columns t, x, y, such as Tracker exports, or a shipped track.",
+)
+@click.option("--track", metavar="NAME", help="Which track, of a file that holds several.")
+@click.option(
+    "--scale",
+    metavar="M",
+    type=float,
+    help="Metres per unit of the file; by default what its header says, else 1.",
+)
+@click.option(
+    "--origin",
+    metavar="X,Y",
+    default="0,0",
+    callback=_point,
+    help="The pulley's axis, in the units of the file.",
+)
+@click.option("--flip-y", is_flag=True, help="y is counted downward in the file, as pixels are.")
+@click.option(
+    "--t0",
+    metavar="S",
+    type=float,
+    default=0.0,
+    help="Time in the file at which the particle is released: t = 0 of the simulation.",
+)
+@click.option(
+    "--fit",
+    "keys",
+    metavar="KEYS",
+    multiple=True,
+    callback=_keys,
+    help="Fit these, such as plate.restitution,incoming.speed. May be repeated.",
+)
+@click.option("--robust", is_flag=True, help="With --fit: give points far off less weight.")
+@set_option
+@click.option(
+    "--out",
+    metavar="DIR",
+    type=click.Path(),
+    callback=folder,
+    help="Write compare.png, points.csv and, with --fit, fit.json into this folder.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")
+def compare(
+    scene: str,
+    data: str,
+    track: str | None,
+    scale: float | None,
+    origin: tuple[float, float],
+    flip_y: bool,
+    t0: float,
+    keys: tuple[str, ...],
+    robust: bool,
+    overrides: tuple[str, ...],
+    out: Path | None,
+    as_json: bool,
+) -> None:
+    """Lay the points of a film over SCENE, and say how far they lie off.
+
+    FILE is a table with a line that names its columns t, x and y, such as the video-analysis
+    program Tracker exports: tabs, semicolons or commas between cells, decimal points or commas,
+    other columns and empty cells do no harm. In the world, x = M (x_file - X), and y likewise, with
+    --flip-y downward; the clock is t_file - S.
+
+    \b
+    chutelab compare perpendicular --data perpendicular-track
+    chutelab compare perpendicular --data perpendicular-track \\
+        --fit plate.restitution,incoming.speed --out out
+    chutelab compare my.toml --data film.txt --scale 0.0021 --origin 312,95 --flip-y --fit t0
+
+    The shipped track perpendicular-track is not a film: it was made from a simulation with
+    restitution 0.62 and 1.9 m/s, seen at 120 frames a second with an error of 1 mm in each
+    coordinate. So it is known what a fit to it should find.
+
+    --fit takes any number of the scene, which starts at the scene's value and stays within what the
+    scene allows, and t0 (which is looked for everywhere), scale, origin.x and origin.y. What the
+    points cannot tell is refused by name. The uncertainties are standard deviations,
+    s² (JᵀJ)⁻¹ from how the points respond to the parameters (J) and how much they scatter (s): they
+    hold if errors are independent and the model is right. Needs pip install "chutelab[fit]".
+    """  # noqa: D301 - click wants the backspace
+    from chutelab import measured
+    from chutelab.cli.output import destination
+    from chutelab.cli.progress import progress
+    from chutelab.scene import load
+
+    if robust and not keys:
+        raise click.UsageError("--robust is for fits: name what to fit with --fit.")
+    _free(out)
+    loaded = load(scene, overrides)
+    film = measured.read(data, scale=scale, origin=origin, flip_y=flip_y, t0=t0, track=track)
+    with destination(out, ()) as place:
+        with progress("fitting" if keys else "comparing"):
+            found, fit = _compared(loaded, film, keys, robust=robust)
+        if place is not None:
+            with progress("drawing"):
+                _write(found, fit, place)
+    _tell(found, fit, out, as_json=as_json)
+
+
+def _compared(
+    scene: Scene, film: Track, keys: tuple[str, ...], *, robust: bool
+) -> tuple[Residuals, Fit | None]:
+    from chutelab import measured
+
+    if not keys:
+        return measured.residuals(scene, film), None
+    try:
+        fit = measured.fit(scene, film, keys, robust=robust)
+    except ImportError as error:
+        raise RefusedError(f"--fit: {error}") from error
+    return fit.after, fit
+
+
+def _free(out: Path | None) -> None:
+    """Refuse a folder in which a name to be written is taken by a folder."""
+    for name in FILES:
+        if out is not None and (out / name).is_dir():
+            raise RefusedError(f"--out {out}: {out / name} is a folder, not a file")
+
+
+def _write(found: Residuals, fit: Fit | None, place: Path) -> None:
+    from chutelab.measured.files import as_dict, points_csv
+    from chutelab.plots.measured import measured
+
+    measured(found, fit, path=place / "compare.png")
+    (place / "points.csv").write_text(points_csv(found), encoding="utf-8")
+    if fit is not None:
+        text = json.dumps(as_dict(found, fit), indent=1, allow_nan=False)
+        (place / "fit.json").write_text(text + "\n", encoding="utf-8")
+
+
+def _tell(found: Residuals, fit: Fit | None, out: Path | None, *, as_json: bool) -> None:
+    from chutelab.cli import console
+
+    if as_json:
+        from chutelab.measured.files import as_dict
+
+        console.show_json(as_dict(found, fit))
+        return
+    from rich.text import Text
+
+    from chutelab.cli.report import drawn, wrapped
+    from chutelab.measured.diagnosis import advice
+    from chutelab.sheet import WIDTH
+
+    head = Text(found.recording.title, style="bold")
+    head.append(f"\n{found.track.said()}", style="not bold")
+    parts: list[RenderableType] = [head]
+    for sheet in [found.sheet()] if fit is None else [fit.sheet(), found.sheet()]:
+        lines = [line for note in sheet.notes for line in wrapped(note, WIDTH)]
+        parts += [drawn(sheet), Text("\n".join(lines))]
+    if fit is None and (advised := advice(found)):
+        parts.append(Text("\n" + "\n".join(wrapped(f"note: {advised}", WIDTH))))
+    console.show(*parts)
+    if out is not None:
+        names = [name for name in FILES if fit is not None or name != "fit.json"]
+        click.echo(f"wrote into {out}: {', '.join(names)}")

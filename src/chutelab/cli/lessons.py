@@ -1,0 +1,254 @@
+"""``lesson``: list, show, build, start, grade and bundle lessons."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+from click.shell_completion import CompletionItem
+
+from chutelab.cli.grading import grade
+from chutelab.cli.parameters import folder
+from chutelab.cli.program import RefusedError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from rich.console import RenderableType
+
+    from chutelab.lessons import Lesson
+
+
+class InOrder(click.Group):
+    """A group of commands in the order they are used in, not that of the alphabet."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names of the commands in the order of help."""
+        return list(self.commands)
+
+
+def complete_lesson(
+    _ctx: click.Context, _parameter: click.Parameter, incomplete: str
+) -> list[CompletionItem]:
+    """Offer the names of shipped lessons that begin so, with or without their number."""
+    from chutelab.lessons import shipped
+
+    return [
+        CompletionItem(name, help=lesson.title)
+        for lesson in shipped()
+        for name in (lesson.name, lesson.folder.name)
+        if name.startswith(incomplete)
+    ]
+
+
+@click.group(
+    cls=InOrder,
+    short_help="Lessons: list, show, build, start, grade, bundle.",
+    epilog="Begin with: chutelab lesson list, then: chutelab lesson show 1",
+)
+def lesson() -> None:
+    """Teach with chutelab: lessons with a worksheet, an exercise and an animation each.
+
+    A lesson goes by its number (3), its name (the-bounce), or the folder of one that you wrote
+    yourself. The worksheet says what to predict, what to run, what to compare and what to explain.
+    """
+
+
+@lesson.command("list", short_help="List the lessons.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def list_lessons(as_json: bool) -> None:
+    """List the lessons: number, name, for whom, how long, and the question of each."""
+    from chutelab.cli import console
+    from chutelab.lessons import shipped
+
+    found = shipped()
+    if as_json:
+        console.show_json({"format": 1, "lessons": [_plain(one) for one in found]})
+        return
+    from rich.text import Text
+
+    from chutelab.cli.report import plain_table
+
+    table = plain_table(["", "lesson", "level", "minutes", "what it is about"], texts=5)
+    for one in found:
+        about = Text(one.title, style="bold")
+        about.append(f"\n{one.question}", style="not bold")
+        table.add_row(str(one.number), one.name, one.level, str(one.minutes), about)
+    console.show(table)
+
+
+@lesson.command(short_help="Show one lesson, with its worksheet.")
+@click.argument("wanted", metavar="LESSON", shell_complete=complete_lesson)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def show(wanted: str, as_json: bool) -> None:
+    """Show one lesson: its question, scenes and quantities, its files, and the worksheet.
+
+    \b
+    chutelab lesson show 3
+    chutelab lesson show the-bounce
+    chutelab lesson show ./my-lesson
+    """  # noqa: D301 - click wants the backspace
+    from chutelab.cli import console
+    from chutelab.lessons import find
+
+    found = find(wanted)
+    if as_json:
+        console.show_json({"format": 1, **_plain(found)})
+    else:
+        console.show(*_shown(found))
+
+
+@lesson.command(short_help="Make the picture of each lesson that changed.")
+@click.argument("wanted", metavar="[LESSON]...", nargs=-1, shell_complete=complete_lesson)
+@click.option(
+    "--out",
+    metavar="DIR",
+    type=click.Path(),
+    callback=folder,
+    help="Write each picture into a folder NN-name in here, not into the lesson's own: for an"
+    " installed chutelab, whose folders cannot be written to.",
+)
+@click.option("--force", is_flag=True, help="Make them anew, changed or not.")
+@click.option("--quiet", "-q", is_flag=True, help="Print nothing, and show no progress bar.")
+def build(wanted: tuple[str, ...], out: Path | None, force: bool, quiet: bool) -> None:
+    """Make lesson.gif of each LESSON (without one: of all that are shipped), where it changed.
+
+    A picture is up to date if it was made from the same scene and settings with the same versions
+    of chutelab, numpy, pymunk, matplotlib and pillow; the GIF says so in a comment. The same makes
+    the same bytes.
+    """
+    from chutelab.cli.progress import progress
+    from chutelab.lessons import find, shipped
+    from chutelab.lessons.building import build as build_lesson
+
+    for one in [find(name) for name in wanted] or shipped():
+        with _writing("another folder: --out DIR"), progress(one.name, quiet=quiet) as update:
+            target = out / one.folder.name if out else None
+            built = build_lesson(one, target, force=force, progress=update)
+        if not quiet:
+            done = "written" if built.made else "up to date"
+            click.echo(f"{built.path}: {done}, {built.size / 1000:.0f} kB")
+
+
+@lesson.command(short_help="Start a lesson of your own.")
+@click.argument("name", type=click.Path(path_type=Path))
+@click.option(
+    "--from",
+    "model",
+    metavar="LESSON",
+    shell_complete=complete_lesson,
+    help="Begin with a copy of this lesson: worksheet, exercise, scenes and all.",
+)
+def new(name: Path, model: str | None) -> None:
+    """Start a lesson of your own: a folder NAME with lesson.toml, worksheet and scene.
+
+    It can be shown and built at once; change it from there. With --from it is a copy of a shipped
+    lesson, for whoever wants to adapt one, or to work through it. Nothing is ever overwritten.
+
+    \b
+    chutelab lesson new my-lesson
+    chutelab lesson new our-bounce --from 3
+    """  # noqa: D301 - click wants the backspace
+    from chutelab.lessons import find
+    from chutelab.lessons.starting import start
+
+    copied = None if model is None else find(model)
+    with _writing("another place"):
+        made = start(name, copied)
+    # A name with a folder in front is taken for a folder, even if a shipped lesson has it.
+    said = made if len(made.parts) > 1 else f"./{made}"
+    click.echo(f"wrote {made}; edit it, and make its picture with: chutelab lesson build {said}")
+
+
+lesson.add_command(grade)
+
+
+@lesson.command(short_help="Bundle the lessons as web pages that need no server.")
+@click.argument("wanted", metavar="[LESSON]...", nargs=-1, shell_complete=complete_lesson)
+@click.option(
+    "-o",
+    "--out",
+    metavar="DIR",
+    required=True,
+    type=click.Path(),
+    callback=folder,
+    help="The folder; files that are there are replaced.",
+)
+@click.option("--quiet", "-q", is_flag=True, help="Print nothing, and show no progress bar.")
+def page(wanted: tuple[str, ...], out: Path, quiet: bool) -> None:
+    """Bundle lessons (without LESSON: all that are shipped) into a folder of web pages.
+
+    index.html, and for each lesson its worksheet, animation, files, and a page with sliders. All
+    links are relative: the folder works from a memory stick, from any static web server, and on a
+    phone.
+    """
+    from chutelab.cli.progress import progress
+    from chutelab.lessons import find, shipped
+    from chutelab.lessons.bundle import bundle
+    from chutelab.page import PageError
+    from chutelab.variation import VaryError
+
+    lessons = [find(name) for name in wanted] or shipped()
+    try:
+        with _writing("another folder"), progress("making the pages", quiet=quiet) as update:
+            made = bundle(lessons, out, update)
+    except (PageError, VaryError) as error:
+        raise RefusedError(str(error)) from error
+    if not quiet:
+        size = sum(path.stat().st_size for path in made)
+        click.echo(f"wrote {len(made)} files, {size / 1e6:.1f} MB; open {out / 'index.html'}")
+
+
+@contextmanager
+def _writing(instead: str) -> Iterator[None]:
+    """Turn a file that cannot be written into a message."""
+    try:
+        yield
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        reason = error.strerror or str(error)
+        raise RefusedError(f"{where}cannot be written: {reason}; give {instead}") from error
+
+
+def _plain(lesson: Lesson) -> dict[str, object]:
+    from chutelab.lessons.starting import files_of
+
+    return {
+        "number": lesson.number,
+        "name": lesson.name,
+        **lesson.model_dump(mode="json"),
+        "folder": str(lesson.folder),
+        "files": [path.name for path in files_of(lesson)],
+    }
+
+
+def _shown(lesson: Lesson) -> list[RenderableType]:
+    from rich.markdown import Markdown
+    from rich.text import Text
+
+    from chutelab.cli.report import plain_table, titled
+    from chutelab.lessons import scene_of
+    from chutelab.lessons.reading import unit_in
+    from chutelab.lessons.worksheets import plain_of
+
+    number = "" if lesson.number is None else f"{lesson.number}  "
+    head = Text(f"{number}{lesson.title}", style="bold")
+    head.append(
+        f"\n{lesson.question}\n{lesson.level}, about {lesson.minutes} minutes", style="not bold"
+    )
+    scenes = plain_table(["scene", "what it shows"], texts=2)
+    for name in lesson.scenes:
+        scenes.add_row(name, scene_of(lesson, name).title)
+    looked_at = plain_table(["quantity", "unit", "what it is"], texts=3)
+    for name, words in lesson.quantities.items():
+        looked_at.add_row(name, unit_in(lesson, name), words)
+    parts: list[RenderableType] = [head, titled("Scenes", scenes)]
+    if lesson.quantities:
+        parts.append(titled("Quantities", looked_at))
+    parts.append(Text(f"\nFiles in {lesson.folder}\n"))
+    if lesson.worksheet.is_file():
+        worksheet = plain_of(lesson.worksheet.read_text(encoding="utf-8"))
+        parts.append(Markdown(worksheet, hyperlinks=False))
+    return parts

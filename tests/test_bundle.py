@@ -1,0 +1,190 @@
+"""The lessons as web pages: whole, relative, readable by everybody."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from html.parser import HTMLParser
+
+import pytest
+from click.testing import CliRunner
+
+from chutelab.cli import main
+from chutelab.lessons import find, shipped
+from chutelab.lessons.bundle import bundle
+from chutelab.lessons.worksheets import html_of
+
+
+def chutelab(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+class Links(HTMLParser):
+    """Addresses in a page, what stands for its pictures, and its headings."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.addresses, self.alternatives, self.headings, self.language = [], [], [], None
+        self.feed(page)
+
+    def handle_starttag(self, tag, attrs):
+        attributes = dict(attrs)
+        self.addresses += [
+            attributes[key] for key in ("href", "src", "srcset", "data-still") if key in attributes
+        ]
+        if tag == "img":
+            self.alternatives.append(attributes["alt"])
+        if tag == "html":
+            self.language = attributes["lang"]
+        if re.fullmatch("h[1-6]", tag):
+            self.headings.append(int(tag[1]))
+
+
+@pytest.fixture(scope="module")
+def web(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("web") / "lessons"
+    bundle([find(6), find(2)], folder)
+    return folder
+
+
+def test_a_bundle_has_an_index_and_a_page_for_each_lesson(web):
+    assert (web / "index.html").is_file()
+    for name in ("02-letting-go", "06-grip-or-slip"):
+        files = {path.name for path in (web / name).iterdir()}
+        assert files >= {"index.html", "page.html", "lesson.gif", "still.png", "README.md"}
+        assert (web / name / "page.html").stat().st_size < 500_000
+    page = (web / "06-grip-or-slip" / "index.html").read_text(encoding="utf-8")
+    assert "The textbook angle is the limit" in page
+    assert '<a rel="next" href="../02-letting-go/index.html">2. When does it let go? →</a>' in page
+    assert "(lesson.gif)" not in page
+
+
+def broken_links(web):
+    """Addresses in the pages of a bundle that are not relative, or lead nowhere."""
+    elsewhere = ("#", "data:,", "https://doi.org/", "https://jupyter.org")
+    broken = set()
+    for page in (web / "index.html", *web.glob("*/index.html")):
+        for address in Links(page.read_text(encoding="utf-8")).addresses:
+            target = (page.parent / address.partition("#")[0]).resolve()
+            inside = target.is_relative_to(web.resolve())
+            if not address.startswith(elsewhere) and not (inside and target.is_file()):
+                broken.add(address)
+    return broken
+
+
+def test_all_links_of_a_bundle_are_relative_and_lead_somewhere(web):
+    assert broken_links(web) == set()
+
+
+@pytest.mark.slow
+def test_the_bundle_of_all_lessons_is_whole_and_small(tmp_path):
+    result = chutelab("lesson", "page", "-o", tmp_path / "web")
+    assert result.exit_code == 0
+    assert broken_links(tmp_path / "web") == set()
+    pages = {path.parent.name: path.stat().st_size for path in tmp_path.rglob("page.html")}
+    assert len(pages) == len(shipped())
+    # Lesson 9 varies two keys at many places each.
+    assert max(pages.values()) < 2_000_000
+    assert sorted(pages.values())[-2] < 500_000
+    assert sum(path.stat().st_size for path in tmp_path.rglob("*.*")) < 8_000_000
+
+
+def test_a_bundle_is_not_put_in_place_of_a_file(tmp_path):
+    (tmp_path / "web").write_text("mine")
+    result = chutelab("lesson", "page", "2", "-o", tmp_path / "web")
+    assert result.exit_code == 2
+    assert "it is a file, not a folder" in result.stderr
+    assert (tmp_path / "web").read_text() == "mine"
+
+
+def test_pages_of_a_bundle_can_be_read_by_everybody(web):
+    for page in (web / "index.html", *web.glob("*/index.html")):
+        text = page.read_text(encoding="utf-8")
+        found = Links(text)
+        assert found.language == "en"
+        assert 'name="viewport" content="width=device-width, initial-scale=1"' in text
+        assert found.headings[0] == 1
+        assert all(b <= a + 1 for a, b in zip(found.headings, found.headings[1:], strict=False))
+    lesson = Links((web / "02-letting-go" / "index.html").read_text(encoding="utf-8"))
+    assert lesson.alternatives == [
+        "A particle rides round a large pulley and lets go at an angle of 63 degrees"
+    ]
+    style = (web / "style.css").read_text(encoding="utf-8")
+    assert "prefers-color-scheme: dark" in style
+
+
+def test_colours_of_a_bundle_can_be_told_apart(web):
+    """Contrast of text by WCAG 2: at least 4.5 to 1, light and dark."""
+
+    def luminance(colour):
+        channels = [int(colour[i : i + 2], 16) / 255.0 for i in (1, 3, 5)]
+        linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in channels]
+        return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+    style = (web / "style.css").read_text(encoding="utf-8")
+    themes = [
+        dict(re.findall(r"--([a-z-]+): (#[0-9a-f]{6})", block))
+        for block in re.findall(r":root \{(.*?)\}", style, re.DOTALL)
+    ]
+    assert len(themes) == 2
+    for theme in themes:
+        for ink in ("ink", "muted", "accent"):
+            for ground in ("paper", "card"):
+                a, b = luminance(theme[ink]), luminance(theme[ground])
+                assert (max(a, b) + 0.05) / (min(a, b) + 0.05) >= 4.5, (ink, ground)
+
+
+def test_a_bundle_replaces_its_own_files_and_leaves_others(web, tmp_path):
+    shutil.copytree(web, tmp_path / "web")
+    (tmp_path / "web" / "mine.txt").write_text("keep")
+    (tmp_path / "web" / "index.html").write_text("old")
+    result = chutelab("lesson", "page", "2", "-o", tmp_path / "web")
+    assert result.exit_code == 0
+    assert "open " in result.stdout
+    assert (tmp_path / "web" / "mine.txt").read_text() == "keep"
+    assert "When does it let go?" in (tmp_path / "web" / "index.html").read_text(encoding="utf-8")
+
+
+def test_the_same_bundle_has_the_same_bytes(web, tmp_path):
+    made = bundle([find(2)], tmp_path / "again")
+    for path in made:
+        name = path.relative_to(tmp_path / "again")
+        if name.parts[0] == "02-letting-go" and name.name != "index.html":
+            assert path.read_bytes() == (web / name).read_bytes()
+
+
+def test_worksheets_cannot_smuggle_html_in():
+    made = html_of("# Title\n\n![x](lesson.gif)\n\n<script>alert(1)</script> [a](../b/README.md#c)")
+    assert "<script>" not in made
+    assert "<h1>" not in made
+    assert "<img" not in made
+    assert '<a href="../b/index.html#c">a</a>' in made
+
+
+def test_a_bundle_works_from_a_file_in_a_browser(web):
+    sync = pytest.importorskip("playwright.sync_api")
+    found = shutil.which("chromium") or shutil.which("chromium-browser")
+    if found is None:
+        pytest.skip("no chromium on this machine")
+    with sync.sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=found, args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": 360, "height": 740})
+        troubles, requests = [], []
+        page.on("console", lambda message: troubles.append(message.text))
+        page.on("pageerror", lambda error: troubles.append(str(error)))
+        page.on("request", lambda request: requests.append(request.url))
+        page.goto((web / "index.html").as_uri())
+        page.click("text=When does it let go?")
+        wide = page.evaluate("document.documentElement.scrollWidth")
+        source = "document.querySelector('#picture img').getAttribute('src')"
+        assert page.evaluate(source) == "lesson.gif"
+        page.click("text=Stop the animation")
+        assert page.evaluate(source) == "still.png"
+        page.click("text=Start the animation")
+        assert page.evaluate(source) == "lesson.gif"
+        page.click("text=Try it")
+        page.wait_for_selector("canvas")
+        browser.close()
+    assert troubles == []
+    assert wide == 360
+    assert all(url.startswith(("file:", "data:")) for url in requests)

@@ -1,0 +1,379 @@
+"""The lessons: found, validated, started, built."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from PIL import Image
+
+from chutelab.cli import main
+from chutelab.lessons import LessonError, find, read, shipped
+from chutelab.lessons.building import build, is_current
+from chutelab.lessons.stamp import Stamp
+from chutelab.lessons.starting import start
+
+NAMES = [
+    "the-parabola",
+    "letting-go",
+    "the-bounce",
+    "turning-the-plate",
+    "landing",
+    "grip-or-slip",
+    "a-stream",
+    "trust",
+]
+
+
+def chutelab(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+# What there is -----------------------------------------------------------------------------------
+
+
+def test_the_lessons_are_in_order():
+    lessons = shipped()
+    assert [lesson.name for lesson in lessons][: len(NAMES)] == NAMES
+    assert [lesson.number for lesson in lessons] == list(range(1, len(lessons) + 1))
+
+
+@pytest.mark.parametrize("wanted", [3, "3", "03", "the-bounce", "03-the-bounce", "The-Bounce"])
+def test_a_lesson_is_found_by_number_or_name(wanted):
+    assert find(wanted).folder.name == "03-the-bounce"
+
+
+def test_a_lesson_is_found_by_its_folder(tmp_path):
+    start(tmp_path / "my-lesson")
+    lesson = find(tmp_path / "my-lesson")
+    assert (lesson.name, lesson.number, lesson.title) == ("my-lesson", None, "My lesson")
+
+
+@pytest.mark.parametrize(
+    ("wanted", "said"),
+    [
+        ("bounce", "did you mean the-bounce?"),
+        ("99", "there are 01-the-parabola"),
+        ("", "there are"),
+    ],
+)
+def test_what_is_not_there_is_refused_with_advice(wanted, said):
+    result = chutelab("lesson", "show", wanted)
+    assert result.exit_code == 2
+    assert said in result.stderr
+
+
+# lesson.toml -------------------------------------------------------------------------------------
+
+
+BROKEN = """
+title = 3
+levl = "core"
+minutes = 2
+scenes = ["perpendicular", "inclined-21"]
+
+[quantities]
+x3 = "fine"
+
+[picture]
+fps = 30
+widht = 3
+
+[page]
+scene = "elsewhere"
+vary = ["plate.angle_deg=0:60:4"]
+"""
+
+
+def test_all_faults_of_a_file_are_in_one_message(tmp_path):
+    (tmp_path / "lesson.toml").write_text(BROKEN, encoding="utf-8")
+    with pytest.raises(LessonError) as caught:
+        read(tmp_path)
+    message = str(caught.value)
+    assert message.startswith(f"{tmp_path / 'lesson.toml'}: 9 faults")
+    for said in (
+        "title = 3: must be a text of 1 to 200 characters",
+        'level is missing: "start", "core" or "advanced"',
+        "minutes = 2: must be a whole number from 5 to 600",
+        "question is missing: a text of 1 to 200 characters",
+        "picture.fps = 30: must be 10, 20, 25 or 50",
+        "picture.widht = 3: unknown key; did you mean picture.width?",
+        'levl = "core": unknown key; did you mean level?',
+        'scenes[1] = "inclined-21": no shipped scene, and no file beside lesson.toml; did you mean',
+        'page.scene = "elsewhere": must be one of scenes: perpendicular, inclined-21',
+    ):
+        assert said in message
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('x3 = "way', 'x9 = "way', 'quantities.x9 = "way back from the plate to the landing": no'),
+        ("set = []", 'set = ["plate.tilt=3"]', "picture.set = "),
+        ("=0:1:21", "=0:1", 'page.vary[0] = "plate.restitution=0:1": must be KEY=FROM:TO:COUNT'),
+        (
+            "plate.restitution=0:",
+            "plate.tilt=0:",
+            'page.vary[0] = "plate.tilt=0:1:21": unknown',
+        ),
+        ("minutes = 45", "minutes = true", "minutes = true: must be a whole number"),
+        ('["scene.toml"]', '["../scene.toml"]', 'scenes[0] = "../scene.toml": no shipped scene'),
+        ('["scene.toml"]', '["a\\u0000b"]', "scenes[0] = "),
+        ('["scene.toml"]', "3", "scenes = 3: must be a list of 1 to 20 names"),
+        ('["scene.toml"]', "[]", "scenes = []: must be a list of 1 to 20 names"),
+        ("title =", "title = =", "not TOML"),
+    ],
+)
+def test_a_fault_names_file_key_value_and_what_is_allowed(tmp_path, old, new, said):
+    folder = start(tmp_path / "my-lesson")
+    plan = folder / "lesson.toml"
+    text = plan.read_text(encoding="utf-8")
+    assert old in text
+    plan.write_text(text.replace(old, new, 1), encoding="utf-8")
+    result = chutelab("lesson", "show", folder)
+    assert result.exit_code == 2
+    assert str(plan.resolve()) in result.stderr or str(plan) in result.stderr
+    assert said in result.stderr
+    assert chutelab("lesson", "build", folder).exit_code == 2
+    assert not (folder / "lesson.gif").exists()
+
+
+def test_a_broken_scene_beside_a_lesson_is_a_fault_of_the_lesson(tmp_path):
+    folder = start(tmp_path / "my-lesson")
+    scene = folder / "scene.toml"
+    scene.write_text(scene.read_text(encoding="utf-8").replace("speed = 2.0", "speed = -2.0"))
+    with pytest.raises(LessonError, match=r"scenes\[0\] = \"scene.toml\": .*incoming.speed = -2.0"):
+        read(folder)
+
+
+def test_a_lesson_cannot_be_changed_after_it_was_read():
+    with pytest.raises(ValueError, match="frozen"):
+        find(3).minutes = 5
+
+
+# build -------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    """A lesson with a small picture, built; the tests copy it."""
+    folder = start(tmp_path_factory.mktemp("built") / "small")
+    plan = folder / "lesson.toml"
+    text = plan.read_text(encoding="utf-8")
+    for old, new in (("fps = 25", "fps = 10"), ("800", "320"), ("450", "180")):
+        text = text.replace(old, new, 1)
+    plan.write_text(text.replace("# slow = 8 ", "slow = 2 ", 1), encoding="utf-8")
+    assert build(read(folder)).made
+    return folder
+
+
+@pytest.fixture
+def copied(small, tmp_path):
+    return Path(shutil.copytree(small, tmp_path / "small"))
+
+
+def test_the_same_lesson_gives_the_same_bytes(small, tmp_path):
+    again = build(read(small), tmp_path)
+    assert again.made
+    assert again.path.read_bytes() == (small / "lesson.gif").read_bytes()
+
+
+def test_what_has_not_changed_is_not_built_again(copied):
+    before = (copied / "lesson.gif").stat().st_mtime_ns
+    assert not build(read(copied)).made
+    assert (copied / "lesson.gif").stat().st_mtime_ns == before
+    assert build(read(copied), force=True).made
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "made"),
+    [
+        ("scene.toml", "restitution = 0.5", "restitution = 0.4", True),
+        ("scene.toml", "# What to look at.", "# Another comment.", False),
+        ("lesson.toml", "set = []", 'set = ["plate.restitution=0.3"]', True),
+        ("lesson.toml", "slow = 2", "slow = 1.5", True),
+        ("lesson.toml", "minutes = 45", "minutes = 50", False),
+        ("README.md", "Predict", "Guess", False),
+    ],
+)
+def test_a_picture_is_built_again_when_what_it_shows_has_changed(copied, file, old, new, made):
+    text = (copied / file).read_text(encoding="utf-8")
+    assert old in text
+    (copied / file).write_text(text.replace(old, new, 1), encoding="utf-8")
+    assert build(read(copied)).made is made
+
+
+def test_other_versions_build_again(copied, monkeypatch):
+    assert not build(read(copied)).made
+    monkeypatch.setattr("chutelab.lessons.building.version", lambda name: "0.0")
+    assert build(read(copied)).made
+
+
+def test_a_picture_without_a_stamp_or_a_broken_one_is_built_again(copied):
+    picture = copied / "lesson.gif"
+    whole = picture.read_bytes()
+    for broken in (b"", whole[:1000], whole[: -len(Stamp.of(whole).block) - 1] + b"\x3b"):
+        picture.write_bytes(broken)
+        assert build(read(copied)).made
+        assert picture.read_bytes() == whole
+
+
+def test_nothing_half_written_is_left(copied, monkeypatch):
+    def fail(recording, path, **settings):
+        path.write_bytes(b"GIF89a, half of it")
+        raise RuntimeError("in the middle")
+
+    monkeypatch.setattr(sys.modules["chutelab.animate"], "animate", fail)
+    before = {path.name: path.read_bytes() for path in copied.iterdir()}
+    with pytest.raises(RuntimeError, match="in the middle"):
+        build(read(copied), force=True)
+    assert {path.name: path.read_bytes() for path in copied.iterdir()} == before
+
+
+def test_the_stamp_changes_nothing_that_is_seen(small):
+    data = (small / "lesson.gif").read_bytes()
+    stamp = Stamp.of(data)
+    assert re.fullmatch("[0-9a-f]{32}", stamp.inputs)
+    assert re.search(r"chutelab .+, numpy \d.*, matplotlib \d.*, pillow \d", stamp.versions)
+    bare = data[: -len(stamp.block) - 1] + b"\x3b"
+    assert Stamp.of(bare) is None
+    assert stamp.on(bare) == data
+    (small.parent / "bare.gif").write_bytes(bare)
+    with Image.open(small / "lesson.gif") as one, Image.open(small.parent / "bare.gif") as other:
+        assert one.n_frames == other.n_frames > 10
+        for frame in range(one.n_frames):
+            one.seek(frame)
+            other.seek(frame)
+            assert one.info["duration"] == other.info["duration"]
+            assert one.convert("RGB").tobytes() == other.convert("RGB").tobytes()
+
+
+def test_only_a_gif_can_be_stamped():
+    with pytest.raises(ValueError, match="only a GIF"):
+        Stamp("0" * 32, "chutelab 1").on(b"\x89PNG;")
+
+
+@pytest.mark.parametrize("lesson", shipped(), ids=lambda lesson: lesson.name)
+def test_shipped_pictures_show_what_the_lessons_say(lesson):
+    assert is_current(lesson), f"run: chutelab lesson build {lesson.number}"
+    picture = lesson.folder / "lesson.gif"
+    assert picture.stat().st_size < (250_000 if lesson.name == "a-stream" else 200_000)
+    with Image.open(picture) as film:
+        assert film.size == (800, 450)
+        assert film.n_frames > 40
+
+
+def test_build_of_the_command_line_writes_elsewhere_too(copied, tmp_path):
+    out = tmp_path / "out"
+    first = chutelab("lesson", "build", copied, "--out", out)
+    again = chutelab("lesson", "build", copied, "--out", out)
+    assert (first.exit_code, again.exit_code) == (0, 0)
+    assert "lesson.gif: written, " in first.stdout
+    assert "lesson.gif: up to date, " in again.stdout
+    assert (out / "small" / "lesson.gif").read_bytes() == (copied / "lesson.gif").read_bytes()
+    assert chutelab("lesson", "build", copied, "-q").stdout == ""
+
+
+def test_where_nothing_can_be_written_says_so_and_what_to_do(copied, tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    result = chutelab("lesson", "build", copied, "--out", tmp_path / "file")
+    assert result.exit_code == 2
+    assert "cannot be written" in result.stderr
+    assert "--out DIR" in result.stderr
+
+
+# new ---------------------------------------------------------------------------------------------
+
+
+def test_a_new_lesson_can_be_shown_at_once(tmp_path):
+    result = chutelab("lesson", "new", tmp_path / "09-our-lesson")
+    assert result.exit_code == 0
+    shown = chutelab("lesson", "show", tmp_path / "09-our-lesson")
+    assert shown.exit_code == 0
+    assert "9  Our lesson" in shown.stdout
+    assert "Write down a number, or a sketch" in shown.stdout
+
+
+def test_a_new_lesson_can_be_a_copy(tmp_path):
+    assert chutelab("lesson", "new", tmp_path / "ours", "--from", "3").exit_code == 0
+    lesson, model = find(tmp_path / "ours"), find(3)
+    assert lesson.model_dump() == model.model_dump()
+    assert {p.name for p in lesson.folder.iterdir()} >= {"README.md", "table-1.toml", "lesson.gif"}
+    pictures = [(one.folder / "lesson.gif").read_bytes() for one in (lesson, model)]
+    assert pictures[0] == pictures[1]
+
+
+def test_new_never_overwrites(tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "notes").write_text("dear to me")
+    result = chutelab("lesson", "new", tmp_path / "mine")
+    assert result.exit_code == 2
+    assert "is there already" in result.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["mine"]
+    assert (tmp_path / "mine" / "notes").read_text() == "dear to me"
+
+
+@pytest.mark.parametrize("name", ["My lesson", "-x", "x" * 61, "ärger", ".hidden"])
+def test_names_that_will_not_do_are_refused(tmp_path, name):
+    with pytest.raises(LessonError, match="lower-case letters, digits and hyphens"):
+        start(tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
+# list and show -----------------------------------------------------------------------------------
+
+
+def test_list_names_every_lesson():
+    printed = chutelab("lesson", "list").stdout
+    for name in NAMES:
+        assert name in printed
+    listed = json.loads(chutelab("lesson", "list", "--json").stdout)["lessons"]
+    assert [one["name"] for one in listed] == [lesson.name for lesson in shipped()]
+    assert set(listed[2]["files"]) >= {"README.md", "lesson.gif", "lesson.toml", "table-1.toml"}
+
+
+@pytest.mark.parametrize("number", range(1, 9))
+def test_show_has_question_scenes_quantities_and_worksheet(number):
+    lesson = find(number)
+    shown = chutelab("lesson", "show", number)
+    assert shown.exit_code == 0
+    flat = " ".join(shown.stdout.split())
+    for said in (lesson.title, lesson.question, "Predict", "Compare", "Explain", "For the teacher"):
+        assert said in flat
+    for name in (*lesson.scenes, *lesson.quantities):
+        assert name in flat
+    assert json.loads(chutelab("lesson", "show", number, "--json").stdout)["number"] == number
+
+
+@pytest.mark.parametrize("command", ["list", "show", "build", "new", "grade", "page"])
+def test_each_command_explains_itself(command):
+    said = chutelab("lesson", command, "--help").stdout
+    assert len(said) > 200
+    if command == "grade":
+        assert "RUNS THE STUDENTS' CODE" in said
+        assert "container" in said
+
+
+def test_grade_refuses_what_is_no_notebook(tmp_path):
+    assert chutelab("lesson", "grade").exit_code == 2
+    assert chutelab("lesson", "grade", tmp_path / "missing.ipynb").exit_code == 2
+    result = chutelab("lesson", "grade", tmp_path)
+    assert result.exit_code == 2
+    assert "no notebook (*.ipynb)" in result.stderr
+
+
+def test_the_template_and_the_lessons_know_the_same_keys():
+    template = Path(start.__code__.co_filename).parent / "template" / "lesson.toml"
+    text = template.read_text(encoding="utf-8").replace("TITLE", '"x"').replace("# slow", "slow")
+    keys = tomllib.loads(text)
+    from chutelab.lessons.models import Lesson, Page, Picture
+
+    assert set(keys) == set(Lesson.model_fields)
+    assert set(keys["picture"]) == set(Picture.model_fields)
+    assert set(keys["page"]) <= set(Page.model_fields)

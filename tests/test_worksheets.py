@@ -1,0 +1,423 @@
+"""Nothing in a worksheet that does not hold: its commands run, its numbers are right."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from math import acos, atan, cos, degrees, hypot, log, pi, radians, sin, sqrt
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from chutelab import compare, load, simulate
+from chutelab.cli import main
+from chutelab.ledger import ledger
+from chutelab.lessons import find, scene_of, shipped
+from chutelab.recording import Kind
+from chutelab.stepper.solids import HALF_THICKNESS
+
+G = 9.81
+
+
+def chutelab(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def worksheet(number):
+    return find(number).worksheet.read_text(encoding="utf-8")
+
+
+def commands(text):
+    blocks = re.findall(r"^```sh\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    lines = [line for block in blocks for line in block.splitlines()]
+    assert all(line.startswith("chutelab ") for line in lines)
+    return lines
+
+
+@pytest.mark.parametrize("number", range(1, 9))
+def test_worksheets_have_the_four_parts_and_fit_about_a_page(number):
+    text = worksheet(number)
+    lesson = find(number)
+    assert text.startswith(f"# Lesson {number}. {lesson.title}\n\n![")
+    heads = re.findall(r"^## (.*)$", text, re.MULTILINE)
+    assert heads == ["Predict", "Run", "Compare", "Explain"]
+    assert 300 < len(text.split()) < 800
+    assert "*For the teacher.*" in text
+    assert max(map(len, text.splitlines())) < 240
+
+
+SLOW = ("bench", "stream --", "stream-independent", "fixed-steps.toml --set run.dt=0.0000")
+QUICK = [
+    (number, line)
+    for number in range(1, 9)
+    for line in commands(worksheet(number))
+    if not any(word in line for word in SLOW)
+]
+
+
+@pytest.mark.parametrize(("number", "line"), QUICK)
+def test_commands_of_worksheets_run_as_they_stand(number, line, tmp_path, monkeypatch):
+    shutil.copytree(find(number).folder, tmp_path / "lesson")
+    monkeypatch.chdir(tmp_path / "lesson")
+    # What --out writes is slow, and tested elsewhere: one file shows that the option is right.
+    only = ["--only", "csv"] if "--out" in line else []
+    result = chutelab(*line.split()[1:], *only)
+    assert result.exit_code == 0, result.output
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", range(1, 9))
+def test_slow_commands_of_worksheets_run_too(number, tmp_path, monkeypatch):
+    shutil.copytree(find(number).folder, tmp_path / "lesson")
+    monkeypatch.chdir(tmp_path / "lesson")
+    for line in commands(worksheet(number)):
+        assert chutelab(*line.split()[1:]).exit_code == 0, line
+
+
+def test_commands_of_the_overview_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = (find(1).folder.parent / "README.md").read_text(encoding="utf-8")
+    for line in commands(text):
+        if "page" not in line and "build" not in line:
+            assert chutelab(*line.split()[1:]).exit_code == 0, line
+    for lesson in shipped():
+        row = f"({lesson.folder.name}/README.md) | {lesson.question} | {lesson.level} |"
+        assert row in text
+
+
+def links(text):
+    return re.findall(r"\]\(([^)]+)\)", text)
+
+
+@pytest.mark.parametrize("number", range(1, 9))
+def test_links_of_worksheets_lead_somewhere(number):
+    folder = find(number).folder
+    for target in links(worksheet(number)):
+        if target.startswith("https://"):
+            assert target.startswith("https://doi.org/10.5194/ms-7-167-2016")
+        else:
+            assert (folder / target).is_file(), target
+
+
+def angle(v, radius):
+    """Separation by adhesion, degrees: cos φ1 = v²/(g Rc)."""
+    return degrees(acos(min(1.0, v * v / (G * radius))))
+
+
+def slipping(mu, u0):
+    """Separation of a particle that slips on the pulley, radians, and the onset of its slip.
+
+    Integrates du/dφ = 2 sin φ - 2 µ (cos φ - u) with small steps (midpoint), from sin φ = µ (cos φ
+    - u0) on, until cos φ = u.
+    """
+    low, high = 0.0, 0.5 * pi
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if sin(middle) < mu * (cos(middle) - u0) else (low, middle)
+    onset = phi = low
+    u, step = u0, 1e-5
+
+    def rate(phi, u):
+        return 2.0 * sin(phi) - 2.0 * mu * (cos(phi) - u)
+
+    while u < cos(phi):
+        u += step * rate(phi + 0.5 * step, u + 0.5 * step * rate(phi, u))
+        phi += step
+    return phi, onset
+
+
+def bounce(radius):
+    """Paper's machine at 2 m/s, mass point: v2, φ2, and (v2', v3x, x3) both ways."""
+    d1 = radius + 0.5
+    down = G * d1 / 2.0
+    v2, phi2 = hypot(2.0, down), atan(2.0 / down)
+    phi2r = atan(0.5 * 2.0 / down)
+    right = v2 * sqrt(cos(phi2) ** 2 + 0.25 * sin(phi2) ** 2)
+    printed = v2 * sqrt(sin(phi2) ** 2 + 0.25 * cos(phi2) ** 2)
+    both = []
+    for v in (right, printed):
+        vx, vy = v * sin(phi2r), v * cos(phi2r)
+        both.append((v, vx, vx * (sqrt(vy**2 + 2.0 * G * 0.5) - vy) / G))
+    return v2, degrees(phi2), both[0], both[1]
+
+
+def plate(alpha_deg, r=0.004, d1=0.1, v=2.0):
+    """Disk against an inclined plate, pivot at the belt's height: φ2 in degrees, v_x after."""
+    a = radians(alpha_deg)
+    gap = d1 * cos(a) - r * sin(a) - r
+    half = 0.5 * G * sin(a)
+    t = 2.0 * gap / (v * cos(a) + sqrt((v * cos(a)) ** 2 - 4.0 * half * gap))
+    down = G * t
+    into, along = v * cos(a) - down * sin(a), v * sin(a) + down * cos(a)
+    return degrees(atan(into / along)), along * sin(a) - 0.5 * into * cos(a)
+
+
+def matching(r, d1=0.1, v=2.0):
+    """Angle, degrees, from which on the flight never meets the plate: no discriminant left."""
+    low, high = 10.0, 89.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        a = radians(middle)
+        gap = d1 * cos(a) - r * sin(a) - r
+        met = (v * cos(a)) ** 2 > 2.0 * G * sin(a) * gap
+        low, high = (middle, high) if met else (low, middle)
+    return low
+
+
+def straight_down():
+    low, high = 20.0, 40.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if plate(middle)[1] < 0.0 else (low, middle)
+    return low
+
+
+def layer_delay(h):
+    down = G * 0.298
+    return (sqrt(down**2 + 2.0 * G * (0.5 + h)) - sqrt(down**2 + 2.0 * G * 0.5)) / G
+
+
+def fixed(dt):
+    scene = load(find(8).folder / "fixed-steps.toml", [f"run.dt={dt}"])
+    recording = simulate(scene)
+    return compare(recording).max, ledger(recording).relative_residual
+
+
+def belt(vb, vx=-1.0, m=0.008):
+    return 1e3 * m * vb * (vb - vx), 500.0 * m * (vb - vx) ** 2
+
+
+FALL = sqrt(2.0 * 0.8 / G)
+DOWN = sqrt(G**2 * 0.298**2 + 2.0 * G * 0.5)
+U0 = 4.0 / (G * 0.504)
+B1, B2, B3 = bounce(0.05), bounce(0.1), bounce(0.2)
+
+STATED = {
+    1: {
+        "h = 0.8 m that is {0.404} s": FALL,
+        "{0.808} m at 2 m/s": 2.0 * FALL,
+        "{1.615} m at 4 m/s": 4.0 * FALL,
+        "g t = {3.96} m/s": G * FALL,
+        "makes that {4.44} m/s": hypot(2.0, G * FALL),
+        "here {63.2}°": degrees(atan(G * FALL / 2.0)),
+        "the fall takes {0.994} s": sqrt(2.0 * 0.8 / 1.62),
+    },
+    2: {
+        "gives {78.3}°": angle(1.0, 0.504),
+        "{62.9}° and": angle(1.5, 0.504),
+        "and {36.0}°": angle(2.0, 0.504),
+        "√(g Rc) = {2.22} m/s": sqrt(G * 0.504),
+        "it is {0.229} m": 1.5**2 / G,
+        "v0 sin φ1 = {1.34} m/s": 1.5 * sin(radians(angle(1.5, 0.504))),
+        "negative, {-0.0216} J": 0.008 * (1.5**2 - G * 0.504),
+    },
+    3: {
+        "energy of {16} mJ": 500.0 * 0.008 * 4.0,
+        "(1 - ε²) = {12} mJ": 500.0 * 0.008 * 4.0 * 0.75,
+        "you found {0.146},": B1[2][2],
+        "0.146, {0.138} and": B2[2][2],
+        "and {0.124} m": B3[2][2],
+        "v2 = {3.36} m/s": B1[0],
+        "φ2 = {36.6}°": B1[1],
+        "gives v2' = {2.88} m/s": B1[2][0],
+        "printed one {2.41} m/s": B1[3][0],
+        "with it x3 = {0.137} m": B1[3][2],
+        "grows: {0.84},": B1[3][1],
+        "0.84, {0.80} and": B2[3][1],
+        "and {0.74} m/s": B3[3][1],
+        "| 0.05 | {0.550}": 0.55,
+        "| 0.1 | {0.600}": 0.6,
+        "| 0.2 | {0.700}": 0.7,
+        "0.550 | {0.371}": 0.5 * G * 0.275**2,
+        "0.600 | {0.441}": 0.5 * G * 0.3**2,
+        "0.700 | {0.601}": 0.5 * G * 0.35**2,
+        "0.371 | {0.137}": B1[3][2],
+        "0.441 | {0.127}": B2[3][2],
+        "0.601 | {0.112}": B3[3][2],
+    },
+    4: {
+        "20°: φ2 = {56.4}°": plate(20)[0],
+        "back with {0.42} m/s": -plate(20)[1],
+        "40°: φ2 = {35.9}°": plate(40)[0],
+        "forward with {0.61} m/s": plate(40)[1],
+        "60°: φ2 = {14.7}°": plate(60)[0],
+        "forward with {1.61} m/s": plate(60)[1],
+        "at {28.7}°": straight_down(),
+        "in J: {38.7} mJ": belt(2.0, plate(20)[1])[0],
+        "38.7 mJ, {22.2} mJ": belt(2.0, plate(40)[1])[0],
+        "and {6.3} mJ": belt(2.0, plate(60)[1])[0],
+        "on, where d1 (m) is the way from the axis to the pivot: {63.9}°": degrees(
+            atan(4.0 / (2.0 * G * 0.1))
+        ),
+        "touches up to {68.9}°": matching(0.004),
+    },
+    5: {
+        "in J: {48} mJ": belt(2.0)[0],
+        "The particle gains {12} mJ": 500.0 * 0.008 * (4.0 - 1.0),
+        "(v_b - v_x)² = {36} mJ": belt(2.0)[1],
+        "work {16} mJ": belt(1.0)[0],
+        "heat {16} mJ": belt(1.0)[1],
+        "(µ g) = {3.06} s": 3.0 / (0.1 * G),
+        "with {4.28} m/s downward": DOWN,
+        "times {4.28} m/s at once": DOWN,
+        "left takes {2.62} s": (3.0 / 0.1 - DOWN) / G,
+        "it takes {0.58} s": (3.0 / 0.3 - DOWN) / G,
+        "second that is {9.6} W": 0.008 * 200.0 * 2.0 * 3.0,
+        "it {20} mJ a particle": 500.0 * 0.008 * (1.0 + 4.0),
+        "instead of {48} mJ": belt(2.0)[0],
+    },
+    6: {
+        "The textbook says {36.0}°": angle(2.0, 0.504),
+        "the way to {36.0}°": angle(2.0, 0.504),
+        "which is {5.4}° for": degrees(slipping(0.5, U0)[1]),
+        "at **{22.913}°**": degrees(slipping(0.5, U0)[0]),
+        "and {2.134} m/s": sqrt(G * 0.504 * cos(slipping(0.5, U0)[0])),
+        "not at {36.0}°": angle(2.0, 0.504),
+        "µ = 0: {20.6}°": degrees(acos((2.0 + U0) / 3.0)),
+        "v0²/(g Rc) = {0.809}": U0,
+        "100: {24.9}°": degrees(slipping(1.0, U0)[0]),
+        "24.9°, {31.7}°": degrees(slipping(5.0, U0)[0]),
+        "and {35.7}°": degrees(slipping(100.0, U0)[0]),
+        "leaves at {22.9} degrees": degrees(slipping(0.5, U0)[0]),
+        "here {23.3}°": degrees(acos((3.0 * U0 + 4.0) / 7.0)),
+    },
+    7: {
+        "second belt {48} mJ": belt(2.0)[0],
+        "m n = {1.6} kg/s": 0.008 * 200.0,
+        "v0/n = {10} mm": 1e3 * 2.0 / 200.0,
+        "by up to {11.5} mm": 1e3 * layer_delay(0.05),
+        "of that, {3.3} mm": 1e3 * layer_delay(0.05) / sqrt(12.0),
+        "(v_b - v_x) = {9.6} W": 0.008 * 200.0 * 2.0 * 3.0,
+        "or {9.6} J": 200.0 * 1e-3 * belt(2.0)[0],
+        "v_y = {2.92} m/s": G * 0.298,
+    },
+    8: {
+        "at {4.28} m/s onto": DOWN,
+        "means dt < {1.4} ms": 1e3 * 0.006 / DOWN,
+        "takes {0.298} s": 0.596 / 2.0,
+    },
+}
+"""What the worksheets state, by lesson: words around a {number}, and what it has to be, from
+formulas written here."""
+
+GIVEN = {
+    1: {"0.2", "0.4", "0.8", "1.62", "9.81"},
+    2: {"0.5", "1.5", "2.3"},
+    3: {"0.5", "0.05", "0.1", "0.2"},
+    4: {"0.1", "0.05", "3.2"},
+    5: {"0.1", "0.3", "0.8"},
+    6: {"0.5"},
+    7: {"0.5", "3.6", "3.3"},
+    8: {"0.2", "0.1", "0.05", "0.02", "9.7e-4", "4.9e-4", "2.4e-4", "2.6e-5"}
+    | {"1.6e-8", "4.0e-9", "9.9e-10"},
+}
+"""Further numbers with decimals: what the scenes set, and what other tests look at."""
+
+
+@pytest.mark.parametrize(
+    ("number", "said", "value"),
+    [(number, said, value) for number, all_ in STATED.items() for said, value in all_.items()],
+)
+def test_numbers_of_worksheets_are_right(number, said, value):
+    assert re.sub("[{}]", "", said) in " ".join(worksheet(number).split())
+    (text,) = re.findall(r"\{(-?[\d.]+)\}", said)
+    half = 0.5 * 10.0 ** -len(text.partition(".")[2])
+    assert abs(float(text) - value) <= half * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("number", range(1, 9))
+def test_no_number_of_a_worksheet_goes_unlooked_at(number):
+    prose = re.sub(
+        r"^```.*?^```|`[^`]*`|\]\([^)]*\)|doi:\S+", "", worksheet(number), flags=re.M | re.S
+    )
+    found = set(re.findall(r"\d+\.\d+(?:e-\d+)?", prose))
+    looked_at = {text for said in STATED[number] for text in re.findall(r"\{-?(.*)\}", said)}
+    assert found - looked_at - GIVEN[number] == set()
+
+
+def test_table_1_differs_in_x3_only_as_worksheet_3_says():
+    printed = {0.05: (0.550, 0.371, 0.137), 0.1: (0.600, 0.441, 0.127), 0.2: (0.7, 0.601, 0.112)}
+    for radius, (x2, y2, x3) in printed.items():
+        scene = load(find(3).folder / "table-1.toml", [f"incoming.pulley_radius={radius}"])
+        found = compare(simulate(scene)).simulated
+        assert found["x2"] == pytest.approx(x2, abs=0.5001e-3)
+        assert found["y2"] == pytest.approx(y2, abs=0.5001e-3)
+        assert found["y3"] == pytest.approx(0.5, abs=1e-12)
+        assert found["x3"] > x3 + 0.009
+
+
+def test_the_plate_of_lesson_4_is_missed_from_69_degrees_on():
+    def strikes(angle, radius=0.004):
+        settings = [f"plate.angle_deg={angle}", f"particle.radius={radius}"]
+        recording = simulate(load(find(4).folder / "any-angle.toml", settings))
+        return {recording.surfaces[i] for i in recording.select(Kind.IMPACT)["surface"]}
+
+    assert (strikes(68), strikes(70)) == ({"plate"}, set())
+    assert (strikes(63, 0.0), strikes(64.5, 0.0)) == ({"plate"}, set())
+    assert matching(0.0) == pytest.approx(degrees(atan(4.0 / (2.0 * G * 0.1))), abs=1e-9)
+    assert "pulley" in str(
+        chutelab("run", find(4).folder / "any-angle.toml", "--set", "plate.angle_deg=0").stdout
+    )
+
+
+def test_the_slip_of_lesson_5_lasts_as_long_as_it_says():
+    for mu in (0.1, 0.3):
+        recording = simulate(load(find(5).folder / "landing.toml", [f"outgoing.friction={mu}"]))
+        lasted = recording.events["t"][-1] - recording.select(Kind.LANDING)["t"][0]
+        assert lasted == pytest.approx((3.0 / mu - DOWN) / G, rel=1e-12)
+    rough = simulate(load(find(5).folder / "landing.toml", ["outgoing.friction=0.8"]))
+    assert rough.events["t"][-1] == rough.select(Kind.LANDING)["t"][0]
+
+
+def test_the_spread_of_lesson_7_is_as_it_says():
+    landed = simulate(scene_of(find(7), "bed.toml")).select(Kind.LANDING)["position"][:, 0]
+    many = simulate(load("stream-independent")).select(Kind.LANDING)["position"][:, 0]
+    assert f"{1e3 * np.std(landed):.1f}" == "3.6"
+    assert f"{1e3 * np.std(many):.1f}" == "3.3"
+    assert int(G * 0.298 / (0.05 + 2 * 0.004)) == 50
+
+
+@pytest.mark.slow
+def test_collisions_of_lesson_7_begin_where_it_says():
+    slow = simulate(load("stream", ["stream.rate=20", "stream.count=50"]))
+    assert len(slow.select(Kind.COLLISION)) == 0
+    for rate, met in ((45, False), (60, True)):
+        recording = simulate(load("stream", [f"stream.rate={rate}"]))
+        met_at = recording.select(Kind.COLLISION)["position"]
+        assert len(met_at) > 0
+        assert bool(np.any(met_at[:, 1] > -0.8)) is met
+    books = ledger(simulate(load("stream")))
+    assert books.by_surface["outgoing"]["belt_work"] == pytest.approx(0.9 * 9.6, rel=0.03)
+    lost = books.by_surface["particles"]
+    assert 3.0 < lost["restitution_loss"] + lost["friction_loss"] < 9.0
+
+
+def test_errors_and_orders_of_lesson_8_are_as_it_says():
+    (e1, r1), (e2, r2), (e3, r3) = (fixed(dt) for dt in (2e-4, 1e-4, 5e-5))
+    text = worksheet(8)
+    assert f"{e1:.1e}, {e2:.1e}, {e3:.1e}".replace("e-0", "e-") in text
+    assert log(e1 / e2) / log(2.0) == pytest.approx(1.0, abs=0.01)
+    assert log(e2 / e3) / log(2.0) == pytest.approx(1.0, abs=0.01)
+    said = f"{r1:.1e}, {r2:.1e}, {r3:.1e}".replace("e-0", "e-")
+    assert said in text
+    assert log(r1 / r2) / log(2.0) == pytest.approx(2.0, abs=0.01)
+    assert log(r2 / r3) / log(2.0) == pytest.approx(2.0, abs=0.01)
+
+
+@pytest.mark.slow
+def test_the_lucky_step_of_lesson_8_is_lucky():
+    assert f"{fixed(2e-5)[0]:.1e}".replace("e-0", "e-") in worksheet(8)
+
+
+def test_particles_fall_through_as_lesson_8_says():
+    def surfaces(dt):
+        recording = simulate(load(find(8).folder / "fixed-steps.toml", [f"run.dt={dt}"]))
+        kinds = (Kind.IMPACT, Kind.LANDING)
+        return {recording.surfaces[i] for i in recording.select(*kinds)["surface"]}
+
+    assert surfaces(2e-3) == surfaces(1.3e-3) == {"plate", "outgoing"}
+    assert surfaces(5e-3) == surfaces(1e-2) == {"plate"}
+    assert surfaces(8e-3) == set()
+    assert HALF_THICKNESS == 0.5 * 4e-3
+    assert scene_of(find(8)).run.dt == 1e-2

@@ -38,7 +38,7 @@ def kick(run: Run, carried: Mask, t0: float, t: float) -> None:
     _enter(run, resting | flying, carried, t)
     run.world.step(run.dt)
     contacts = run.world.contacts()
-    if contacts is not None and run.machine.align:
+    if contacts is not None and run.count == 1 and run.machine.align:
         _refuse_wedged(run, contacts, t)
     lost = resting.copy()
     if contacts is not None:
@@ -54,21 +54,16 @@ def kick(run: Run, carried: Mask, t0: float, t: float) -> None:
 
 
 def _refuse_wedged(run: Run, contacts: Contacts, t: float) -> None:
-    """Refuse what no rigid disk can follow: surfaces that drive it into each other.
+    """Refuse what no rigid disk can follow: surfaces that drive a lone one into each other.
 
     Raises
     ------
     StalledError
-        If a particle is in a solid by more than `WEDGED` of its radius, and no other presses it.
+        If it is in a solid by more than `WEDGED` of its radius.
     """
-    rows = contacts.fixed[contacts.depth[contacts.fixed] > WEDGED * run.radius]
-    if not len(rows):
+    row = int(contacts.depth.argmax())
+    if contacts.depth[row] <= WEDGED * run.radius:
         return
-    pushed = np.concatenate([contacts.first[contacts.pairs], contacts.other[contacts.pairs]])
-    rows = rows[~np.isin(contacts.first[rows], pushed)]
-    if not len(rows):
-        return
-    row = rows[0]
     i, solid = int(contacts.first[row]), int(contacts.other[row]) - run.count
     name = run.machine.surfaces[run.solids.surface[solid]]
     x, y, _, _ = run.tracks.state(i, t)

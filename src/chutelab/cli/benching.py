@@ -41,7 +41,7 @@ REPEATS = 9
     show_default=True,
     help="Timed runs after the first, at most; fewer of what takes long.",
 )
-@click.option("--quick", is_flag=True, help="Few values of each parameter: well under a minute.")
+@click.option("--quick", is_flag=True, help="Few values of each parameter: about two minutes.")
 @click.option(
     "--scaling",
     is_flag=True,

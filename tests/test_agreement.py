@@ -276,15 +276,22 @@ def test_pymunk_with_fixed_steps_agrees_with_exact_to_the_way_of_three(dt, examp
         way = 3.0 * dt * float(np.hypot(*track["velocity"].T).max())
         assume(way / 3.0 < draw["radius"] + stepper.HALF_THICKNESS)
         assume(surfaces_met(recording)[-1:] == ["outgoing"])
+        shifted = []
         for shift in (-way, way):
             moved = built_or_none(scene_of({**draw, "shift": shift}, max_time=3.0))
-            assume(moved is not None and surfaces_met(exact.run(moved)) == surfaces_met(recording))
+            assume(moved is not None)
+            shifted.append(exact.run(moved))
+            assume(surfaces_met(shifted[-1]) == surfaces_met(recording))
         stepped = stepper.run(built)
         assert surfaces_met(stepped) == surfaces_met(recording)
         for kind in (Kind.IMPACT, Kind.LANDING):
-            mine, its = recording.select(kind)[0], stepped.select(kind)[0]
-            off = np.abs(mine["position"] - its["position"])
-            assert off[1 if kind is Kind.IMPACT else 0] <= way, (draw, off, way)
+            mine, its, *others = (
+                r.select(kind)["position"][0] for r in (recording, stepped, *shifted)
+            )
+            off, along = np.abs(mine - its), 1 if kind is Kind.IMPACT else 0
+            # A blow on the round pulley magnifies what came before it, in any answer.
+            allowed = max(way, *(abs(mine[along] - other[along]) for other in others))
+            assert off[along] <= allowed, (draw, off, allowed)
             tally["late"] += bool(off.max() > 1e-3 * way)
         tally["compared"] += 1
 

@@ -27,10 +27,11 @@ from chutelab.animate.palette import BITS, CLEAR, Palette, colours, tint
 from chutelab.animate.stage import Stage
 from chutelab.animate.words import contact_normal, going_on, in_flight, sentence
 from chutelab.cli import main
+from chutelab.compare import scene_of
 from chutelab.machine import build
 from chutelab.plots import style
 from chutelab.plots.sampling import energies
-from chutelab.plots.scenery import machine_of, scene_of
+from chutelab.plots.scenery import machine_of
 from chutelab.plots.window import window_of
 from chutelab.recorder import Recorder
 from chutelab.recording import Kind, Recording

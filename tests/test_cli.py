@@ -151,10 +151,30 @@ def test_json_says_null_where_there_is_no_answer():
 def test_where_the_closed_form_ends_the_summary_says_why():
     text = call("run", "free-fall").stdout
     assert "\nNo closed form; outside the model: there is no incoming" in text
-    assert "Particle 0" not in text
+    assert "  theory  " not in text
     assert "ended: 5 settled" in text
+    # Its way is told instead: by free fall down to the first ramp, without a velocity sideways.
+    row = re.search(r"^meets (\S+) +(\S+) +(\S+) +(\S+) +(\S+) +(\S+)$", text, re.MULTILINE)
+    t, _, y, vx, vy = map(float, row.groups()[1:])
+    release = sc.load("free-fall").stream
+    assert vx == pytest.approx(release.velocity[0], abs=1e-5)
+    assert vy == pytest.approx(release.velocity[1] - 9.81 * t, rel=1e-5)
+    assert y == pytest.approx(release.at[1] + release.velocity[1] * t - 0.5 * 9.81 * t**2, rel=1e-5)
     text = call("run", "perpendicular", "--set", "outgoing.length=0.1").stdout
     assert "\nNo closed form from here on; misses the outgoing belt: " in text
+
+
+def test_a_changed_machine_does_not_go_by_the_bare_title():
+    title = "Perpendicular damping plate, 2 m/s"
+    changes = ["--set", "plate.angle_deg=5", "--set", "incoming.speed=3"]
+    told = f"{title}; with plate.angle_deg=5, incoming.speed=3"
+    assert call("run", "perpendicular", *changes).stdout.splitlines()[0] == told
+    call("run", "perpendicular", *changes, "--out", "out", "--only", "npz")
+    assert call("show", "out/recording.npz").stdout.splitlines()[0] == told
+    for same in (["--set", "run.engine=pymunk"], ["--dt", "0.001"], []):
+        assert call("run", "perpendicular", *same).stdout.splitlines()[0] == title
+    own = call("run", "perpendicular", *changes, "--set", "title=Ours").stdout
+    assert own.splitlines()[0] == "Ours"
 
 
 def test_quiet_prints_nothing():
@@ -623,7 +643,7 @@ def test_new_writes_a_scene_that_runs_and_overwrites_nothing():
 def test_new_says_why_it_cannot_write():
     Path("folder").mkdir()
     assert "folder is a folder" in refused("new", "folder")
-    assert "cannot be written: No such file" in refused("new", "nowhere/my.toml")
+    assert "cannot be written: there is no such folder" in refused("new", "nowhere/my.toml")
 
 
 def test_show_prints_the_summary_of_the_run_and_makes_its_files_again():

@@ -6,14 +6,14 @@ import json
 import re
 from fractions import Fraction
 from html.parser import HTMLParser
-from math import atan, cos, degrees, isfinite, nan, radians, sin
+from math import atan, cos, degrees, hypot, isfinite, nan, radians, sin, sqrt
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from chutelab import simulate
-from chutelab.exercises import EXERCISES, LessonError, Values, Verdict, find, lesson
+from chutelab.exercises import EXERCISES, ExerciseError, Values, Verdict, find, lesson
 from chutelab.exercises.drawing import draw, draws, solved
 from chutelab.exercises.values import shown
 from chutelab.recording import Kind
@@ -173,6 +173,21 @@ def test_the_engine_spreads_a_stream_as_far_as_the_exercise_says():
         landings = simulate(drop).select(Kind.LANDING)["position"][:, 0]
         # 400 draws leave some hundredths of the bed's height unused at its top.
         assert np.ptp(landings) == pytest.approx(solution("a-stream", given)[2], rel=0.03)
+
+
+@pytest.mark.parametrize("name", ["the-bounce", "a-stream"])
+def test_nothing_strikes_the_pulley_on_its_way_back(name):
+    for number in range(60):
+        given = lesson(name, f"back {number}").given
+        r, bed = (given.r, 0.0) if name == "the-bounce" else (given.mm / 1000, given.bed)
+        x0, y0 = given.R + given.d - r, given.R + r
+        t2 = x0 / given.v0
+        t3 = (sqrt((G * t2) ** 2 + 2 * G * given.d2) - G * t2) / G
+        for higher in (0.0, bed):
+            for t in np.linspace(0.0, t3, 200).tolist():
+                x, y = x0 - given.e * given.v0 * t, y0 + higher - 0.5 * G * (t2 + t) ** 2
+                gap = hypot(x, y) if x > 0.0 else abs(y)  # the belt's strands run back from it
+                assert gap > given.R + r
 
 
 # Known mistakes
@@ -440,9 +455,9 @@ def test_lessons_are_found_by_number_or_name():
     for ask in (3, "3", "the-bounce", "03-the-bounce", "The Bounce", "03"):
         assert find(ask).name == "the-bounce"
     assert [exercise.number for exercise in EXERCISES.values()] == list(range(1, 9))
-    with pytest.raises(LessonError, match="Did you mean 'the-bounce'"):
+    with pytest.raises(ExerciseError, match="Did you mean 'the-bounce'"):
         lesson("the-bonce", "x")
-    with pytest.raises(LessonError, match=r"no lesson '9'.* 8 trust"):
+    with pytest.raises(ExerciseError, match=r"no lesson '9'.* 8 trust"):
         lesson(9, "x")
 
 

@@ -14,7 +14,8 @@ from PIL import Image
 import chutelab
 from chutelab.cli import main
 from chutelab.figures import DRAWINGS, NUMBERS, FigureError, figure
-from chutelab.figures.paths import CASES, path
+from chutelab.figures.flights import path
+from chutelab.figures.paths import CASES
 from chutelab.plots.figures import paper_figure
 from chutelab.recording import Kind
 

@@ -211,7 +211,7 @@ def test_a_picture_is_built_again_when_what_it_shows_has_changed(copied, file, o
 
 def test_other_versions_build_again(copied, monkeypatch):
     assert not build(read(copied)).made
-    monkeypatch.setattr("chutelab.lessons.building.version", lambda name: "0.0")
+    monkeypatch.setattr("chutelab.lessons.building.version_of", lambda name: "0.0")
     assert build(read(copied)).made
 
 
@@ -366,6 +366,12 @@ def test_grade_refuses_what_is_no_notebook(tmp_path):
     result = chutelab("lesson", "grade", tmp_path)
     assert result.exit_code == 2
     assert "no notebook (*.ipynb)" in result.stderr
+    (tmp_path / "broken.ipynb").write_text("{", encoding="utf-8")
+    result = chutelab("lesson", "grade", tmp_path, "--out", tmp_path / "class.csv")
+    assert result.exit_code == 2
+    assert "JSON" in result.stdout
+    assert "nothing to mark" in result.stderr
+    assert not (tmp_path / "class.csv").exists()
 
 
 def test_the_template_and_the_lessons_know_the_same_keys():

@@ -18,9 +18,9 @@ from matplotlib.text import Text
 from PIL import Image
 
 from chutelab import plots, scene, theory
+from chutelab.compare import scene_of
 from chutelab.machine import build
 from chutelab.plots import sampling, style
-from chutelab.plots.scenery import scene_of
 from chutelab.plots.window import Window
 from chutelab.recorder import Recorder
 from chutelab.recording import Kind, Recording
@@ -642,9 +642,12 @@ def test_without_a_plate_a_slipping_belt_throws_too() -> None:
 
 @pytest.mark.parametrize(
     "more",
-    ["start = 5.0", "speed = 1.0\n[[surface]]\nname = 'hood'\nfrom = [0, 1]\nto = [1, 1]"],
-)
-def test_no_parabola_where_something_else_may_be_hit(more: str) -> None:
+    [
+        "start = 5.0", "speed = 1.0\n[[surface]]\nname = 'hood'\nfrom = [0, 1]\nto = [1, 1]",
+        "[stream]\nat = [0.5, 1.0]\nvelocity = [1.0, 0.0]", "[stream]\ncount = 9\ninteract = true",
+    ],
+)  # fmt: skip
+def test_no_parabola_where_something_else_may_happen(more: str) -> None:
     text = (
         '[incoming]\nspeed = 2.0\npulley_radius = 0.1\n[outgoing]\ndrop = 0.8\ndrop_from = "top"\n'
     )

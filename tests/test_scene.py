@@ -290,15 +290,14 @@ def test_a_scene_is_found_by_name_from_anywhere(tmp_path, monkeypatch):
 
 
 def test_scenes_of_an_installed_wheel_are_found_in_the_package(tmp_path):
-    package = Path(sc.__file__).parent
-    for source in package.glob("*.*"):
-        target = tmp_path / "chutelab" / "scene" / source.name
+    package = Path(sc.__file__).parents[1]
+    for source in (*package.glob("*.py"), *package.glob("scene/*.*")):
+        target = tmp_path / "chutelab" / source.relative_to(package)
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_bytes(source.read_bytes())
     scenes = tmp_path / "chutelab" / "data" / "scenes"
     scenes.mkdir(parents=True)
     (scenes / "only.toml").write_text(CONVEYOR, encoding="utf-8")
-    (tmp_path / "chutelab" / "__init__.py").write_text("", encoding="utf-8")
     code = "from chutelab import scene; print(list(scene.shipped()), scene.load('only').source)"
     printed = _python(code, cwd=tmp_path, path=tmp_path)
     assert printed == f"['only'] {scenes / 'only.toml'}"

@@ -94,6 +94,9 @@ def test_a_file_appears_only_when_it_is_whole(tmp_path):
         assert reader.read() == "some"
     assert path.read_text() == "more"
     assert listing(tmp_path) == ["new.txt"]
+    with pytest.raises(FileNotFoundError, match="no such folder") as error, whole(tmp_path / "a/b"):
+        pass
+    assert error.value.filename == str(tmp_path / "a")
 
 
 def altered(path, change_header=None, **arrays):

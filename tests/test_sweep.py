@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from math import sqrt
 from pathlib import Path
 
 import numpy as np
@@ -27,11 +28,11 @@ from chutelab.sweep import (
     NUMBERS,
     REASON,
     SampleError,
+    batch,
     planned,
     sweep,
 )
 from chutelab.sweep.alone import alone
-from chutelab.sweep.batch import Batch
 from chutelab.sweep.block import Block
 from chutelab.sweep.columns import joined
 from chutelab.variation import Vary, VaryError, parse_range, quantity
@@ -113,7 +114,7 @@ def test_rows_of_a_batch_are_those_of_single_runs_to_the_bit(line):
     name, settings, varies = (part.split() for part in line.split("|"))
     block = block_of(load(*name, settings), varies)
     singles = joined([alone(block, row) for row in range(len(block.values))])
-    assert_same(Batch(block).swept(), singles)
+    assert_same(batch.swept(block), singles)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -127,7 +128,7 @@ def test_samples_over_many_keys_are_single_runs_to_the_bit(seed):
     scene = load("perpendicular", ["run.until=settled", "run.max_time=5.0"])
     block = block_of(scene, ranges, sample=60, seed=seed)
     singles = joined([alone(block, row) for row in range(len(block.values))])
-    found = Batch(block).swept()
+    found = batch.swept(block)
     assert_same(found, singles)
     assert np.isfinite(found["landing.x"]).sum() > 10
 
@@ -148,7 +149,7 @@ def test_surfaces_that_join_in_some_variants_only_are_told_apart():
     alike = kinds(build(family(scene, {"outgoing.drop": heights})))
     assert sorted(map(len, alike)) == [1, 2]
     assert [1] in [part.tolist() for part in alike]
-    found = Batch(block).swept()
+    found = batch.swept(block)
     singles = joined([alone(block, row) for row in range(len(block.values))])
     assert_same(found, singles)
     # Across the joint the particle slides onto the belt; beside it, it falls onto or under it.
@@ -176,7 +177,7 @@ points = [[6.000000014, 0.0], [6.0, 1.0]]
     varies = ["incoming.speed=0.22,0.23,2", "plate.restitution=0,1"]
     block = block_of(chained, varies)
     singles = joined([alone(block, row) for row in range(len(block.values))])
-    assert_same(Batch(block).swept(), singles)
+    assert_same(batch.swept(block), singles)
 
 
 def test_one_that_the_exact_engine_cannot_follow_spoils_no_other(monkeypatch):
@@ -210,7 +211,7 @@ max_time = 2.0
             raise
 
     monkeypatch.setattr("chutelab.sweep.batch.run", watched)
-    assert_same(Batch(block).swept(), singles)
+    assert_same(batch.swept(block), singles)
     assert refused[0] == 10
     assert 1 <= refused.count(1) < 10
 
@@ -261,6 +262,34 @@ def test_a_stream_has_means_and_spreads():
         assert found["belt_work"] == work
         assert found["power"] == pytest.approx(work / 40 * scene.stream.rate, rel=1e-15)
         assert found["misses"] == 40 - len(down)
+
+
+def test_what_the_belt_pays_is_that_of_solve_and_theory_only_where_runs_go_on_until_no_slip():
+    from chutelab.design import value
+
+    m, vb, vx, mu = 0.008, 2.0, -1.0, 0.5
+    down = sqrt((9.81 * 0.298) ** 2 + 2.0 * 9.81 * 0.5)
+    landed = sweep(load("perpendicular"), ["plate.restitution=0.5"])
+    settled = sweep(load("perpendicular", ["run.until=settled"]), ["plate.restitution=0.5"])
+    assert landed.columns["belt_work"][0] == pytest.approx(m * vb * mu * down, rel=1e-12)
+    assert settled.columns["belt_work"][0] == pytest.approx(m * vb * (vb - vx), rel=1e-12)
+    assert settled.columns["slip_heat"][0] == pytest.approx(0.5 * m * (vb - vx) ** 2, rel=1e-12)
+    for name in ("belt_work", "slip_heat", "power"):
+        expected = value(load("perpendicular"), name)
+        assert settled.columns[name][0] == pytest.approx(expected, rel=1e-12)
+    assert "counted up to run.until" in str(landed)
+    assert "counted up to run.until" not in str(settled)
+
+
+def test_a_run_until_settled_that_never_is_says_so():
+    scene = load("perpendicular", ["run.until=settled", "stream.count=2"])
+    swept = sweep(scene, ["outgoing.friction=0,0.5"])
+    assert swept.columns["misses"].tolist() == [0.0, 0.0]
+    assert swept.columns["belt_work"][0] == 0.0
+    slides, rides = swept.columns[REASON].tolist()
+    assert "2 of 2 particles landed, but never came to rest" in slides
+    assert rides == ""
+    assert sweep(load("perpendicular"), ["outgoing.friction=0"]).columns[REASON].tolist() == [""]
 
 
 @pytest.mark.parametrize(
@@ -401,7 +430,7 @@ def test_what_cannot_be_varied_is_refused_with_what_is_allowed(varies, allowed, 
         (["--sample", "0"], "from 1 to 1000000"),
         (["--sample", "3", "--seed", "-1"], "a whole number from 0"),
         (["--out", "rows.txt"], ".csv or .parquet"),
-        (["--out", "nowhere/rows.csv"], "No such file or directory"),
+        (["--out", "nowhere/rows.csv"], "nowhere/rows.csv: there is no folder nowhere"),
         (["--plot", "rows.csv"], ".png"),
         (["--plot", "rows.png", "--of", "height"], "landing.vx"),
         (["--resume"], "--out"),

@@ -35,7 +35,7 @@ def commands(text):
     return lines
 
 
-@pytest.mark.parametrize("number", range(1, 9))
+@pytest.mark.parametrize("number", range(1, 10))
 def test_worksheets_have_the_four_parts_and_fit_about_a_page(number):
     text = worksheet(number)
     lesson = find(number)
@@ -47,10 +47,16 @@ def test_worksheets_have_the_four_parts_and_fit_about_a_page(number):
     assert max(map(len, text.splitlines())) < 240
 
 
-SLOW = ("bench", "stream --", "stream-independent", "fixed-steps.toml --set run.dt=0.0000")
+SLOW = (
+    "bench",
+    "uncertainty",
+    "stream --",
+    "stream-independent",
+    "fixed-steps.toml --set run.dt=0.0000",
+)
 QUICK = [
     (number, line)
-    for number in range(1, 9)
+    for number in range(1, 10)
     for line in commands(worksheet(number))
     if not any(word in line for word in SLOW)
 ]
@@ -67,7 +73,7 @@ def test_commands_of_worksheets_run_as_they_stand(number, line, tmp_path, monkey
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", range(1, 9))
+@pytest.mark.parametrize("number", range(1, 10))
 def test_slow_commands_of_worksheets_run_too(number, tmp_path, monkeypatch):
     shutil.copytree(find(number).folder, tmp_path / "lesson")
     monkeypatch.chdir(tmp_path / "lesson")
@@ -90,7 +96,7 @@ def links(text):
     return re.findall(r"\]\(([^)]+)\)", text)
 
 
-@pytest.mark.parametrize("number", range(1, 9))
+@pytest.mark.parametrize("number", range(1, 10))
 def test_links_of_worksheets_lead_somewhere(number):
     folder = find(number).folder
     for target in links(worksheet(number)):
@@ -165,11 +171,12 @@ def matching(r, d1=0.1, v=2.0):
     return low
 
 
-def straight_down():
-    low, high = 20.0, 40.0
+def leaving_at(vx):
+    """Angle, degrees, of the plate that the particle leaves with this forward velocity."""
+    low, high = 20.0, 60.0
     for _ in range(60):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if plate(middle)[1] < 0.0 else (low, middle)
+        low, high = (middle, high) if plate(middle)[1] < vx else (low, middle)
     return low
 
 
@@ -243,7 +250,7 @@ STATED = {
         "forward with {0.61} m/s": plate(40)[1],
         "60°: φ2 = {14.7}°": plate(60)[0],
         "forward with {1.61} m/s": plate(60)[1],
-        "at {28.7}°": straight_down(),
+        "at {28.7}°": leaving_at(0.0),
         "in J: {38.7} mJ": belt(2.0, plate(20)[1])[0],
         "38.7 mJ, {22.2} mJ": belt(2.0, plate(40)[1])[0],
         "and {6.3} mJ": belt(2.0, plate(60)[1])[0],
@@ -297,6 +304,13 @@ STATED = {
         "means dt < {1.4} ms": 1e3 * 0.006 / DOWN,
         "takes {0.298} s": 0.596 / 2.0,
     },
+    9: {
+        "last digit: {28.67}°": leaving_at(0.0),
+        "and {47.25}°": leaving_at(1.0),
+        "wins, {6.3} mJ": belt(2.0, plate(60)[1])[0],
+        "as much, {32.0} mJ": belt(2.0, 0.0)[0],
+        "It is least, {16} mJ": 500.0 * 0.008 * 4.0,
+    },
 }
 """What the worksheets state, by lesson: words around a {number}, and what it has to be, from
 formulas written here."""
@@ -309,8 +323,9 @@ GIVEN = {
     5: {"0.1", "0.3", "0.8"},
     6: {"0.5"},
     7: {"0.5", "3.6", "3.3"},
-    8: {"0.2", "0.1", "0.05", "0.02", "9.7e-4", "4.9e-4", "2.4e-4", "2.6e-5"}
+    8: {"0.4", "0.2", "0.1", "0.05", "0.02", "9.7e-4", "4.9e-4", "2.4e-4", "2.6e-5"}
     | {"1.6e-8", "4.0e-9", "9.9e-10"},
+    9: {"0.1", "0.5", "0.05"},
 }
 """Further numbers with decimals: what the scenes set, and what other tests look at."""
 
@@ -326,7 +341,7 @@ def test_numbers_of_worksheets_are_right(number, said, value):
     assert abs(float(text) - value) <= half * (1.0 + 1e-9)
 
 
-@pytest.mark.parametrize("number", range(1, 9))
+@pytest.mark.parametrize("number", range(1, 10))
 def test_no_number_of_a_worksheet_goes_unlooked_at(number):
     prose = re.sub(
         r"^```.*?^```|`[^`]*`|\]\([^)]*\)|doi:\S+", "", worksheet(number), flags=re.M | re.S
@@ -393,6 +408,16 @@ def test_collisions_of_lesson_7_begin_where_it_says():
     assert 3.0 < lost["restitution_loss"] + lost["friction_loss"] < 9.0
 
 
+def test_impacts_of_lesson_8_are_late_by_a_step_or_on_time_as_it_says():
+    late = []
+    for dt in (4e-4, 2e-4, 1e-4, 5e-5):
+        assert 0.298 / dt == pytest.approx(round(0.298 / dt), abs=1e-9)
+        scene = load(find(8).folder / "fixed-steps.toml", [f"run.dt={dt}"])
+        late.append((compare(simulate(scene)).simulated["t2"] - 0.298) / dt)
+    assert late == pytest.approx([0.0, 1.0, 1.0, 1.0], abs=1e-8)
+    assert fixed(4e-4)[0] < fixed(2e-4)[0]
+
+
 def test_errors_and_orders_of_lesson_8_are_as_it_says():
     (e1, r1), (e2, r2), (e3, r3) = (fixed(dt) for dt in (2e-4, 1e-4, 5e-5))
     text = worksheet(8)
@@ -403,6 +428,30 @@ def test_errors_and_orders_of_lesson_8_are_as_it_says():
     assert said in text
     assert log(r1 / r2) / log(2.0) == pytest.approx(2.0, abs=0.01)
     assert log(r2 / r3) / log(2.0) == pytest.approx(2.0, abs=0.01)
+
+
+def test_the_uncertainty_of_lesson_9_is_as_it_says():
+    """To first order: every input by itself, a hundredth of its deviation to both sides."""
+    means, deviations = np.array([0.5, 40.0, 0.05, 2.0]), np.array([0.05, 0.5, 0.002, 0.02])
+
+    def landing(e, degree, distance, v, r=0.004, radius=0.05):
+        a = radians(degree)
+        gap = (radius + distance) * cos(a) - r * sin(a) - r
+        t = v * cos(a) - sqrt((v * cos(a)) ** 2 - 2.0 * G * sin(a) * gap)
+        t /= G * sin(a)
+        into, along = v * cos(a) - G * t * sin(a), v * sin(a) + G * t * cos(a)
+        vx, down = along * sin(a) - e * into * cos(a), along * cos(a) + e * into * sin(a)
+        return v * t + vx * (sqrt(down**2 + 2.0 * G * 0.5) - down) / G
+
+    parts = np.empty(4)
+    for k, step in enumerate(np.diag(0.01 * deviations)):
+        parts[k] = (landing(*(means + step)) - landing(*(means - step))) / 0.02
+    shares = 100.0 * parts**2 / (parts**2).sum()
+    said = " ".join(worksheet(9).split())
+    assert f"within ±{1.96e3 * hypot(*parts):.0f} mm in 95 of 100 cases" in said
+    assert [round(share) for share in shares] == [68, 19, 11, 1]
+    assert "68 % of its variance is that of ε alone, 19 % that of the angle, 11 % that of" in said
+    assert "and 1 % that of the speed" in said
 
 
 @pytest.mark.slow

@@ -98,9 +98,6 @@ def __dir__() -> list[str]:
 
 
 def _version() -> str:
-    from importlib.metadata import PackageNotFoundError, version
+    from chutelab.versions import version_of
 
-    try:
-        return version("chutelab")
-    except PackageNotFoundError:
-        return "unknown (not installed)"
+    return version_of("chutelab") or "unknown (not installed)"

@@ -58,8 +58,8 @@ MEANINGS = {
     "d3": "height of the transfer",
     "dEk": "energy, Eq. (14)",
     "P": "power, Eq. (15)",
-    "belt_work": "work of the outgoing belt",
-    "slip_heat": "heat of the slip on it",
+    "belt_work": "belt work until no slip",
+    "slip_heat": "slip heat until then",
 }
 
 

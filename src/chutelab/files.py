@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from contextlib import contextmanager
+from errno import ENOENT
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,9 @@ def whole(path: str | Path) -> Iterator[Path]:
     It lies in the same directory, so that the last step is one atomic rename.
     """
     path = Path(path)
+    if not path.parent.exists():
+        # Else the error would name the temporary folder.
+        raise FileNotFoundError(ENOENT, "there is no such folder", str(path.parent))
     with tempfile.TemporaryDirectory(prefix=f".{path.name}-", dir=path.parent) as folder:
         unfinished = Path(folder) / path.name
         yield unfinished

@@ -49,7 +49,7 @@ class Sheet:
         head = [self._line(self.columns, widths), line] if any(self.columns) else []
         body = [self._line(row, widths) for row in self.rows]
         foot = [line, *(self._line(row, widths) for row in self.foot)] if self.foot else []
-        said = ["\n".join(wrap(note, WIDTH, break_on_hyphens=False)) for note in self.notes]
+        said = ["\n".join(wrapped(note)) for note in self.notes]
         return "\n".join([*([self.title] if self.title else []), *head, *body, *foot, *said])
 
     def _line(self, cells: tuple[str, ...], widths: list[int]) -> str:
@@ -58,7 +58,7 @@ class Sheet:
             for index, (cell, width) in enumerate(zip(cells, widths, strict=True))
         ).rstrip()
 
-    def _repr_html_(self) -> str:
+    def html(self) -> str:
         """Return the table as HTML that takes its colours from the page around it."""
         caption = (
             f'<caption style="text-align:left;font-weight:bold">{escape(self.title)}</caption>'
@@ -73,11 +73,14 @@ class Sheet:
         notes = "".join(f'<p style="max-width:45em">{escape(note)}</p>' for note in self.notes)
         return f"<div><table>{caption}{head}<tbody>{body}</tbody>{foot}</table>{notes}</div>"
 
+    def _repr_html_(self) -> str:
+        return self.html()
+
     def _row(self, cells: tuple[str, ...], tag: str = "td") -> str:
         sides = ("left" if index < self.texts else "right" for index in range(len(cells)))
         return "<tr>{}</tr>".format(
             "".join(
-                f'<{tag} style="text-align:{side}">{escape(cell)}</{tag}>'
+                f'<{tag} style="text-align:{side};padding:.1em .8em .1em 0">{escape(cell)}</{tag}>'
                 for side, cell in zip(sides, cells, strict=True)
             )
         )
@@ -94,7 +97,12 @@ class Shown:
         return str(self.sheet())
 
     def _repr_html_(self) -> str:
-        return self.sheet()._repr_html_()
+        return self.sheet().html()
+
+
+def wrapped(text: str, width: int = WIDTH) -> list[str]:
+    """Return a text in lines of at most `width` characters, broken between words."""
+    return wrap(text, width, break_on_hyphens=False)
 
 
 def number(value: float) -> str:

@@ -19,8 +19,8 @@ from chutelab import animate, load, simulate
 from chutelab.animate import Stage, film
 from chutelab.animate.layout import lay_out
 from chutelab.animate.moments import span
+from chutelab.compare import scene_of
 from chutelab.plots import machine_of, style
-from chutelab.plots.scenery import scene_of
 from chutelab.scene import shipped
 from chutelab.theory import predict
 

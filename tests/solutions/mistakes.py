@@ -271,7 +271,7 @@ MISTAKES = {
         "direction lost": lambda g: (g.vb - back(g)) / (g.mu * G),
         "µ forgotten": lambda g: (g.vb + back(g)) / G,
         "a start from rest": lambda g: g.vb / (g.mu * G),
-        "belt and particle speed exchanged": lambda g: back(g) / (g.mu * G),
+        "half of the way only": lambda g: back(g) / (g.mu * G),
     },
     ("landing", 4): {
         "direction lost": lambda g: g.rate * mass(g) * g.vb * (g.vb - back(g)),

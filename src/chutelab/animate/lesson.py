@@ -10,8 +10,9 @@ from chutelab.animate.layout import SHOWS, lay_out
 from chutelab.animate.moments import film, frame_delay, slowness, span
 from chutelab.animate.stage import Stage
 from chutelab.animate.video import VIDEOS, VideoWriter
+from chutelab.compare import scene_of
 from chutelab.files import whole
-from chutelab.plots.scenery import machine_of, scene_of
+from chutelab.plots.scenery import machine_of
 from chutelab.theory import predict
 
 if TYPE_CHECKING:

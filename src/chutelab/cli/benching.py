@@ -101,7 +101,7 @@ def bench(
 
     _judge(cases, methods, scaling=scaling)
     about = environment()
-    with destination(out, ()) as folder:
+    with destination(out) as folder:
         with progress("measuring") as update:
             if scaling:
                 sizes = _sizes(cases, methods, repeats, quick, update)

@@ -14,9 +14,6 @@ if TYPE_CHECKING:
 
     from chutelab.preflight import Coverage, Effort, Preflight, Stepping
 
-WIDTH = 80
-"""Columns of a line, at most: a terminal's."""
-
 NAMES = 16
 """Columns for the names at the left."""
 
@@ -154,6 +151,8 @@ def _item(name: str, what: str) -> Iterator[str]:
 
 def _wrapped(text: str, first: str, later: str) -> Iterator[str]:
     from textwrap import wrap
+
+    from chutelab.sheet import WIDTH
 
     yield from wrap(
         text,

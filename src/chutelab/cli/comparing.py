@@ -128,10 +128,9 @@ def compare(
 
     if robust and not keys:
         raise click.UsageError("--robust is for fits: name what to fit with --fit.")
-    _free(out)
     loaded = load(scene, overrides)
     film = measured.read(data, scale=scale, origin=origin, flip_y=flip_y, t0=t0, track=track)
-    with destination(out, ()) as place:
+    with destination(out, FILES) as place:
         with progress("fitting" if keys else "comparing"):
             found, fit = _compared(loaded, film, keys, robust=robust)
         if place is not None:
@@ -152,13 +151,6 @@ def _compared(
     except ImportError as error:
         raise RefusedError(f"--fit: {error}") from error
     return fit.after, fit
-
-
-def _free(out: Path | None) -> None:
-    """Refuse a folder in which a name to be written is taken by a folder."""
-    for name in FILES:
-        if out is not None and (out / name).is_dir():
-            raise RefusedError(f"--out {out}: {out / name} is a folder, not a file")
 
 
 def _write(found: Residuals, fit: Fit | None, place: Path) -> None:
@@ -182,18 +174,18 @@ def _tell(found: Residuals, fit: Fit | None, out: Path | None, *, as_json: bool)
         return
     from rich.text import Text
 
-    from chutelab.cli.report import drawn, wrapped
+    from chutelab.cli.report import drawn
     from chutelab.measured.diagnosis import advice
-    from chutelab.sheet import WIDTH
+    from chutelab.sheet import wrapped
 
     head = Text(found.recording.title, style="bold")
     head.append(f"\n{found.track.said()}", style="not bold")
     parts: list[RenderableType] = [head]
     for sheet in [found.sheet()] if fit is None else [fit.sheet(), found.sheet()]:
-        lines = [line for note in sheet.notes for line in wrapped(note, WIDTH)]
+        lines = [line for note in sheet.notes for line in wrapped(note)]
         parts += [drawn(sheet), Text("\n".join(lines))]
     if fit is None and (advised := advice(found)):
-        parts.append(Text("\n" + "\n".join(wrapped(f"note: {advised}", WIDTH))))
+        parts.append(Text("\n" + "\n".join(wrapped(f"note: {advised}"))))
     console.show(*parts)
     if out is not None:
         names = [name for name in FILES if fit is not None or name != "fit.json"]

@@ -45,9 +45,8 @@ def figure(number: int, out: Path | None, as_json: bool) -> None:
         found = compute(number)
     except FigureError as error:
         raise RefusedError(str(error)) from error
-    _free(out, found)
     written: list[str] = []
-    with destination(out, ()) as place:
+    with destination(out, _names(found)) as place:
         if place is not None:
             _write(found, place)
             written = sorted(file.name for file in place.iterdir())
@@ -67,19 +66,15 @@ def figure(number: int, out: Path | None, as_json: bool) -> None:
     if out is not None:
         click.echo(f"\nwrote into {out}: {', '.join(written)}")
         if found.sweep:
-            click.echo(f"The corrected side with the engine: {found.sweep}")
+            click.echo(
+                "The corrected side with the engine, where landing.vx and landing.vy are -v3x and"
+                f" -v3y: {found.sweep}"
+            )
 
 
 def _names(found: PaperFigure) -> list[str]:
     name = f"figure-{found.number}"
     return [f"{name}.png", f"{name}.csv", *(f"{scene}.toml" for scene in found.scenes)]
-
-
-def _free(out: Path | None, found: PaperFigure) -> None:
-    """Refuse a folder in which a name to be written is taken by a folder."""
-    for name in _names(found):
-        if out is not None and (out / name).is_dir():
-            raise RefusedError(f"--out {out}: {out / name} is a folder, not a file")
 
 
 def _write(found: PaperFigure, place: Path) -> None:

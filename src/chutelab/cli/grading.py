@@ -55,13 +55,13 @@ def grade(files: tuple[Path, ...], out: Path | None, time_limit: float, quiet: b
     chutelab lesson grade anna.ipynb ben.ipynb --time-limit 30
     """  # noqa: D301 - click wants the backspace
     from chutelab.cli import console
+    from chutelab.cli.output import check_file, writing
     from chutelab.cli.progress import progress
     from chutelab.grading import grade as grade_notebooks
     from chutelab.grading import write_csv
 
     notebooks = [path for file in files for path in _notebooks(file)]
-    if out is not None and not out.parent.is_dir():
-        raise RefusedError(f"--out {out}: there is no folder {out.parent}")
+    check_file("--out", out)
     try:
         with progress("running the notebooks", quiet=quiet) as update:
             grades = grade_notebooks(notebooks, time_limit=time_limit, progress=update)
@@ -69,11 +69,11 @@ def grade(files: tuple[Path, ...], out: Path | None, time_limit: float, quiet: b
         raise RefusedError(str(error)) from error
     if not quiet:
         console.show(_marks(grades))
+    if not any(one.marks for one in grades):
+        raise RefusedError("nothing to mark: none of these is a notebook of a lesson's exercise")
     if out is not None:
-        try:
+        with writing(f"--out {out}"):
             write_csv(grades, out)
-        except OSError as error:
-            raise RefusedError(f"--out {out}: cannot be written: {error.strerror}") from error
         click.echo(f"wrote {out}")
 
 
@@ -90,6 +90,8 @@ def _marks(grades: list[Grade]) -> RenderableType:
     from chutelab.cli.report import plain_table
 
     table = plain_table(["file", "student", "lesson", "marks", "remarks"], texts=5)
+    table.columns[0].no_wrap = False
+    table.columns[0].overflow = "fold"  # a long path must leave room for the remarks
     for one in grades:
         marks = " ".join(str(mark) for mark in one.marks)
         total = f"{one.total} of {one.out_of} ({marks})" if one.marks else "-"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,22 +10,12 @@ from click.shell_completion import CompletionItem
 
 from chutelab.cli.grading import grade
 from chutelab.cli.parameters import folder
-from chutelab.cli.program import RefusedError
+from chutelab.cli.program import InOrder, RefusedError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from rich.console import RenderableType
 
     from chutelab.lessons import Lesson
-
-
-class InOrder(click.Group):
-    """A group of commands in the order they are used in, not that of the alphabet."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        """Return the names of the commands in the order of help."""
-        return list(self.commands)
 
 
 def complete_lesson(
@@ -119,12 +108,16 @@ def build(wanted: tuple[str, ...], out: Path | None, force: bool, quiet: bool) -
     of chutelab, numpy, pymunk, matplotlib and pillow; the GIF says so in a comment. The same makes
     the same bytes.
     """
+    from chutelab.cli.output import writing
     from chutelab.cli.progress import progress
     from chutelab.lessons import find, shipped
     from chutelab.lessons.building import build as build_lesson
 
     for one in [find(name) for name in wanted] or shipped():
-        with _writing("another folder: --out DIR"), progress(one.name, quiet=quiet) as update:
+        with (
+            writing(instead="another folder: --out DIR"),
+            progress(one.name, quiet=quiet) as update,
+        ):
             target = out / one.folder.name if out else None
             built = build_lesson(one, target, force=force, progress=update)
         if not quiet:
@@ -151,11 +144,12 @@ def new(name: Path, model: str | None) -> None:
     chutelab lesson new my-lesson
     chutelab lesson new our-bounce --from 3
     """  # noqa: D301 - click wants the backspace
+    from chutelab.cli.output import writing
     from chutelab.lessons import find
     from chutelab.lessons.starting import start
 
     copied = None if model is None else find(model)
-    with _writing("another place"):
+    with writing(instead="another place"):
         made = start(name, copied)
     # A name with a folder in front is taken for a folder, even if a shipped lesson has it.
     said = made if len(made.parts) > 1 else f"./{made}"
@@ -184,6 +178,7 @@ def page(wanted: tuple[str, ...], out: Path, quiet: bool) -> None:
     links are relative: the folder works from a memory stick, from any static web server, and on a
     phone.
     """
+    from chutelab.cli.output import writing
     from chutelab.cli.progress import progress
     from chutelab.lessons import find, shipped
     from chutelab.lessons.bundle import bundle
@@ -192,24 +187,13 @@ def page(wanted: tuple[str, ...], out: Path, quiet: bool) -> None:
 
     lessons = [find(name) for name in wanted] or shipped()
     try:
-        with _writing("another folder"), progress("making the pages", quiet=quiet) as update:
+        with writing(instead="another folder"), progress("making the pages", quiet=quiet) as update:
             made = bundle(lessons, out, update)
     except (PageError, VaryError) as error:
         raise RefusedError(str(error)) from error
     if not quiet:
         size = sum(path.stat().st_size for path in made)
         click.echo(f"wrote {len(made)} files, {size / 1e6:.1f} MB; open {out / 'index.html'}")
-
-
-@contextmanager
-def _writing(instead: str) -> Iterator[None]:
-    """Turn a file that cannot be written into a message."""
-    try:
-        yield
-    except OSError as error:
-        where = f"{error.filename}: " if error.filename else ""
-        reason = error.strerror or str(error)
-        raise RefusedError(f"{where}cannot be written: {reason}; give {instead}") from error
 
 
 def _plain(lesson: Lesson) -> dict[str, object]:

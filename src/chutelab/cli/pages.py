@@ -40,7 +40,9 @@ def _varies(
 @set_option
 @click.option(
     "-o",
+    "--out",
     "--output",
+    "output",
     metavar="FILE",
     type=click.Path(path_type=Path),
     help="The file to write; default: the scene's name with .html, here.",
@@ -58,6 +60,7 @@ def page(
     It holds everything: no network, no server. Every variant is simulated now; those that cannot
     be run say so on their positions. A file that is there is replaced.
     """
+    from chutelab.cli.output import writing
     from chutelab.cli.progress import progress
     from chutelab.page import PageError, write
     from chutelab.scene import load
@@ -66,12 +69,10 @@ def page(
     path = _destination(scene, output)
     loaded = load(scene, overrides)
     try:
-        with progress(f"simulating {scene}", quiet=quiet) as update:
+        with writing(str(path)), progress(f"simulating {scene}", quiet=quiet) as update:
             written = write(loaded, varies, path, progress=update)
     except (VaryError, PageError) as error:
         raise RefusedError(str(error)) from error
-    except OSError as error:
-        raise RefusedError(f"{path}: cannot be written: {error.strerror or error}") from error
     if not quiet:
         click.echo(_told(written))
 

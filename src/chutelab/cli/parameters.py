@@ -11,7 +11,9 @@ from click.shell_completion import CompletionItem
 from chutelab.cli.program import RefusedError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
+
+    from chutelab.scene import Scene
 
     Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
@@ -81,6 +83,20 @@ set_option = click.option(
     multiple=True,
     help="Change a key of the scene, such as plate.angle_deg=20. May be repeated.",
 )
+
+
+def retitled(scene: Scene, changes: Sequence[str]) -> Scene:
+    """Return a scene whose title says what was changed of its machine, each ``KEY=VALUE``.
+
+    Titles name numbers, such as "2 m/s": a picture of another machine must not go by them alone.
+    """
+    if any(change.partition("=")[0].strip() == "title" for change in changes):
+        return scene
+    told = [change.strip() for change in changes if not change.strip().startswith("run.")]
+    if not told:
+        return scene
+    title = f"{scene.title}; with {', '.join(told)}"
+    return scene.model_copy(update={"title": title if len(title) <= 200 else f"{title[:198]} …"})
 
 
 def output_options(command: Callable[..., Any]) -> Callable[..., Any]:

@@ -23,12 +23,16 @@ class RefusedError(click.ClickException):
     exit_code = 2
 
 
-class Program(click.Group):
-    """A group of commands, listed in the order they were added, that never shows a traceback."""
+class InOrder(click.Group):
+    """A group of commands, listed in the order they were added."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Return the names of the commands in the order of help."""
         return list(self.commands)
+
+
+class Program(InOrder):
+    """The commands of ``chutelab``, which never show a traceback."""
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
         """Run the program; Ctrl-C between two commands' worth of code is Ctrl-C all the same."""

@@ -29,7 +29,7 @@ def show(
     quiet: bool,
 ) -> None:
     """Print the summary of RECORDING, a recording.npz; with --out make its files again."""
-    from chutelab.cli.output import destination, write
+    from chutelab.cli.output import destination, files_of, write
     from chutelab.recording import Recording
     from chutelab.storage import RecordingError
 
@@ -38,7 +38,7 @@ def show(
         loaded = Recording.load(recording)
     except RecordingError as error:
         raise RefusedError(f"{error}{_advice(recording)}") from error
-    with destination(out, kinds) as folder:
+    with destination(out, files_of(kinds)) as folder:
         if folder is not None:
             write(loaded, folder, kinds, quiet=quiet)
     tell(loaded, out, kinds, as_json=as_json, quiet=quiet)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING
 
+import numpy as np
 from rich import box
 from rich.console import Group
 from rich.table import Table
@@ -13,8 +14,8 @@ from rich.text import Text
 from chutelab.accuracy.wanted import Wanted
 from chutelab.compare import compare
 from chutelab.ledger import ledger
-from chutelab.recording import REASONS
-from chutelab.sheet import WIDTH
+from chutelab.recording import REASONS, Kind
+from chutelab.sheet import Sheet, number, wrapped
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,7 +24,9 @@ if TYPE_CHECKING:
 
     from chutelab.accuracy import Accuracy
     from chutelab.recording import Recording
-    from chutelab.sheet import Sheet
+
+STATIONS = 6
+"""Contacts of particle 0 that are listed where no theory speaks of them."""
 
 
 def report(recording: Recording, accuracy: Accuracy | None = None) -> list[RenderableType]:
@@ -33,9 +36,25 @@ def report(recording: Recording, accuracy: Accuracy | None = None) -> list[Rende
     if compared.rows:
         parts.append(drawn(compared))
     parts += [Text(f"\n{note}") for note in compared.notes]
+    if compared.notes and (way := _way(recording)).rows:
+        parts.append(drawn(way))
     books = ledger(recording).sheet()
     parts += [drawn(books), Text("\n" + "\n".join(books.notes))]
     return parts if accuracy is None else [*parts, _reached(accuracy)]
+
+
+def _way(recording: Recording) -> Sheet:
+    """Return where and when particle 0 touched or left something first, as no theory says it."""
+    own = recording.events[recording.events["particle"] == 0]
+    own = own[np.isin(own["kind"], [Kind.SEPARATION, Kind.IMPACT, Kind.LANDING])][:STATIONS]
+    rows = []
+    for event in own:
+        name = recording.surfaces[event["surface"]]
+        what = "leaves" if event["kind"] == Kind.SEPARATION else "meets"
+        numbers = (event["t"], *event["position"], *event["velocity_before"])
+        rows.append((f"{what} {name}", *(number(float(value)) for value in numbers)))
+    heads = ("", "t, s", "x, m", "y, m", "vx, m/s", "vy, m/s")
+    return Sheet("Particle 0, its first contacts", heads, tuple(rows))
 
 
 def drawn(sheet: Sheet) -> Group:
@@ -65,13 +84,6 @@ def plain_table(columns: Sequence[str], *, texts: int = 1, width: int | None = N
     return table
 
 
-def wrapped(text: str, width: int) -> list[str]:
-    """Return a text in lines of at most `width` characters, broken between words."""
-    from textwrap import wrap
-
-    return wrap(text, width, break_on_hyphens=False)
-
-
 def _head(recording: Recording) -> Text:
     one = recording.count == 1
     counted = Counter(recording.ended.tolist())
@@ -80,7 +92,8 @@ def _head(recording: Recording) -> Text:
     head = Text(recording.title, style="bold")
     head.append(
         f"\nengine {recording.engine}, {recording.count} particle{'' if one else 's'},"
-        f" {recording.contacts} contacts, {recording.steps} {rounds}, {recording.seconds:.3g} s",
+        f" {recording.contacts} contact{'' if recording.contacts == 1 else 's'},"
+        f" {recording.steps} {rounds}, {recording.seconds:.3g} s",
         style="not bold",
     )
     head.append(f"\nended: {endings}", style="not bold")
@@ -98,7 +111,7 @@ def _reached(accuracy: Accuracy) -> Text:
         said = f"about {found} ({accuracy.worst}); asked for {wanted}"
     text = Text("\nAccuracy\n", style="bold")
     line = f"{what} {said}, {'reached' if accuracy.met else 'NOT REACHED'}"
-    text.append("\n".join(wrapped(line, WIDTH)), style="not bold")
+    text.append("\n".join(wrapped(line)), style="not bold")
     how = f"how it is known: {accuracy.method}"
-    text.append("\n" + "\n".join(wrapped(how, WIDTH)), style="not bold")
+    text.append("\n" + "\n".join(wrapped(how)), style="not bold")
     return text

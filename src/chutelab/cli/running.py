@@ -6,7 +6,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from chutelab.cli.parameters import chosen, complete_scene, output_options, set_option
+from chutelab.cli.parameters import (
+    chosen,
+    complete_scene,
+    output_options,
+    retitled,
+    set_option,
+)
 from chutelab.cli.recordings import tell
 from chutelab.cli.stalling import partial_option, salvaged
 
@@ -77,7 +83,7 @@ def run(
     step that is tried; if the accuracy cannot be reached, everything is printed and written all
     the same, and the exit code is 1.
     """
-    from chutelab.cli.output import destination, write
+    from chutelab.cli.output import destination, files_of, write
     from chutelab.cli.progress import progress
     from chutelab.scene import load
     from chutelab.scene.overrides import Setting
@@ -91,7 +97,7 @@ def run(
         settings.append(Setting(f"run.engine={engine}", f"--engine {engine}"))
     if dt is not None:
         settings.append(Setting(f"run.dt={dt}", f"--dt {dt:.12g}"))
-    loaded = load(scene, settings)
+    loaded = retitled(load(scene, settings), overrides)
     reached: Accuracy | None = None
 
     def simulated() -> Recording:
@@ -103,7 +109,7 @@ def run(
         found, reached = reach(loaded, accuracy, update)
         return found
 
-    with destination(out, kinds) as folder:
+    with destination(out, files_of(kinds)) as folder:
         with progress("simulating", quiet=quiet) as update:
             recording, stuck = salvaged(simulated, keep=partial)
         if folder is not None:

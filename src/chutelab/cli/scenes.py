@@ -52,6 +52,7 @@ def schema() -> None:
 @click.option("--force", is_flag=True, help="Overwrite a file that is there.")
 def new(path: Path, force: bool) -> None:
     """Write a complete, commented scene to start from (scene.toml, or PATH; - prints it)."""
+    from chutelab.cli.output import writing
     from chutelab.files import whole
     from chutelab.scene import template
 
@@ -62,9 +63,6 @@ def new(path: Path, force: bool) -> None:
         raise RefusedError(f"{path} is a folder; give the name of a file.")
     if path.exists() and not force:
         raise RefusedError(f"{path} is there already; --force overwrites it.")
-    try:
-        with whole(path) as unfinished:
-            unfinished.write_text(template(), encoding="utf-8")
-    except OSError as error:
-        raise RefusedError(f"{path}: cannot be written: {error.strerror or error}") from error
+    with writing(str(path)), whole(path) as unfinished:
+        unfinished.write_text(template(), encoding="utf-8")
     click.echo(f"wrote {path}; run it with: chutelab run {path}")

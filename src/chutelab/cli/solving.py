@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 import click
 
-from chutelab.cli.parameters import complete_scene, folder, set_option
+from chutelab.cli.parameters import complete_scene, folder, retitled, set_option
 from chutelab.cli.program import RefusedError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from chutelab.design import Solution
@@ -104,10 +105,9 @@ def solve(
     goals = [goal for goal in (targets, minimize, maximize) if goal]
     if len(goals) != 1:
         raise click.UsageError("Give one of --target, --minimize and --maximize.")
-    _free(out)
     loaded = load(scene, overrides)
     written = []
-    with destination(out, ()) as place:
+    with destination(out, FILES) as place:
         with progress("searching", quiet=quiet) as meter:
             found = _solved(loaded, vary, targets, minimize, maximize, points, seed, meter)
         if place is not None:
@@ -132,27 +132,20 @@ def _solved(
     maximize: str | None,
     points: int,
     seed: int,
-    meter: object,
+    meter: Callable[[float], None] | None,
 ) -> Solution:
     from chutelab import design
     from chutelab.variation import VaryError
 
-    options = {"points": points, "seed": seed, "progress": meter}
     try:
         if targets:
-            return design.solve(scene, vary, targets, **options)  # type: ignore[arg-type]
-        if minimize:
-            return design.minimize(scene, vary, minimize, **options)  # type: ignore[arg-type]
-        return design.maximize(scene, vary, maximize or "", **options)  # type: ignore[arg-type]
+            return design.solve(scene, vary, targets, points=points, seed=seed, progress=meter)
+        extremum, quantity = (
+            (design.minimize, minimize) if minimize else (design.maximize, maximize or "")
+        )
+        return extremum(scene, vary, quantity, points=points, seed=seed, progress=meter)
     except (design.DesignError, VaryError, ImportError) as error:
         raise RefusedError(str(error)) from error
-
-
-def _free(out: Path | None) -> None:
-    """Refuse a folder in which a name to be written is taken by a folder."""
-    for name in FILES:
-        if out is not None and (out / name).is_dir():
-            raise RefusedError(f"--out {out}: {out / name} is a folder, not a file")
 
 
 def _write(found: Solution, place: Path) -> None:
@@ -160,6 +153,7 @@ def _write(found: Solution, place: Path) -> None:
     from chutelab.design.documents import to_toml
     from chutelab.plots import overlay
     from chutelab.plots.design import scan
+    from chutelab.simulation import simulate
 
     text = json.dumps(as_dict(found), indent=1, allow_nan=False)
     (place / "solve.json").write_text(text + "\n", encoding="utf-8")
@@ -167,10 +161,12 @@ def _write(found: Solution, place: Path) -> None:
         scan(found, path=place / "scan.png")
     if not (found.solved or found.nearest):
         return
+    values = zip(found.ranges, found.answer.values, strict=True)
+    scene = retitled(found.scene, [f"{one.key}={value:.4g}" for one, value in values])
     name = "solution.toml" if found.solved else "nearest.toml"
     comment = f"{found.asked}: {'solution' if found.solved else 'no solution, the nearest to one'}."
-    (place / name).write_text(to_toml(found.scene, comment), encoding="utf-8")
-    overlay(found.recording(), path=place / "overlay.png")
+    (place / name).write_text(to_toml(scene, comment), encoding="utf-8")
+    overlay(simulate(scene), path=place / "overlay.png")
 
 
 def _tell_json(found: Solution) -> None:

@@ -75,6 +75,7 @@ def stress(
     Exit code 1 if one is broken.
     """
     from chutelab.cli import console
+    from chutelab.cli.output import check_file, writing
     from chutelab.cli.progress import progress
     from chutelab.stress import chosen, results
     from chutelab.stress.table import plain, write
@@ -87,8 +88,7 @@ def stress(
         for case in cases:
             click.echo(f"{case.name}\t{case.group}")
         return
-    if out is not None and not out.parent.is_dir():
-        raise RefusedError(f"--out {out}: there is no folder {out.parent}")
+    check_file("--out", out)
     found: list[Result] = []
     with progress("stressing", quiet=quiet) as update:
         for done, result in results(cases, engines or ENGINES):
@@ -98,10 +98,8 @@ def stress(
     if not found:
         raise RefusedError("none of these cases is for that engine")
     if out is not None:
-        try:
+        with writing(f"--out {out}"):
             write(found, out)
-        except OSError as error:
-            raise RefusedError(f"--out {out}: {error.strerror or error}") from error
     failed = sum(not result.holds for result in found)
     if as_json:
         shown = {"format": 1, "results": [plain(result) for result in found]}

@@ -14,8 +14,6 @@ from chutelab.cli.program import RefusedError
 if TYPE_CHECKING:
     from chutelab.sweep import Plan, Sweep
 
-PICTURES = (".png", ".svg", ".pdf")
-
 
 def _complete_column(
     _ctx: click.Context, _parameter: click.Parameter, incomplete: str
@@ -129,6 +127,10 @@ def sweep(
     time (from the release to the landing, and to the end), belt_work and slip_heat (of the outgoing
     belt), restitution_loss, power (belt work at the stream's rate), misses, residual (of the
     ledger), error (against the theory), and reason (why there are no numbers, or not all).
+
+    Belt work, slip heat and power are counted up to run.until, which is the landing unless said: a
+    slip that goes on after it is not in them. With --set run.until=settled it is, as it always is
+    in chutelab solve and with --uncertainty.
     """
     from chutelab.cli import console
     from chutelab.scene import load
@@ -186,6 +188,7 @@ def sweep(
 def _carried_out(
     plan: Plan, out: Path | None, resume: bool, jobs: int, scheduler: str | None, *, quiet: bool
 ) -> Sweep:
+    from chutelab.cli.output import writing
     from chutelab.cli.progress import progress
     from chutelab.sweep import crew, sweep_to, swept_by
 
@@ -194,15 +197,12 @@ def _carried_out(
         with crew(jobs, scheduler) as team, progress(what, quiet=quiet, left=True) as update:
             if out is None:
                 return swept_by(plan, team, progress=update)
-            return sweep_to(plan, out, team, resume=resume, progress=update)
+            with writing(f"--out {out}"):
+                return sweep_to(plan, out, team, resume=resume, progress=update)
     except KeyboardInterrupt:
         if said := _and_resume("", out):
             click.echo(f"\n{said}", err=True)
         raise
-    except OSError as error:
-        if out is None:
-            raise
-        raise RefusedError(f"--out {out}: {error.strerror or error}") from error
 
 
 def _and_resume(said: str, out: Path | None) -> str:
@@ -216,16 +216,14 @@ def _and_resume(said: str, out: Path | None) -> str:
 
 def _check_plot(plan: Plan, plot: Path | None, column: str) -> None:
     """Refuse, before anything runs, a picture that cannot be drawn."""
+    from chutelab.cli.output import PICTURES, check_file
     from chutelab.sweep import NUMBERS
 
     if column not in NUMBERS:
         raise RefusedError(f"--of {column}: one of {', '.join(NUMBERS)}")
+    check_file("--plot", plot, PICTURES)
     if plot is None:
         return
-    if plot.suffix.lower() not in PICTURES:
-        raise RefusedError(f"--plot {plot}: the name of a picture ends with {', '.join(PICTURES)}")
-    if plot.is_dir() or not plot.parent.is_dir():
-        raise RefusedError(f"--plot {plot}: it is a folder, or there is no folder {plot.parent}")
     varied = sum(len(set(vary.values)) > 1 for vary in plan.varies)
     if varied > 2:
         raise RefusedError(f"--plot draws one or two varied keys, not {varied}")

@@ -9,13 +9,11 @@ import click
 from chutelab.cli.program import RefusedError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from pathlib import Path
 
     from chutelab.design import Uncertainty
     from chutelab.scene import Scene
-
-PICTURES = (".png", ".svg", ".pdf")
 
 
 def propagate(
@@ -43,18 +41,17 @@ def propagate(
         A CSV file for all samples, and a picture.
     """
     from chutelab.cli import console
+    from chutelab.cli.output import PICTURES, check_file, writing
     from chutelab.cli.progress import progress
     from chutelab.design.propagation import SAMPLES, as_dict
 
-    _writable(out, ("--out", ".csv"), (".csv",))
-    _writable(plot, ("--plot", " or ".join(PICTURES)), PICTURES)
+    check_file("--out", out, (".csv",))
+    check_file("--plot", plot, PICTURES)
     count = SAMPLES if samples is None else samples
     with progress("propagating", quiet=quiet) as meter:
         found = _found(scene, given, count, seed, meter)
-    try:
+    with writing():
         _write(found, out, plot)
-    except OSError as error:
-        raise RefusedError(f"{error.filename or out or plot}: {error.strerror}") from error
     if as_json:
         console.show_json(as_dict(found))
     elif not quiet:
@@ -65,27 +62,19 @@ def propagate(
 
 
 def _found(
-    scene: Scene, given: Sequence[str], samples: int, seed: int, meter: object
+    scene: Scene,
+    given: Sequence[str],
+    samples: int,
+    seed: int,
+    meter: Callable[[float], None] | None,
 ) -> Uncertainty:
     from chutelab.design import DesignError, uncertainty
     from chutelab.variation import VaryError
 
     try:
-        return uncertainty(scene, given, samples=samples, seed=seed, progress=meter)  # type: ignore[arg-type]
+        return uncertainty(scene, given, samples=samples, seed=seed, progress=meter)
     except (DesignError, VaryError, ImportError) as error:
         raise RefusedError(str(error)) from error
-
-
-def _writable(path: Path | None, said: tuple[str, str], suffixes: Sequence[str]) -> None:
-    """Refuse a file that cannot be written before anything runs."""
-    if path is None:
-        return
-    option, kinds = said
-    if path.suffix.lower() not in suffixes:
-        raise RefusedError(f"{option} {path}: with --uncertainty, a name that ends in {kinds}")
-    if path.is_dir() or not path.absolute().parent.is_dir():
-        why = "is a folder" if path.is_dir() else "its folder does not exist"
-        raise RefusedError(f"{option} {path}: {why}")
 
 
 def _write(found: Uncertainty, out: Path | None, plot: Path | None) -> None:

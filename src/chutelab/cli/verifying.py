@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from chutelab.agreement import Agreement, Finding, Verification
     from chutelab.scene import Scene
 
-WIDTH = 80
-"""Columns of a line, at most: a terminal's."""
-
 OK, FAILED = "ok", "FAILED"
 
 
@@ -101,7 +98,8 @@ def _shown(name: str, scene: Scene, answer: Verification) -> Iterator[Text]:
     """Yield the lines on one scene."""
     from rich.text import Text
 
-    from chutelab.cli.report import wrapped
+    from chutelab.scene.units import with_unit
+    from chutelab.sheet import WIDTH, wrapped
 
     yield Text(f"{name}: {scene.title}", style="bold")
     if answer.findings:
@@ -111,8 +109,7 @@ def _shown(name: str, scene: Scene, answer: Verification) -> Iterator[Text]:
     for (quantity, source, unit), rows in groupby(
         answer.findings, lambda row: (row.quantity, row.source, row.unit)
     ):
-        shown = unit.replace("degrees", "°")
-        head = f"{quantity}{f', {shown}' if shown else ''}: {source}"
+        head = f"{with_unit(quantity, unit)}: {source}"
         for number, line in enumerate(wrapped(head, WIDTH - 4)):
             yield Text(f"  {'  ' if number else ''}{line}")
         for row in rows:
@@ -151,7 +148,7 @@ def _judged(columns: str, holds: bool, *, promised: bool) -> Text:
 
 
 def _compared(row: Agreement) -> Iterator[Text]:
-    from chutelab.cli.report import wrapped
+    from chutelab.sheet import WIDTH, wrapped
 
     pair = f"{row.pair.replace(', ', ' - ')}: {row.quantity}"
     if row.difference is None and row.tolerance is None:

@@ -12,9 +12,10 @@
   `Uncertainty`;
 - `quantities`, `ranges`, `spreads`: what can be aimed at, varied, and be uncertain;
 - `evaluation`: the one place where variants are run; `value`, one quantity of one scene;
+  `families`, many at once; `courses`, the surfaces that a particle touches;
 - `pieces`, `roots`, `extrema`, `scalar`: one key: smooth pieces, all roots, all minima;
 - `search`: several keys; `sensitivity`: slopes, and what one per cent does;
-- `sampling`, `sobol`: Sobol points, and what each input contributes to a variance;
+- `sobol`: Sobol points, and what each input contributes to a variance;
 - `answers`, `words`, `documents`: results, in words, and as scene files.
 """
 

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from chutelab.design.frames import frame
 from chutelab.design.ranges import varied
 from chutelab.design.words import remarks, slopes
+from chutelab.frames import frame
+from chutelab.scene.units import with_unit
 from chutelab.sheet import Sheet, Shown
 from chutelab.simulation import simulate
 
@@ -24,9 +25,6 @@ if TYPE_CHECKING:
 
 DIGITS: Final = 10
 """Significant digits in which an answer is shown; it has more."""
-
-MOST_SHOWN: Final = 6
-"""Jumps and other minima that are listed in words."""
 
 
 @dataclass(frozen=True)
@@ -168,9 +166,9 @@ class Solution(Shown):
     def sheet(self) -> Sheet:
         """Return the answers in a table, with what to know of them."""
         shown = self.answers or ((self.nearest,) if self.nearest else ())
-        columns = ["", *(head(one.key, one.unit) for one in self.ranges)]
+        columns = ["", *(with_unit(one.key, one.unit) for one in self.ranges)]
         for name, unit in zip(self.quantities, self.units, strict=True):
-            columns.append(head(name, unit))
+            columns.append(with_unit(name, unit))
         rows = []
         for i, answer in enumerate(shown):
             name = "nearest" if not self.solved else self._name(i)
@@ -188,17 +186,12 @@ class Solution(Shown):
 
     def _repr_html_(self) -> str:
         parts = (self.sheet(), self.slopes()) if self.solved else (self.sheet(),)
-        return "".join(part._repr_html_() for part in parts)
+        return "".join(part.html() for part in parts)
 
     def _name(self, i: int) -> str:
         if self.goal == "solve":
             return "solution" if len(self.answers) == 1 else f"solution {i + 1}"
         return {"minimize": "least", "maximize": "most"}[self.goal] if i == 0 else "also"
-
-
-def head(name: str, unit: str) -> str:
-    """Return a name with its unit, for the head of a column."""
-    return f"{name}, {'°' if unit == 'degrees' else unit}" if unit else name
 
 
 def finite(value: float) -> float | None:

@@ -118,7 +118,6 @@ class Evaluator:
                 rows = slice(start, start + BLOCK)
                 block = Block(to_dict(base), base.source, keys, keys, table[rows], None)
                 family = Family(block, chosen)
-                family.swept()
                 values[rows, columns] = family.values
                 for row, (course, fault) in enumerate(
                     zip(family.courses, family.faults, strict=True), start

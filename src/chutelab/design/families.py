@@ -13,26 +13,23 @@ import numpy as np
 
 from chutelab.compare import from_events, never
 from chutelab.design.courses import courses_of
-from chutelab.design.quantities import Given, Measured, value_in
-from chutelab.exact import CornerError, run
-from chutelab.recorder import StalledError
+from chutelab.design.quantities import Given, Measured
 from chutelab.recording import ENTRIES, REASONS, Kind
 from chutelab.scene import measures
 from chutelab.scene.family import is_plain
+from chutelab.scene.paths import value_at
+from chutelab.sweep.alone import one_line
 from chutelab.sweep.batch import Batch
-from chutelab.sweep.columns import REASON
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
     from chutelab.design.quantities import Quantity
-    from chutelab.machine import Machine
     from chutelab.recording import Floats, Recording
     from chutelab.scene import Scene
     from chutelab.sweep.block import Block
-    from chutelab.sweep.columns import Columns
 
     Ints = NDArray[np.int64]
 
@@ -63,8 +60,8 @@ def _readable(quantity: Quantity) -> bool:
     return False
 
 
-class Family(Batch):
-    """The quantities of a block of variants, as they come in.
+class Family:
+    """The quantities of variants that can be run at once.
 
     Parameters
     ----------
@@ -79,34 +76,21 @@ class Family(Batch):
         The quantities, NaN where they did not happen.
     courses : list of str
         "" for variants that did not run here.
+    faults : list of str
+        Why there was no run; "" where there was one.
     left : list of int
         Variants that have to run by themselves.
     """
 
     def __init__(self, block: Block, quantities: Sequence[Quantity]) -> None:
-        super().__init__(block)
         self.quantities = quantities
         self.values = np.full((len(block.values), len(quantities)), np.nan)
         self.courses = [""] * len(block.values)
-        self.left: list[int] = []
+        batch = Batch(block, self._read)
+        self.faults = [one_line(batch.faults.get(row, "")) for row in range(len(block.values))]
+        self.left = batch.left
 
-    @property
-    def faults(self) -> list[str]:
-        """Why there was no run; "" where there was one."""
-        return [str(reason) for reason in self.found[REASON]]
-
-    def _put(self, which: Ints, columns: Columns) -> None:
-        # Rows of variants that ran alone: they are run again, and more is read off them.
-        del columns
-        self.left += which.tolist()
-
-    def _together(self, machine: Machine, which: Ints, scenes: Callable[[Ints], Scene]) -> None:
-        try:
-            recording = run(machine, apart=True)
-        except (CornerError, StalledError):
-            super()._together(machine, which, scenes)
-            return
-        family = scenes(which)
+    def _read(self, recording: Recording, family: Scene, which: Ints) -> None:
         for column, quantity in enumerate(self.quantities):
             self.values[which, column] = _column(recording, family, quantity)
         for row, course in zip(which.tolist(), courses_of(recording), strict=True):
@@ -116,7 +100,7 @@ class Family(Batch):
 def _column(recording: Recording, family: Scene, quantity: Quantity) -> Any:
     """Return a quantity of each variant of a recording, (N,), or a number for all."""
     if isinstance(quantity, Given):
-        return value_in(family, quantity.name)
+        return value_at(family, quantity.name)
     if not isinstance(quantity, Measured):
         return quantity.value
     found = _measured(recording, family, quantity.key)

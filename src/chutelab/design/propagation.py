@@ -8,19 +8,20 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from chutelab.design.answers import finite, head
+from chutelab.design.answers import finite
 from chutelab.design.errors import DesignError
 from chutelab.design.evaluation import Evaluator
-from chutelab.design.frames import frame, text
 from chutelab.design.quantities import measured
 from chutelab.design.sobol import Indices, crossed, design, indices
 from chutelab.design.spreads import Spread, spreads
+from chutelab.frames import csv_text, frame
+from chutelab.scene.units import with_unit
 from chutelab.sheet import Sheet, Shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from chutelab.design.evaluation import Floats
+    from chutelab.design.evaluation import Floats, Outcomes
     from chutelab.scene import Scene
 
 QUANTITIES: Final = ("landing.x", "belt_work")
@@ -60,7 +61,7 @@ class Uncertainty(Shown):
     indices : tuple of Indices
         Of each quantity.
     lost : dict of str
-        Why samples have no value, and how many.
+        Why samples lack a value, of which quantities, and how many.
     runs, samples, seed : int
         Variants that were run, samples of each set, and the seed of the points.
     """
@@ -110,11 +111,11 @@ class Uncertainty(Shown):
 
     def csv(self) -> str:
         """Return inputs and outputs as CSV; an empty cell is a sample without the quantity."""
-        return text(self.columns)
+        return csv_text(self.columns)
 
     def sheet(self) -> Sheet:
         """Return mean, interval and indices of each quantity."""
-        columns = ["", *(head(n, u) for n, u in zip(self.quantities, self.units, strict=True))]
+        columns = ["", *(with_unit(n, u) for n, u in zip(self.quantities, self.units, strict=True))]
         rows = [("all inputs at their means", *(f"{value:.6g}" for value in self.nominal))]
         rows.append(("mean", *(f"{value:.6g}" for value in self.mean)))
         rows.append(("standard deviation", *(f"{value:.3g}" for value in self.deviation)))
@@ -141,7 +142,7 @@ class Uncertainty(Shown):
         ]
         total = len(self.inputs)
         for reason, count in sorted(self.lost.items(), key=lambda item: -item[1])[:3]:
-            said.append(f"{count} of {total} samples have no value, and are left out: {reason}.")
+            said.append(f"{count} of {total} samples are left out: {reason}.")
         for name, found in zip(self.quantities, self.indices, strict=True):
             if np.isnan(found.first).all() and np.isfinite(self.outputs).any():
                 said.append(f"{name} does not depend on these inputs.")
@@ -228,13 +229,21 @@ def uncertainty(
     outcomes = evaluate(points)
     used = 2 * samples
     missing = np.flatnonzero(~np.isfinite(outcomes.values[:used]).all(axis=1))
-    lost = Counter(outcomes.faults[i] or f"touches {outcomes.courses[i]}" for i in missing)
+    lost = Counter(_why(outcomes, i, names) for i in missing.tolist())
     return Uncertainty(
         scene.title, inputs, tuple(names), tuple(one.unit for one in wanted), nominal,
         points[:used], outcomes.values[:used],
         tuple(_indices(column, samples, len(inputs), seed) for column in outcomes.values.T),
         dict(lost), evaluate.runs, samples, seed,
     )  # fmt: skip
+
+
+def _why(outcomes: Outcomes, row: int, names: Sequence[str]) -> str:
+    """Return why a sample lacks some of the quantities, or all."""
+    if outcomes.faults[row]:
+        return outcomes.faults[row]
+    lacking = [n for n, value in zip(names, outcomes.values[row], strict=True) if np.isnan(value)]
+    return f"no {' and no '.join(lacking)} (touches {outcomes.courses[row]})"
 
 
 def _indices(values: Floats, samples: int, inputs: int, seed: int) -> Indices:

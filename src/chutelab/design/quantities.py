@@ -11,16 +11,19 @@ from __future__ import annotations
 import difflib
 from dataclasses import dataclass
 from math import nan
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 from chutelab.agreement.measure import measure
 from chutelab.design.errors import DesignError
 from chutelab.recording import REASONS
 from chutelab.scene import MISSING, measures
+from chutelab.scene.paths import value_at
 from chutelab.scene.units import read_size
 from chutelab.variation import Vary, VaryError, quantity
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from chutelab.recording import Recording
     from chutelab.scene import Scene
 
@@ -78,7 +81,7 @@ class Given:
 
     def of(self, _recording: Recording | None, scene: Scene) -> float:
         """Return its value in a scene; NaN where it has none."""
-        value = value_in(scene, self.name)
+        value = value_at(scene, self.name)
         return float(value) if isinstance(value, (int, float)) else nan
 
 
@@ -114,26 +117,6 @@ class Target:
         return f"{self.left.name} = {self.right.name}"
 
 
-def value_in(scene: Scene, path: str) -> Any:
-    """Return what a scene has at a full path such as ``stream.at[0]``, defaults filled in.
-
-    `MISSING` if there is no such thing; an array for a varied key of a family of scenes.
-    """
-    found: Any = scene
-    for part in path.replace("[", ".[").split("."):
-        try:
-            found = found[int(part[1:-1])] if part.startswith("[") else getattr(found, part)
-        except (AttributeError, IndexError, TypeError):
-            return MISSING
-    return found
-
-
-def surfaces(scene: Scene) -> list[str]:
-    """Return the names of a scene's surfaces."""
-    tables = [name for name in ("incoming", "plate", "outgoing") if getattr(scene, name)]
-    return [*tables, *(free.name for free in scene.surface)]
-
-
 def measured(scene: Scene, name: str, typed: str = "") -> Measured:
     """Return the quantity of a scene that has this name, short or full.
 
@@ -149,7 +132,7 @@ def measured(scene: Scene, name: str, typed: str = "") -> Measured:
     DesignError
         If the scene has no such quantity.
     """
-    known = surfaces(scene)
+    known = scene.surfaces
     key, ending = SHORT.get(name, (name, _ending(name)))
     unit = measures.unit_of(key, known)
     if unit is None:
@@ -165,7 +148,7 @@ def _ending(name: str) -> Ending:
     return "any" if head in (*measures.NEEDED, *measures.SYMBOLS) else "scene"
 
 
-def _suggestion(name: str, key: str, known: list[str]) -> str:
+def _suggestion(name: str, key: str, known: Sequence[str]) -> str:
     near = difflib.get_close_matches(name, SHORT, n=1, cutoff=0.75)
     if near and near[0] != name:
         return f"did you mean {near[0]}?"
@@ -214,7 +197,7 @@ def _right(scene: Scene, text: str, typed: str, left: Measured) -> Quantity:
             ) from None
     else:
         return Fixed(number, unit)
-    if text in SHORT or measures.unit_of(text, surfaces(scene)) is not None:
+    if text in SHORT or measures.unit_of(text, scene.surfaces) is not None:
         return measured(scene, text, typed)
     try:
         found = quantity(scene, Vary(text, (0.0,), typed))
@@ -223,7 +206,7 @@ def _right(scene: Scene, text: str, typed: str, left: Measured) -> Quantity:
         raise DesignError(
             typed, f"{text} is neither a number, nor a quantity, nor a key of the scene: {allowed}"
         ) from None
-    value = value_in(scene, found.path)
+    value = value_at(scene, found.path)
     if value is MISSING or value is None or isinstance(value, (str, bool)):
         raise DesignError(typed, f"{found.path} has no number as its value in this scene")
     return Given(found.path, found.unit)

@@ -8,8 +8,8 @@ from math import isfinite
 from typing import TYPE_CHECKING, Final
 
 from chutelab.design.errors import DesignError
-from chutelab.design.quantities import value_in
-from chutelab.scene import Scene, SceneError, from_dict, to_dict
+from chutelab.scene import Scene, SceneError, overridden
+from chutelab.scene.paths import value_at
 from chutelab.variation import parse_range, quantity, reason, setting
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ def _read(scene: Scene, text: str) -> Span:
     if about.whole:
         raise DesignError(given.typed, f"{about.path} is a whole number: it cannot be searched")
     _allowed(scene, about.path, (low, low + INSIDE * (high - low), high), given.typed)
-    value = value_in(scene, about.path)
+    value = value_at(scene, about.path)
     start = float(value) if isinstance(value, (int, float)) else None
     return Span(about.path, about.unit, low, high, start, about.label)
 
@@ -136,4 +136,4 @@ def varied(
         If the scene refuses a value, or two that do not go together.
     """
     overrides = [setting(key, float(value)) for key, value in zip(keys, values, strict=True)]
-    return from_dict(to_dict(scene), scene.source, [*overrides, *extra])
+    return overridden(scene, [*overrides, *extra])

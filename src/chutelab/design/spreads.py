@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
 from chutelab.design.errors import DesignError, scipy
-from chutelab.design.quantities import value_in
-from chutelab.design.ranges import varied, without_source
-from chutelab.scene import Scene, SceneError, schema
+from chutelab.design.ranges import INSIDE, varied, without_source
+from chutelab.scene import Scene, SceneError
+from chutelab.scene.paths import limits_of, parts_of, rule_at, value_at
 from chutelab.scene.units import read_size
 from chutelab.variation import Vary, quantity, reason
 
@@ -129,15 +129,15 @@ def _read(scene: Scene, text: str) -> Spread:
     if law not in ("", *LAWS):
         raise DesignError(typed, f"{law} is no distribution here; there are {' and '.join(LAWS)}")
     about = quantity(scene, Vary(_full(scene, key), (0.0,), typed))
-    own = value_in(scene, about.path)
+    own = value_at(scene, about.path)
     if not isinstance(own, (int, float)):
         own = None
     if own is None and not parts[0]:
         raise DesignError(typed, f"{about.path} has no value in this scene: give the mean, too")
     mean = float(own) if own is not None and not parts[0] else _number(parts[0], about.unit, typed)
     spread = _size(parts[1], mean, about.unit, typed)
-    low, high = limits(about.path)
-    for value in (mean, float(np.clip(mean + 0.381966 * spread, low, high))):
+    low, high = limits_of(rule_at(parts_of(about.path)) or {}) or (-np.inf, np.inf)
+    for value in (mean, float(np.clip(mean + INSIDE * spread, low, high))):
         try:
             varied(scene, [about.path], [value])
         except SceneError as error:
@@ -177,24 +177,3 @@ def _size(text: str, mean: float, unit: str, typed: str) -> float:
     if not value > 0.0:
         raise DesignError(typed, f"the spread {text} must be more than 0; it {FORM}")
     return value
-
-
-def limits(path: str) -> tuple[float, float]:
-    """Return the least and the largest value that a key of a scene may have, for floats."""
-    described = schema()
-    rule: dict[str, Any] = described
-    for part in path.replace("[", ".[").split("."):
-        rule = described["$defs"][rule["$ref"].rpartition("/")[2]] if "$ref" in rule else rule
-        if part.startswith("["):
-            items = rule.get("prefixItems")
-            rule = items[int(part[1:-1])] if items else rule.get("items", {})
-        else:
-            rule = rule["properties"][part]
-    options = [one for one in rule.get("anyOf", [rule]) if one.get("type") == "number"]
-    one = options[0] if options else {}
-    low, high = one.get("minimum", -np.inf), one.get("maximum", np.inf)
-    if "exclusiveMinimum" in one:
-        low = np.nextafter(one["exclusiveMinimum"], np.inf)
-    if "exclusiveMaximum" in one:
-        high = np.nextafter(one["exclusiveMaximum"], -np.inf)
-    return float(low), float(high)

@@ -6,7 +6,7 @@ from math import isfinite
 from typing import TYPE_CHECKING, Final
 
 from chutelab.design.evaluation import NO_RUN
-from chutelab.scene.units import write_size
+from chutelab.scene.units import symbol, write_size
 from chutelab.sheet import Sheet
 
 if TYPE_CHECKING:
@@ -20,8 +20,9 @@ if TYPE_CHECKING:
 MOST: Final = 6
 """Changes of one kind that are spelled out."""
 
-ROUNDING: Final = 1e-12
-"""Relative change over one per cent of a key that is none."""
+ROUNDING: Final = 1e-10
+"""Relative change over one per cent of a key that is none: a minimum is found to half of the
+digits, and the slope there is what that leaves."""
 
 KINK: Final = 1e-4
 """Relative change of a quantity across a change of course that is no jump."""
@@ -136,7 +137,7 @@ def slopes(found: Sequence[Sensitivity]) -> Sheet:
     """Return sensitivities as a table."""
     rows = []
     for s in found:
-        unit = "°" if s.unit == "degrees" else s.unit
+        unit = symbol(s.unit)
         per = f"{s.quantity_unit} per {unit}" if unit else s.quantity_unit
         size = max(abs(s.lower), abs(s.upper)) if isfinite(s.lower + s.upper) else 0.0
         nothing = abs(s.derivative * s.step) <= ROUNDING * size

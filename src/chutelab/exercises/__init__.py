@@ -18,7 +18,7 @@
 Answers are computed from `chutelab.theory` for the parameters drawn; none is stored.
 """
 
-from chutelab.exercises.catalogue import EXERCISES, LessonError, find, lesson
+from chutelab.exercises.catalogue import EXERCISES, ExerciseError, find, lesson
 from chutelab.exercises.exercise import Exercise, Mistake, Parameter, Question
 from chutelab.exercises.replies import Passage, Progress, Reply, Standing, Verdict
 from chutelab.exercises.task import Task
@@ -27,7 +27,7 @@ from chutelab.exercises.values import Values
 __all__ = [
     "EXERCISES",
     "Exercise",
-    "LessonError",
+    "ExerciseError",
     "Mistake",
     "Parameter",
     "Passage",

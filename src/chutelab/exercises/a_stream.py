@@ -14,6 +14,7 @@ from chutelab.exercises.exercise import (
     Mistake,
     Parameter,
     Question,
+    falls_past_pulley,
     steps,
 )
 from chutelab.theory import transfer
@@ -25,9 +26,10 @@ if TYPE_CHECKING:
 
 
 def fits(given: Values) -> bool:
-    """Let the whole bed leave at the top: v0² > g (R + r + bed)."""
+    """Let the whole bed leave at the top, v0² > g (R + r + bed), and fall past the pulley."""
     radius = given.mm / 1000.0
-    return given.v0**2 > 1.05 * G * (given.R + radius + given.bed)
+    at_top = given.v0**2 > 1.05 * G * (given.R + radius + given.bed)
+    return at_top and falls_past_pulley(given, radius, given.bed)
 
 
 def solve(given: Values) -> Mapping[str, float]:
@@ -174,7 +176,8 @@ EXERCISE = Exercise(
             text=(
                 "Every layer reaches the plate at the same x, after the same time. But the highest"
                 " layer has {bed} m more to fall. How far from each other do the lowest and the"
-                " highest layer land? A positive number."
+                " highest layer land? A positive number. It comes from a small difference of two"
+                " times: keep all digits on the way."
             ),
             unit="m",
             answer=lambda s: s.spread,
@@ -210,7 +213,7 @@ EXERCISE = Exercise(
                 "How much later does the highest layer land? It moves back at ε v0 all that time.",
                 "Both sink with v2y = g t2 at the plate, t2 = (R + d - r) / v0.",
                 "t3 = (√(v2y² + 2 g fall) - v2y) / g, for d2 and for d2 + bed; ε v0 times the"
-                " difference. Keep all digits on the way.",
+                " difference.",
             ),
             working=(
                 "v2y = g t2 = {vy} m/s at the plate, for all layers\n"

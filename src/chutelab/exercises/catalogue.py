@@ -36,11 +36,8 @@ EXERCISES: dict[str, Exercise] = {
 """All exercises by name, in the order of the lessons."""
 
 
-class LessonError(LookupError):
-    """There is no such lesson."""
-
-    def __str__(self) -> str:
-        return str(self.args[0])
+class ExerciseError(LookupError):
+    """There is no exercise of such a lesson."""
 
 
 def find(name: str | int) -> Exercise:
@@ -48,7 +45,7 @@ def find(name: str | int) -> Exercise:
 
     Raises
     ------
-    LessonError
+    ExerciseError
         If there is none; the message lists them.
     """
     wanted = str(name).strip().casefold().replace("_", "-").replace(" ", "-")
@@ -60,7 +57,7 @@ def find(name: str | int) -> Exercise:
     near = difflib.get_close_matches(wanted, EXERCISES, n=1)
     hint = f" Did you mean {near[0]!r}?" if near else ""
     listed = ", ".join(f"{exercise.number} {name}" for name, exercise in EXERCISES.items())
-    raise LessonError(f"no lesson {str(name)[:40]!r}.{hint} There are: {listed}")
+    raise ExerciseError(f"no lesson {str(name)[:40]!r}.{hint} There are: {listed}")
 
 
 def lesson(name: str | int, student: object = "") -> Task:
@@ -81,7 +78,7 @@ def lesson(name: str | int, student: object = "") -> Task:
 
     Raises
     ------
-    LessonError
+    ExerciseError
         If there is no such lesson.
 
     Examples

@@ -142,6 +142,26 @@ class Exercise:
     fits: Callable[[Values], bool] = always
 
 
+def falls_past_pulley(given: Values, radius: float, bed: float = 0.0) -> bool:
+    """Tell whether what an upright plate throws back is below the pulley when it gets there.
+
+    Else it would strike pulley or belt on its way to the landing. From the plate it has d - 2 r to
+    the place where it could touch the pulley, at ε v0, and falls all the time.
+
+    Parameters
+    ----------
+    given : Values
+        With v0, R, d and e, of a ball that leaves the pulley at its top.
+    radius, bed : float
+        Of the ball, and how much higher than on the pulley its flight begins, m.
+    """
+    ride = given.R + radius
+    flown = (given.R + given.d - radius) / given.v0 + (given.d - 2.0 * radius) / (
+        given.e * given.v0
+    )
+    return 0.5 * G * flown**2 > 2.0 * ride + bed
+
+
 def steps(first: float, last: float, step: float) -> tuple[float, ...]:
     """Return round numbers from first to last, both included.
 

@@ -215,8 +215,8 @@ EXERCISE = Exercise(
         Question(
             title="slipping at once",
             text=(
-                "At which belt speed does the body slip, and leave, right at"
-                " the top, with µ = {mu}?"
+                "From which belt speed on does the body leave right at the top, as soon as it would"
+                " slip, with µ = {mu}?"
             ),
             unit="m/s",
             answer=lambda s: s.critical,
@@ -245,7 +245,7 @@ EXERCISE = Exercise(
                 "u0 = 1, so v = √(g Rc).",
             ),
             working="sin 0 = µ (1 - u0) gives u0 = 1: v = √(g Rc) = √(9.81 · {Rc}) m/s, for any µ",
-            source="Eq. (1) of Molnár et al. (2016), for the path of the centre",
+            source="Eq. (2) of Molnár et al. (2016) with φ1 = 0, for the path of the centre",
         ),
     ),
 )

@@ -1,7 +1,6 @@
 """Replies as HTML: no background and no text colour of their own, so right on light and on dark.
 
-The colours are those of Okabe and Ito (2008), told apart with any common colour blindness; a sign
-and words always say the same.
+What colours say, a sign and words always say too.
 """
 
 from __future__ import annotations
@@ -9,14 +8,14 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+from chutelab import colours
+from chutelab.sheet import Sheet
 
-GOOD = "#009E73"
-WRONG = "#D55E00"
-WARN = "#E69F00"
-INFO = "#56B4E9"
-QUIET = "#8C8C8C"
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+GOOD, WRONG, WARN = colours.GREEN, colours.VERMILION, colours.ORANGE
+INFO, QUIET = colours.SKY, colours.GREY
 
 BAR, HEIGHT, GAP = 150, 12, 4
 """Pixels: length and height of a part of the progress bar, and what is between two."""
@@ -61,15 +60,7 @@ def progress(summary: str, rows: Sequence[tuple[str, str, str, str, str]]) -> st
     return f'<div style="line-height:1.5"><b>{escape(summary)}</b><br>{bar}{table(lines)}</div>'
 
 
-def table(rows: Iterable[Sequence[str]]) -> str:
-    """Return a plain table, its cells aligned to the left."""
-    body = "".join(
-        "<tr>"
-        + "".join(
-            f'<td style="text-align:left;padding:.1em .8em .1em 0">{escape(cell)}</td>'
-            for cell in row
-        )
-        + "</tr>"
-        for row in rows
-    )
-    return f'<table style="margin:.3em 0">{body}</table>'
+def table(rows: Sequence[tuple[str, ...]]) -> str:
+    """Return a table of words without a head, at least one row."""
+    width = len(rows[0])
+    return Sheet("", ("",) * width, tuple(rows), texts=width).html()

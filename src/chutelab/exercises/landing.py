@@ -195,7 +195,7 @@ EXERCISE = Exercise(
                     lambda s: s.vb / (s.mu * G),
                 ),
                 Mistake(
-                    "belt and particle speed exchanged",
+                    "half of the way only",
                     "That is how long the belt takes to stop the particle only. It then has to"
                     " bring it to v_b.",
                     lambda s: -s.vx / (s.mu * G),

@@ -88,7 +88,7 @@ EXERCISE = Exercise(
                 "v² / Rc = g, with Rc = R + r.",
             ),
             working="v = √(g (R + r)) = √(9.81 · ({R} + {r})) m/s",
-            source="Eq. (1) of Molnár et al. (2016), for the path of the centre",
+            source="Eq. (2) of Molnár et al. (2016) with φ1 = 0, for the path of the centre",
         ),
         Question(
             title="angle of separation",

@@ -14,6 +14,7 @@ from chutelab.exercises.exercise import (
     Mistake,
     Parameter,
     Question,
+    falls_past_pulley,
     steps,
 )
 from chutelab.exercises.general import DOUBLE, SIGN
@@ -26,8 +27,9 @@ if TYPE_CHECKING:
 
 
 def fits(given: Values) -> bool:
-    """Leave the pulley at its top: v0² > g Rc."""
-    return given.v0**2 > 1.05 * G * (given.R + given.r)
+    """Leave the pulley at its top, v0² > g Rc, and fall past it after the plate."""
+    at_top = given.v0**2 > 1.05 * G * (given.R + given.r)
+    return at_top and falls_past_pulley(given, given.r)
 
 
 def solve(given: Values) -> Mapping[str, float]:

@@ -5,7 +5,7 @@
 
 - `model`: a figure as data: lines in panels, numbers, what the misprint does to its conclusion;
 - `radius`: Figures 6 to 9, energy and velocities against the radius of the drive pulley;
-- `paths`: Figures 11 to 13, trajectories.
+- `paths`: Figures 11 to 13, trajectories; `flights`: what they are made of.
 
 V. Molnár et al., Mech. Sci. 7, 167-177, 2016, doi:10.5194/ms-7-167-2016. The paper's pictures are
 not copied: what its text gives is computed anew, and what it does not give is said.
@@ -35,9 +35,6 @@ DRAWINGS: Final = {
 
 class FigureError(LookupError):
     """The paper has no such figure of results."""
-
-    def __str__(self) -> str:
-        return str(self.args[0])
 
 
 def figure(number: int) -> PaperFigure:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Final, Literal
 
-from chutelab.design.frames import text
+from chutelab.frames import csv_text
 from chutelab.sheet import Sheet, Shown
 
 if TYPE_CHECKING:
@@ -17,6 +17,12 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 Form = Literal["as-printed", "corrected"]
+
+RESTITUTION: Final = 0.5
+"""ε of the plate in all figures."""
+
+GRAVITY: Final = 9.81
+"""m/s²."""
 
 FORMS: tuple[Form, Form] = ("as-printed", "corrected")
 
@@ -123,7 +129,7 @@ class PaperFigure(Shown):
 
     def csv(self) -> str:
         """Return the numbers as CSV, in full."""
-        return text(self.columns)
+        return csv_text(self.columns)
 
 
 def _cell(value: Any) -> str:

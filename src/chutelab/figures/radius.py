@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from chutelab.figures.model import FORMS, Form, Line, Panel, PaperFigure
+from chutelab.figures.model import FORMS, GRAVITY, RESTITUTION, Form, Line, Panel, PaperFigure
 from chutelab.scene import Scene, from_dict
 from chutelab.theory import transfer
 from chutelab.theory.printed import DISTANCES, RADII
@@ -19,15 +19,15 @@ if TYPE_CHECKING:
 MASS: Final = 0.008
 """kg; the paper says 7.95 g to 8 g."""
 
-RESTITUTION: Final = 0.5
-GRAVITY: Final = 9.81
-
 GRID: Final = np.unique(np.concatenate([np.linspace(0.05, 0.5, 91), np.array(RADII, dtype=float)]))
 """Radii, m: those of the paper's tables, and enough between them for a smooth line."""
 
 SHOWN: Final = tuple(int(np.searchsorted(GRID, float(radius))) for radius in RADII)
 
 SPEEDS: Final = {6: 2.0, 7: 4.0, 8: 2.0, 9: 4.0}
+
+SWEEP: Final = "chutelab sweep figure-{}.toml --vary incoming.pulley_radius=0.05:0.5:91"
+"""The same radii with the engine."""
 
 ROLES: Final = ("first", "second", "third", "fourth")
 
@@ -66,7 +66,7 @@ def energy_figure(number: int) -> PaperFigure:
         columns,
         SHOWN,
         {f"figure-{number}": _scene(number, speed)},
-        f"chutelab sweep figure-{number}.toml --vary incoming.pulley_radius=0.05:0.5:91",
+        SWEEP.format(number),
     )
 
 
@@ -126,7 +126,7 @@ def velocity_figure(number: int) -> PaperFigure:
         columns,
         SHOWN,
         {f"figure-{number}": _scene(number, speed)},
-        f"chutelab sweep figure-{number}.toml --vary incoming.pulley_radius=0.05:0.5:91",
+        SWEEP.format(number),
     )
 
 

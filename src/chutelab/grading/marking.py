@@ -8,7 +8,7 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from chutelab.exercises import LessonError, Task, lesson
+from chutelab.exercises import ExerciseError, Task, lesson
 from chutelab.exercises.drawing import plain
 from chutelab.exercises.task import UNNAMED
 from chutelab.files import whole
@@ -152,7 +152,7 @@ def _task(reports: list[Any]) -> tuple[Task | None, list[str]]:
                     task.check(int(number), float(answer))
             for number in report["revealed"]:
                 task.reveal(int(number))
-        except (LessonError, ArithmeticError, LookupError, TypeError, ValueError, AttributeError):
+        except (ExerciseError, ArithmeticError, LookupError, TypeError, ValueError, AttributeError):
             continue
     if not tasks:
         return None, ["no exercise was opened: lesson(…) was never called"]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from typing import TYPE_CHECKING, Final
 
 from chutelab.files import whole
@@ -13,6 +12,7 @@ from chutelab.lessons.reading import scene_of
 from chutelab.lessons.stamp import Stamp
 from chutelab.scene import to_dict
 from chutelab.simulation import simulate
+from chutelab.versions import version_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -105,11 +105,4 @@ def stamp_of(lesson: Lesson, scene: Scene) -> Stamp:
     inputs = {"scene": document, "picture": settings, "question": lesson.question}
     text = json.dumps(inputs, sort_keys=True, ensure_ascii=True)
     digest = hashlib.sha256(text.encode("ascii")).hexdigest()[:32]
-    return Stamp(digest, ", ".join(f"{name} {_version(name)}" for name in LIBRARIES))
-
-
-def _version(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return "unknown"
+    return Stamp(digest, ", ".join(f"{name} {version_of(name) or 'unknown'}" for name in LIBRARIES))

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from chutelab.hints import did_you_mean
 from chutelab.lessons.reading import PLAN, LessonError, read
 from chutelab.scene import Fault
 from chutelab.scene import shipped as shipped_scenes
@@ -53,9 +53,8 @@ def find(wanted: str | int | Path) -> Lesson:
     if path.name == PLAN and path.is_file():
         return read(path.parent)
     names = [folder.name.split("-", 1)[1] for folder in folders]
-    near = difflib.get_close_matches(said.lower(), names, n=2)
     listed = ", ".join(folder.name for folder in folders)
-    advice = f"did you mean {' or '.join(near)}?" if near else f"there are {listed}"
+    advice = did_you_mean(said.lower(), names, f"there are {listed}", most=2)
     text = f"no lesson of this number or name, and no folder with a {PLAN}; {advice}"
     raise LessonError(said or '""', [Fault("", None, text)])
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pydantic import ValidationError
 
+from chutelab.hints import did_you_mean
 from chutelab.lessons.models import LEVELS, TABLES, Lesson, Page, Picture
 from chutelab.scene import MISSING, Fault, Scene, SceneError, load, shipped
 from chutelab.scene.errors import at_path, joined
@@ -94,8 +95,7 @@ def _judged(lesson: Lesson) -> Iterator[Fault]:
     for i, name in enumerate(lesson.scenes):
         here = f"scenes[{i}]"
         if beside(lesson, name) is None and name not in shipped():
-            near = difflib.get_close_matches(name, shipped(), n=1)
-            hint = f"did you mean {near[0]}?" if near else "`chutelab scenes` lists the shipped"
+            hint = did_you_mean(name, shipped(), "`chutelab scenes` lists the shipped")
             yield Fault(here, name, f"no shipped scene, and no file beside lesson.toml; {hint}")
             continue
         try:

@@ -91,7 +91,7 @@ class Board:
         found = numbers(scene, recording)
         lost = scene.outgoing is not None and isnan(found["x"])
         self._say("It does not land on the outgoing belt." if lost else "")
-        self.picture.value = f"{drawn}{table(found)}"
+        self.picture.value = f"{drawn}{table(found).html()}"
 
     def _say(self, text: str) -> None:
         self.words.value = f"<b>{escape(text)}</b>" if text else ""

@@ -6,7 +6,7 @@ import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from chutelab.scene import from_dict, to_dict
+from chutelab.scene import overridden
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -88,7 +88,7 @@ def changed(scene: Scene, values: Mapping[str, float | bool | str]) -> Scene:
         If it cannot be used.
     """
     overrides = [f"{key}={json.dumps(value)}" for key, value in values.items()]
-    return from_dict(to_dict(scene), scene.source, overrides)
+    return overridden(scene, overrides)
 
 
 def _speed(key: str, label: str, value: float, low: float) -> Control:

@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chutelab import colours
 from chutelab.compare import observed
 from chutelab.recording import Kind
+from chutelab.sheet import Sheet
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -22,8 +24,8 @@ if TYPE_CHECKING:
     from chutelab.recording import Recording
     from chutelab.scene import Scene
 
-TRACK, GHOST, STRIKE = "#0072B2", "#8C8C8C", "#D55E00"
-"""Okabe and Ito (2008): the track, the one before, and places of impacts."""
+TRACK, GHOST, STRIKE = colours.BLUE, colours.GREY, colours.VERMILION
+"""The track, the one before, and places of impacts."""
 
 WIDTH, TALLEST = 660, 460
 """Pixels of the picture, across and at most in height."""
@@ -177,15 +179,14 @@ def numbers(scene: Scene, recording: Recording) -> dict[str, float]:
     return found
 
 
-def table(found: dict[str, float]) -> str:
+def table(found: dict[str, float]) -> Sheet:
     """Return the numbers of particle 0 as a table; without those that are not there."""
-    cells = "".join(
-        f'<tr><td style="text-align:left;padding-right:1em">{words}</td>'
-        f'<td style="text-align:right">{found[key]:.3g}\N{NO-BREAK SPACE}{unit}</td></tr>'
+    rows = [
+        (words, f"{found[key]:.3g}\N{NO-BREAK SPACE}{unit}")
         for key, words, unit in ROWS
         if isfinite(found[key])
-    )
-    return f"<table>{cells}</table>"
+    ]
+    return Sheet("", ("", ""), tuple(rows))
 
 
 def _machine(view: View, machine: Machine) -> list[str]:

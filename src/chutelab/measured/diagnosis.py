@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chutelab.measured.clock import best_t0
-from chutelab.measured.residuals import length, over
+from chutelab.measured.residuals import over
 from chutelab.measured.track import MeasuredError
+from chutelab.scene.units import write_size
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
     from chutelab.measured.parameters import Parameter
     from chutelab.measured.residuals import Residuals
     from chutelab.measured.track import Floats
+
+MAD = 1.4826
+"""Standard deviations of a normal distribution in its median absolute deviation."""
 
 CORRELATED = 0.9
 BENT = 0.2
@@ -107,12 +111,12 @@ def notes(
                 " straight line: the uncertainty is rough"
             )
     left = after.values[after.used]
-    deviation = 1.4826 * float(np.median(np.abs(left)))
+    deviation = MAD * float(np.median(np.abs(left)))
     distance = np.hypot(*left.T)
     far = np.flatnonzero(distance > max(FAR * deviation, 1e-12))
     if 0 < len(far) <= NAMED:
         lines = after.track.lines[after.used]
-        said = ", ".join(f"line {lines[i]} ({length(distance[i])})" for i in far)
+        said = ", ".join(f"line {lines[i]} ({write_size(float(distance[i]), 'm')})" for i in far)
         less = "" if robust else "; a robust fit gives such points less weight"
         yield f"far off the others: {said}{less}"
     elif alike(left.ravel()):

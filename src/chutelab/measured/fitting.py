@@ -35,9 +35,6 @@ SEARCHED = 41
 KEPT = 0.9
 """Share of the points that a better minimum must keep: it must not do by losing them."""
 
-MAD = 1.4826
-"""Standard deviations of a normal distribution in its median absolute deviation."""
-
 TUNING = 2.0
 """Standard deviations from which on a robust fit begins to believe a point less."""
 
@@ -174,7 +171,7 @@ def _elsewhere(problem: Problem, values: Floats) -> Floats | None:
 def _threshold(left: Floats) -> float:
     """Return the residual, m, from which on a robust fit believes a point less."""
     # Neither 0, for points without noise, nor so large that it could not be told from none.
-    return min(max(TUNING * MAD * float(np.median(np.abs(left))), 1e-9), 0.99)
+    return min(max(TUNING * diagnosis.MAD * float(np.median(np.abs(left))), 1e-9), 0.99)
 
 
 def _judged(

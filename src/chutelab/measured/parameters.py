@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from chutelab.measured.track import MeasuredError
-from chutelab.scene import MISSING, Fault, from_dict, schema, to_dict
+from chutelab.scene import MISSING, Fault, overridden, shown
+from chutelab.scene.errors import at_path, joined
+from chutelab.scene.paths import limits_of, rule_at
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -65,13 +67,12 @@ def resolve(scene: Scene, track: Track, keys: Sequence[str]) -> tuple[Parameter,
         With all keys that are unknown, no number, without a value to start from, or given twice.
     """
     document = scene.model_dump(by_alias=True)
-    described = schema()
     faults: list[Fault] = []
     found: list[Parameter] = []
     if not keys:
         faults.append(Fault("fit", None, "name at least one key, such as plate.restitution"))
     for key in keys:
-        known = _placed(track, key) if key in PLACEMENT else _of_scene(document, described, key)
+        known = _placed(track, key) if key in PLACEMENT else _of_scene(document, key)
         if isinstance(known, str):
             faults.append(Fault(f"fit {key}", None, known))
         elif any(known.key == other.key for other in found):
@@ -107,7 +108,7 @@ def changed(
             case key:
                 overrides.append(f"{key}={value!r}")
     if overrides:
-        scene = from_dict(to_dict(scene), scene.source, overrides)
+        scene = overridden(scene, overrides)
     return scene, track.placed(origin=(origin[0], origin[1]), **placement)
 
 
@@ -123,46 +124,24 @@ def _placed(track: Track, key: str) -> Parameter:
     return Parameter(key, unit, start, low, high)
 
 
-def _of_scene(
-    document: Mapping[str, Any], described: Mapping[str, Any], key: str
-) -> Parameter | str:
+def _of_scene(document: Mapping[str, Any], key: str) -> Parameter | str:
     """Return the parameter of a key of the scene, or why there is none."""
     parts = _parts(document, key)
-    rule = _rule(described, parts)
+    rule = rule_at(parts)
     head = str(parts[0]) if parts else ""
     if rule is None:
-        return _unknown(document, described, key)
+        return _unknown(document, key)
     if document.get(head) in (None, ()):
         return f"the scene has no [{head}]"
-    value: Any = document
-    for part in parts:
-        try:
-            value = value[part]
-        except (LookupError, TypeError):
-            value = MISSING
-            break
-    path = re.sub(r"\.(\d+)", r"[\1]", ".".join(map(str, parts)))
-    kinds = [option for option in rule.get("anyOf", [rule]) if option.get("type") == "number"]
+    value: Any = at_path(document, parts)
+    path, limits = joined(parts), limits_of(rule)
     if value is None or value is MISSING:
-        if not kinds:
+        if limits is None:
             return "not a number"
         return f"has no value in this scene; give one to start from, --set {path}=..."
-    if not kinds or isinstance(value, (str, bool)):
-        return f"{_said(value)} is not a number that can vary continuously"
-    (limits,) = kinds
-    # least_squares keeps off its bounds by no margin: an excluded bound is moved by one float.
-    low, high = limits.get("minimum", -np.inf), limits.get("maximum", np.inf)
-    if "exclusiveMinimum" in limits:
-        low = np.nextafter(limits["exclusiveMinimum"], np.inf)
-    if "exclusiveMaximum" in limits:
-        high = np.nextafter(limits["exclusiveMaximum"], -np.inf)
-    return Parameter(path, rule.get("x-unit", ""), float(value), float(low), float(high))
-
-
-def _said(value: Any) -> str:
-    from chutelab.scene import shown
-
-    return shown(value)
+    if limits is None or isinstance(value, (str, bool)):
+        return f"{shown(value)} is not a number that can vary continuously"
+    return Parameter(path, rule.get("x-unit", ""), float(value), *limits)
 
 
 def _parts(document: Mapping[str, Any], key: str) -> list[str | int]:
@@ -178,31 +157,8 @@ def _parts(document: Mapping[str, Any], key: str) -> list[str | int]:
     return parts
 
 
-def _rule(described: Mapping[str, Any], parts: Sequence[str | int]) -> Mapping[str, Any] | None:
-    """Follow a path through the JSON Schema; None where it leads nowhere."""
-    rule: Mapping[str, Any] | None = described
-    for part in parts:
-        if rule is None:
-            return None
-        rule = _referred(described, rule)
-        if isinstance(part, str):
-            rule = rule.get("properties", {}).get(part)
-        elif part < len(rule.get("prefixItems", [])):
-            rule = rule["prefixItems"][part]
-        else:
-            rule = rule.get("items")
-    return None if rule is None else _referred(described, rule)
-
-
-def _referred(described: Mapping[str, Any], rule: Mapping[str, Any]) -> Mapping[str, Any]:
-    if "$ref" in rule:
-        found: Mapping[str, Any] = described["$defs"][rule["$ref"].rpartition("/")[2]]
-        return found
-    return rule
-
-
-def _unknown(document: Mapping[str, Any], described: Mapping[str, Any], key: str) -> str:
-    known = [*numbers(document, described), *PLACEMENT]
+def _unknown(document: Mapping[str, Any], key: str) -> str:
+    known = [*numbers(document), *PLACEMENT]
     near = difflib.get_close_matches(key, known, n=3, cutoff=0.6)
     if not near:
         near = [name for name in known if name.rpartition(".")[2] == key.rpartition(".")[2]]
@@ -210,7 +166,7 @@ def _unknown(document: Mapping[str, Any], described: Mapping[str, Any], key: str
     return f"unknown key; {advice}"
 
 
-def numbers(document: Mapping[str, Any], described: Mapping[str, Any]) -> Iterator[str]:
+def numbers(document: Mapping[str, Any]) -> Iterator[str]:
     """Yield the keys of a scene's tables whose values are numbers that can be fitted."""
     for head, table in document.items():
         entries = {head: table}
@@ -223,5 +179,5 @@ def numbers(document: Mapping[str, Any], described: Mapping[str, Any]) -> Iterat
                 for name, value in surface.items()
             }
         for key, value in entries.items():
-            if isinstance(value, float) and _rule(described, _parts(document, key)):
+            if isinstance(value, float) and rule_at(_parts(document, key)):
                 yield key

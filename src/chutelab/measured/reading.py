@@ -9,7 +9,6 @@ user's choice. Any other table with columns t, x and y does as well.
 
 from __future__ import annotations
 
-import difflib
 import re
 from dataclasses import dataclass
 from math import isfinite
@@ -18,6 +17,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from chutelab.hints import did_you_mean
 from chutelab.measured.residuals import LEAST
 from chutelab.measured.text import (
     NAMES,
@@ -79,8 +79,7 @@ def find(name_or_path: str | Path) -> Path:
     }
     if (name := str(name_or_path).removesuffix(".csv")) in tracks:
         return tracks[name]
-    near = difflib.get_close_matches(path.stem, tracks, n=1)
-    advice = f"did you mean {near[0]}?" if near else f"shipped: {', '.join(tracks) or 'none'}"
+    advice = did_you_mean(path.stem, tracks, f"shipped: {', '.join(tracks) or 'none'}")
     raise refused(name_or_path or '""', "", f"no such file, and no shipped track; {advice}")
 
 

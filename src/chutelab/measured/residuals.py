@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from chutelab.measured.track import MeasuredError, counted
 from chutelab.scene import Fault, from_dict, to_dict
+from chutelab.scene.units import write_size
 from chutelab.sheet import Sheet, Shown
 from chutelab.simulation import simulate
 
@@ -90,7 +91,7 @@ class Residuals(Shown):
         i = self.worst
         where = self.track.position[i]
         rows = [
-            (name, length(x), length(y), length(float(np.hypot(x, y))))
+            (name, *(write_size(float(value), "m") for value in (x, y, np.hypot(x, y))))
             for name, (x, y) in (
                 ("RMS", self.rms),
                 ("mean", self.mean),
@@ -170,8 +171,6 @@ def follow(recording: Recording, times: Floats) -> Floats:
     """
     within = np.clip(times, *ends(recording))
     if recording.count > 1:
-        from dataclasses import replace
-
         recording = replace(
             recording,
             knots=recording.track(0),
@@ -181,14 +180,3 @@ def follow(recording: Recording, times: Floats) -> Floats:
     position, velocity = recording.at(within)
     onward: Floats = position[:, 0] + velocity[:, 0] * (times - within)[:, None]
     return onward
-
-
-def length(value: float) -> str:
-    """Return a length with a readable unit.
-
-    >>> length(0.00123), length(0.25), length(0.0)
-    ('1.23 mm', '0.25 m', '0 mm')
-    """
-    if abs(value) >= 0.1:
-        return f"{value:.3g} m"
-    return f"{1e3 * value:.3g} mm"

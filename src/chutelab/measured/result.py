@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chutelab.measured.residuals import length
+from chutelab.scene.units import write_size
 from chutelab.sheet import Sheet, Shown
 
 if TYPE_CHECKING:
@@ -85,11 +85,11 @@ class Fit(Shown):
                 self.parameters, self.values, self.errors, self.low, self.high, strict=True
             )
         )
-        x, y = self.after.rms
+        scatter, x, y = (write_size(size, "m") for size in (self.scatter, *self.after.rms))
         kind = "a coordinate, robustly" if self.robust else "a coordinate"
         notes = (
-            f"scatter {length(self.scatter)} {kind}, {self.freedom} degrees of freedom; RMS"
-            f" residual {length(x)} in x, {length(y)} in y",
+            f"scatter {scatter} {kind}, {self.freedom} degrees of freedom; RMS"
+            f" residual {x} in x, {y} in y",
             *(f"note: {note}" for note in self.notes),
         )
         title = "Fit, ± one standard deviation"

@@ -39,7 +39,7 @@ CROWD = {
 
 BOOKS = {
     "contacts": "Contacts",
-    "ledger.belt_work": "Belt work",
+    "ledger.belt_work": "Belt work in the run",
     "ledger.restitution_loss": "Lost in rebounds",
     "ledger.friction_loss": "Slip heat",
     "ledger.residual": "Residual",

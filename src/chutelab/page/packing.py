@@ -12,6 +12,8 @@ from chutelab.page.figures import figures
 from chutelab.plots import style
 from chutelab.plots.sampling import STRUCK, action, strobe_step
 from chutelab.recording import ENTRIES, REASONS, Kind
+from chutelab.scene.paths import value_at
+from chutelab.scene.units import symbol
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -53,7 +55,7 @@ def pack(study: Study) -> dict[str, Any]:
             {
                 "key": vary.key,
                 "label": quantity.label,
-                "unit": _unit(quantity.unit),
+                "unit": symbol(quantity.unit),
                 "values": list(vary.values),
                 "start": _nearest(study, axis),
             }
@@ -73,7 +75,7 @@ def pack(study: Study) -> dict[str, Any]:
                 "group": figure.group,
                 "name": figure.name,
                 "label": figure.label,
-                "unit": _unit(figure.unit),
+                "unit": symbol(figure.unit),
                 "simulated": list(figure.simulated),
                 "analytic": list(figure.analytic) if any(
                     value is not None for value in figure.analytic
@@ -85,19 +87,9 @@ def pack(study: Study) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _unit(unit: str) -> str:
-    return "°" if unit == "degrees" else unit
-
-
 def _nearest(study: Study, axis: int) -> int:
     """Return where a slider begins: near the scene's own value, if any is known, else at 0."""
-    key = study.quantities[axis].path
-    found: Any = study.scene.model_dump(by_alias=True)
-    for part in key.replace("[", ".[").split("."):
-        try:
-            found = found[int(part[1:-1]) if part.startswith("[") else part]
-        except (KeyError, IndexError, TypeError):
-            return 0
+    found = value_at(study.scene, study.quantities[axis].path)
     if not isinstance(found, int | float):
         return 0
     return int(np.argmin(np.abs(np.array(study.varies[axis].values) - found)))

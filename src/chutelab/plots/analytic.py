@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chutelab.releases import on_belt, release_velocity
 from chutelab.theory.separation import separation
 
 if TYPE_CHECKING:
@@ -87,6 +88,9 @@ def _thrown(scene: Scene, belt: Incoming) -> tuple[Arc, ...]:
     """Return the flight from the pulley down to the outgoing belt, where nothing is in the way."""
     out, g, r = scene.outgoing, scene.gravity, scene.particle.radius
     if out is None or scene.surface or not g:
+        return ()
+    carried = on_belt(scene) and release_velocity(scene) == (belt.speed, 0.0) and belt.speed > 0.0
+    if not carried or (scene.stream.interact and scene.stream.count > 1):
         return ()
     riding = belt.pulley_radius + r
     left = separation(

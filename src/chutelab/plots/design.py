@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from textwrap import fill, shorten
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from chutelab.plots import style
-from chutelab.plots.figure import DPI, save
-from chutelab.plots.picture import Picture
+from chutelab.plots.picture import DPI, Picture
+from chutelab.scene.units import symbol, with_unit
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -42,13 +43,9 @@ def scan(solution: Solution, *, path: str | Path | None = None) -> Figure:
     figure = _figure(SIZE)
     ax = figure.add_axes((0.105, 0.115, 0.865, 0.66))
     draw_scan(ax, solution)
-    _titles(figure, shorten(solution.base.title, 70, placeholder=" …"), solution.asked)
-    ax.legend(
-        loc="lower left", bbox_to_anchor=(-0.01, 1.0), ncols=4, fontsize=style.SMALL,
-        frameon=False, borderaxespad=0.3, handlelength=2.2,
-    )  # fmt: skip
-    if path is not None:
-        save(figure, Path(path))
+    _titles(figure, solution.base.title, solution.asked)
+    style.legend_above(ax, 4)
+    figure.write(path)
     return figure
 
 
@@ -60,7 +57,7 @@ def draw_scan(ax: Axes, solution: Solution) -> Axes:
     key, (name, *_), (unit, *_) = solution.ranges[0], solution.quantities, solution.units
     finite = np.abs(found.values[np.isfinite(found.values)])
     factor, said = _scaled(float(finite.max()) if len(finite) else 0.0, unit)
-    style.dress(ax, _label(key.key, key.unit), _label(name, said))
+    style.dress(ax, with_unit(key.key, key.unit), with_unit(name, said))
     label = name
     for piece in found.pieces:
         ax.plot(
@@ -143,12 +140,11 @@ def spread(found: Uncertainty, *, path: str | Path | None = None) -> Figure:
         if row < rows - 1:
             ax.set_xlabel("")
     given = ", ".join(
-        f"{one.key} = {one.mean:g} ± {one.spread:.3g} {_short(one.unit)}".rstrip()
+        f"{one.key} = {one.mean:g} ± {one.spread:.3g} {symbol(one.unit)}".rstrip()
         for one in found.spreads
     )
-    _titles(figure, shorten(found.scene, 70, placeholder=" …"), given, wide=150)
-    if path is not None:
-        save(figure, Path(path))
+    _titles(figure, found.scene, given, wide=150)
+    figure.write(path)
     return figure
 
 
@@ -158,7 +154,7 @@ def draw_distribution(ax: Axes, found: Uncertainty, row: int) -> Axes:
     values = values[np.isfinite(values)]
     factor, unit = _scaled(float(np.abs(values).max()) if len(values) else 0.0, found.units[row])
     name = found.quantities[row]
-    style.dress(ax, _label(name, unit), "samples", name)
+    style.dress(ax, with_unit(name, unit), "samples", name)
     if not len(values):
         return ax
     low, high = factor * found.interval[row]
@@ -182,7 +178,10 @@ def draw_strongest(ax: Axes, found: Uncertainty, row: int) -> Axes:
     finite = np.abs(values[np.isfinite(values)])
     factor, unit = _scaled(float(finite.max()) if len(finite) else 0.0, found.units[row])
     style.dress(
-        ax, _label(one.key, one.unit), _label(found.quantities[row], unit), f"against {one.key}"
+        ax,
+        with_unit(one.key, one.unit),
+        with_unit(found.quantities[row], unit),
+        f"against {one.key}",
     )
     ax.plot(
         found.inputs[:, k], factor * values,
@@ -213,34 +212,24 @@ def draw_shares(ax: Axes, found: Uncertainty, row: int) -> Axes:
     ax.set_xlim(0.0, max(105.0, ax.get_xlim()[1]))
     ax.grid(visible=False, axis="y")
     if row == 0:
-        ax.legend(loc="lower right", fontsize=style.SMALL, frameon=False)
+        room = max(0.45, 0.14 * len(places))
+        ax.set_ylim(len(places) - 0.5 + room, -0.5)  # below the last bar, for the legend
+        ax.legend(loc="lower center", ncols=2, fontsize=style.SMALL, frameon=False)
     return ax
 
 
-def _figure(size: tuple[float, float]) -> Figure:
+def _figure(size: tuple[float, float]) -> Picture:
     return Picture(figsize=size, dpi=DPI)
 
 
-def _titles(figure: Figure, title: str, text: str, wide: int = 95) -> None:
+def _titles(figure: Picture, title: str, text: str, wide: int = 95) -> None:
     """Write a title, and a line below it."""
     height = float(figure.get_figheight())
-    figure.text(
-        0.02, 1.0 - 0.28 / height, title,
-        fontsize=style.LARGE, fontweight="bold", verticalalignment="center",
-    )  # fmt: skip
+    figure.headline(0.02, 1.0 - 0.28 / height, title, 70)
     figure.text(
         0.02, 1.0 - 0.47 / height, fill(text, wide),
         fontsize=style.NORMAL, color=style.MUTED, verticalalignment="top",
     )  # fmt: skip
-
-
-def _label(name: str, unit: str) -> str:
-    unit = _short(unit)
-    return f"{name}, {unit}" if unit else name
-
-
-def _short(unit: str) -> str:
-    return "°" if unit == "degrees" else unit
 
 
 def _scaled(largest: float, unit: str) -> tuple[float, str]:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from textwrap import shorten
 from typing import TYPE_CHECKING
 
-from chutelab.files import whole
+from chutelab.compare import scene_of
 from chutelab.plots import style
 from chutelab.plots.panels import (
     STREAM_TRACKS,
@@ -17,12 +15,14 @@ from chutelab.plots.panels import (
     draw_tracks,
     draw_velocity,
 )
-from chutelab.plots.picture import Picture
-from chutelab.plots.scenery import draw_scene, machine_of, scene_of
+from chutelab.plots.picture import DPI, Picture
+from chutelab.plots.scenery import draw_scene, machine_of
 from chutelab.plots.window import window_of
 from chutelab.theory import predict
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 
 SIZE = (13.0, 7.6)
 """Width and height of the figure, inches."""
-
-DPI = 120
 
 
 def overlay(
@@ -83,12 +81,10 @@ def overlay(
         handlelength=1.4,
         columnspacing=1.0,
     )
-    title = shorten(recording.title, 80, placeholder=" …")
-    figure.text(0.06, 0.965, title, fontsize=style.LARGE, fontweight="bold", va="center")
+    figure.headline(0.06, 0.965, recording.title)
     engine = figure.text(0.985, 0.965, _said(recording), fontsize=style.NORMAL, color=style.MUTED)
     engine.set(horizontalalignment="right", verticalalignment="center")
-    if path is not None:
-        save(figure, Path(path))
+    figure.write(path)
     return figure
 
 
@@ -98,15 +94,7 @@ def draw_view(ax: Axes, recording: Recording, parts: tuple[Arc, ...]) -> Axes:
     style.dress(ax, "x, m", "y, m")
     draw_scene(ax, machine, window_of(recording, machine))
     draw_tracks(draw_analytic(ax, parts), recording)
-    ax.legend(
-        loc="lower left",
-        bbox_to_anchor=(-0.01, 1.0),
-        ncols=4,
-        fontsize=style.SMALL,
-        frameon=False,
-        borderaxespad=0.3,
-        handlelength=2.2,
-    )
+    style.legend_above(ax, 4)
     return ax
 
 
@@ -117,9 +105,3 @@ def _said(recording: Recording) -> str:
     if recording.count > STREAM_TRACKS:
         said += f", {STREAM_TRACKS} tracks drawn"
     return said
-
-
-def save(figure: Figure, path: Path) -> None:
-    """Write a figure, whole or not at all."""
-    with whole(path) as unfinished:
-        figure.savefig(unfinished, format=path.suffix.lstrip(".") or "png")

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from chutelab.plots import style
-from chutelab.plots.figure import DPI, save
-from chutelab.plots.picture import Picture
+from chutelab.plots.picture import DPI, Picture
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -70,10 +70,8 @@ def paper_figure(found: PaperFigure, *, path: str | Path | None = None) -> Figur
             bbox_to_anchor=(0.985, 1.0 - 0.12 / height), ncols=4, fontsize=style.SMALL,
             frameon=False,
         )  # fmt: skip
-    figure.text(
-        0.02, 1.0 - 0.3 / height, f"Figure {found.number}: {found.title}",
-        fontsize=style.LARGE, fontweight="bold", verticalalignment="center",
-    )  # fmt: skip
+    title = f"Figure {found.number}: {found.title}"
+    figure.headline(0.02, 1.0 - 0.3 / height, title, 150)
     y = below - 0.65
     for i, text in enumerate(texts):
         figure.text(
@@ -81,8 +79,7 @@ def paper_figure(found: PaperFigure, *, path: str | Path | None = None) -> Figur
             color=style.INK if i < len(found.meaning) else style.MUTED,
         )  # fmt: skip
         y -= TEXT * (text.count("\n") + 1)
-    if path is not None:
-        save(figure, Path(path))
+    figure.write(path)
     return figure
 
 

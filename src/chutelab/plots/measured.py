@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from textwrap import shorten
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chutelab.measured.residuals import length
+from chutelab.compare import scene_of
 from chutelab.measured.result import plus_minus
 from chutelab.measured.track import counted
 from chutelab.plots import style
-from chutelab.plots.figure import DPI, SIZE, save
+from chutelab.plots.figure import SIZE
 from chutelab.plots.panels import analytic_of, draw_analytic
-from chutelab.plots.picture import Picture
+from chutelab.plots.picture import DPI, Picture
 from chutelab.plots.sampling import struck_by_nominal, subset, track_times
-from chutelab.plots.scenery import draw_scene, machine_of, scene_of
+from chutelab.plots.scenery import draw_scene, machine_of
 from chutelab.plots.window import FAR, around, window_of
 from chutelab.recording import Kind
+from chutelab.scene.units import write_size
 from chutelab.theory import predict
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -63,16 +64,14 @@ def measured(found: Residuals, fit: Fit | None = None, *, path: str | Path | Non
     draw_residuals(upper, found, 0)
     upper.set_xlabel("")
     draw_residuals(figure.add_subplot(grid[1]), found, 1)
-    title = shorten(found.recording.title, 60, placeholder=" …")
-    figure.text(0.06, 0.965, title, fontsize=style.LARGE, fontweight="bold", va="center")
+    figure.headline(0.06, 0.965, found.recording.title, 60)
     said = [] if fit is None else _said(fit)
     for i, text in enumerate(said or [f"{len(found.track)} measured points, nothing fitted"]):
         figure.text(
             0.985, 0.965 - 0.032 * i, text, fontsize=style.NORMAL, color=style.MUTED,
             horizontalalignment="right", verticalalignment="center",
         )  # fmt: skip
-    if path is not None:
-        save(figure, Path(path))
+    figure.write(path)
     return figure
 
 
@@ -120,10 +119,7 @@ def draw_measured(ax: Axes, found: Residuals, before: Recording | None = None) -
             transform=ax.transAxes, fontsize=style.NORMAL, color=style.STRIKE,
             horizontalalignment="center", verticalalignment="top",
         )  # fmt: skip
-    ax.legend(
-        loc="lower left", bbox_to_anchor=(-0.01, 1.0), ncols=3, fontsize=style.SMALL,
-        frameon=False, borderaxespad=0.3, handlelength=2.2,
-    )  # fmt: skip
+    style.legend_above(ax, 3)
     return ax
 
 
@@ -137,7 +133,7 @@ def draw_residuals(ax: Axes, found: Residuals, axis: int) -> Axes:
         ax,
         "time, s",
         f"residual in {name}, {unit}",
-        f"Measured − simulated {name}: RMS {length(rms)}",
+        f"Measured − simulated {name}: RMS {write_size(rms, 'm')}",
     )
     ax.axhspan(-factor * rms, factor * rms, color=style.STEEL_LIGHT, zorder=0.5, gid="rms")
     ax.axhline(0.0, color=style.TRACK, linewidth=1.6, zorder=2.0)

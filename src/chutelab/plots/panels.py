@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.collections import LineCollection
 
+from chutelab.compare import scene_of
 from chutelab.plots import style
 from chutelab.plots.analytic import arcs, flight
 from chutelab.plots.sampling import (
@@ -21,7 +22,7 @@ from chutelab.plots.sampling import (
     track_times,
     upright,
 )
-from chutelab.plots.scenery import scene_of, shown_particles
+from chutelab.plots.scenery import shown_particles
 from chutelab.recording import Kind
 
 if TYPE_CHECKING:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 
-from chutelab import scene as scenes
+from chutelab.compare import scene_of
 from chutelab.machine import build
 from chutelab.plots import style
 from chutelab.plots.sampling import spread
@@ -22,18 +21,12 @@ if TYPE_CHECKING:
 
     from chutelab.machine import Machine
     from chutelab.recording import Recording
-    from chutelab.scene import Scene
 
 HALO = [withStroke(linewidth=3.0, foreground="white")]
 """Keeps text readable where a line runs behind it."""
 
 TWO_LINES = 32.0
 """pt; height of two lines of small text."""
-
-
-def scene_of(recording: Recording) -> Scene:
-    """Return the validated scene that a recording carries."""
-    return scenes.from_dict(json.loads(recording.scene), recording.title)
 
 
 def machine_of(recording: Recording) -> Machine:

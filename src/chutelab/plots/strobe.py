@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from math import floor, log10
-from pathlib import Path
-from textwrap import shorten
 from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.transforms import Bbox
 
+from chutelab.compare import scene_of
 from chutelab.plots import style
-from chutelab.plots.figure import draw_view, save
+from chutelab.plots.figure import draw_view
 from chutelab.plots.panels import analytic_of
 from chutelab.plots.picture import Picture
 from chutelab.plots.sampling import round_times, strobe_step, subset
-from chutelab.plots.scenery import HALO, scene_of
+from chutelab.plots.scenery import HALO
 from chutelab.theory import predict
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.path import Path as MplPath
@@ -81,10 +82,8 @@ def strobe(
     ax = figure.add_axes((0.095, 0.09, 0.885, 0.77))
     draw_view(ax, recording, analytic_of(recording, prediction)[0])
     _write_times(ax, recording)
-    title = shorten(recording.title, 70, placeholder=" …")
-    figure.text(0.095, 0.955, title, fontsize=style.LARGE, fontweight="bold", va="center")
-    if path is not None:
-        save(figure, Path(path))
+    figure.headline(0.095, 0.955, recording.title, 70)
+    figure.write(path)
     return figure
 
 

@@ -1,7 +1,6 @@
 """Colours, text sizes and units that every picture shares.
 
-The colours are those of Okabe and Ito (2008), "Color Universal Design": told apart by readers with
-any common colour blindness. Each stands for one thing in every panel.
+Each of `chutelab.colours` stands for one thing in every panel.
 """
 
 from __future__ import annotations
@@ -9,30 +8,32 @@ from __future__ import annotations
 from math import floor, isfinite, log10
 from typing import TYPE_CHECKING
 
+from chutelab import colours
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 INK = "#000000"
 MUTED = "#595959"
 GRID = "#E3E3E3"
-STEEL = "#8C8C8C"
+STEEL = colours.GREY
 STEEL_LIGHT = "#E6E6E6"
 
-TRACK = "#0072B2"
-ANALYTIC = "#E69F00"
-BELT = "#009E73"
-STRIKE = "#D55E00"
-STREAM = "#56B4E9"
+TRACK = colours.BLUE
+ANALYTIC = colours.ORANGE
+BELT = colours.GREEN
+STRIKE = colours.VERMILION
+STREAM = colours.SKY
 
-VELOCITY = {"vx": "#0072B2", "vy": "#D55E00"}
+VELOCITY = {"vx": colours.BLUE, "vy": colours.VERMILION}
 
 ENERGY = {
     "start": "#BFBFBF",
-    "kinetic": "#E69F00",
-    "potential": "#56B4E9",
-    "belt_work": "#009E73",
-    "restitution_loss": "#D55E00",
-    "friction_loss": "#CC79A7",
+    "kinetic": colours.ORANGE,
+    "potential": colours.SKY,
+    "belt_work": colours.GREEN,
+    "restitution_loss": colours.VERMILION,
+    "friction_loss": colours.PURPLE,
     "residual": "#000000",
 }
 ENERGY_LABEL = {
@@ -90,6 +91,19 @@ def dress(ax: Axes, x: str = "", y: str = "", title: str = "") -> Axes:
     for side in ("top", "right"):
         ax.spines[side].set_visible(False)
     return ax
+
+
+def legend_above(ax: Axes, columns: int) -> None:
+    """Add a legend right above axes, in one line if it fits."""
+    ax.legend(
+        loc="lower left",
+        bbox_to_anchor=(-0.01, 1.0),
+        ncols=columns,
+        fontsize=SMALL,
+        frameon=False,
+        borderaxespad=0.3,
+        handlelength=2.2,
+    )
 
 
 def scientific(value: float, unit: str) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from pathlib import Path
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
@@ -11,11 +10,13 @@ import matplotlib as mpl
 import numpy as np
 
 from chutelab.plots import style
-from chutelab.plots.figure import DPI, save
-from chutelab.plots.picture import Picture
+from chutelab.plots.picture import DPI, Picture
+from chutelab.scene.units import with_unit
 from chutelab.sweep.columns import NUMBERS, REASON
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
@@ -69,13 +70,11 @@ def sweep_figure(swept: Sweep, column: str, *, path: str | Path | None = None) -
     else:
         draw_lines(ax, swept, column)
     figure.subplots_adjust(left=0.115, right=0.97, top=0.86, bottom=0.18)
-    title = shorten(swept.title, 80, placeholder=" …")
-    figure.text(0.03, 0.955, title, fontsize=style.LARGE, fontweight="bold", va="center")
+    figure.headline(0.03, 0.955, swept.title)
     figure.text(
         0.03, 0.03, _missing(swept, column), fontsize=style.SMALL, color=style.MUTED, va="center"
     )
-    if path is not None:
-        save(figure, Path(path))
+    figure.write(path)
     return figure
 
 
@@ -178,8 +177,7 @@ def _bar(ax: Axes, painted: Any, label: str) -> None:
 
 
 def _label(swept: Sweep, key: str) -> str:
-    unit = swept.unit(key)
-    return f"{key}, {'°' if unit == 'degrees' else unit}" if unit else key
+    return with_unit(key, swept.unit(key))
 
 
 def _axis(swept: Sweep, column: str) -> tuple[float, str]:

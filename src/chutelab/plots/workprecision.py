@@ -10,9 +10,9 @@ import matplotlib.patheffects as pe
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
+from chutelab import colours
 from chutelab.plots import style
-from chutelab.plots.figure import save
-from chutelab.plots.picture import Picture
+from chutelab.plots.picture import DPI, Picture
 from chutelab.workprecision import METHODS, cases
 from chutelab.workprecision.fit import exponent, points, work_slope
 
@@ -41,19 +41,17 @@ CHARACTERS = 14.0
 ERRORS = 1e-17, 0.2
 """Where the axes of relative errors end, the same for all cases."""
 
-DPI = 120
-
 LEAST = 1e-16
 """Errors are drawn no smaller: that is the last digit of a double."""
 
 LOOKS: dict[str, dict[str, Any]] = {
-    "plain": {"color": "#D55E00", "marker": "^", "markersize": 8.0},
-    "dop853": {"color": "#CC79A7", "marker": "D", "markersize": 6.5},
-    "fixed": {"color": "#E69F00", "marker": "s", "markersize": 9.0},
-    "aligned": {"color": "#009E73", "marker": "o", "markersize": 6.5},
-    "exact": {"color": "#0072B2", "marker": "*", "markersize": 15.0},
+    "plain": {"color": colours.VERMILION, "marker": "^", "markersize": 8.0},
+    "dop853": {"color": colours.PURPLE, "marker": "D", "markersize": 6.5},
+    "fixed": {"color": colours.ORANGE, "marker": "s", "markersize": 9.0},
+    "aligned": {"color": colours.GREEN, "marker": "o", "markersize": 6.5},
+    "exact": {"color": colours.BLUE, "marker": "*", "markersize": 15.0},
 }
-"""Colour (Okabe and Ito) and marker of each method: two signs, for readers who tell colours apart
+"""Colour and marker of each method: two signs, for readers who tell colours apart
 badly. In the order of drawing: of two at one place, the upper is the smaller."""
 
 HALO = [pe.withStroke(linewidth=3.0, foreground="white")]
@@ -96,8 +94,7 @@ def workprecision(
         )  # fmt: skip
     used = [name for name in METHODS if any(one.method == name for one in records)]
     _explain(cells[-1], used)
-    if path is not None:
-        save(figure, path)
+    figure.write(path)
     return figure
 
 
@@ -143,8 +140,7 @@ def scaling(sizes: Sequence[Size], about: Mapping[str, str], *, path: Path | Non
         ):
             style.dress(ax, "particles", unit, f"{kind} particles: {unit.partition(',')[0]}")
             draw_sizes(ax, [one for one in sizes if one.case == case.name], case.name, what)
-    if path is not None:
-        save(figure, path)
+    figure.write(path)
     return figure
 
 
@@ -249,7 +245,7 @@ def _width(columns: int) -> float:
 
 def _page(
     lines: Sequence[int], columns: int, about: Mapping[str, str]
-) -> tuple[Figure, list[Axes]]:
+) -> tuple[Picture, list[Axes]]:
     """Return a figure with axes that have so many lines of text under them, and its foot."""
     below = [max(lines[k : k + columns]) for k in range(0, len(lines), columns)]
     heights = [TITLE + PANEL + LABEL + LINE * count for count in below]

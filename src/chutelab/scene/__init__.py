@@ -11,6 +11,7 @@
 - `overrides`: ``KEY=VALUE`` texts, as ``--set`` takes them, laid over a scene.
 - `loading`: read, parse, override, validate.
 - `editor`: the JSON Schema, for editors that complete scene files.
+- `paths`: values and limits at a key's full path.
 - `family`: many scenes that differ in numbers, as one.
 - `library`: the shipped scenes, found by name; the starter scene.
 """
@@ -19,7 +20,7 @@ from chutelab.scene.editor import schema
 from chutelab.scene.errors import MISSING, Fault, SceneError, shown
 from chutelab.scene.expectations import Expect
 from chutelab.scene.library import About, about, find, shipped, template
-from chutelab.scene.loading import from_dict, load, parse, to_dict
+from chutelab.scene.loading import from_dict, load, overridden, parse, to_dict
 from chutelab.scene.models import (
     Incoming,
     Outgoing,
@@ -51,6 +52,7 @@ __all__ = [
     "find",
     "from_dict",
     "load",
+    "overridden",
     "parse",
     "schema",
     "shipped",

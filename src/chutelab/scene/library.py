@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from chutelab.hints import did_you_mean
 from chutelab.scene.errors import Fault, SceneError
 
 _TITLE: Final = re.compile(r"""^title\s*=\s*["'](.*?)["']\s*(?:#.*)?$""", re.MULTILINE)
@@ -57,8 +57,7 @@ def find(name_or_path: str | Path) -> Path:
     if folder and source:
         text = "a directory; give a scene file, or the name of a shipped scene"
         raise SceneError(source, [Fault("", None, text)])
-    near = difflib.get_close_matches(path.stem, scenes, n=3)
-    advice = f"did you mean {' or '.join(near)}?" if near else f"there are {', '.join(scenes)}"
+    advice = did_you_mean(path.stem, scenes, f"there are {', '.join(scenes)}", most=3)
     text = f"no such file, and no shipped scene of this name; {advice}"
     raise SceneError(source or '""', [Fault("", None, text)])
 

@@ -94,6 +94,17 @@ def from_dict(
     return scene
 
 
+def overridden(scene: Scene, overrides: Sequence[str]) -> Scene:
+    """Return a scene with overrides laid over it, validated anew.
+
+    Raises
+    ------
+    SceneError
+        If it refuses a value, or two that do not go together.
+    """
+    return from_dict(to_dict(scene), scene.source, overrides)
+
+
 def to_dict(scene: Scene) -> dict[str, Any]:
     """Return the keys that were set, nested as in the file: `from_dict` makes the scene again."""
     return scene.model_dump(by_alias=True, exclude_unset=True)

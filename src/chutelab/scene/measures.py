@@ -7,8 +7,9 @@ there has one entry a particle; a name stands for particle 0's, and with ``.mean
 
 from __future__ import annotations
 
-import difflib
 from typing import TYPE_CHECKING, Final
+
+from chutelab.hints import did_you_mean
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -100,8 +101,7 @@ def suggestion(name: str, surfaces: Iterable[str]) -> str:
     for tables in (*([table] for table in absent), absent):
         if tables and unit_of(name, [*known, *tables]) is not None:
             return f"it needs {' and '.join(f'[{table}]' for table in tables)}"
-    near = difflib.get_close_matches(name, list(_names(known)), n=1, cutoff=_NEAR)
-    return f"did you mean {near[0]}?" if near else f"there are {_families(known)}"
+    return did_you_mean(name, _names(known), f"there are {_families(known)}", cutoff=_NEAR)
 
 
 def _names(surfaces: list[str]) -> Iterator[str]:

@@ -51,6 +51,24 @@ def read_size(text: str) -> tuple[float, str]:
     return number, unit
 
 
+def symbol(unit: str) -> str:
+    """Return a unit as tables and pictures have it.
+
+    >>> symbol("degrees"), symbol("m/s")
+    ('°', 'm/s')
+    """
+    return "°" if unit == "degrees" else unit
+
+
+def with_unit(name: str, unit: str) -> str:
+    """Return a name with its unit, for the head of a column or an axis.
+
+    >>> with_unit("plate.angle_deg", "degrees"), with_unit("plate.restitution", "")
+    ('plate.angle_deg, °', 'plate.restitution')
+    """
+    return f"{name}, {symbol(unit)}" if unit else name
+
+
 def write_size(number: float, unit: str, digits: int = 3) -> str:
     """Write a size with the prefix that makes it easiest to read; a share as a bare number.
 
@@ -60,8 +78,7 @@ def write_size(number: float, unit: str, digits: int = 3) -> str:
     ('0.5 mm', '44 ns', '1e-16 m')
     """
     size = abs(number)
-    if unit == "degrees":
-        unit = "°"
+    unit = symbol(unit)
     if unit in ("m", "s", "J", "m/s") and 1e-10 <= size < 0.1:
         prefix = next(p for p in ("m", "µ", "n") if size >= 0.1 * _PREFIXES[p])
         return f"{number * round(1.0 / _PREFIXES[prefix]):.{digits}g} {prefix}{unit}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from difflib import get_close_matches
 from fnmatch import fnmatch
 from typing import TYPE_CHECKING
 
@@ -40,8 +41,11 @@ def chosen(names: Collection[str], *, full: bool = False) -> tuple[Case, ...]:
     known = cases(full=True)
     for pattern in names:
         if not any(_matches(case, pattern) for case in known):
+            near = get_close_matches(pattern, [case.name for case in known], n=3)
+            advice = f"did you mean {' or '.join(near)}? " if near else ""
             raise ValueError(
-                f"no case is called {pattern!r}; there are " + ", ".join(c.name for c in known)
+                f"no case is called {pattern!r}; {advice}chutelab stress --full --list"
+                f" names all {len(known)}, and * stands for anything"
             )
     return tuple(c for c in known if any(_matches(c, pattern) for pattern in names))
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from chutelab.scene.family import is_plain
+from chutelab.sweep import batch
 from chutelab.sweep.alone import alone
-from chutelab.sweep.batch import Batch
 from chutelab.sweep.columns import joined
 
 if TYPE_CHECKING:
@@ -44,5 +44,5 @@ class Block:
 def swept(block: Block) -> Columns:
     """Return the rows of a block: together where that can be, else one by one."""
     if all(is_plain(path) for path in block.paths):
-        return Batch(block).swept()
+        return batch.swept(block)
     return joined([alone(block, row) for row in range(len(block.values))])

@@ -10,9 +10,10 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from importlib.metadata import PackageNotFoundError, version
 from time import monotonic
 from typing import TYPE_CHECKING, Any, BinaryIO, Final, Self
+
+from chutelab.versions import version_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -48,19 +49,12 @@ def head_of(plan: Plan) -> dict[str, Any]:
         samples = hashlib.sha256(plan.samples.tobytes()).hexdigest()
     return {
         "format": FORMAT,
-        "chutelab": _version(),
+        "chutelab": version_of("chutelab"),
         "scene": json.loads(json.dumps(plan.document)),
         "vary": [[vary.key, list(vary.values)] for vary in plan.varies],
         "samples": samples,
         "engine": plan.engine,
     }
-
-
-def _version() -> str:
-    try:
-        return version("chutelab")
-    except PackageNotFoundError:
-        return "unknown"
 
 
 class Part:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from chutelab.frames import frame
 from chutelab.sheet import Sheet, Shown, number
 from chutelab.sweep.columns import NUMBERS, REASON
 from chutelab.sweep.table import write
@@ -22,6 +23,12 @@ if TYPE_CHECKING:
 
 MOST_REASONS = 5
 """Reasons that are listed."""
+
+PARTIAL = (
+    "belt_work, slip_heat and power are counted up to run.until. --set run.until=settled counts"
+    " them until nothing slips on the belt, as the theory, solve and --uncertainty do."
+)
+"""Said where runs may end before the slip does."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -39,12 +46,15 @@ class Sweep(Shown):
         (NaN where there is nothing to tell), then ``reason``: why there are no numbers, or not all.
     shape : tuple of int or None
         Values of each key in a grid, whose last key runs fastest; None for samples.
+    settled : bool
+        Whether all runs go on until nothing slips.
     """
 
     title: str
     quantities: Mapping[str, Quantity]
     columns: Mapping[str, NDArray[Any]]
     shape: tuple[int, ...] | None
+    settled: bool = False
 
     def __post_init__(self) -> None:
         for values in self.columns.values():
@@ -58,12 +68,8 @@ class Sweep(Shown):
         return self.quantities[column].unit if column in self.quantities else NUMBERS[column][1]
 
     def frame(self) -> Any:
-        """Return a pandas DataFrame; a varied key or a result is a column."""
-        try:
-            from pandas import DataFrame
-        except ImportError:
-            raise ImportError("a DataFrame needs pandas: pip install pandas") from None
-        return DataFrame(dict(self.columns))
+        """Return a pandas DataFrame; a varied key or a result is a column. Needs pandas."""
+        return frame(self.columns)
 
     def to_csv(self, path: str | Path) -> Path:
         """Write a CSV file, whole or not at all; NaN is an empty cell."""
@@ -84,8 +90,11 @@ class Sweep(Shown):
             low, high = float(known.min()), float(known.max())
             if name in self.quantities or low != high or low != 0.0:
                 rows.append((name, unit, number(low), number(high), f"{len(known):,}"))
+        notes = []
+        if not self.settled and np.any(np.nan_to_num(self.columns["slip_heat"])):
+            notes.append(PARTIAL)
         reasons = Counter(reason for reason in self.columns[REASON].tolist() if reason)
-        notes = [f"{count:,} × {reason}" for reason, count in reasons.most_common(MOST_REASONS)]
+        notes += [f"{count:,} × {reason}" for reason, count in reasons.most_common(MOST_REASONS)]
         if len(reasons) > MOST_REASONS:
             notes.append(f"and {len(reasons) - MOST_REASONS:,} other reasons")
         return Sheet(

@@ -39,7 +39,7 @@ def rows(recording: Recording, scene: Scene, variants: int = 1) -> Columns:
     Parameters
     ----------
     recording : Recording
-        Of one variant; or of as many as there are particles, from `chutelab.exact.run_family`.
+        Of one variant; or of as many as there are particles, each on a machine of its own.
     scene : Scene
         What was run: a family in the second case.
     variants : int
@@ -78,6 +78,10 @@ def rows(recording: Recording, scene: Scene, variants: int = 1) -> Columns:
     if scene.outgoing is not None:
         found["misses"] = (shape[1] - landed.reshape(shape).sum(axis=1)).astype(np.float64)
         _tell_misses(found[REASON], recording.ended.reshape(shape), ~landed.reshape(shape))
+        # Where it is varied, it is an array of numbers.
+        if isinstance(scene.run.until, str) and scene.run.until == "settled":
+            restless = landed & (recording.ended != REASONS.index("settled"))
+            _tell_restless(found[REASON], restless.reshape(shape).sum(axis=1), shape[1])
     found["error"] = deviation(recording, scene, shape)
     return found
 
@@ -120,3 +124,11 @@ def _tell_misses(reason: NDArray[Any], ended: NDArray[np.int8], missed: Bools) -
         if missed.shape[1] == 1:
             told = [FATES[fates[0]]]
         reason[row] = f"{of_all} missed the outgoing belt: {', '.join(told)}"
+
+
+def _tell_restless(reason: NDArray[Any], restless: NDArray[Any], of: int) -> None:
+    """Say that what the belt pays is not all, where a run until settled ended before that."""
+    for row in np.flatnonzero(restless).tolist():
+        who = f"{restless[row]} of {of} particles" if of > 1 else "it"
+        more = f"{who} landed, but never came to rest on a belt: belt_work has only a part"
+        reason[row] = f"{reason[row]}; {more}" if reason[row] else more

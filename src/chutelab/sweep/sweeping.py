@@ -193,4 +193,5 @@ def _gathered(plan: Plan, blocks: Sequence[Columns]) -> Sweep:
         quantities=dict(zip(plan.keys, plan.quantities, strict=True)),
         columns=joined(blocks),
         shape=None if plan.samples is not None else tuple(len(v.values) for v in plan.varies),
+        settled=plan.document.get("run", {}).get("until") == "settled",
     )

@@ -32,10 +32,13 @@ def format_of(path: str | Path) -> str:
     Raises
     ------
     TableError
-        If it is none that is known, or what it needs is not installed; or it is a folder.
+        If it is none that is known, or what it needs is not installed; or it is a folder, or in one
+        that is not there.
     """
     if Path(path).is_dir():
         raise TableError(f"{path} is a folder, not a file")
+    if not (folder := Path(path).parent).is_dir():
+        raise TableError(f"{path}: there is no folder {folder}")
     found = SUFFIXES.get(Path(path).suffix.lower())
     if found is None:
         raise TableError(f"{path}: the name of a table ends with {' or '.join(SUFFIXES)}")

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import platform
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+
+from chutelab.versions import version_of
 
 PACKAGES = ("chutelab", "numpy", "pymunk", "scipy")
 
@@ -21,12 +22,8 @@ def environment() -> dict[str, str]:
         "system": platform.system(),
         "python": f"{platform.python_implementation()} {platform.python_version()}",
     }
-    for package in PACKAGES:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            continue
-    return found
+    versions = {package: version_of(package) for package in PACKAGES}
+    return found | {package: version for package, version in versions.items() if version}
 
 
 def _processor() -> str:

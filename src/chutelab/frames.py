@@ -31,7 +31,7 @@ def frame(columns: Mapping[str, NDArray[Any]]) -> Any:
     return pandas.DataFrame(dict(columns))
 
 
-def text(columns: Mapping[str, NDArray[Any]]) -> str:
+def csv_text(columns: Mapping[str, NDArray[Any]]) -> str:
     """Return named columns of one length as CSV; NaN is an empty cell."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")

@@ -26,7 +26,7 @@ half of what it was then."""
 MOST = 200
 """Impacts of a particle lately, beyond which it does not bounce any more."""
 
-LOAD = 100, 0.1
+LOAD = 100, 0.05
 """Impacts of all particles lately, at least and per particle, beyond which each counts for more:
 some tens are resolved within the time of a step of pymunk's and its books."""
 

@@ -239,7 +239,7 @@ def test_a_handful_of_colliding_particles_is_no_chaos():
 
 
 def test_a_heap_is_chaotic_and_its_mean_is_what_can_be_known():
-    scene = sc.load("stream", ["stream.count=40"])
+    scene = sc.load("stream", ["stream.count=60"])
     recording, found = reach(scene, "1um")
     assert found.chaotic
     assert not found.met
@@ -247,12 +247,11 @@ def test_a_heap_is_chaotic_and_its_mean_is_what_can_be_known():
     assert found.worst == "mean landing point"
     assert found.method.startswith("chaotic: ")
     # Another stir of the same size: within what was said, or nearly.
-    stir = 3e-9
-    other = simulate(disturbed(with_step(scene, found.dt), stir))
+    other = simulate(disturbed(with_step(scene, found.dt), 3e-9))
     means = [next(iter(together(run))).values[0] for run in (recording, other)]
     assert abs(means[0] - means[1]) <= 5.0 * found.reached
-    # On the way of some particle the stir, of metres at most, grows a thousandfold and more.
-    assert difference(other, recording, "m") > 1e3 * stir
+    # The ways of its particles are not known at all.
+    assert difference(other, recording, "m") > 1e-4
 
 
 # The parts.

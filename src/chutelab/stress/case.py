@@ -21,9 +21,6 @@ if TYPE_CHECKING:
 ENGINES = ("exact", "pymunk", "fixed")
 """``fixed`` is pymunk with run.align = false: every step lasts dt."""
 
-STUCK = "stuck"
-"""What an engine may say of a scene instead of a key: that a particle gets no further."""
-
 STEPS = (1e-3, 1.0 / 30.0)
 """s; pymunk's default, and two frames of a game."""
 
@@ -105,8 +102,7 @@ class Case:
     refusals : mapping of str to str
         Engines that must refuse the scene, and the key that they have to name.
     may_refuse : mapping of str to str
-        Engines that may do so instead of keeping the laws; `STUCK` instead of a key allows a
-        `StalledError`.
+        Engines that may do so instead of keeping the laws.
     ends : tuple of str
         How particles may end, empty: in any way.
     inside : tuple of float or None

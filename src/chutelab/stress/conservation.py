@@ -84,8 +84,7 @@ def _energy_bound(e: Evidence) -> float:
 
     Contacts round it. In pymunk a lone particle's is moved, besides, where an overlap of a step is
     parted: each contact by the weight times what `Evidence.late` says of a particle that was at
-    rest, as impulses are booked to the last bit. A belt that grips on a slope holds a particle half
-    a step longer than it lies there: by the weight times what the belt climbs in that time.
+    rest, as impulses are booked to the last bit.
     """
     rounding = EPS * (ROUNDINGS + A_CONTACT * e.recording.contacts)
     if e.dt is None:
@@ -96,8 +95,6 @@ def _energy_bound(e: Evidence) -> float:
 
     m = e.machine
     sunk = SLOP * m.particle.radius + m.gravity * e.dt**2
-    climb = np.abs(m.segments.speed * m.segments.tangent[:, 1]).max(initial=0.0)
-    sunk += 0.5 * e.dt * float(climb)
     touched = max(1, e.recording.contacts)
     return rounding + touched * m.particle.mass * m.gravity * sunk / e.energy
 

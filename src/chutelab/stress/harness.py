@@ -7,10 +7,9 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 from chutelab.machine import build
-from chutelab.recorder import StalledError
 from chutelab.scene import SceneError
 from chutelab.simulation import simulate
-from chutelab.stress.case import ENGINES, STUCK, scene_of
+from chutelab.stress.case import ENGINES, scene_of
 from chutelab.stress.demands import demands, order, symmetric
 from chutelab.stress.evidence import Evidence, Verdict
 from chutelab.stress.laws import LAWS
@@ -149,8 +148,6 @@ class _Run:
             allowed = expected or self.case.may_refuse.get(self.engine, "")
             named = any(fault.key == allowed for fault in error.faults)
             return self._result(REFUSED, named, said)
-        if isinstance(error, StalledError) and self.case.may_refuse.get(self.engine) == STUCK:
-            return self._result(REFUSED, True, said)
         return self.failed(REFUSED if expected else RUNS, f"{type(error).__name__}: {said}")
 
     def failed(self, law: str, detail: str) -> Result:

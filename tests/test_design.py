@@ -375,7 +375,7 @@ BAD = [
     (("--vary", "stream.count=1:5", *AIM), "whole number"),
     (("--vary", "run.engine=0:1", *AIM), "no number"),
     (("--vary", "surface.hood.speed=0:1", *AIM), "no [[surface]]"),
-    ((*VARY, *VARY, *AIM), "varied already"),
+    ((*VARY, *VARY, *AIM), "given already"),
     ((*VARY, "--target", "landing.vx"), "must be QUANTITY=VALUE"),
     ((*VARY, "--target", "landing.vxx=1"), "no such quantity"),
     ((*VARY, "--target", "landing.vx=1m"), "in m/s"),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import isfinite
 from typing import TYPE_CHECKING, Final
 
-from chutelab.design.errors import DesignError
+from chutelab.design.errors import DesignError, each_once
 from chutelab.scene import Scene, SceneError, overridden
 from chutelab.scene.paths import value_at
 from chutelab.variation import parse_range, quantity, reason, setting
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 
 FORM: Final = "must be KEY=FROM:TO, such as plate.angle_deg=0:80"
+
+ASK = f"say what may vary; it {FORM}"
 
 MOST: Final = 8
 """Keys that may vary at once: beyond, a search over the whole range takes too long to be one."""
@@ -65,17 +67,7 @@ def ranges(scene: Scene, texts: Sequence[str]) -> tuple[Span, ...]:
         If a range cannot be read, is empty, goes beyond what the scene allows, or is of a key that
         is unknown, no continuous number, or given twice.
     """
-    if not texts:
-        raise DesignError("--vary", f"say what may vary; it {FORM}")
-    if len(texts) > MOST:
-        raise DesignError(f"--vary {texts[MOST]}", f"at most {MOST} keys can be varied")
-    found: list[Span] = []
-    for text in texts:
-        one = _read(scene, text)
-        if any(one.key == other.key for other in found):
-            raise DesignError(f"--vary {text}", f"{one.key} is varied already")
-        found.append(one)
-    return tuple(found)
+    return each_once("--vary", texts, lambda text: _read(scene, text), ASK, MOST)
 
 
 def _read(scene: Scene, text: str) -> Span:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
-from chutelab.design.errors import DesignError, scipy
+from chutelab.design.errors import DesignError, each_once, scipy
 from chutelab.design.ranges import INSIDE, varied, without_source
 from chutelab.scene import Scene, SceneError
 from chutelab.scene.paths import limits_of, parts_of, rule_at, value_at
@@ -30,6 +30,8 @@ FORM: Final = (
     "must be KEY=MEAN±SPREAD, such as restitution=0.5±0.05 or incoming.speed=2+-1% (or ±SPREAD"
     " alone, around the scene's value); :uniform at the end makes SPREAD a half-width"
 )
+
+ASK = f"say what is uncertain; it {FORM}"
 
 LAWS: Final = ("normal", "uniform")
 
@@ -106,17 +108,7 @@ def spreads(scene: Scene, texts: Sequence[str]) -> tuple[Spread, ...]:
     DesignError, VaryError
         If one cannot be read, or is of a key that is unknown, no continuous number, or given twice.
     """
-    if not texts:
-        raise DesignError("--uncertainty", f"say what is uncertain; it {FORM}")
-    if len(texts) > MOST:
-        raise DesignError(f"--uncertainty {texts[MOST]}", f"at most {MOST} inputs are allowed")
-    found: list[Spread] = []
-    for text in texts:
-        one = _read(scene, text)
-        if any(one.key == other.key for other in found):
-            raise DesignError(f"--uncertainty {text}", f"{one.key} is given already")
-        found.append(one)
-    return tuple(found)
+    return each_once("--uncertainty", texts, lambda text: _read(scene, text), ASK, MOST)
 
 
 def _read(scene: Scene, text: str) -> Spread:

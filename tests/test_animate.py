@@ -294,7 +294,7 @@ def test_contact_normal_is_that_of_the_plate(name: str, angle: float, overrides:
     recording = simulate(scene.load(name, [*overrides, "plate.restitution=0.4"]))
     (hit,) = recording.select(Kind.IMPACT, surface="plate")
     normal = -np.cos(np.radians(angle)), -np.sin(np.radians(angle))
-    assert contact_normal(machine_of(recording), hit) == pytest.approx(normal, abs=1e-9)
+    assert contact_normal(machine_of(recording), hit) == pytest.approx(normal, abs=1e-14)
     said = float(sentence(recording, hit).partition(", ε = ")[2].partition("\n")[0])
     # A fixed step mixes a step's gravity into the velocities.
     assert said == pytest.approx(0.4, abs=0.02 if "run.align=false" in overrides else 0.0)
@@ -313,7 +313,7 @@ def test_contact_normal_points_away_from_a_clipped_end() -> None:
     end = np.array([0.6, -0.3])
     assert np.hypot(*(hit["position"] - end)) == pytest.approx(0.02, rel=1e-9)
     expected = (hit["position"] - end) / 0.02
-    assert contact_normal(machine_of(recording), hit) == pytest.approx(expected, abs=1e-9)
+    assert contact_normal(machine_of(recording), hit) == pytest.approx(expected, abs=1e-14)
 
 
 def test_separation_is_told_by_its_angle(runs: dict[str, Recording]) -> None:

@@ -53,7 +53,8 @@ def contact_normal(machine: Machine, event: Any) -> NDArray[np.float64]:
         if abs(rim - pulley.radius) < gap.min():
             return np.asarray(position / rim)
     nearest = int(np.argmin(gap))
-    if gap[nearest] > 0.5 * machine.particle.radius > 0.0:
+    beyond = not 0.0 <= along[nearest] <= segments.length[mine][nearest]
+    if beyond and gap[nearest] > 0.5 * machine.particle.radius > 0.0:
         return np.asarray(away[nearest] / gap[nearest])
     normal = np.array([-tangent[nearest][1], tangent[nearest][0]])
     return normal if normal @ event["velocity_before"] < 0.0 else -normal

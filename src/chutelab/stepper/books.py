@@ -1,9 +1,4 @@
-"""Contacts that last or come together: what each step's impulses did, and to whom it is booked.
-
-In a step pymunk changes a body's velocity from w to w', half a step ahead of the time on the clock.
-Seen as a jump of the true velocity at the end of the step, from v to v', the sum v + v' is w + w'
-whatever gravity does: J·(w + w')/2 is the work of an impulse to the last bit, at rest as in a blow.
-"""
+"""Contacts that last or come together: what a step did, in knots, events and the ledger."""
 
 from __future__ import annotations
 
@@ -15,6 +10,7 @@ from numpy.typing import NDArray
 
 from chutelab.recording import Kind
 from chutelab.stepper.curves import follow
+from chutelab.stepper.entries import book
 from chutelab.stepper.impacts import FAINT
 from chutelab.stepper.tracks import CARRIED, FLYING
 
@@ -103,6 +99,7 @@ def settle_books(run: Run, contacts: Contacts, x: Floats, motion: Floats, t: flo
     )
     smooth = ~shock
     bend, hit = who[smooth], who[shock]
+    # The mean of the velocities before and after is that halfway through the step's impulses.
     k.go_smoothly(bend, t, x[bend], after[bend] - 0.5 * deeds.change[smooth])
     if len(hit):
         # A flight comes in with the true velocity, half a step on from pymunk's.
@@ -110,7 +107,7 @@ def settle_books(run: Run, contacts: Contacts, x: Floats, motion: Floats, t: flo
         came[:, :2] += 0.5 * run.dt * run.gravity * flew[shock, None]
         k.close(hit)
         k.knot(hit, t, x[hit], came[:, :2], came[:, 2])
-    _book(run, contacts, deeds, after)
+    book(run, contacts, deeds, after)
     k.knot(hit, t, x[hit], after[hit, :2], after[hit, 2])
     _events(run, contacts, deeds, x, before, after, t)
 
@@ -143,36 +140,6 @@ def _deeds(run: Run, contacts: Contacts, x: Floats, motion: Floats) -> Deeds:
         belt, before_n, before_t, after_n, after_t, np.maximum(np.abs(after_n), np.abs(after_t)),
         rounded, uses, who, motion[1, who] - motion[0, who],
     )  # fmt: skip
-
-
-def _book(run: Run, contacts: Contacts, deeds: Deeds, after: Floats) -> None:
-    """Book contacts; what two particles lose is shared, what a carried one gives is belt work."""
-    i, j, count = contacts.first, contacts.other, run.count
-    carried = run.tracks.mode == CARRIED
-    share = np.full(len(i), -0.5)
-    held = carried[j[contacts.pairs]]
-    share[contacts.pairs[~held]] = -0.25
-    entries = np.empty((len(i), 3))
-    entries[:, 0] = contacts.j_t * deeds.belt
-    entries[:, 1] = share * contacts.j_n * (deeds.before_n + deeds.after_n)
-    entries[:, 2] = share * contacts.j_t * (deeds.before_t + deeds.after_t)
-    # Twice each: for the first, and for the partner.
-    sums = np.bincount(
-        (3 * np.concatenate([i, j])[:, None] + np.arange(3)).ravel(),
-        np.concatenate([entries, entries]).ravel(),
-        3 * len(after),
-    ).reshape(-1, 3)
-    book = run.recorder
-    if np.count_nonzero(held):
-        rows = contacts.pairs[held]
-        sums[carried.nonzero()[0]] = 0.0
-        (nx, ny), (u, v, _) = contacts.normal[rows].T, after[j[rows]].T
-        given = contacts.j_n[rows] * (u * nx + v * ny) + contacts.j_t[rows] * (u * ny - v * nx)
-        book.book(run.ids[i[rows]], 0, given)
-    book.entries[run.ids] += sums[:count]
-    on_solids = sums[count:]
-    np.add.at(book.by_surface, run.solids.surface, on_solids)
-    book.by_surface[run.particles] += sums[:count].sum(axis=0) - on_solids.sum(axis=0)
 
 
 def _events(

@@ -16,6 +16,7 @@ from chutelab.recording import Kind
 from chutelab.stepper.books import SETTLED, STILL
 from chutelab.stepper.carriage import Carriage, Carriages, carriage
 from chutelab.stepper.clash import Clashes
+from chutelab.stepper.entries import end_contacts
 from chutelab.stepper.forecast import Forecast
 from chutelab.stepper.impacts import particle_partner, solid_partner, strike
 from chutelab.stepper.kick import kick
@@ -228,8 +229,7 @@ class _Loop:
 
     def _end_settled(self, who: Ints, t: float) -> None:
         r, k = self.run_state, self.run_state.tracks
-        r.idle.wake(who)
-        k.close(who)
+        end_contacts(r, who)
         r.event(Kind.SETTLE, who, t, k.x[who], k.v[who], k.omega[who], r.stays.on[who])
         r.finish(who, "settled")
 
@@ -284,8 +284,7 @@ class _Loop:
         """End what is left."""
         r, k = self.run_state, self.run_state.tracks
         resting = (k.mode == RESTING).nonzero()[0]
-        r.idle.wake(resting)
-        k.close(resting)
+        end_contacts(r, resting)
         flying = (k.mode == FLYING).nonzero()[0]
         if len(flying):
             x, v = k.flight(flying, end)

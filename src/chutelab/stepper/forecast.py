@@ -16,6 +16,7 @@ from chutelab.stepper.idle import QUIET
 from chutelab.stepper.meetings import meeting, neighbours
 from chutelab.stepper.solids import WEDGED
 from chutelab.stepper.tracks import CARRIED, DONE, FLYING, RESTING, WAITING
+from chutelab.stepper.wedge import hold_fast
 
 if TYPE_CHECKING:
     from chutelab.stepper.outline import Outline, Touch
@@ -114,11 +115,15 @@ class Forecast:
         """Foretell what solid a particle meets; return when, or inf."""
         k = self._run.tracks
         x, y, vx, vy = k.state(i, now)
-        short = hypot(vx, vy) * self._run.dt < WEDGED * self._run.radius
-        if short and k.mode[i] == RESTING and self._run.crowd.impacts[i] > MOST:
+        speed = hypot(vx, vy)
+        worn_out = k.mode[i] == RESTING and self._run.crowd.impacts[i] > MOST
+        if worn_out and speed * self._run.dt < WEDGED * self._run.radius:
             # Two faces that drive it into each other are left to the step.
             return inf
         touch = self._outline.first(x, y, vx, vy, span)
+        if worn_out and self._run.count == 1 and touch.t * speed <= NEAR * self._run.radius:
+            hold_fast(self._run, i, touch.solid)
+            return inf
         if k.mode[i] == RESTING:
             self._safe_until[i] = -inf
             fall = vy - touch.t * self._run.machine.gravity
@@ -224,7 +229,9 @@ class Forecast:
         run, out = self._run, inf
         x, y, *velocity = path
         asleep, near = run.idle.asleep[i], NEAR * run.radius
-        force = run.idle.acceleration(i) if asleep else (0.0, 0.0)
+        force = (0.0, 0.0)
+        if asleep:
+            velocity, force = run.tracks.w[i].tolist(), run.idle.acceleration(i)
         pace = max(hypot(*velocity), self._fastest)
         for gap, approach, pull in self._outline.around(x, y, (velocity[0], velocity[1]), force):
             if asleep:

@@ -98,13 +98,18 @@ class Idle:
         new = who[~awake[who]]
         if not len(new):
             return
-        self.asleep[new], self._slides[new], self._pays[new] = True, False, False
-        self._until[new] = np.inf
-        self._change[new[~alone[new]]] = 0.0
+        kept = self._change[new] * alone[new, None]
+        self.hold(new)
+        self._change[new] = kept
         supported = fixed[~awake[i[fixed]]]
         left = self._way_left(i[supported], j[supported] - run.count)
         np.minimum.at(self._until, i[supported], left)
         self._slide(contacts, flat[~awake[i[flat]]], deeds)
+
+    def hold(self, who: Ints) -> None:
+        """Put particles to sleep as they move, for good, and at no cost."""
+        self.asleep[who], self._slides[who], self._pays[who] = True, False, False
+        self._until[who], self._change[who] = np.inf, 0.0
 
     def _slide(self, contacts: Contacts, rows: Ints, deeds: Deeds) -> None:
         """Note what sliding costs, and when it ends."""
@@ -170,6 +175,11 @@ class Idle:
             # Seen from halfway between two steps, as what is stepped.
             motion = np.column_stack([k.w[who], k.spin[who]]) - 0.5 * self._change[who]
             k.hold(who, k.from_t[who], k.from_x[who], motion)
+            # Half of what the last step paid: slip and what it pays change evenly.
+            dues = self._dues[who] * self._pays[who, None]
+            k.ahead[who] = 0.0
+            k.ahead[who, 0] = 0.5 * dues[:, 0]
+            k.ahead[who, 2] = 0.5 * dues[:, 1] - 0.375 * dues[:, 2]
 
     def disturb(self, i: int) -> None:
         """Wake a particle that is hit, and what touches it."""

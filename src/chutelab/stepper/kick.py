@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.recorder import StalledError
 from chutelab.stepper.books import settle_books
-from chutelab.stepper.solids import WEDGED
 from chutelab.stepper.tracks import CARRIED, FLYING, RESTING
+from chutelab.stepper.wedge import hold_fast, squeezed
 
 if TYPE_CHECKING:
     from chutelab.stepper.state import Run
@@ -38,8 +37,9 @@ def kick(run: Run, carried: Mask, t0: float, t: float) -> None:
     _enter(run, resting | flying, carried, t)
     run.world.step(run.dt)
     contacts = run.world.contacts()
-    if contacts is not None and run.count == 1 and run.machine.align:
-        _refuse_wedged(run, contacts, t)
+    if contacts is not None and run.count == 1 and run.machine.align and squeezed(run, contacts):
+        hold_fast(run, 0, int(contacts.other[0]) - run.count)
+        return
     lost = resting.copy()
     if contacts is not None:
         lost[contacts.first] = False
@@ -51,28 +51,6 @@ def kick(run: Run, carried: Mask, t0: float, t: float) -> None:
         return
     _resolve(run, contacts, flying | lost, t)
     run.go_on((k.mode == RESTING) & (resting | flying), t)
-
-
-def _refuse_wedged(run: Run, contacts: Contacts, t: float) -> None:
-    """Refuse what no rigid disk can follow: surfaces that drive a lone one into each other.
-
-    Raises
-    ------
-    StalledError
-        If it is in a solid by more than `WEDGED` of its radius.
-    """
-    row = int(contacts.depth.argmax())
-    if contacts.depth[row] <= WEDGED * run.radius:
-        return
-    i, solid = int(contacts.first[row]), int(contacts.other[row]) - run.count
-    name = run.machine.surfaces[run.solids.surface[solid]]
-    x, y, _, _ = run.tracks.state(i, t)
-    reason = (
-        f'it is pressed {contacts.depth[row]:.3g} m into "{name}" between surfaces that move or '
-        "grip so that no rigid disk could pass, where a real drive would stall; change their "
-        "speeds, friction or angle"
-    )
-    raise StalledError(int(run.ids[i]), t, (x, y), reason)
 
 
 def _enter(run: Run, free: Mask, carried: Mask, t: float) -> None:

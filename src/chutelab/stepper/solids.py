@@ -32,7 +32,7 @@ contact. The pulley is smaller by twice as much: what lies a hair inside the bel
 behind x = 0."""
 
 WEDGED = 0.1
-"""Share of the radius; impacts end steps, so that only a wedge brings a lone disk so deep."""
+"""Share of the radius; what faces drive into each other is stepped if a step leads less far."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -57,6 +57,8 @@ class Run:
         Steps in a row without slip on a surface to settle on.
     touching : ndarray
         Keys of the contacts a step ago, sorted.
+    ahead : tuple of ndarray, (M,), (M,) and (M, 3)
+        Particles, surfaces and entries (J) of the second half of the last step's impulses.
     settles_on : ndarray of bool, (K,)
         Solids at rest, and the outgoing belt.
     start, now : float
@@ -109,6 +111,7 @@ class Run:
         self.stays = Stays(self)
         self.calm = np.zeros(count, dtype=np.int64)
         self.touching = np.empty(0, dtype=np.int64)
+        self.ahead: tuple[Ints, Ints, Floats] = self.touching, self.touching, np.empty((0, 3))
         self.inside = np.zeros(count, dtype=bool)
         self.version = np.zeros(count, dtype=np.int64)
         self.fresh: list[int] = []

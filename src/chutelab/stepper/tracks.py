@@ -59,6 +59,10 @@ class Tracks:
         Solid on whose flat face alone a particle in contact lies, or -1.
     exit : ndarray, (N,)
         s; when a flight leaves the scene, inf if it never does.
+    held : ndarray of bool, (N,)
+        In contact, with a last state that is no knot (yet).
+    ahead : ndarray, (N, 3)
+        Entries (J) booked beyond that state: it is halfway through a step's impulses.
     """
 
     def __init__(self, machine: Machine, recorder: Recorder, ids: Ints) -> None:
@@ -78,7 +82,7 @@ class Tracks:
         self.upon = np.zeros((count, 2))
         self.face = np.full(count, -1)
         self.exit = np.full(count, np.inf)
-        self._held = np.zeros(count, dtype=bool)
+        self.held, self.ahead = np.zeros(count, dtype=bool), np.zeros((count, 3))
         self._held_t, self._held_x, self._held_v = (
             np.zeros(count), np.zeros((count, 2)), np.zeros((count, 3))
         )  # fmt: skip
@@ -98,10 +102,13 @@ class Tracks:
         self, i: int, t: float, x: float, y: float, vx: float, vy: float, omega: float
     ) -> None:
         """Write a knot for one particle."""
-        self._knot[i] = t, x, y, vx, vy, omega
         n = int(self.ids[i])
+        self._write(i, n, (t, x, y, vx, vy, omega), self._recorder.entries[n])
+
+    def _write(self, i: int, n: int, state: tuple[float, ...], entries: Floats) -> None:
+        self._knot[i] = state
         self._owners.append(n)
-        self._knots.extend((t, x, y, vx, vy, omega, *self._recorder.entries[n].tolist()))
+        self._knots.extend((*state, *entries.tolist()))
 
     def flush(self) -> None:
         """Hand over the knots written."""
@@ -159,7 +166,7 @@ class Tracks:
     def rest(self, who: Ints | int) -> None:
         """Keep particles in contact from their last knots on."""
         self.mode[who], self.exit[who] = RESTING, np.inf
-        self._held[who] = self._bend_known[who] = False
+        self.held[who] = self._bend_known[who] = False
 
     def leave(self, who: Ints | int, x: ArrayLike, w: ArrayLike, omega: ArrayLike) -> None:
         """Note the states in which pymunk leaves particles in contact."""
@@ -208,7 +215,7 @@ class Tracks:
         off = (np.abs(off_x) > KNOT_POSITION * self._radius).any(axis=1)
         off |= (np.abs(off_v) * self._lever > KNOT_SPEED).any(axis=1)
         if np.count_nonzero(off):
-            turn = (off & self._held[who]).nonzero()[0]
+            turn = (off & self.held[who]).nonzero()[0]
             them = who[turn]
             self.close(them)
             last = self._knot[them]
@@ -217,27 +224,27 @@ class Tracks:
 
     def hold(self, who: Ints, t: ArrayLike, x: Floats, motion: Floats) -> None:
         """Remember states as knots that may not be needed."""
-        self._held[who] = True
+        self.held[who] = True
         self._held_t[who], self._held_x[who], self._held_v[who] = t, x, motion
 
     def give_up(self, i: int, t: float) -> None:
         """Write the last state of a particle in contact if it is from before t, else forget it."""
         if self._held_t[i] < t:
             self.close_one(i)
-        self._held[i] = False
+        self.held[i] = False
 
     def close(self, who: Ints) -> None:
         """Write the last states of particles in contact, if they are not knots yet."""
-        for i in who[self._held[who]].tolist():
+        for i in who[self.held[who]].tolist():
             self.close_one(i)
 
     def close_one(self, i: int) -> None:
         """Write the last state of one particle in contact, if it is not a knot yet."""
-        if self._held[i]:
-            self._held[i] = False
-            self.mark(
-                i, float(self._held_t[i]), *self._held_x[i].tolist(), *self._held_v[i].tolist()
-            )
+        if self.held[i]:
+            self.held[i] = False
+            state = float(self._held_t[i]), *self._held_x[i].tolist(), *self._held_v[i].tolist()
+            n = int(self.ids[i])
+            self._write(i, n, state, self._recorder.entries[n] - self.ahead[i])
 
     def finish(self, who: Ints, reason: str) -> None:
         """End tracks at their last knots."""

@@ -279,7 +279,8 @@ def test_a_method_that_is_not_installed_is_shown(monkeypatch):
     missing = replace(METHODS["dop853"], needs="chutelab_no_such_module.ivp")
     monkeypatch.setitem(METHODS, "dop853", missing)
     rows = measure(["transfer"], ["dop853"], quick=True)
-    assert {row.failed for row in rows} == {"chutelab_no_such_module is not installed"}
+    missing = 'chutelab_no_such_module is missing: pip install "chutelab[bench]"'
+    assert {row.failed for row in rows} == {missing}
 
 
 def test_a_method_that_breaks_costs_nobody_else_his_row(monkeypatch):

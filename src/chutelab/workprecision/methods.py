@@ -68,7 +68,7 @@ class Method:
             import_module(self.needs)
         except ImportError as error:
             missing = (error.name or self.needs).partition(".")[0]
-            raise UnableError(f"{missing} is not installed") from error
+            raise UnableError(f'{missing} is missing: pip install "chutelab[bench]"') from error
 
     def prepare(self, scene: Scene, value: float | None) -> Scene:
         """Return the scene with the parameter written into it where the engines look for it."""

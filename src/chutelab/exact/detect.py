@@ -121,20 +121,14 @@ def _faces(
     Of the given segments; works on arrays of shape (S, F, k), where F is 1 if nobody turns back
     from a segment before `until` and can so meet one of its faces only, else 2.
     """
-
-    def of(array: Floats) -> Floats:
-        chosen = array if len(segments) == array.shape[-2] else array[..., segments, :]
-        return rows_of(chosen, motion.rows)[..., None, :]
-
-    frame = of(obstacles.frame)
-    velocity, acceleration = (
-        x[:, None, None, None] for x in (motion.velocity, motion.acceleration)
-    )
-    away = motion.position[:, None, None] - of(obstacles.start)
+    some = len(segments) < obstacles.segments
+    faces = obstacles.faces.take(segments, axis=2) if some else obstacles.faces
+    faces = rows_of(faces, motion.rows)
+    frame = faces[:, :2]
     # Components along the normals and the tangents of the segments.
-    rise, pace = dot(velocity, frame)
-    pull, push = dot(acceleration, frame)
-    height, foot = dot(away[:, None], frame)
+    rise, pace = dot(motion.velocity[:, None, None, None], frame)
+    pull, push = dot(motion.acceleration[:, None, None, None], frame)
+    height, foot = dot(motion.position[:, None, None, None] - faces[:, 2:3], frame)
     last = rise + pull * until
     turns = np.count_nonzero(rise * last < 0.0)
     sides = SIDES if turns else np.where(rise + last > 0.0, -1.0, 1.0)
@@ -163,17 +157,18 @@ def _faces(
 
     if motion.past is not None and np.count_nonzero(touching):
         past = motion.past
-        height_then = dot(past.place[:, None, None] - of(obstacles.start), frame[:, 0])
+        height_then = dot(past.place[:, None, None] - faces[:, 2], frame[:, 0])
         known = past.obstacle == segments[:, None, None]
         behind = sides * np.where(known, past.side, height_then) < 0.0
         valid &= ~(touching & ~same & behind & (time == 0.0))
 
     # How far along the segment the contact is.
     foot = foot + time * (pace + (0.5 * time) * push)
-    low, high = of(obstacles.feet)
+    low, high = faces[:, 3]
     valid &= (foot >= low) & (foot <= high)
     if grazing is not None:
-        length, reach = of(obstacles.length), -low
+        length = rows_of(obstacles.length[segments], motion.rows)[:, None]
+        reach = -low
         # Grazing the end on the way out is not lying on the face.
         outward = ((foot <= reach) & (pace < 0.0)) | ((foot >= length - reach) & (pace > 0.0))
         valid &= ~(grazing & outward)

@@ -58,7 +58,7 @@ def carry_round(s: Swarm, who: Ints) -> None:
     hit, free = struck & ~over, ~struck & ~over
     s.finish(who[over], "time")
     s.part(who[free], 0)
-    s.fly(who[free], o.pulley, 0, np.where(end[free] > 0.0, 3, 2))
+    s.fly(who[free], o.pulley, 0, 2 + (end[free] > 0.0))
     if found is not None and np.count_nonzero(hit):
         strike(s, who[hit], found.high_obstacle[hit], found.high_side[hit])
 

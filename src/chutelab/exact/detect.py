@@ -27,8 +27,8 @@ FEW = 4
 
 def first_contact(
     motion: Motion, obstacles: Obstacles, radius: Value, until: Floats
-) -> tuple[Floats, Ints, Floats]:
-    """Return time from now, obstacle and side of the first contact before `until`, each (k,).
+) -> tuple[Floats, Bools, Ints, Floats]:
+    """Return until when particles go on, who meets something then, and its number and side, (k,).
 
     Finds: faces within a segment's length, ends of segments (for a disk), the pulley. Misses, by
     design: a point against the end of a segment, and anything the particle overlaps already.
@@ -46,9 +46,9 @@ def first_contact(
 
     Returns
     -------
-    time, obstacle, side
-        Time inf where there is none, the other two are any numbers then; side is +1 or -1 for a
-        face, 0 for a circle.
+    time, hits, obstacle, side
+        Time from now, not longer than `until`: a contact at that very time comes first. The last
+        two are any numbers where there is none; side is +1 or -1 for a face, 0 for a circle.
     """
     segments, count = obstacles.segments, len(until)
     held = motion.never is not None or motion.on is not None
@@ -56,13 +56,14 @@ def first_contact(
     faces, circles = _reached(motion, obstacles, places)
     if len(faces):
         time, obstacle, side = _faces(motion, obstacles, radius, until, faces)
+        hits = time <= until
         until = np.minimum(time, until)
         places = None
     else:
-        time, side = np.full(count, np.inf), np.zeros(count)
+        hits, side = np.zeros(count, dtype=bool), np.zeros(count)
         obstacle = np.zeros(count, dtype=np.int64)
     if not len(circles):
-        return time, obstacle, side
+        return until, hits, obstacle, side
     if places is None:
         places = _box(motion, until)
     pairs = touched(places, motion, obstacles, circles)
@@ -70,11 +71,13 @@ def first_contact(
         pairs &= ~hidden(motion, obstacles, circles)
     if np.count_nonzero(pairs):
         t, circle = first_circle(motion, obstacles, until, circles, pairs)
-        sooner = t < time
-        time = np.where(sooner, t, time)
+        # Before a face that is met then, and at the latest at the end.
+        sooner = (t < until) | (~hits & (t == until))
+        until = np.where(sooner, t, until)
+        hits |= sooner
         obstacle = np.where(sooner, circle + segments, obstacle)
         side = np.where(sooner, 0, side)
-    return time, obstacle, side
+    return until, hits, obstacle, side
 
 
 def _box(motion: Motion, until: Floats) -> tuple[Floats, Floats]:
@@ -144,8 +147,9 @@ def _faces(
         grazing = touching & (np.abs(rate) <= PARALLEL * length_of(motion.velocity))
         if np.count_nonzero(grazing):
             rate[grazing > same] = 0.0
-            unpressed = np.abs(fall) <= PARALLEL * length_of(motion.acceleration)
-            fall = np.where(grazing & unpressed, 0.0, fall)
+            unpressed = grazing & (np.abs(fall) <= PARALLEL * length_of(motion.acceleration))
+            if np.count_nonzero(unpressed):
+                fall = np.where(unpressed, 0.0, fall)
         else:
             grazing = None
     time = descent(gap, rate, fall)

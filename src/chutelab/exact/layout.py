@@ -153,7 +153,8 @@ def spots_of(ends: Floats, tolerance: float) -> list[tuple[int, int]]:
     number = list(range(2 * count))
     window: list[int] = []
     for n in sorted(number, key=x.__getitem__):
-        window = [m for m in window if x[n] - x[m] <= tolerance]
+        while window and x[n] - x[window[0]] > tolerance:
+            del window[0]
         for m in window:
             if abs(y[n] - y[m]) <= tolerance:
                 number[n] = number[m]

@@ -73,7 +73,11 @@ class Motion:
     on: Ints | None = None
     never: Bools | None = None
     past: Past | None = None
+    _known: tuple[Floats, Floats] | None = None
 
     def after(self, t: Floats) -> Floats:
-        """Return where they are after times (k,), (2, k), m."""
-        return self.position + t * (self.velocity + (0.5 * t) * self.acceleration)
+        """Return where they are after times (k,), (2, k), m; of the same array it is known."""
+        if self._known is None or self._known[0] is not t:
+            place = self.position + t * (self.velocity + (0.5 * t) * self.acceleration)
+            self._known = t, place
+        return self._known[1]

@@ -186,9 +186,10 @@ class Obstacles:
 
         `position` (2, n) is that of all particles; of those that touch both are (2, k).
         """
-        normal = side * pick(self.normal, rows, obstacle)
+        normal, _, start, _ = pick(self.faces[:, :, :, 0], rows, obstacle).swapaxes(0, 1)
+        normal = side * normal
         out = position.take(rows, axis=1)
-        out -= (dot(out - pick(self.start, rows, obstacle), normal) - r) * normal
+        out -= (dot(out - start, normal) - r) * normal
         round_ = (obstacle >= self.segments).nonzero()[0]
         if len(round_):
             circle = obstacle[round_] - self.segments

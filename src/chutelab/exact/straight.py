@@ -121,9 +121,8 @@ def _next(s: Swarm, motion: Motion, until: Floats) -> tuple[Floats, Bools, tuple
 
     Not longer than `until`; a contact at that very time comes first.
     """
-    time, obstacle, side = first_contact(motion, s.obstacles, of(s.radius, motion.rows), until)
-    hits = time <= until
-    dt = np.minimum(time, until)
+    radius = of(s.radius, motion.rows)
+    dt, hits, obstacle, side = first_contact(motion, s.obstacles, radius, until)
     s.count_idle(motion.rows, dt)
     return dt, hits, (obstacle, side)
 

@@ -198,7 +198,8 @@ class Swarm:
         belt = dot(material[:2], tangent)
         if at(o.pulley_speed, 0) != 0.0:
             round_ = (obstacle == o.pulley).nonzero()[0]
-            belt[round_] = of(o.pulley_speed, who[round_])
+            if len(round_):
+                belt[round_] = of(o.pulley_speed, who[round_])
         return Contact(normal, tangent, belt, material[3], material[2], o.surface[obstacle])
 
     def at(self, who: Ints) -> Ints | slice:
@@ -226,7 +227,7 @@ class Swarm:
         """Write an event for each of the particles as they are now, without an impulse."""
         if len(who):
             state = self.now(who)
-            self.journal.events(kind, who, surface, state, velocity=state[3:5], omega=state[5])
+            self.journal.events(kind, who, surface, state)
 
     def book(
         self,

@@ -160,10 +160,8 @@ def _blow(
     )
     state = s.now(who)
     s.journal.knots(who, state)
-    kind = np.full(len(who), int(Kind.IMPACT))
     told = approach > NEGLIGIBLE
     if landing is not None:
-        kind[landing] = int(Kind.LANDING)
         told |= landing
     surface, push, rub = c.surface, mass * normal, mass * tangential
     count = int(np.count_nonzero(told))
@@ -172,11 +170,13 @@ def _blow(
         count = int(np.count_nonzero(told))
     s.journal.contacts += count
     if count < len(told):
-        who, kind, surface, state = who[told], kind[told], surface[told], state[:, told]
+        who, surface, state = who[told], surface[told], state[:, told]
+        landing = None if landing is None else landing[told]
         before, omega_before = before[:, told], omega_before[told]
         push, rub = push[told], rub[told]
+    hit = int(Kind.IMPACT)
     s.journal.events(
-        kind,
+        hit if landing is None else np.where(landing, int(Kind.LANDING), hit),
         who,
         surface,
         state,

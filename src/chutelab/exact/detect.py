@@ -103,8 +103,10 @@ def _reached(
     """
     if places is None:
         return obstacles.numbers
-    low = np.minimum.reduce(places[0], axis=1, keepdims=True)
-    high = np.maximum.reduce(places[1], axis=1, keepdims=True)
+    low, high = places
+    if low.shape[1] > 1:
+        low = np.minimum.reduce(low, axis=1, keepdims=True)
+        high = np.maximum.reduce(high, axis=1, keepdims=True)
     each = (low < obstacles.bound_high) & (high > obstacles.bound_low)
     near = each[0] & each[1]
     if motion.never is not None:

@@ -109,7 +109,9 @@ def touch_of(size: Value, far: float = 0.0) -> Value:
 def size_of(corners: Floats, places: Floats) -> Value:
     """Return the largest coordinate, m; for each particle, (N,), where each has its own corners."""
     if corners.shape[-1] == 1:
-        return max(float(np.abs(corners).max(initial=0.0)), float(np.abs(places).max()))
+        # Not their methods, which take twice as long.
+        sizes = (np.maximum.reduce(np.abs(x), axis=None, initial=0.0) for x in (corners, places))
+        return float(max(sizes))
     return np.maximum(np.abs(corners).max(axis=(0, 1), initial=0.0), np.abs(places).max(axis=1))
 
 

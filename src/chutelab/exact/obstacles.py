@@ -171,7 +171,7 @@ class Obstacles:
 
         `position` (2, n) is that of all particles.
         """
-        normal = side * pick(self.normal, rows, obstacle)
+        normal = bare(side) * pick(self.normal, rows, obstacle)
         round_ = (obstacle >= self.segments).nonzero()[0]
         if len(round_):
             circle = obstacle[round_] - self.segments
@@ -187,9 +187,9 @@ class Obstacles:
         `position` (2, n) is that of all particles; of those that touch both are (2, k).
         """
         normal, _, start, _ = pick(self.faces[:, :, :, 0], rows, obstacle).swapaxes(0, 1)
-        normal = side * normal
+        normal = bare(side) * normal
         out = position.take(rows, axis=1)
-        out -= (dot(out - start, normal) - r) * normal
+        out = out - bare(dot(out - start, normal) - r) * normal
         round_ = (obstacle >= self.segments).nonzero()[0]
         if len(round_):
             circle = obstacle[round_] - self.segments
@@ -200,6 +200,11 @@ class Obstacles:
             away = there - center
             out[:, round_], normal[:, round_] = there, away / np.hypot(away[0], away[1])
         return out, normal
+
+
+def bare(values: Floats) -> Floats:
+    """Values (k,) to meet vectors (2, k): a lone one without axes, which NumPy is quicker with."""
+    return values.reshape(()) if values.shape == (1,) else values
 
 
 def dot(a: Floats, b: Floats) -> Floats:

@@ -45,9 +45,9 @@ def carry_round(s: Swarm, who: Ints) -> None:
     rho, v = s.p[1, who], s.v[0, who]
     left = s.stop[who] - s.age[who]
     cosine = np.minimum(v**2 / (of(s.gravity, who) * rho), 1.0)
-    end = np.arctan2(np.sqrt((1.0 - cosine) * (1.0 + cosine)), cosine)
-    struck, found = np.zeros(len(who), dtype=bool), None
-    if np.count_nonzero(end):
+    end, struck, found = np.zeros(len(who)), np.zeros(len(who), dtype=bool), None
+    if np.count_nonzero(cosine < 1.0):
+        end = np.arctan2(np.sqrt((1.0 - cosine) * (1.0 + cosine)), cosine)
         pulley = np.full(len(who), o.pulley - o.segments)
         found = bounds(o, who, pulley, rho, np.zeros(len(who)), of(s.radius, who))
         struck = ~found.high_handover & (found.high < end)

@@ -10,7 +10,7 @@ from chutelab.ballistics import descent
 from chutelab.exact.detect import FEW, first_contact
 from chutelab.exact.grip import end_slip, face_force, settle_law
 from chutelab.exact.motion import Motion
-from chutelab.exact.obstacles import NONE, Floats, Ints, dot, pick, rows_of
+from chutelab.exact.obstacles import NONE, Floats, Ints, bare, dot, pick, rows_of
 from chutelab.exact.round import carry_round, ride_on
 from chutelab.exact.swarm import Mode
 from chutelab.exact.touch import strike
@@ -137,7 +137,7 @@ def _move(s: Swarm, motion: Motion, dt: Floats) -> None:
         touch = of(s.obstacles.touch, motion.rows)
         away = (np.abs(place - middle) > CLEAR * touch).any(axis=0)
         s.past.place[:, motion.rows[away]] = middle[:, away]
-    s.v[:, at] = motion.velocity + dt * motion.acceleration
+    s.v[:, at] = motion.velocity + bare(dt) * motion.acceleration
 
 
 def _strike(s: Swarm, who: Ints, hits: Bools, meeting: tuple[Ints, Floats]) -> None:

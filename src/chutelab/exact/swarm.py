@@ -119,10 +119,9 @@ class Swarm:
         self.mode, self.ended = np.zeros((2, count), dtype=np.int8)
         self.mode[:] = Mode.FLIGHT
         self.mode[start.carried[first:last]] = Mode.CARRIED
-        self.order, self.idle, self.crawls, self.on, self.left = integers = np.zeros(
-            (5, count), dtype=np.int64
-        )
+        integers = np.zeros((5, count), dtype=np.int64)
         integers[3:] = NONE
+        self.order, self.idle, self.crawls, self.on, self.left = integers
         self.side, self.left_side, self.belt, self.slip = np.zeros((4, count))
         self.slip[:] = 1.0
         self.stop = of(machine.end_time, mine) - self.released

@@ -10,7 +10,7 @@ import numpy as np
 from chutelab.exact.arcs import bounds
 from chutelab.exact.corner import hold
 from chutelab.exact.grip import face_force, load_on, settle_law
-from chutelab.exact.obstacles import NONE, Floats, Ints, dot, length_of, pick
+from chutelab.exact.obstacles import NONE, Floats, Ints, bare, dot, length_of, pick
 from chutelab.exact.swarm import COLLAPSE, Contact, Mode, Swarm
 from chutelab.impact import impulses, limited
 from chutelab.many import of
@@ -147,7 +147,7 @@ def _blow(
     slip = s.slip_of(who, c, along)
     normal, tangential = impulses(approach, slip, c.restitution, c.friction, s.share)
     # The normal speed is set, not added to: ε |v_n| to the last bit.
-    s.v[:, s.at(who)] = rebound * c.normal + (along + tangential) * c.tangent
+    s.v[:, s.at(who)] = bare(rebound) * c.normal + bare(along + tangential) * c.tangent
     if s.spins:
         s.z[who] += 2.0 * tangential
     after, mass = slip + tangential / s.share, of(s.mass, who)

@@ -86,7 +86,8 @@ def descent(gap: Values, rate: Values, acceleration: Values) -> Floats:
     flat = span == 0.0
     if np.count_nonzero(flat):
         # Neither gap nor rate: it closes at once if it is pulled.
-        t = np.where(flat & (gap == 0.0) & (acceleration < 0.0), 0.0, t)
+        t = np.asarray(t)
+        t[flat & (gap == 0.0) & (acceleration < 0.0)] = 0.0
     return np.asarray(t)
 
 

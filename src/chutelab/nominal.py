@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chutelab.ballistics import closing_time, descent
+from chutelab.ballistics import closing_time, crossing, descent
 from chutelab.many import Value, each, ratio, root, smaller, where
 from chutelab.releases import on_belt, release_point, release_velocity
 from chutelab.ride import Circle, Outcome, advance, grip_slip, normal_force
@@ -145,10 +145,13 @@ def plate_hit(scene: Scene, start: Discharge) -> tuple[Value, Value]:
     pivot_y: Value = scene.plate.pivot_height
     (x, y), (vx, vy) = start.position, start.velocity
     gap = (x - pivot_x) * nx + (y - pivot_y) * ny - scene.particle.radius
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        t: Value = descent(np.asarray(gap), np.asarray(vx * nx + vy * ny), -scene.gravity * ny)
+    pace, pull = vx * nx + vy * ny, -scene.gravity * ny
+    t: Value
     if scene.members is None:
-        t = float(t)
-    still = (vx == 0.0) & (vy == 0.0) & (scene.gravity == 0.0)
-    t = where((gap >= 0.0) & (t >= 0.0) & (t < inf) & ~np.bool_(still), t, nan)
+        t = crossing(gap, pace, pull)
+    else:
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            t = descent(np.asarray(gap), np.asarray(pace), pull)
+    moves = (vx != 0.0) | (vy != 0.0) | (scene.gravity != 0.0)
+    t = where((gap >= 0.0) & (t >= 0.0) & (t < inf) & moves, t, nan)
     return x + vx * t, y + vy * t - 0.5 * scene.gravity * t * t

@@ -190,7 +190,8 @@ class Recorder:
             knots = np.insert(knots, offsets[lonely], knots[offsets[lonely]])
             np.cumsum(np.where(sizes == 1, 2, sizes), out=offsets[1:])
         events = _joined(self._events, EVENT)
-        events = events.take(_in_time(events))
+        if count > 1:
+            events = events.take(_in_time(events))
         if any(origin):
             knots = knots.copy()
             for rows in (knots, events):

@@ -13,6 +13,7 @@ from chutelab.scene import Fault, SceneError
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from chutelab.many import Value
     from chutelab.scene import Scene
 
 ON_BELT = 1e-9
@@ -95,9 +96,9 @@ def draw(scene: Scene) -> Releases:
         t = np.zeros(count)
     else:
         t = np.arange(count) / stream.rate
-    velocity = np.empty((count, 2))
+    position, velocity = np.empty((2, count, 2))
     velocity[:, 0], velocity[:, 1] = release_velocity(scene)
-    height = np.zeros(count)
+    height: Value = 0.0
     # The first one has no spread. Making a generator takes as long as all other preparations.
     if stream.count > 1 and (stream.bed_height > 0.0 or stream.speed_spread > 0.0 or crowded):
         rng = np.random.default_rng(stream.seed)
@@ -114,9 +115,8 @@ def draw(scene: Scene) -> Releases:
         fall = 0.0 if adheres else 0.5 * scene.gravity
         floor = 0.0 if rides else -inf
         _spread_apart(scene, t, height, velocity, fall, floor, rng)
-    position = np.empty((count, 2))
-    position[:, 0], position[:, 1] = release_point(scene)
-    position[:, 1] += height
+    position[:, 0], low = release_point(scene)
+    position[:, 1] = low + height
     carried = np.zeros(count, dtype=bool)
     carried[:] = adheres
     return Releases(t, position, velocity, carried)

@@ -29,9 +29,11 @@ def touched(
     places: tuple[Floats, Floats], motion: Motion, obstacles: Obstacles, circles: Ints
 ) -> Bools:
     """Which circles' boxes the box of a path touches, (C, k)."""
-    which = circles + obstacles.segments
-    near = places[0][:, None] < rows_of(obstacles.high.take(which, axis=1), motion.rows)
-    near &= places[1][:, None] > rows_of(obstacles.low.take(which, axis=1), motion.rows)
+    low, high = obstacles.low[:, obstacles.segments :], obstacles.high[:, obstacles.segments :]
+    if len(circles) < low.shape[1]:
+        low, high = low.take(circles, axis=1), high.take(circles, axis=1)
+    near = places[0][:, None] < rows_of(high, motion.rows)
+    near &= places[1][:, None] > rows_of(low, motion.rows)
     return np.asarray(near[0] & near[1])
 
 

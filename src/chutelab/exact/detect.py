@@ -27,8 +27,8 @@ FEW = 4
 
 def first_contact(
     motion: Motion, obstacles: Obstacles, radius: Value, until: Floats
-) -> tuple[Floats, Ints, Floats]:
-    """Return time from now, obstacle and side of the first contact before `until`, each (k,).
+) -> tuple[Floats, Bools, Ints, Floats]:
+    """Return until when particles go on, who meets something then, and its number and side, (k,).
 
     Finds: faces within a segment's length, ends of segments (for a disk), the pulley. Misses, by
     design: a point against the end of a segment, and anything the particle overlaps already.
@@ -46,9 +46,9 @@ def first_contact(
 
     Returns
     -------
-    time, obstacle, side
-        Time inf where there is none, the other two are any numbers then; side is +1 or -1 for a
-        face, 0 for a circle.
+    time, hits, obstacle, side
+        Time from now, not longer than `until`: a contact at that very time comes first. The last
+        two are any numbers where there is none; side is +1 or -1 for a face, 0 for a circle.
     """
     segments, count = obstacles.segments, len(until)
     held = motion.never is not None or motion.on is not None
@@ -56,13 +56,14 @@ def first_contact(
     faces, circles = _reached(motion, obstacles, places)
     if len(faces):
         time, obstacle, side = _faces(motion, obstacles, radius, until, faces)
+        hits = time <= until
         until = np.minimum(time, until)
         places = None
     else:
-        time, side = np.full(count, np.inf), np.zeros(count)
+        hits, side = np.zeros(count, dtype=bool), np.zeros(count)
         obstacle = np.zeros(count, dtype=np.int64)
     if not len(circles):
-        return time, obstacle, side
+        return until, hits, obstacle, side
     if places is None:
         places = _box(motion, until)
     pairs = touched(places, motion, obstacles, circles)
@@ -70,11 +71,13 @@ def first_contact(
         pairs &= ~hidden(motion, obstacles, circles)
     if np.count_nonzero(pairs):
         t, circle = first_circle(motion, obstacles, until, circles, pairs)
-        sooner = t < time
-        time = np.where(sooner, t, time)
+        # Before a face that is met then, and at the latest at the end.
+        sooner = (t < until) | (~hits & (t == until))
+        until = np.where(sooner, t, until)
+        hits |= sooner
         obstacle = np.where(sooner, circle + segments, obstacle)
         side = np.where(sooner, 0, side)
-    return time, obstacle, side
+    return until, hits, obstacle, side
 
 
 def _box(motion: Motion, until: Floats) -> tuple[Floats, Floats]:
@@ -100,8 +103,10 @@ def _reached(
     """
     if places is None:
         return obstacles.numbers
-    low = np.minimum.reduce(places[0], axis=1, keepdims=True)
-    high = np.maximum.reduce(places[1], axis=1, keepdims=True)
+    low, high = places
+    if low.shape[1] > 1:
+        low = np.minimum.reduce(low, axis=1, keepdims=True)
+        high = np.maximum.reduce(high, axis=1, keepdims=True)
     each = (low < obstacles.bound_high) & (high > obstacles.bound_low)
     near = each[0] & each[1]
     if motion.never is not None:
@@ -121,20 +126,14 @@ def _faces(
     Of the given segments; works on arrays of shape (S, F, k), where F is 1 if nobody turns back
     from a segment before `until` and can so meet one of its faces only, else 2.
     """
-
-    def of(array: Floats) -> Floats:
-        chosen = array if len(segments) == array.shape[-2] else array[..., segments, :]
-        return rows_of(chosen, motion.rows)[..., None, :]
-
-    frame = of(obstacles.frame)
-    velocity, acceleration = (
-        x[:, None, None, None] for x in (motion.velocity, motion.acceleration)
-    )
-    away = motion.position[:, None, None] - of(obstacles.start)
+    some = len(segments) < obstacles.segments
+    faces = obstacles.faces.take(segments, axis=2) if some else obstacles.faces
+    faces = rows_of(faces, motion.rows)
+    frame = faces[:, :2]
     # Components along the normals and the tangents of the segments.
-    rise, pace = dot(velocity, frame)
-    pull, push = dot(acceleration, frame)
-    height, foot = dot(away[:, None], frame)
+    rise, pace = dot(motion.velocity[:, None, None, None], frame)
+    pull, push = dot(motion.acceleration[:, None, None, None], frame)
+    height, foot = dot(motion.position[:, None, None, None] - faces[:, 2:3], frame)
     last = rise + pull * until
     turns = np.count_nonzero(rise * last < 0.0)
     sides = SIDES if turns else np.where(rise + last > 0.0, -1.0, 1.0)
@@ -150,8 +149,9 @@ def _faces(
         grazing = touching & (np.abs(rate) <= PARALLEL * length_of(motion.velocity))
         if np.count_nonzero(grazing):
             rate[grazing > same] = 0.0
-            unpressed = np.abs(fall) <= PARALLEL * length_of(motion.acceleration)
-            fall = np.where(grazing & unpressed, 0.0, fall)
+            unpressed = grazing & (np.abs(fall) <= PARALLEL * length_of(motion.acceleration))
+            if np.count_nonzero(unpressed):
+                fall = np.where(unpressed, 0.0, fall)
         else:
             grazing = None
     time = descent(gap, rate, fall)
@@ -163,17 +163,18 @@ def _faces(
 
     if motion.past is not None and np.count_nonzero(touching):
         past = motion.past
-        height_then = dot(past.place[:, None, None] - of(obstacles.start), frame[:, 0])
+        height_then = dot(past.place[:, None, None] - faces[:, 2], frame[:, 0])
         known = past.obstacle == segments[:, None, None]
         behind = sides * np.where(known, past.side, height_then) < 0.0
         valid &= ~(touching & ~same & behind & (time == 0.0))
 
     # How far along the segment the contact is.
     foot = foot + time * (pace + (0.5 * time) * push)
-    low, high = of(obstacles.feet)
+    low, high = faces[:, 3]
     valid &= (foot >= low) & (foot <= high)
     if grazing is not None:
-        length, reach = of(obstacles.length), -low
+        length = rows_of(obstacles.length[segments], motion.rows)[:, None]
+        reach = -low
         # Grazing the end on the way out is not lying on the face.
         outward = ((foot <= reach) & (pace < 0.0)) | ((foot >= length - reach) & (pace > 0.0))
         valid &= ~(grazing & outward)

@@ -158,7 +158,7 @@ def _release(s: Swarm) -> None:
         s.finish((s.stop <= 0.0).nonzero()[0], "time")
     state = s.now(who)
     s.journal.knots(who, state)
-    s.journal.events(int(Kind.RELEASE), who, NONE, state, velocity=state[3:5], omega=state[5])
+    s.journal.events(int(Kind.RELEASE), who, NONE, state)
     if s.machine.until == "settled" and s.machine.pulley and at(s.machine.pulley.speed, 0) == 0.0:
         rests = who[s.mode[who] == Mode.CARRIED]
         s.event(int(Kind.SETTLE), rests, s.machine.pulley.surface)

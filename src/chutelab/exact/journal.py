@@ -23,6 +23,12 @@ if TYPE_CHECKING:
 STATE = 9
 """Rows of a state: the columns of a knot, namely time, position, velocity, ω, ledger entries."""
 
+NUMBERS = np.dtype([("head", f"V{EVENT.itemsize - 80}"), ("numbers", "f8", 10)])
+"""What `EVENT` holds from the position on, in one piece: position, velocity before and after, ω
+before and after, normal and tangential impulse."""
+
+OF_STATE = np.array([1, 2, 3, 4, 3, 4, 5, 5, 0, 0])
+"""Rows of a state that these numbers are where nothing changes; without impulse, see below."""
 
 MANY = 1000
 """Chunks that are joined into one: a long run of one particle consists of small ones."""
@@ -41,7 +47,7 @@ class Journal:
         self.first, self.count = first, count
         self.contacts = 0
         self._knots: list[tuple[Ints, Floats]] = []
-        self._events: list[tuple[Ints, dict[str, ArrayLike]]] = []
+        self._events: list[tuple[Ints, int | Ints, int | Ints, Floats, Floats]] = []
         self._books: list[tuple[Ints, Floats, Ints]] = []
         # The same, joined.
         self._old_knots: list[tuple[Ints, Floats]] = []
@@ -62,27 +68,22 @@ class Journal:
         surface: int | Ints,
         state: Floats,
         *,
-        velocity: Floats,
-        omega: Floats,
+        velocity: Floats | None = None,
+        omega: Floats | None = None,
         normal: ArrayLike = 0.0,
         tangential: ArrayLike = 0.0,
     ) -> None:
-        """Add an event for each of the particles, with velocity (2, k) and ω before it."""
+        """Add an event for each of the particles, with velocity (2, k) and ω before it.
+
+        Where they are left out nothing changes.
+        """
         if not len(who):
             return
-        values: dict[str, ArrayLike] = {
-            "kind": kind,
-            "surface": surface,
-            "t": state[0],
-            "position": state[1:3].T,
-            "velocity_before": velocity.T,
-            "velocity_after": state[3:5].T,
-            "omega_before": omega,
-            "omega_after": state[5],
-            "normal_impulse": normal,
-            "tangential_impulse": tangential,
-        }
-        self._events.append((who, values))
+        numbers = state.take(OF_STATE, axis=0)
+        if velocity is not None:
+            numbers[2:4], numbers[6] = velocity, omega
+        numbers[8], numbers[9] = normal, tangential
+        self._events.append((who, kind, surface, state[0], numbers))
         if len(self._events) >= MANY:
             self._old_events.append(self._laid_out())
             self._events.clear()
@@ -118,19 +119,25 @@ class Journal:
 
     def _laid_out(self) -> NDArray[Any]:
         """Return the events, chunk by chunk, (E,)."""
-        events, begin = np.empty(sum(len(who) for who, _ in self._events), dtype=EVENT), 0
+        events, begin = np.empty(sum(len(chunk[0]) for chunk in self._events), dtype=EVENT), 0
         events["other"] = -1
-        for who, values in self._events:
-            chunk = events[begin : begin + len(who)]
-            chunk["particle"] = who + self.first
-            for name, value in values.items():
-                chunk[name] = value
+        names = ("particle", "kind", "surface", "t")
+        particles, kinds, surfaces, times = (events[name] for name in names)
+        rows = events.view(NUMBERS)["numbers"]
+        for who, kind, surface, t, numbers in self._events:
+            chunk = slice(begin, begin + len(who))
+            particles[chunk], kinds[chunk], surfaces[chunk] = who, kind, surface
+            times[chunk], rows[chunk] = t, numbers.T
             begin += len(who)
+        particles += self.first
         return events
 
     def _tracks(self, knots: list[tuple[Ints, Floats]]) -> tuple[Floats, Ints]:
         """Return knots, particle by particle, (K, 9), and how many each has, (count,)."""
         each, count = len(knots), self.count
+        if count == 1:
+            rows = np.concatenate([state for _, state in knots], axis=1).T.copy()
+            return rows, np.array([len(rows)])
         if not self._old_knots and all(len(who) == count for who, _ in knots):
             # Everybody in every chunk.
             rows = np.empty((count, each, STATE))

@@ -11,8 +11,6 @@ from chutelab.exact.obstacles import NONE, Floats, Ints, Obstacles
 from chutelab.many import Value, at
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from chutelab.machine import Machine, Segments
 
 FOOT = 1e-12
@@ -50,47 +48,37 @@ def obstacles(machine: Machine, origin: tuple[float, float] = (0.0, 0.0)) -> Obs
     size = size_of(corners, places)
     touch = touch_of(size, far)
     spots = spots_of(corners[..., 0], JOINT * at(size, 0))
-    material, surface = _material(seg, tangent), seg.surface
     kept = _distinct(spots)
     if len(kept) < len(spots):
         corners = corners[:, [*kept, *(s + len(spots) for s in kept)]]
         spots, tangent, length = [spots[s] for s in kept], tangent[:, kept], length[kept]
-        material, surface = material[:, kept], surface[kept]
 
     # Segments, then their ends, then the pulley.
-    flat, width = length.shape
+    flat = len(length)
     disks = at(r, 0) > 0.0
     ends, end_circle = _ends(spots, wheel is not None) if disks else _points(flat)
-    owner = np.array([s for s, _ in ends], dtype=np.int64)
-    center = corners.take(np.array([s + e * flat for s, e in ends], dtype=np.int64), axis=1)
-    rho = np.full((len(ends), width), r)
-    material = np.concatenate([material, material.take(owner, axis=1)], axis=1)
-    surface = np.concatenate([surface, surface.take(owner)])
-    owns = _owned(end_circle, len(ends))
+    where = [s + e * flat for s, e in ends]
+    owner = kept + [kept[s] for s, _ in ends]
+    if wheel is not None:
+        end_circle[0][1] = flat + len(ends)
+        # It stands in for an end of the first segment until its own values are put in.
+        where.append(0)
+        owner.append(0)
+    center = corners.take(np.array(where, dtype=np.int64), axis=1)
+    rho = np.empty(center.shape[1:])
+    rho[:] = r
+    material, surface = _material(seg, owner)
     pulley, pulley_speed = NONE, cast("Value", 0.0)
     if wheel is not None:
         pulley, pulley_speed = flat + len(ends), wheel.speed
-        end_circle[0, 1] = pulley
-        own = np.zeros((4, width))
-        own[2], own[3] = wheel.restitution, wheel.friction
-        material = _more(material, own)
-        center, rho = _more(center, 0.0), _more(rho, wheel.radius + r)
-        surface = np.append(surface, wheel.surface)
-        owns = np.concatenate([owns, np.zeros((1, flat), dtype=bool)])
-    frame = np.empty((2, 2, flat, width))
-    frame[0, 0], frame[1, 0], frame[:, 1] = -tangent[1], tangent[0], tangent
-    feet = np.empty((2, flat, width))
-    feet[1] = FOOT * length
-    np.negative(feet[1], out=feet[0])
-    feet[1] += length
+        center[:, -1], rho[-1], surface[-1] = 0.0, wheel.radius + r, wheel.surface
+        material[:2, -1], material[2, -1], material[3, -1] = 0.0, wheel.restitution, wheel.friction
     first, second = corners[:, :flat], corners[:, flat:]
     # A circle's box is smaller: what only touches it does not meet it.
     reach, inner = r + BOX_TOUCHES * touch, rho - touch
     return Obstacles(
-        start=first,
-        frame=frame,
+        faces=_faces(first, tangent, length),
         length=length,
-        feet=feet,
         center=center,
         rho=rho,
         material=material,
@@ -98,8 +86,7 @@ def obstacles(machine: Machine, origin: tuple[float, float] = (0.0, 0.0)) -> Obs
         high=np.concatenate([np.maximum(first, second) + reach, center + inner], axis=1),
         surface=surface,
         spots=tuple(spots),
-        end_circle=end_circle,
-        owns=owns,
+        end_circle=np.array(end_circle, dtype=np.int64).reshape(-1, 2),
         pulley=pulley,
         pulley_speed=pulley_speed,
         touch=touch,
@@ -122,23 +109,30 @@ def touch_of(size: Value, far: float = 0.0) -> Value:
 def size_of(corners: Floats, places: Floats) -> Value:
     """Return the largest coordinate, m; for each particle, (N,), where each has its own corners."""
     if corners.shape[-1] == 1:
-        return max(float(np.abs(corners).max(initial=0.0)), float(np.abs(places).max()))
+        # Not their methods, which take twice as long.
+        sizes = (np.maximum.reduce(np.abs(x), axis=None, initial=0.0) for x in (corners, places))
+        return float(max(sizes))
     return np.maximum(np.abs(corners).max(axis=(0, 1), initial=0.0), np.abs(places).max(axis=1))
 
 
-def _material(segments: Segments, tangent: Floats) -> Floats:
-    """Return `Obstacles.material` of the segments, (4, S, n)."""
+def _faces(start: Floats, tangent: Floats, length: Floats) -> Floats:
+    """Return `Obstacles.faces`."""
+    faces = np.empty((2, 4, len(length), 1, length.shape[1]))
+    normal, along, first, feet = faces[:, :, :, 0].swapaxes(0, 1)
+    normal[0], normal[1], along[:], first[:] = -tangent[1], tangent[0], tangent, start
+    over = FOOT * length
+    feet[0], feet[1] = -over, over + length
+    return faces
+
+
+def _material(segments: Segments, owner: list[int]) -> tuple[Floats, Ints]:
+    """Return `Obstacles.material` and `Obstacles.surface` of obstacles that belong to segments."""
+    tangent = _vectors(segments.tangent)
     material = np.empty((4, *tangent.shape[1:]))
     material[:2] = _scalars(segments.speed) * tangent
     material[2], material[3] = _scalars(segments.restitution), _scalars(segments.friction)
-    return material
-
-
-def _more(array: Floats, value: Floats | float) -> Floats:
-    """Append one obstacle."""
-    out = np.empty((*array.shape[:-2], array.shape[-2] + 1, array.shape[-1]))
-    out[..., :-1, :], out[..., -1, :] = array, value
-    return out
+    which = np.array(owner, dtype=np.int64)
+    return material.take(which, axis=1), segments.surface.take(which)
 
 
 def _vectors(array: Floats) -> Floats:
@@ -161,7 +155,8 @@ def spots_of(ends: Floats, tolerance: float) -> list[tuple[int, int]]:
     number = list(range(2 * count))
     window: list[int] = []
     for n in sorted(number, key=x.__getitem__):
-        window = [m for m in window if x[n] - x[m] <= tolerance]
+        while window and x[n] - x[window[0]] > tolerance:
+            del window[0]
         for m in window:
             if abs(y[n] - y[m]) <= tolerance:
                 number[n] = number[m]
@@ -178,39 +173,31 @@ def _distinct(spots: list[tuple[int, int]]) -> list[int]:
     return list(seen.values())
 
 
-def _points(count: int) -> tuple[list[tuple[int, int]], Ints]:
+def _points(count: int) -> tuple[list[tuple[int, int]], list[list[int]]]:
     """No circles: a point meets the end of a segment with probability zero."""
-    return [], np.full((count, 2), NONE, dtype=np.int64)
+    return [], [[NONE, NONE] for _ in range(count)]
 
 
-def _ends(spots: list[tuple[int, int]], pulley: bool) -> tuple[list[tuple[int, int]], Ints]:
+def _ends(
+    spots: list[tuple[int, int]], pulley: bool
+) -> tuple[list[tuple[int, int]], list[list[int]]]:
     """Give each distinct end of the segments a circle; the pulley stands for the first one's end.
 
     Returns
     -------
     ends : list of (segment, end)
         Where each of them is, first come.
-    circle : ndarray, (S, 2)
+    circles : list of (int, int), (S,)
         Obstacle number of the circle at each end of each segment, -1 for the one left out.
     """
-    circles: dict[int, int] = {}
-    ends, circle = _points(len(spots))
+    known: dict[int, int] = {}
+    ends, circles = _points(len(spots))
     for s, pair in enumerate(spots):
         for e, spot in enumerate(pair):
-            if pulley and (s, e) == (0, 1):
+            if pulley and s == 0 and e == 1:
                 continue
-            if spot not in circles:
-                circles[spot] = len(spots) + len(ends)
+            if spot not in known:
+                known[spot] = len(spots) + len(ends)
                 ends.append((s, e))
-            circle[s, e] = circles[spot]
-    return ends, circle
-
-
-def _owned(end_circle: Ints, circles: int) -> NDArray[np.bool_]:
-    """Tell of which segments a circle is an end, (C, S)."""
-    owns = np.zeros((circles, len(end_circle)), dtype=bool)
-    for segment, pair in enumerate(end_circle.tolist()):
-        for circle in pair:
-            if circle != NONE:
-                owns[circle - len(end_circle), segment] = True
-    return owns
+            circles[s][e] = known[spot]
+    return ends, circles

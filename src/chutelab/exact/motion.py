@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from chutelab.exact.obstacles import bare
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -73,7 +75,12 @@ class Motion:
     on: Ints | None = None
     never: Bools | None = None
     past: Past | None = None
+    _known: tuple[Floats, Floats] | None = None
 
     def after(self, t: Floats) -> Floats:
-        """Return where they are after times (k,), (2, k), m."""
-        return self.position + t * (self.velocity + (0.5 * t) * self.acceleration)
+        """Return where they are after times (k,), (2, k), m; of the same array it is known."""
+        if self._known is None or self._known[0] is not t:
+            mean = self.velocity + bare(0.5 * t) * self.acceleration
+            place = self.position + bare(t) * mean
+            self._known = t, place
+        return self._known[1]

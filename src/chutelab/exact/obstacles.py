@@ -27,7 +27,7 @@ FOLDED = 1e-9
 """Difference of two directions below which one segment lies on the other."""
 
 PER_PARTICLE = (
-    "start", "frame", "length", "feet", "center", "rho", "material", "low", "high",
+    "faces", "length", "center", "rho", "material", "low", "high",
 )  # fmt: skip
 """Arrays of `Obstacles` whose last axis may be the particles."""
 
@@ -38,14 +38,11 @@ class Obstacles:
 
     Attributes
     ----------
-    start : ndarray, (2, S, n)
-        First ends of the segments, m.
-    frame : ndarray, (2, 2, S, n)
-        Their unit vectors, components first: normal, and tangent to the right of it.
+    faces : ndarray, (2, 4, S, 1, n)
+        Of the segments, components first: unit normal, unit tangent to the right of it, first end
+        (m), and from where to where along a segment a place counts as beside it (m).
     length : ndarray, (S, n)
         m.
-    feet : ndarray, (2, S, n)
-        From where to where along a segment a place counts as beside it, m.
     center : ndarray, (2, C, n)
         Centres of the circles: segment ends, then the pulley.
     rho : ndarray, (C, n)
@@ -61,8 +58,6 @@ class Obstacles:
         Numbers of the places where a segment begins and ends; the same where they are joined.
     end_circle : ndarray, (S, 2)
         Obstacle number of the circle at a segment's first and second end, or -1 for a point.
-    owns : ndarray of bool, (C, S)
-        Of which segments a circle is an end.
     pulley : int
         Obstacle number of the pulley, or -1.
     pulley_speed : float, or ndarray, (n,)
@@ -71,10 +66,8 @@ class Obstacles:
         m; gaps smaller than this are rounding.
     """
 
-    start: Floats
-    frame: Floats
+    faces: Floats
     length: Floats
-    feet: Floats
     center: Floats
     rho: Floats
     material: Floats
@@ -83,7 +76,6 @@ class Obstacles:
     surface: Ints
     spots: tuple[tuple[int, int], ...]
     end_circle: Ints
-    owns: NDArray[np.bool_]
     pulley: int
     pulley_speed: Value
     touch: Value
@@ -96,12 +88,25 @@ class Obstacles:
     @property
     def normal(self) -> Floats:
         """Unit vectors to the left of the segments, (2, S, n)."""
-        return self.frame[:, 0]
+        return self.faces[:, 0, :, 0]
 
     @property
     def tangent(self) -> Floats:
         """Unit vectors along the segments, (2, S, n)."""
-        return self.frame[:, 1]
+        return self.faces[:, 1, :, 0]
+
+    @property
+    def start(self) -> Floats:
+        """First ends of the segments, (2, S, n), m."""
+        return self.faces[:, 2, :, 0]
+
+    @cached_property
+    def owns(self) -> NDArray[np.bool_]:
+        """Tell of which segments a circle is an end, (C, S)."""
+        circle = np.arange(self.segments, len(self.surface))[:, None]
+        owns = (self.end_circle[:, 0] == circle) | (self.end_circle[:, 1] == circle)
+        # The pulley only stands for one.
+        return np.asarray(owns & (circle != self.pulley))
 
     @cached_property
     def bound_low(self) -> Floats:
@@ -123,7 +128,7 @@ class Obstacles:
         """Return what particles held on the incoming belt cannot meet at any height, (S + C,)."""
         held = np.zeros(len(self.surface), dtype=bool)
         held[0] = held[self.pulley] = True
-        held[self.segments :] |= self.owns[:, 0]
+        held[self.end_circle[0]] = True
         return held
 
     @cached_property
@@ -166,7 +171,7 @@ class Obstacles:
 
         `position` (2, n) is that of all particles.
         """
-        normal = side * pick(self.normal, rows, obstacle)
+        normal = bare(side) * pick(self.normal, rows, obstacle)
         round_ = (obstacle >= self.segments).nonzero()[0]
         if len(round_):
             circle = obstacle[round_] - self.segments
@@ -176,22 +181,30 @@ class Obstacles:
 
     def snapped(
         self, rows: Ints, obstacle: Ints, side: Floats, position: Floats, r: Value
-    ) -> Floats:
-        """Positions, (2, k), put exactly at contact distance, so that rounding cannot add up.
+    ) -> tuple[Floats, Floats]:
+        """Positions put exactly at contact distance, so that rounding cannot add up, and normals.
 
-        `position` (2, n) is that of all particles.
+        `position` (2, n) is that of all particles; of those that touch both are (2, k).
         """
-        normal = side * pick(self.normal, rows, obstacle)
+        normal, _, start, _ = pick(self.faces[:, :, :, 0], rows, obstacle).swapaxes(0, 1)
+        normal = bare(side) * normal
         out = position.take(rows, axis=1)
-        out -= (dot(out - pick(self.start, rows, obstacle), normal) - r) * normal
+        out = out - bare(dot(out - start, normal) - r) * normal
         round_ = (obstacle >= self.segments).nonzero()[0]
         if len(round_):
             circle = obstacle[round_] - self.segments
             center = pick(self.center, rows[round_], circle)
             away = position[:, rows[round_]] - center
             distance = np.hypot(away[0], away[1])
-            out[:, round_] = center + (pick(self.rho, rows[round_], circle) / distance) * away
-        return np.asarray(out)
+            there = center + (pick(self.rho, rows[round_], circle) / distance) * away
+            away = there - center
+            out[:, round_], normal[:, round_] = there, away / np.hypot(away[0], away[1])
+        return out, normal
+
+
+def bare(values: Floats) -> Floats:
+    """Values (k,) to meet vectors (2, k): a lone one without axes, which NumPy is quicker with."""
+    return values.reshape(()) if values.shape == (1,) else values
 
 
 def dot(a: Floats, b: Floats) -> Floats:
@@ -214,8 +227,11 @@ def length_of(vector: Floats) -> Floats:
 
 
 def rows_of(array: Floats, rows: Ints) -> Floats:
-    """Columns of a per-particle array, or the one column that all particles share."""
-    return array if array.shape[-1] == 1 else array.take(rows, axis=-1)
+    """Columns of a per-particle array, or the one column that all particles share.
+
+    `rows` ascend: as many as there are columns are all of them.
+    """
+    return array if array.shape[-1] in (1, len(rows)) else array.take(rows, axis=-1)
 
 
 def pick(array: Floats, rows: Ints, which: Ints) -> Floats:

@@ -45,9 +45,9 @@ def carry_round(s: Swarm, who: Ints) -> None:
     rho, v = s.p[1, who], s.v[0, who]
     left = s.stop[who] - s.age[who]
     cosine = np.minimum(v**2 / (of(s.gravity, who) * rho), 1.0)
-    end = np.arctan2(np.sqrt((1.0 - cosine) * (1.0 + cosine)), cosine)
-    struck, found = np.zeros(len(who), dtype=bool), None
-    if np.count_nonzero(end):
+    end, struck, found = np.zeros(len(who)), np.zeros(len(who), dtype=bool), None
+    if np.count_nonzero(cosine < 1.0):
+        end = np.arctan2(np.sqrt((1.0 - cosine) * (1.0 + cosine)), cosine)
         pulley = np.full(len(who), o.pulley - o.segments)
         found = bounds(o, who, pulley, rho, np.zeros(len(who)), of(s.radius, who))
         struck = ~found.high_handover & (found.high < end)
@@ -58,7 +58,7 @@ def carry_round(s: Swarm, who: Ints) -> None:
     hit, free = struck & ~over, ~struck & ~over
     s.finish(who[over], "time")
     s.part(who[free], 0)
-    s.fly(who[free], o.pulley, 0, np.where(end[free] > 0.0, 3, 2))
+    s.fly(who[free], o.pulley, 0, 2 + (end[free] > 0.0))
     if found is not None and np.count_nonzero(hit):
         strike(s, who[hit], found.high_obstacle[hit], found.high_side[hit])
 

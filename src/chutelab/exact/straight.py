@@ -10,7 +10,7 @@ from chutelab.ballistics import descent
 from chutelab.exact.detect import FEW, first_contact
 from chutelab.exact.grip import end_slip, face_force, settle_law
 from chutelab.exact.motion import Motion
-from chutelab.exact.obstacles import NONE, Floats, Ints, dot, pick, rows_of
+from chutelab.exact.obstacles import NONE, Floats, Ints, bare, dot, pick, rows_of
 from chutelab.exact.round import carry_round, ride_on
 from chutelab.exact.swarm import Mode
 from chutelab.exact.touch import strike
@@ -43,15 +43,14 @@ def fly(s: Swarm, who: Ints) -> None:
         leaves = _exit(s, motion)
     dt, hits, meeting = _next(s, motion, stops if leaves is None else np.minimum(leaves, stops))
     free = ~hits
-    out = np.zeros(0, dtype=np.int64)
-    if np.count_nonzero(free):
-        if leaves is None:
-            leaves = _exit(s, motion)
-            dt = np.where(hits, dt, np.minimum(leaves, stops))
-        out = who[free & (leaves <= stops)]
+    goes_on = np.count_nonzero(free) > 0
+    if goes_on and leaves is None:
+        leaves = _exit(s, motion)
+        dt = np.where(hits, dt, np.minimum(leaves, stops))
     _move(s, motion, dt)
     s.knots(who)
-    if np.count_nonzero(free):
+    if goes_on:
+        out = who[free & (leaves <= stops)]
         s.event(int(Kind.EXIT), out)
         s.finish(out, "exit")
         _stop(s, who[free & (s.mode[who] != Mode.DONE)])
@@ -63,7 +62,8 @@ def carry(s: Swarm, who: Ints) -> None:
     motion = _motion(s, who, AT_REST)
     motion.never = s.obstacles.under_belt
     v = motion.velocity[0]
-    ends, stops = np.where(v > 0.0, -motion.position[0] / v, np.inf), s.stop[who] - s.age[who]
+    ends, stops = -motion.position[0] / v, s.stop[who] - s.age[who]
+    ends[~(v > 0.0)] = np.inf
     dt, hits, meeting = _next(s, motion, np.minimum(ends, stops))
     _move(s, motion, dt)
     s.knots(who)
@@ -90,7 +90,7 @@ def slide(s: Swarm, who: Ints) -> None:
     mass = of(s.mass, who)
     s.book(who, c.surface, mass * force * c.belt * dt, 0.0, -mass * force * mean * dt)
     _move(s, motion, dt)
-    s.p[:, who] = s.obstacles.snapped(who, on, side, s.p, of(s.radius, who))
+    s.p[:, who], _ = s.obstacles.snapped(who, on, side, s.p, of(s.radius, who))
     if s.spins:
         s.z[who] += 2.0 * force * dt
     # What was left at the beginning is some way off now.
@@ -121,9 +121,8 @@ def _next(s: Swarm, motion: Motion, until: Floats) -> tuple[Floats, Bools, tuple
 
     Not longer than `until`; a contact at that very time comes first.
     """
-    time, obstacle, side = first_contact(motion, s.obstacles, of(s.radius, motion.rows), until)
-    hits = time <= until
-    dt = np.minimum(time, until)
+    radius = of(s.radius, motion.rows)
+    dt, hits, obstacle, side = first_contact(motion, s.obstacles, radius, until)
     s.count_idle(motion.rows, dt)
     return dt, hits, (obstacle, side)
 
@@ -138,7 +137,7 @@ def _move(s: Swarm, motion: Motion, dt: Floats) -> None:
         touch = of(s.obstacles.touch, motion.rows)
         away = (np.abs(place - middle) > CLEAR * touch).any(axis=0)
         s.past.place[:, motion.rows[away]] = middle[:, away]
-    s.v[:, at] = motion.velocity + dt * motion.acceleration
+    s.v[:, at] = motion.velocity + bare(dt) * motion.acceleration
 
 
 def _strike(s: Swarm, who: Ints, hits: Bools, meeting: tuple[Ints, Floats]) -> None:

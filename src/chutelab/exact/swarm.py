@@ -66,8 +66,9 @@ class Swarm:
         Views of it.
     radius, mass, gravity : float, or ndarray, (k,)
         m, kg, m/s²; arrays in a family of machines.
-    falls, spins : bool
-        Whether there is gravity, and whether the particles are free disks.
+    falls, spins, staggered : bool
+        Whether there is gravity, whether the particles are free disks, and whether they are
+        released at other times than 0.
     past : Past or None
         See `detect.Motion`.
     mode : ndarray, (k,)
@@ -102,11 +103,12 @@ class Swarm:
         self.radius, self.mass = of(particle.radius, mine), of(particle.mass, mine)
         self.gravity = of(machine.gravity, mine)
         self.fall = np.zeros((2, np.size(self.gravity)))
-        np.negative(self.gravity, out=self.fall[1])
-        self.falls, self.spins = bool(self.fall[1, 0]), bool(at(particle.inertia, 0) > 0.0)
+        self.fall[1] = -self.gravity
+        self.falls, self.spins = at(self.gravity, 0) != 0.0, at(particle.inertia, 0) > 0.0
         self.share = DISK_SHARE if self.spins else 1.0
         start = machine.releases
         self.released = start.t[first:last]
+        self.staggered = np.count_nonzero(self.released) > 0
         self.state = np.zeros((STATE, count))
         self.age, self.p, self.v = self.state[0], self.state[1:3], self.state[3:5]
         self.z, self.entries = self.state[5], self.state[6:]
@@ -114,18 +116,20 @@ class Swarm:
         self.p[:], self.v[:] = start.position[first:last].T, start.velocity[first:last].T
         if self.origin is not None:
             self.p -= self.origin
-        self.mode = np.where(start.carried[first:last], Mode.CARRIED, Mode.FLIGHT).astype(np.int8)
-        self.on, self.left = np.full((2, count), NONE)
-        self.order, self.idle, self.crawls = np.zeros((3, count), dtype=np.int64)
+        self.mode, self.ended = np.zeros((2, count), dtype=np.int8)
+        self.mode[:] = Mode.FLIGHT
+        self.mode[start.carried[first:last]] = Mode.CARRIED
+        integers = np.zeros((5, count), dtype=np.int64)
+        integers[3:] = NONE
+        self.order, self.idle, self.crawls, self.on, self.left = integers
         self.side, self.left_side, self.belt, self.slip = np.zeros((4, count))
-        self.slip += 1.0
+        self.slip[:] = 1.0
         self.stop = of(machine.end_time, mine) - self.released
         self.landed = np.zeros(count, dtype=bool)
         self.past: Past | None = None
         if at(self.radius, 0) <= at(self.obstacles.touch, 0):
             self.past = Past(np.full(count, NONE), np.zeros(count), self.p.copy())
         self.idling = self.crawling = False
-        self.ended = np.zeros(count, dtype=np.int8)
         self.first, self.rounds = first, 0
 
     @cached_property
@@ -148,11 +152,12 @@ class Swarm:
 
     def count_idle(self, who: Ints, dt: Floats) -> None:
         """Count events in a row that take no time, and raise rather than hang if they never end."""
-        still = ~(dt > ROUNDING * self.age[who])
-        self.idling = bool(np.count_nonzero(still)) or (self.idling and bool(self.idle.any()))
+        moved = dt > ROUNDING * self.age[who]
+        still = int(np.count_nonzero(moved)) < len(who)
+        self.idling = still or (self.idling and bool(self.idle.any()))
         if not self.idling:
             return
-        self.idle[who] = np.where(still, self.idle[who] + 1, 0)
+        self.idle[who] = np.where(moved, 0, self.idle[who] + 1)
         if self.idle[who].max() > 2 * COLLAPSE:
             reason = (
                 f"{2 * COLLAPSE} events in a row took no time; look for surfaces that nearly"
@@ -168,7 +173,7 @@ class Swarm:
     def parties(self) -> list[tuple[int, Ints]]:
         """Return the modes (but `DONE`) that particles are in now, and who is in each."""
         count, mode = len(self.mode), int(self.mode[0])
-        if np.count_nonzero(self.mode == mode) == count:
+        if count == 1 or np.count_nonzero(self.mode == mode) == count:
             return [(mode, self.everyone)] if mode != Mode.DONE else []
         counts = np.bincount(self.mode).tolist()
         return [
@@ -181,15 +186,19 @@ class Swarm:
         """Angular velocities, rad/s."""
         return self.z[who] / of(self.radius, who) if self.spins else np.zeros(len(who))
 
-    def contact(self, who: Ints, obstacle: Ints, side: Floats) -> Contact:
+    def contact(
+        self, who: Ints, obstacle: Ints, side: Floats, normal: Floats | None = None
+    ) -> Contact:
         """Return what a contact with an obstacle is like where the particles are now."""
         o = self.obstacles
-        normal = o.normal_at(who, obstacle, side, self.p)
+        if normal is None:
+            normal = o.normal_at(who, obstacle, side, self.p)
         tangent, material = along(normal), pick(o.material, who, obstacle)
         belt = dot(material[:2], tangent)
         if at(o.pulley_speed, 0) != 0.0:
             round_ = (obstacle == o.pulley).nonzero()[0]
-            belt[round_] = of(o.pulley_speed, who[round_])
+            if len(round_):
+                belt[round_] = of(o.pulley_speed, who[round_])
         return Contact(normal, tangent, belt, material[3], material[2], o.surface[obstacle])
 
     def at(self, who: Ints) -> Ints | slice:
@@ -200,7 +209,8 @@ class Swarm:
         """Return the particles as rows of a knot, (9, k)."""
         everyone = len(who) == len(self.mode)
         state = self.state.copy() if everyone else self.state.take(who, axis=1)
-        state[0] += self.released if everyone else self.released[who]
+        if self.staggered:
+            state[0] += self.released if everyone else self.released[who]
         if self.origin is not None:
             state[1:3] += self.origin
         if self.spins:
@@ -216,7 +226,7 @@ class Swarm:
         """Write an event for each of the particles as they are now, without an impulse."""
         if len(who):
             state = self.now(who)
-            self.journal.events(kind, who, surface, state, velocity=state[3:5], omega=state[5])
+            self.journal.events(kind, who, surface, state)
 
     def book(
         self,
@@ -236,6 +246,8 @@ class Swarm:
 
     def finish(self, who: Ints, reason: str) -> None:
         """End the tracks of the particles."""
+        if not len(who):
+            return
         self.mode[who] = Mode.DONE
         self.ended[who] = REASONS.index(reason)
 

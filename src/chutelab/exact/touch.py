@@ -10,7 +10,7 @@ import numpy as np
 from chutelab.exact.arcs import bounds
 from chutelab.exact.corner import hold
 from chutelab.exact.grip import face_force, load_on, settle_law
-from chutelab.exact.obstacles import NONE, Floats, Ints, dot, length_of, pick
+from chutelab.exact.obstacles import NONE, Floats, Ints, bare, dot, length_of, pick
 from chutelab.exact.swarm import COLLAPSE, Contact, Mode, Swarm
 from chutelab.impact import impulses, limited
 from chutelab.many import of
@@ -42,8 +42,9 @@ def strike(s: Swarm, who: Ints, obstacle: Ints, side: Floats) -> None:
     carried = s.mode[who] == Mode.CARRIED
     if np.count_nonzero(carried):
         s.part(who[carried], 0)
-    s.p[:, s.at(who)] = s.obstacles.snapped(who, obstacle, side, s.p, of(s.radius, who))
-    c = s.contact(who, obstacle, side)
+    place, normal = s.obstacles.snapped(who, obstacle, side, s.p, of(s.radius, who))
+    s.p[:, s.at(who)] = place
+    c = s.contact(who, obstacle, side, normal)
     before = s.v.take(who, axis=1)
     approach = np.maximum(-dot(before, c.normal), 0.0)
     soft = approach <= NEGLIGIBLE
@@ -51,12 +52,13 @@ def strike(s: Swarm, who: Ints, obstacle: Ints, side: Floats) -> None:
         c = c._replace(restitution=np.where(soft, 0.0, c.restitution))
     rebound = c.restitution * approach
     landing = (c.surface == s.machine.landing) & ~s.landed[who]
-    _blow(s, who, c, before, approach, rebound, landing)
-    if np.count_nonzero(landing):
+    lands = np.count_nonzero(landing) > 0
+    _blow(s, who, c, before, approach, rebound, landing if lands else None)
+    if lands:
         s.landed[who] |= landing
         if s.machine.until == "landed":
             s.finish(who[landing], "landed")
-            if landing.all():
+            if np.count_nonzero(landing) == len(who):
                 return
     _after(s, who, obstacle, side, c, rebound)
 
@@ -67,10 +69,14 @@ def _after(s: Swarm, who: Ints, obstacle: Ints, side: Floats, c: Contact, reboun
         before, before_side = _touched_before(s, who)
         other = before != obstacle
         s.past.obstacle[who[other]], s.past.side[who[other]] = before[other], before_side[other]
-    jammed = _stop_jammed(s, who, obstacle, side)
-    live = (s.mode[who] != Mode.DONE) & ~jammed
-    held = s.mode[who] >= Mode.FACE
-    if np.count_nonzero(held):
+    jammed = _stop_jammed(s, who, obstacle, side, rebound)
+    mode = s.mode[who]
+    live = mode != Mode.DONE
+    if jammed is not None:
+        live &= ~jammed
+    held = mode >= Mode.FACE
+    on_surface = np.count_nonzero(held) > 0
+    if on_surface:
         held[held] = _still_on(s, who[held])
         slides = held & live
         _slide_past(s, who[slides], obstacle[slides], side[slides], rebound[slides])
@@ -82,25 +88,29 @@ def _after(s: Swarm, who: Ints, obstacle: Ints, side: Floats, c: Contact, reboun
         live &= ~rests
     if np.count_nonzero(live) < len(live):
         who, obstacle, side, rebound = who[live], obstacle[live], side[live], rebound[live]
-    on = s.on[who]
-    leaves = on != NONE
-    if np.count_nonzero(leaves):
+    if on_surface:
+        on = s.on[who]
+        leaves = on != NONE
         s.part(who[leaves], s.obstacles.surface[on[leaves]])
-    s.fly(who, obstacle, side, np.where(rebound > 0.0, 1, 2))
+    s.fly(who, obstacle, side, 2 - (rebound > 0.0))
 
 
-def _stop_jammed(s: Swarm, who: Ints, obstacle: Ints, side: Floats) -> Bools:
+def _stop_jammed(
+    s: Swarm, who: Ints, obstacle: Ints, side: Floats, rebound: Floats
+) -> Bools | None:
     """Bring to rest, and tell, who goes to and fro between two obstacles without getting on."""
+    if not (s.idling or s.crawling or np.count_nonzero(rebound <= 2.0 * CRAWL)):
+        return None
     slow = length_of(s.v.take(who, axis=1)) <= CRAWL
     if not (s.idling or s.crawling or np.count_nonzero(slow)):
-        return np.zeros(len(who), dtype=bool)
+        return None
     before, before_side = _touched_before(s, who)
     between = (before != NONE) & (before != obstacle) & (s.mode[who] != Mode.DONE)
     s.crawls[who] = np.where(slow, s.crawls[who] + between, 0)
     s.crawling = bool(s.crawls.any())
     jammed = between & ((s.idle[who] > COLLAPSE) | (s.crawls[who] > COLLAPSE))
     if not np.count_nonzero(jammed):
-        return np.asarray(jammed)
+        return None
     # Faces that lie on each other make no corner.
     one = s.contact(who[jammed], before[jammed], before_side[jammed]).normal
     two = s.contact(who[jammed], obstacle[jammed], side[jammed]).normal
@@ -126,15 +136,18 @@ def _touched_before(s: Swarm, who: Ints) -> tuple[Ints, Floats]:
 
 def _blow(
     s: Swarm, who: Ints, c: Contact, before: Floats, approach: Floats, rebound: Floats,
-    landing: Bools,
+    landing: Bools | None,
 ) -> None:  # fmt: skip
-    """Change the velocities (`before` so far), book the energies, write events and knots."""
+    """Change the velocities (`before` so far), book the energies, write events and knots.
+
+    `landing` tells who lands with it; None for nobody.
+    """
     omega_before = s.omega(who)
     along = dot(before, c.tangent)
     slip = s.slip_of(who, c, along)
     normal, tangential = impulses(approach, slip, c.restitution, c.friction, s.share)
     # The normal speed is set, not added to: ε |v_n| to the last bit.
-    s.v[:, s.at(who)] = rebound * c.normal + (along + tangential) * c.tangent
+    s.v[:, s.at(who)] = bare(rebound) * c.normal + bare(along + tangential) * c.tangent
     if s.spins:
         s.z[who] += 2.0 * tangential
     after, mass = slip + tangential / s.share, of(s.mass, who)
@@ -147,17 +160,23 @@ def _blow(
     )
     state = s.now(who)
     s.journal.knots(who, state)
-    told = (approach > NEGLIGIBLE) | landing | (tangential != 0.0)
-    kind = np.where(landing, int(Kind.LANDING), int(Kind.IMPACT))
+    told = approach > NEGLIGIBLE
+    if landing is not None:
+        told |= landing
     surface, push, rub = c.surface, mass * normal, mass * tangential
     count = int(np.count_nonzero(told))
+    if count < len(told):
+        told |= tangential != 0.0
+        count = int(np.count_nonzero(told))
     s.journal.contacts += count
     if count < len(told):
-        who, kind, surface, state = who[told], kind[told], surface[told], state[:, told]
+        who, surface, state = who[told], surface[told], state[:, told]
+        landing = None if landing is None else landing[told]
         before, omega_before = before[:, told], omega_before[told]
         push, rub = push[told], rub[told]
+    hit = int(Kind.IMPACT)
     s.journal.events(
-        kind,
+        hit if landing is None else np.where(landing, int(Kind.LANDING), hit),
         who,
         surface,
         state,

@@ -61,23 +61,29 @@ def cleared(
         return releases
     # All start in one column, above the release point.
     x, low = release_point(scene)
-    high = low if scene.members is not None else float(releases.position[:, 1].max())
-    carried = bool(releases.carried[0])
+    carried, drawn = bool(releases.carried[0]), releases
     for n, (x0, y0, x1, y1, *_) in enumerate(rows):
-        near = (
-            (larger(x0, x1) > x - r) & (smaller(x0, x1) < x + r)
-            & (larger(y0, y1) > low - r) & (smaller(y0, y1) < high + r)
-        )  # fmt: skip
-        if some(near) and not (carried and owner[n] == 0):
+        if carried and owner[n] == 0:
+            continue
+        near = (larger(x0, x1) > x - r) & (smaller(x0, x1) < x + r) & (larger(y0, y1) > low - r)
+        if some(near):
+            near = near & (smaller(y0, y1) < _highest(scene, drawn, low) + r)
+        if some(near):
             _one_by_one(scene, near)
             releases = _out(scene, releases, (x0, y0), (x1, y1), r, names[owner[n]])
     if scene.incoming is not None and not carried:
         reach = scene.incoming.pulley_radius + r
+        high = _highest(scene, drawn, low)
         near = (abs(x) < reach) & (low < reach) & (high > -reach)
         if some(near):
             _one_by_one(scene, near)
             releases = _out(scene, releases, (0.0, 0.0), (0.0, 0.0), reach, "incoming")
     return releases
+
+
+def _highest(scene: Scene, releases: Releases, low: Value) -> Value:
+    """Return the height of the highest release, m."""
+    return low if scene.members is not None else float(releases.position[:, 1].max())
 
 
 def _one_by_one(scene: Scene, near: Value) -> None:

@@ -251,7 +251,8 @@ class Scene(Table):
     @property
     def members(self) -> int | None:
         """How many scenes a family holds, see `chutelab.scene.family`; None for one scene."""
-        return self._members
+        # As `self._members`, for which pydantic takes ten times as long.
+        return (self.__pydantic_private__ or {}).get("_members")
 
     def __eq__(self, other: object) -> bool:
         # The same machine from another file is the same scene.

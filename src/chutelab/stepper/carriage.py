@@ -81,8 +81,12 @@ class Carriages:
         """Return positions (k, 2) at a time, m."""
         begin, x, speed, rho = self._columns[:, who]
         along = x + speed * (t - begin)
-        phi = np.maximum(along, 0.0) / rho
-        return np.stack([np.where(along > 0.0, rho * np.sin(phi), along), rho * np.cos(phi)], -1)
+        places = np.array([along, rho]).T
+        round_ = (along > 0.0).nonzero()[0]
+        if len(round_):
+            phi, rho = along[round_] / rho[round_], rho[round_]
+            places[round_, 0], places[round_, 1] = rho * np.sin(phi), rho * np.cos(phi)
+        return places
 
 
 def carriage(machine: Machine, solids: Solids, particle: int) -> Carriage:

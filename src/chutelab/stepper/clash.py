@@ -82,7 +82,7 @@ class Clash:
         below = upper.radius if lower is None else lower.radius
         self._upper.position = 0.0, upper.radius * (1.0 - OVERLAP)
         self._lower.position = 0.0, -below * (1.0 - OVERLAP)
-        self._movable = lower is not None
+        self._mass = upper.mass
 
     @staticmethod
     def _body(disk: Disk) -> pymunk.Body:
@@ -110,8 +110,7 @@ class Clash:
         move(upper, velocity, omega)
         move(lower, other, other_omega)
         self._space.step(MOMENT)
-        after = upper.velocity
-        mass = upper.mass
+        after, mass = upper.velocity, self._mass
         impulse = mass * (after[0] - velocity[0]), mass * (after[1] - velocity[1])
         return impulse, upper.angular_velocity
 

@@ -7,7 +7,7 @@ to the step; the faster a crowd would meet, the more counts as slow, up to plain
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,8 +15,6 @@ from chutelab.recorder import StalledError
 from chutelab.stepper.tracks import FLYING
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
     from chutelab.stepper.state import Run
 
 MANY = 10
@@ -103,10 +101,14 @@ class Crowd:
         """Tell whether that many impacts lately make a crowd."""
         return impacts * self._pressure > MANY
 
-    def least_approach(self, impacts: ArrayLike) -> Any:
-        """Return what approaches too slowly to be foretold where all are stepped, m/s."""
+    def least_approach(self, impacts: int) -> float:
+        """Return what approaches too slowly to be foretold where all are stepped, m/s.
+
+        It is `Run.slow` or more.
+        """
         p = self._pressure
-        return self._run.slow * (p * np.maximum(np.asarray(impacts) * p / MANY, 1.0)) ** 2
+        factor = p * max(impacts * p / MANY, 1.0)
+        return self._run.slow * (factor * factor)
 
     @property
     def _pressure(self) -> float:

@@ -116,6 +116,7 @@ class _Loop:
             if releases.carried[i]
         }
         self.carriages = Carriages(self.rides, len(ids))
+        self.ahead = inf, np.empty(0, dtype=np.int64), np.empty((0, 2))
         start = float(self.release[0])
         if len(ids) == 1 and 0 in self.rides:
             # Nothing to step before it is let go.
@@ -159,10 +160,11 @@ class _Loop:
         r, mode = self.run_state, self.run_state.tracks.mode
         if not r.fresh and self.tick < inf:
             return
-        alive = bool((mode == RESTING).any())
-        if not alive and (mode == FLYING).any():
+        some = np.count_nonzero
+        alive = bool(some(mode == RESTING))
+        if not alive and some(mode == FLYING):
             alive = not self.machine.align or (
-                self.machine.interact and bool((mode == CARRIED).any() or r.crowd.stepped.any())
+                self.machine.interact and bool(some(mode == CARRIED) or some(r.crowd.stepped))
             )
         if not alive:
             self.tick = inf
@@ -180,10 +182,14 @@ class _Loop:
         span = self.tick - now
         who = (k.mode == CARRIED).nonzero()[0]
         if self.machine.interact and len(who) and 0.0 < span < inf:
-            begin = self.carriages.position(who, now)
+            # Where they are now was foretold at the last step, unless somebody came or left.
+            known, riders, begin = self.ahead
+            if known != now or riders.tobytes() != who.tobytes():
+                begin = self.carriages.position(who, now)
+            then = self.carriages.position(who, self.tick)
+            self.ahead = self.tick, who, then
             k.from_t[who], k.from_x[who] = now, begin
-            mean = (self.carriages.position(who, self.tick) - begin) / span
-            k.from_v[who] = mean - 0.5 * span * r.gravity
+            k.from_v[who] = (then - begin) / span - 0.5 * span * r.gravity
             r.version[who] += 1
 
     def _impact(self, t: float) -> None:
@@ -220,7 +226,8 @@ class _Loop:
             return
         if self.machine.interact:
             live = (mode != DONE).nonzero()[0]
-            if (mode[live] != RESTING).any() or (r.calm[live] * r.dt < STILL[1]).any():
+            some = np.count_nonzero
+            if some(mode[live] != RESTING) or some(r.calm[live] * r.dt < STILL[1]):
                 return
         else:
             live = ((mode == RESTING) & (r.calm >= SETTLED[1])).nonzero()[0]

@@ -130,35 +130,37 @@ class Forecast:
         return now + touch.t
 
     def _rows(
-        self,
-        who: list[int],
-        spans: list[float],
-        everybody: tuple[Floats, ...],
-        now: float,
-        tick: float,
+        self, who: list[int], spans: list[float], everybody: Floats, now: float, tick: float
     ) -> None:
         """Foretell what some particles meet within their spans, of all there are."""
-        run, k = self._run, self._run.tracks
-        x, y, u, v = (np.subtract.outer(-a[who], -a) for a in everybody)
-        t, approach = meeting(x, y, u, v, 2.0 * run.radius)
-        rows, columns = (t <= np.array(spans)[:, None]).nonzero()
-        if not len(rows):
+        run, mode = self._run, self._run.tracks.mode
+        apart = everybody[:, None] - everybody.take(who, axis=1)[:, :, None]
+        which, t, approach = meeting(apart, 2.0 * run.radius, np.array(spans)[:, None])
+        if not len(which):
             return
-        crowd, impacts, mode = run.crowd.stepped, run.crowd.impacts, k.mode
-        found = t[rows, columns].tolist(), approach[rows, columns].tolist()
-        for n, j, t_j, speed in zip(rows.tolist(), columns.tolist(), *found, strict=True):
-            i = who[n]
-            if mode[j] == WAITING or mode[j] == DONE:
+        rows, columns = np.divmod(which, run.count)
+        crowd, others = run.crowd.stepped, mode.take(columns)
+        for n, j, other, t_j, speed in zip(
+            rows.tolist(), columns.tolist(), others.tolist(), t.tolist(), approach.tolist(),
+            strict=True,
+        ):  # fmt: skip
+            if t_j > spans[n] or other in (WAITING, DONE):
                 continue
-            held = mode[j] != FLYING
-            if held and (now + t_j > tick or (mode[j] == CARRIED and mode[i] == CARRIED)):
+            i, held = who[n], other != FLYING
+            mine = mode[i]
+            if held and (now + t_j > tick or (other == CARRIED and mine == CARRIED)):
                 continue
-            if (mode[i] != FLYING or crowd[i]) and (held or crowd[j]):
-                floor = run.crowd.least_approach(max(impacts[i], impacts[j]))
+            if (mine != FLYING or crowd[i]) and (held or crowd[j]):
+                floor = self._least(i, j)
             else:
-                floor = ROUNDING * (hypot(everybody[2][i], everybody[3][i]) + run.soft)
+                floor = ROUNDING * (hypot(everybody[2, i], everybody[3, i]) + run.soft)
             if speed > floor:
                 self._pair(now + t_j, i, j)
+
+    def _least(self, i: int, j: int) -> float:
+        """Return what two that are stepped approach too slowly with to be foretold, m/s."""
+        crowd = self._run.crowd
+        return crowd.least_approach(max(int(crowd.impacts[i]), int(crowd.impacts[j])))
 
     def _pair(self, t: float, i: int, j: int) -> None:
         if max(self._run.crowd.impacts[i], self._run.crowd.impacts[j]) > MOST:
@@ -170,40 +172,51 @@ class Forecast:
     def window(self, now: float, tick: float) -> None:
         """Foretell up to the next step what those meet that do not fly, and pairs with them."""
         run, k = self._run, self._run.tracks
-        resting = k.mode == RESTING
+        resting, carried, flying = (k.mode == kind for kind in (RESTING, CARRIED, FLYING))
         self._solids(resting, now, tick)
         self.beside[:] = False
-        carried, flying = k.mode == CARRIED, k.mode == FLYING
         some = np.count_nonzero
-        if not self._crowd or not (some(resting) or (some(carried) and some(flying))):
+        belt = some(carried)
+        if not self._crowd or not (some(resting) or (belt and some(flying))):
             return
+        everybody, span = k.all_at(now), tick - now
         who = (resting | carried | flying).nonzero()[0]
-        x, v = k.flight(who, now)
-        span = tick - now
-        way = span * (v + 0.5 * span * run.gravity)
+        x, v = everybody.take(who, axis=1).reshape(2, 2, -1)
+        way = span * (v + 0.5 * span * run.gravity[:, None])
         margin = run.radius * (1.0 + NEAR)
         low = np.minimum(way, 0.0) + x
-        a, b = neighbours(low - margin, low + np.abs(way) + margin)
-        i, j = who[a], who[b]
+        i, j = neighbours(low - margin, low + np.abs(way) + margin)
+        i, j = who.take(i), who.take(j)
+        kind = k.mode.take(i)
         # Two in flight were foretold when they took off; two on the belt never meet.
-        asked = (~(flying[i] & flying[j]) & ~(carried[i] & carried[j])).nonzero()[0]
-        if not len(asked):
+        asked = (kind != k.mode.take(j)) | (kind == RESTING)
+        if not some(asked):
             return
-        a, b, i, j = a[asked], b[asked], i[asked], j[asked]
-        (dx, dy), (du, dv) = (x[b] - x[a]).T, (v[b] - v[a]).T
-        t, approach = meeting(dx, dy, du, dv, 2.0 * run.radius)
+        i, j = i.compress(asked), j.compress(asked)
+        apart = everybody.take(j, axis=1) - everybody.take(i, axis=1)
+        which, t, approach = meeting(apart, 2.0 * run.radius, span)
         free = flying & ~run.crowd.stepped
-        flies = free[i] | free[j]
-        impacts = run.crowd.impacts
-        least = run.crowd.least_approach(np.maximum(impacts[i], impacts[j]))
-        floor = np.where(flies, ROUNDING * run.soft, least)
-        for n in ((t <= span) & (approach > floor)).nonzero()[0].tolist():
-            self._pair(now + float(t[n]), int(i[n]), int(j[n]))
-        held = carried[i] | carried[j]
-        touching = (~flies & ~held & (dx * dx + dy * dy <= 4.0 * margin * margin)).nonzero()[0]
-        run.idle.stir(i[touching], j[touching], np.where(t <= span, approach, 0.0)[touching])
-        beside = (held & ~flies).nonzero()[0]
-        self.beside[i[beside]] = self.beside[j[beside]] = True
+        flies = free.take(i) | free.take(j)
+        closing = np.zeros(len(i))
+        soon = (t <= span).nonzero()[0]
+        if len(soon):
+            which, t, approach = which.take(soon), t.take(soon), approach.take(soon)
+            closing[which] = approach
+            first, second = i.take(which), j.take(which)
+            # Most are at rest to each other, but for rounding.
+            fast = (flies.take(which) & (approach > ROUNDING * run.soft)) | (approach > run.slow)
+            for n in fast.nonzero()[0].tolist():
+                one, other = int(first[n]), int(second[n])
+                if flies[which[n]] or approach[n] > self._least(one, other):
+                    self._pair(now + float(t[n]), one, other)
+        if belt:
+            held = carried.take(i) | carried.take(j)
+            beside = held & ~flies
+            self.beside[i[beside]] = self.beside[j[beside]] = True
+            flies |= held
+        parts = apart[:2] * apart[:2]
+        touching = (~flies & (parts[0] + parts[1] <= 4.0 * margin * margin)).nonzero()[0]
+        run.idle.stir(i.take(touching), j.take(touching), closing.take(touching))
 
     def _solids(self, resting: Mask, now: float, tick: float) -> None:
         """Foretell impacts on solids of those in contact; most are far from any other solid."""

@@ -52,7 +52,7 @@ class Idle:
         self._alike = np.zeros(count, dtype=np.int64)
         self._until = np.full(count, np.inf)
         # Per step: change of vx, vy and ω; belt work, friction loss and what that changes by.
-        self._change = np.zeros((count, 3))
+        self._change = np.zeros((3, count)).T
         self._lever = np.array([1.0, 1.0, run.radius])
         self._dues = np.zeros((count, 3))
         self._slides, self._pays = np.zeros((2, count), dtype=bool)
@@ -149,8 +149,10 @@ class Idle:
         run.calm += resumed & ~self._slides
         pays = (resumed & self._pays).nonzero()[0]
         if len(pays):
-            dues = self._dues[pays]
-            run.recorder.book(run.ids[pays], run.stays.on[pays], dues[:, 0], 0.0, dues[:, 1])
+            dues = self._dues.take(pays, axis=0)
+            entries = np.zeros((len(pays), 3))
+            entries[:, ::2] = dues[:, :2]
+            run.recorder.enter(run.ids.take(pays), run.stays.on.take(pays), entries)
             self._dues[pays, 1] += dues[:, 2]
         self.wake((self.asleep & (self._until <= tick)).nonzero()[0])
 

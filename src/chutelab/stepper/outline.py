@@ -144,13 +144,26 @@ class Outline:
             left, right = _range(x, vx, 0.0, until)
             bottom, top = _range(y, vy, -self._gravity, until)
         near = [
-            circle
-            for circle, (west, south, east, north) in self._circles
-            if left < east and right > west and bottom < north and top > south
+            (circle, box)
+            for circle, box in self._circles
+            if left < box[2] and right > box[0] and bottom < box[3] and top > box[1]
         ]
-        if near:
-            return self._round(np.array([x, y]), np.array([vx, vy]), near, until, first)
+        if any(self._passes((x, y, vx, vy), until, box) for _, box in near):
+            circles = [circle for circle, _ in near]
+            return self._round(np.array([x, y]), np.array([vx, vy]), circles, until, first)
         return first
+
+    def _passes(self, path: tuple[float, float, float, float], until: float, box: _Box) -> bool:
+        """Tell whether a path may come within the height of a box while within its width."""
+        (x, y, vx, vy), (west, south, east, north), g = path, box, self._gravity
+        if vx == 0.0:
+            return True
+        begin, end = sorted(((west - x) / vx, (east - x) / vx))
+        begin = max(begin, 0.0)
+        span, hair = max(min(end, until) - begin, 0.0), END * self._radius
+        at = y + begin * (vy - 0.5 * begin * g)
+        bottom, top = _range(at, vy - begin * g, -g, span)
+        return bottom - hair < north and top + hair > south
 
     def _faces(
         self, slab: _Slab, path: tuple[float, float, float, float], until: float, first: Touch

@@ -71,14 +71,12 @@ class Forecast:
 
     def next(self) -> float:
         """Return the time of the next impact, inf if none is foretold."""
-        while self._heap:
-            t, _, what = self._heap[0]
-            version = self._run.version
-            if version[what.particle] == what.versions[0] and (
-                what.other < 0 or version[what.other] == what.versions[1]
-            ):
+        heap, version = self._heap, self._run.version
+        while heap:
+            t, _, (i, j, _, (mine, theirs)) = heap[0]
+            if version[i] == mine and (j < 0 or version[j] == theirs):
                 return t
-            heappop(self._heap)
+            heappop(heap)
         return inf
 
     def take(self) -> Appointment:
@@ -95,7 +93,7 @@ class Forecast:
         run, k = self._run, self._run.tracks
         who, spans = [], []
         for i in dict.fromkeys(run.fresh):
-            mode = k.mode[i]
+            mode = int(k.mode[i])
             if mode in (WAITING, DONE):
                 continue
             until = min(float(k.exit[i]) if mode == FLYING else tick, run.machine.end_time)
@@ -136,18 +134,13 @@ class Forecast:
         run, mode = self._run, self._run.tracks.mode
         apart = everybody[:, None] - everybody.take(who, axis=1)[:, :, None]
         which, t, approach = meeting(apart, 2.0 * run.radius, np.array(spans)[:, None])
-        if not len(which):
-            return
-        rows, columns = np.divmod(which, run.count)
-        crowd, others = run.crowd.stepped, mode.take(columns)
-        for n, j, other, t_j, speed in zip(
-            rows.tolist(), columns.tolist(), others.tolist(), t.tolist(), approach.tolist(),
-            strict=True,
-        ):  # fmt: skip
+        crowd = run.crowd.stepped
+        for flat, t_j, speed in zip(which.tolist(), t.tolist(), approach.tolist(), strict=True):
+            n, j = divmod(flat, run.count)
+            i, other = who[n], int(mode[j])
             if t_j > spans[n] or other in (WAITING, DONE):
                 continue
-            i, held = who[n], other != FLYING
-            mine = mode[i]
+            mine, held = int(mode[i]), other != FLYING
             if held and (now + t_j > tick or (other == CARRIED and mine == CARRIED)):
                 continue
             if (mine != FLYING or crowd[i]) and (held or crowd[j]):
@@ -181,8 +174,9 @@ class Forecast:
             return
         everybody, span = k.all_at(now), tick - now
         who = (resting | carried | flying).nonzero()[0]
-        x, v = everybody.take(who, axis=1).reshape(2, 2, -1)
-        way = span * (v + 0.5 * span * run.gravity[:, None])
+        x, way = everybody.take(who, axis=1).reshape(2, 2, -1)
+        way[1] += 0.5 * span * run.gravity[1]
+        way *= span
         margin = run.radius * (1.0 + NEAR)
         low = np.minimum(way, 0.0) + x
         i, j = neighbours(low - margin, low + np.abs(way) + margin)

@@ -129,7 +129,7 @@ class Tracks:
     def state(self, i: int, t: float) -> tuple[float, float, float, float]:
         """Return position and velocity of one particle on its present path at a time."""
         s = t - float(self.from_t[i])
-        (x, y), (vx, vy) = self.from_x[i].tolist(), self.from_v[i].tolist()
+        x, y, vx, vy = self._path[:, i].tolist()
         g = self._machine.gravity
         return x + s * vx, y + s * (vy - 0.5 * s * g), vx, vy - s * g
 

@@ -116,7 +116,6 @@ class _Loop:
             if releases.carried[i]
         }
         self.carriages = Carriages(self.rides, len(ids))
-        self.ahead = inf, np.empty(0, dtype=np.int64), np.empty((0, 2))
         start = float(self.release[0])
         if len(ids) == 1 and 0 in self.rides:
             # Nothing to step before it is let go.
@@ -182,14 +181,9 @@ class _Loop:
         span = self.tick - now
         who = (k.mode == CARRIED).nonzero()[0]
         if self.machine.interact and len(who) and 0.0 < span < inf:
-            # Where they are now was foretold at the last step, unless somebody came or left.
-            known, riders, begin = self.ahead
-            if known != now or riders.tobytes() != who.tobytes():
-                begin = self.carriages.position(who, now)
-            then = self.carriages.position(who, self.tick)
-            self.ahead = self.tick, who, then
-            k.from_t[who], k.from_x[who] = now, begin
-            k.from_v[who] = (then - begin) / span - 0.5 * span * r.gravity
+            k.from_t[who] = now
+            k.from_x[who], mean = self.carriages.chord(who, now, self.tick)
+            k.from_v[who] = mean - 0.5 * span * r.gravity
             r.version[who] += 1
 
     def _impact(self, t: float) -> None:
@@ -225,9 +219,9 @@ class _Loop:
         if self.machine.until != "settled":
             return
         if self.machine.interact:
-            live = (mode != DONE).nonzero()[0]
-            some = np.count_nonzero
-            if some(mode[live] != RESTING) or some(r.calm[live] * r.dt < STILL[1]):
+            live, some = (mode == RESTING).nonzero()[0], np.count_nonzero
+            ended = len(mode) - len(live) == some(mode == DONE)
+            if not ended or some(r.calm[live] * r.dt < STILL[1]):
                 return
         else:
             live = ((mode == RESTING) & (r.calm >= SETTLED[1])).nonzero()[0]

@@ -45,14 +45,11 @@ class Appointment(NamedTuple):
         Who meets whom; other is -1 for a solid.
     touch : Touch or None
         The contact with a solid.
-    versions : tuple of int
-        Of the paths of the two.
     """
 
     particle: int
     other: int
     touch: Touch | None
-    versions: tuple[int, int]
 
 
 class Forecast:
@@ -60,7 +57,8 @@ class Forecast:
 
     def __init__(self, run: Run, outline: Outline) -> None:
         self._run, self._outline = run, outline
-        self._heap: list[tuple[float, int, Appointment]] = []
+        # When, a number for the order of those at one time, who, how, and on which paths.
+        self._heap: list[tuple[float, int, int, int, Touch | None, int, int]] = []
         self._number = count()
         # Until when who is in contact can meet no other solid; who slept then, if it sleeps on.
         self._safe_until = np.full(run.count, -inf)
@@ -73,7 +71,7 @@ class Forecast:
         """Return the time of the next impact, inf if none is foretold."""
         heap, version = self._heap, self._run.version
         while heap:
-            t, _, (i, j, _, (mine, theirs)) = heap[0]
+            t, _, i, j, _, mine, theirs = heap[0]
             if version[i] == mine and (j < 0 or version[j] == theirs):
                 return t
             heappop(heap)
@@ -81,12 +79,12 @@ class Forecast:
 
     def take(self) -> Appointment:
         """Return the next impact."""
-        return heappop(self._heap)[2]
+        return Appointment(*heappop(self._heap)[2:5])
 
     def _push(self, t: float, i: int, j: int, touch: Touch | None = None) -> None:
         v = self._run.version
-        what = Appointment(i, j, touch, (int(v[i]), int(v[j]) if j >= 0 else 0))
-        heappush(self._heap, (t, next(self._number), what))
+        theirs = int(v[j]) if j >= 0 else 0
+        heappush(self._heap, (t, next(self._number), i, j, touch, int(v[i]), theirs))
 
     def refresh(self, now: float, tick: float) -> None:
         """Foretell the impacts of particles on new paths."""
@@ -112,12 +110,13 @@ class Forecast:
         """Foretell what solid a particle meets; return when, or inf."""
         k = self._run.tracks
         x, y, vx, vy = k.state(i, now)
-        short = hypot(vx, vy) * self._run.dt < WEDGED * self._run.radius
-        if short and k.mode[i] == RESTING and self._run.crowd.impacts[i] > MOST:
+        rests = bool(k.mode[i] == RESTING)
+        many = rests and self._run.crowd.impacts[i] > MOST
+        if many and hypot(vx, vy) * self._run.dt < WEDGED * self._run.radius:
             # Two faces that drive it into each other are left to the step.
             return inf
         touch = self._outline.first(x, y, vx, vy, span)
-        if k.mode[i] == RESTING:
+        if rests:
             self._safe_until[i] = -inf
             fall = vy - touch.t * self._run.machine.gravity
             if -(vx * touch.normal[0] + fall * touch.normal[1]) <= self._run.soft:
@@ -165,7 +164,7 @@ class Forecast:
     def window(self, now: float, tick: float) -> None:
         """Foretell up to the next step what those meet that do not fly, and pairs with them."""
         run, k = self._run, self._run.tracks
-        resting, carried, flying = (k.mode == kind for kind in (RESTING, CARRIED, FLYING))
+        resting, carried, flying = k.mode == RESTING, k.mode == CARRIED, k.mode == FLYING
         self._solids(resting, now, tick)
         self.beside[:] = False
         some = np.count_nonzero

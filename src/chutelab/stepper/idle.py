@@ -177,10 +177,9 @@ class Idle:
         """Wake a particle that is hit, and what touches it."""
         if self.asleep[i]:
             k = self._run.tracks
-            who = self.asleep.nonzero()[0]
-            apart = k.from_x[who] - k.from_x[i]
+            x, y = (k.from_x - k.from_x[i]).T
             reach = 2.0 * self._run.radius * (1.0 + CONTACT)
-            self.wake(who[np.hypot(apart[:, 0], apart[:, 1]) <= reach])
+            self.wake((self.asleep & (np.hypot(x, y) <= reach)).nonzero()[0])
 
     def stir(self, first: Ints, second: Ints, approach: Floats) -> None:
         """Wake whoever touches somebody awake, or approaches somebody, of pairs in contact (k,)."""
@@ -188,7 +187,11 @@ class Idle:
         if not np.count_nonzero(self.asleep):
             return
         awake = run.crowd.stepped | ((run.tracks.mode == RESTING) & ~self.asleep)
-        awake[first[approach > QUIET]] = True
+        loud = approach > QUIET
+        if np.count_nonzero(loud):
+            awake[first.compress(loud)] = True
+        elif not np.count_nonzero(awake.take(first) != awake.take(second)):
+            return
         spread(awake, first, second)
         self.wake((awake & self.asleep).nonzero()[0])
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import hypot, inf
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -61,8 +60,7 @@ _Box = tuple[float, float, float, float]
 """Least x and y, largest x and y, m."""
 
 
-@dataclass(frozen=True)
-class _Slab:
+class _Slab(NamedTuple):
     """A slab by its struck face: start a, unit tangent t and normal n, length and thickness, m."""
 
     solid: int
@@ -170,8 +168,8 @@ class Outline:
     ) -> Touch:
         """Return the first touch with a face, or `first` if that is sooner."""
         x, y, vx, vy = path
-        (ax, ay), (tx, ty), (nx, ny) = slab.a, slab.t, slab.n
-        r, length, thickness = self._radius, slab.length, slab.thickness
+        solid, (ax, ay), (tx, ty), (nx, ny), length, thickness = slab
+        r = self._radius
         still, free, hair = PARALLEL * hypot(vx, vy), PARALLEL * self._gravity, END * r
         u, w = (x - ax) * tx + (y - ay) * ty, (x - ax) * nx + (y - ay) * ny
         ru, rw = vx * tx + vy * ty, vx * nx + vy * ny
@@ -191,7 +189,7 @@ class Outline:
                 there, speed = foot + t * (pace + 0.5 * t * turn), pace + t * turn
                 # Moving out over the very end is not a touch of the face.
                 if hair * (speed < 0.0) <= there <= wide - hair * (speed > 0.0):
-                    first = Touch(t, slab.solid, out, gap=gap if inside else 0.0)
+                    first = Touch(t, solid, out, gap=gap if inside else 0.0)
         return first
 
     def _round(
@@ -245,9 +243,9 @@ class Outline:
         (vx, vy), (ax, ay) = velocity, acceleration
         out = []
         for slab, _ in self._slabs:
-            (x0, y0), (tx, ty), (nx, ny) = slab.a, slab.t, slab.n
+            _, (x0, y0), (tx, ty), (nx, ny), length, thickness = slab
             u, w = (x - x0) * tx + (y - y0) * ty, (x - x0) * nx + (y - y0) * ny
-            u, w = u - min(max(u, 0.0), slab.length), w - min(max(w, -slab.thickness), 0.0)
+            u, w = u - min(max(u, 0.0), length), w - min(max(w, -thickness), 0.0)
             dx, dy = u * tx + w * nx, u * ty + w * ny
             far = hypot(dx, dy)
             if far > 0.0:

@@ -63,7 +63,7 @@ class Tracks:
 
     def __init__(self, machine: Machine, recorder: Recorder, ids: Ints) -> None:
         count = len(ids)
-        self.ids = ids
+        self.ids, self._names = ids, ids.tolist()
         self._machine = machine
         self._recorder = recorder
         self._g = np.array([0.0, -machine.gravity])
@@ -101,7 +101,7 @@ class Tracks:
     ) -> None:
         """Write a knot for one particle."""
         self._knot[i] = t, x, y, vx, vy, omega
-        n = int(self.ids[i])
+        n = self._names[i]
         self._owners.append(n)
         self._knots.extend((t, x, y, vx, vy, omega, *self._recorder.entries[n].tolist()))
 

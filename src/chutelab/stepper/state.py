@@ -225,8 +225,8 @@ class Run:
         """
         k = self.tracks
         k.rest(i)
-        k.leave(i, k.x[i], k.v[i], k.omega[i])
-        k.begin(i)
+        _, x, y, vx, vy = k.begin(i)
+        k.leave(i, (x, y), (vx, vy), k.omega[i])
         k.upon[i], self.bend[i], self.sunk[i] = normal, curvature, sunk
         k.face[i] = solid if curvature == 0.0 else -1
         self.changed(i)

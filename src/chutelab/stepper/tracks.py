@@ -103,7 +103,7 @@ class Tracks:
         self._knot[i] = t, x, y, vx, vy, omega
         n = self._names[i]
         self._owners.append(n)
-        self._knots.extend((t, x, y, vx, vy, omega, *self._recorder.entries[n].tolist()))
+        self._knots.frombytes(self._knot[i].tobytes() + self._recorder.entries[n].tobytes())
 
     def flush(self) -> None:
         """Hand over the knots written."""

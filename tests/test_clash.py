@@ -137,9 +137,8 @@ def test_when_and_where_disks_meet(course, share, speed, gap):
     leg = sqrt(reach**2 - offset**2)
     start = leg + gap
     x, y = -start * c - offset * s, -start * s + offset * c
-    (t,), (approach,) = meeting(
-        np.array([x]), np.array([y]), np.array([speed * c]), np.array([speed * s]), reach
-    )
+    apart = np.array([[x], [y], [speed * c], [speed * s]])
+    _, (t,), (approach,) = meeting(apart, reach, 10.0)
     assert t == pytest.approx(gap / speed, rel=1e-9)
     assert approach == pytest.approx(speed * leg / reach, rel=1e-9)
 

@@ -11,6 +11,19 @@ from hypothesis import strategies as st
 
 from chutelab.stepper.meetings import meeting, neighbours
 
+LONG = 1e250
+"""s; longer than it takes any of these to meet."""
+
+
+def meetings(x, y, u, v, reach, span=LONG):
+    """When disks meet, inf if not within the span, and how fast they approach then, else 0."""
+    apart = np.array([x, y, u, v])
+    which, when, speed = meeting(apart, reach, span)
+    t, approach = np.full(apart.shape[1:], inf), np.zeros(apart.shape[1:])
+    soon = when <= np.broadcast_to(span, t.shape).ravel()[which]
+    t.ravel()[which[soon]], approach.ravel()[which[soon]] = when[soon], speed[soon]
+    return t, approach
+
 
 def pairs(first, second):
     return {(min(a, b), max(a, b)) for a, b in zip(first.tolist(), second.tolist(), strict=True)}
@@ -40,7 +53,7 @@ def test_neighbours_are_all_boxes_that_overlap(seed, count, size, grid):
     if grid:
         # Many sides that coincide.
         low, sides = np.round(4.0 * low) / 4.0, np.round(4.0 * sides) / 4.0
-    first, second = neighbours(low, low + sides)
+    first, second = neighbours(low.T, (low + sides).T)
     assert len(first) == len(pairs(first, second))  # each pair once
     assert not np.any(first == second)
     assert pairs(first, second) == all_pairs(low, low + sides)
@@ -49,7 +62,7 @@ def test_neighbours_are_all_boxes_that_overlap(seed, count, size, grid):
 def test_neighbours_of_a_thousand_in_a_heap():
     rng = np.random.default_rng(1)
     low = rng.uniform(0.0, 1.0, (1000, 2))
-    first, second = neighbours(low, low + 0.02)
+    first, second = neighbours(low.T, low.T + 0.02)
     gap = np.abs(low[:, None] - low).max(axis=2)
     expected = np.argwhere(np.triu(gap <= 0.02, 1))
     assert len(first) == len(expected) > 100
@@ -60,7 +73,7 @@ def test_a_wide_box_is_the_neighbour_of_all_below_it():
     low = np.array([[-10.0, 0.0], *([float(x), 0.5] for x in range(5)), [0.0, 2.0]])
     high = low + 0.1
     high[0] = [10.0, 1.0]
-    assert pairs(*neighbours(low, high)) == {(0, n) for n in range(1, 6)}
+    assert pairs(*neighbours(low.T, high.T)) == {(0, n) for n in range(1, 6)}
 
 
 @settings(max_examples=200)
@@ -73,8 +86,12 @@ def test_at_the_meeting_the_distance_is_the_reach_and_before_it_is_more(place, v
     (x, y), (u, v) = place, velocity
     apart, speed = np.hypot(x, y), np.hypot(u, v)
     assume(apart > reach * (1.0 + 1e-6))
-    (t,), (approach,) = meeting(*(np.array([a]) for a in (x, y, u, v)), reach)
+    (t,), (approach,) = meetings(*(np.array([a]) for a in (x, y, u, v)), reach)
     nearest = abs(x * v - y * u) / speed if speed > 0.0 else apart
+    if 0.0 < speed < 1e-150:
+        # Its square is no number; that they meet at all is beyond all time.
+        assert t > 1e100
+        return
     if x * u + y * v >= 0.0 or nearest >= reach:
         assert t == inf
         assert approach == 0.0
@@ -92,7 +109,7 @@ def test_grazing_loses_no_digits(below):
     # Past at (1 - below) of the reach: the approach is speed √(2 below - below²).
     reach, speed = 0.008, 2.0
     miss = reach * (1.0 - below)
-    (t,), (approach,) = meeting(
+    (t,), (approach,) = meetings(
         np.array([-0.1]), np.array([miss]), np.array([speed]), np.array([0.0]), reach
     )
     part = 1.0 - miss / reach  # what of `below` a float keeps
@@ -105,12 +122,32 @@ def test_grazing_loses_no_digits(below):
 @pytest.mark.parametrize("share", [1.0, 0.9, 0.5])
 def test_disks_that_overlap_meet_at_once_or_never(u, t, approach, share):
     x = np.array([0.008 * share])
-    found = meeting(x, np.zeros(1), np.array([u]), np.zeros(1), 0.008)
+    found = meetings(x, np.zeros(1), np.array([u]), np.zeros(1), 0.008)
     assert found[0] == pytest.approx([t], abs=1e-16)
     assert found[1] == pytest.approx([approach], rel=1e-14)
 
 
 def test_disks_at_rest_to_each_other_never_meet():
-    t, approach = meeting(np.array([0.1, 0.008]), np.zeros(2), np.zeros(2), np.zeros(2), 0.008)
+    t, approach = meetings(np.array([0.1, 0.008]), np.zeros(2), np.zeros(2), np.zeros(2), 0.008)
     assert t.tolist() == [inf, inf]
     assert approach.tolist() == [0.0, 0.0]
+
+
+@settings(max_examples=200)
+@given(
+    seed=st.integers(0, 2**31),
+    scale=st.sampled_from([1e-6, 1.0, 1e6]),
+    share=st.sampled_from([0.5, 1.0 - 1e-12, 1.0, 1.0 + 1e-12, 2.0]),
+)
+def test_asked_within_a_span_it_finds_what_meets_within_it(seed, scale, share):
+    # Rows with a span each; some spans end when, or a rounding before or after, two meet.
+    rng = np.random.default_rng(seed)
+    apart = rng.uniform(-1.0, 1.0, (4, 3, 20))
+    apart[:2] *= scale
+    reach = 0.2 * scale
+    whole, approach = meetings(*apart, reach)
+    first = np.minimum(whole.min(axis=1), LONG)
+    span = share * first[:, None]
+    t, speed = meetings(*apart, reach, span)
+    assert np.array_equal(t, np.where(whole <= span, whole, inf))
+    assert np.array_equal(speed, np.where(whole <= span, approach, 0.0))

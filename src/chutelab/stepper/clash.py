@@ -82,7 +82,7 @@ class Clash:
         below = upper.radius if lower is None else lower.radius
         self._upper.position = 0.0, upper.radius * (1.0 - OVERLAP)
         self._lower.position = 0.0, -below * (1.0 - OVERLAP)
-        self._movable = lower is not None
+        self._mass = upper.mass
 
     @staticmethod
     def _body(disk: Disk) -> pymunk.Body:
@@ -110,8 +110,7 @@ class Clash:
         move(upper, velocity, omega)
         move(lower, other, other_omega)
         self._space.step(MOMENT)
-        after = upper.velocity
-        mass = upper.mass
+        after, mass = upper.velocity, self._mass
         impulse = mass * (after[0] - velocity[0]), mass * (after[1] - velocity[1])
         return impulse, upper.angular_velocity
 
@@ -133,6 +132,7 @@ class Clashes:
         self._particles = Pair(machine.pair_restitution, machine.pair_friction)
         self._solids = solids
         self._known: dict[tuple[int, bool], Clash] = {}
+        self._grips = [*solids.friction.tolist(), machine.pair_friction]
 
     def of(self, solid: int, *, free: bool) -> Clash:
         """Return a particle with a solid, or if that is -1 with a particle, free or carried."""
@@ -143,7 +143,8 @@ class Clashes:
 
     def grip(self, solid: int) -> float:
         """Return the coefficient of friction with a solid, or if that is -1 with a particle."""
-        return self._pair(solid).friction
+        grip: float = self._grips[solid]
+        return grip
 
     def _pair(self, solid: int) -> Pair:
         if solid < 0:

@@ -7,7 +7,7 @@ to the step; the faster a crowd would meet, the more counts as slow, up to plain
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,8 +15,6 @@ from chutelab.recorder import StalledError
 from chutelab.stepper.tracks import FLYING
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
     from chutelab.stepper.state import Run
 
 MANY = 10
@@ -50,6 +48,8 @@ class Crowd:
         self.impacts = np.zeros(run.count, dtype=np.int64)
         self.stepped = np.zeros(run.count, dtype=bool)
         self._until, self._load, self._within = run.start, 0, 0
+        # The largest number of impacts, and whether anybody is stepped.
+        self._most, self._any = 0, False
         self._allowed = max(LOAD[0], LOAD[1] * run.count)
         self._bound = BOUND[0] + BOUND[1] * run.count
 
@@ -62,10 +62,13 @@ class Crowd:
             If there were too many within one step.
         """
         self._forget(t)
+        most = 0
         for n in {i, j}:
-            self.impacts[n] += 1
+            impacts = int(self.impacts[n]) + 1
+            self.impacts[n], most = impacts, max(most, impacts)
             self._load += 1
         self._within += 1
+        self._most = max(self._most, most)
         if self._within > self._bound:
             run = self._run
             x, y, _, _ = run.tracks.state(i, t)
@@ -74,7 +77,7 @@ class Crowd:
                 "number of particles, or the speeds"
             )
             raise StalledError(int(run.ids[i]), t, (x, y), reason)
-        return int(max(self.impacts[i], self.impacts[j]))
+        return most
 
     def _forget(self, t: float) -> None:
         """Halve what was counted with each step that is over."""
@@ -82,8 +85,12 @@ class Crowd:
             return
         tick = self._run.next_tick(t)
         if tick > self._until:
-            self.impacts >>= min(round((tick - self._until) / self._run.dt), 60)
-            self._load, self._within, self._until = int(self.impacts.sum()), 0, tick
+            if self._most:
+                steps = min(round((tick - self._until) / self._run.dt), 60)
+                self.impacts >>= steps
+                self._most >>= steps
+                self._load = int(self.impacts.sum())
+            self._within, self._until = 0, tick
 
     def look(self, t: float) -> None:
         """Note at a step who is in a crowd; who is in none any more flies on as foretold."""
@@ -91,11 +98,11 @@ class Crowd:
         run = self._run
         if run.count == 1:
             return
-        if not (self._load or np.count_nonzero(self.stepped)):
+        if not (self._any or self.is_in(self._most)):
             return
         stepped = self.impacts * self._pressure > MANY
         out = (self.stepped & ~stepped & (run.tracks.mode == FLYING)).nonzero()[0]
-        self.stepped = stepped
+        self.stepped, self._any = stepped, self.is_in(self._most)
         for n in out.tolist():
             run.changed(n)
 
@@ -103,10 +110,14 @@ class Crowd:
         """Tell whether that many impacts lately make a crowd."""
         return impacts * self._pressure > MANY
 
-    def least_approach(self, impacts: ArrayLike) -> Any:
-        """Return what approaches too slowly to be foretold where all are stepped, m/s."""
+    def least_approach(self, impacts: int) -> float:
+        """Return what approaches too slowly to be foretold where all are stepped, m/s.
+
+        It is `Run.slow` or more.
+        """
         p = self._pressure
-        return self._run.slow * (p * np.maximum(np.asarray(impacts) * p / MANY, 1.0)) ** 2
+        factor = p * max(impacts * p / MANY, 1.0)
+        return self._run.slow * (factor * factor)
 
     @property
     def _pressure(self) -> float:

@@ -160,10 +160,11 @@ class _Loop:
         r, mode = self.run_state, self.run_state.tracks.mode
         if not r.fresh and self.tick < inf:
             return
-        alive = bool((mode == RESTING).any())
-        if not alive and (mode == FLYING).any():
+        some = np.count_nonzero
+        alive = bool(some(mode == RESTING))
+        if not alive and some(mode == FLYING):
             alive = not self.machine.align or (
-                self.machine.interact and bool((mode == CARRIED).any() or r.crowd.stepped.any())
+                self.machine.interact and bool(some(mode == CARRIED) or some(r.crowd.stepped))
             )
         if not alive:
             self.tick = inf
@@ -181,9 +182,8 @@ class _Loop:
         span = self.tick - now
         who = (k.mode == CARRIED).nonzero()[0]
         if self.machine.interact and len(who) and 0.0 < span < inf:
-            begin = self.carriages.position(who, now)
-            k.from_t[who], k.from_x[who] = now, begin
-            mean = (self.carriages.position(who, self.tick) - begin) / span
+            k.from_t[who] = now
+            k.from_x[who], mean = self.carriages.chord(who, now, self.tick)
             k.from_v[who] = mean - 0.5 * span * r.gravity
             r.version[who] += 1
 
@@ -220,8 +220,9 @@ class _Loop:
         if self.machine.until != "settled":
             return
         if self.machine.interact:
-            live = (mode != DONE).nonzero()[0]
-            if (mode[live] != RESTING).any() or (r.calm[live] * r.dt < STILL[1]).any():
+            live, some = (mode == RESTING).nonzero()[0], np.count_nonzero
+            ended = len(mode) - len(live) == some(mode == DONE)
+            if not ended or some(r.calm[live] * r.dt < STILL[1]):
                 return
         else:
             live = ((mode == RESTING) & (r.calm >= SETTLED[1])).nonzero()[0]

@@ -46,14 +46,11 @@ class Appointment(NamedTuple):
         Who meets whom; other is -1 for a solid.
     touch : Touch or None
         The contact with a solid.
-    versions : tuple of int
-        Of the paths of the two.
     """
 
     particle: int
     other: int
     touch: Touch | None
-    versions: tuple[int, int]
 
 
 class Forecast:
@@ -61,7 +58,8 @@ class Forecast:
 
     def __init__(self, run: Run, outline: Outline) -> None:
         self._run, self._outline = run, outline
-        self._heap: list[tuple[float, int, Appointment]] = []
+        # When, a number for the order of those at one time, who, how, and on which paths.
+        self._heap: list[tuple[float, int, int, int, Touch | None, int, int]] = []
         self._number = count()
         # Until when who is in contact can meet no other solid; who slept then, if it sleeps on.
         self._safe_until = np.full(run.count, -inf)
@@ -72,31 +70,29 @@ class Forecast:
 
     def next(self) -> float:
         """Return the time of the next impact, inf if none is foretold."""
-        while self._heap:
-            t, _, what = self._heap[0]
-            version = self._run.version
-            if version[what.particle] == what.versions[0] and (
-                what.other < 0 or version[what.other] == what.versions[1]
-            ):
+        heap, version = self._heap, self._run.version
+        while heap:
+            t, _, i, j, _, mine, theirs = heap[0]
+            if version[i] == mine and (j < 0 or version[j] == theirs):
                 return t
-            heappop(self._heap)
+            heappop(heap)
         return inf
 
     def take(self) -> Appointment:
         """Return the next impact."""
-        return heappop(self._heap)[2]
+        return Appointment(*heappop(self._heap)[2:5])
 
     def _push(self, t: float, i: int, j: int, touch: Touch | None = None) -> None:
         v = self._run.version
-        what = Appointment(i, j, touch, (int(v[i]), int(v[j]) if j >= 0 else 0))
-        heappush(self._heap, (t, next(self._number), what))
+        theirs = int(v[j]) if j >= 0 else 0
+        heappush(self._heap, (t, next(self._number), i, j, touch, int(v[i]), theirs))
 
     def refresh(self, now: float, tick: float) -> None:
         """Foretell the impacts of particles on new paths."""
         run, k = self._run, self._run.tracks
         who, spans = [], []
         for i in dict.fromkeys(run.fresh):
-            mode = k.mode[i]
+            mode = int(k.mode[i])
             if mode in (WAITING, DONE):
                 continue
             until = min(float(k.exit[i]) if mode == FLYING else tick, run.machine.end_time)
@@ -115,8 +111,8 @@ class Forecast:
         """Foretell what solid a particle meets; return when, or inf."""
         k = self._run.tracks
         x, y, vx, vy = k.state(i, now)
-        speed = hypot(vx, vy)
-        worn_out = k.mode[i] == RESTING and self._run.crowd.impacts[i] > MOST
+        rests, speed = bool(k.mode[i] == RESTING), hypot(vx, vy)
+        worn_out = rests and self._run.crowd.impacts[i] > MOST
         if worn_out and speed * self._run.dt < WEDGED * self._run.radius:
             # Two faces that drive it into each other are left to the step.
             return inf
@@ -124,7 +120,7 @@ class Forecast:
         if worn_out and self._run.count == 1 and touch.t * speed <= NEAR * self._run.radius:
             hold_fast(self._run, i, touch.solid)
             return inf
-        if k.mode[i] == RESTING:
+        if rests:
             self._safe_until[i] = -inf
             fall = vy - touch.t * self._run.machine.gravity
             if -(vx * touch.normal[0] + fall * touch.normal[1]) <= self._run.soft:
@@ -135,35 +131,32 @@ class Forecast:
         return now + touch.t
 
     def _rows(
-        self,
-        who: list[int],
-        spans: list[float],
-        everybody: tuple[Floats, ...],
-        now: float,
-        tick: float,
+        self, who: list[int], spans: list[float], everybody: Floats, now: float, tick: float
     ) -> None:
         """Foretell what some particles meet within their spans, of all there are."""
-        run, k = self._run, self._run.tracks
-        x, y, u, v = (np.subtract.outer(-a[who], -a) for a in everybody)
-        t, approach = meeting(x, y, u, v, 2.0 * run.radius)
-        rows, columns = (t <= np.array(spans)[:, None]).nonzero()
-        if not len(rows):
-            return
-        crowd, impacts, mode = run.crowd.stepped, run.crowd.impacts, k.mode
-        found = t[rows, columns].tolist(), approach[rows, columns].tolist()
-        for n, j, t_j, speed in zip(rows.tolist(), columns.tolist(), *found, strict=True):
-            i = who[n]
-            if mode[j] == WAITING or mode[j] == DONE:
+        run, mode = self._run, self._run.tracks.mode
+        apart = everybody[:, None] - everybody.take(who, axis=1)[:, :, None]
+        which, t, approach = meeting(apart, 2.0 * run.radius, np.array(spans)[:, None])
+        crowd = run.crowd.stepped
+        for flat, t_j, speed in zip(which.tolist(), t.tolist(), approach.tolist(), strict=True):
+            n, j = divmod(flat, run.count)
+            i, other = who[n], int(mode[j])
+            if t_j > spans[n] or other in (WAITING, DONE):
                 continue
-            held = mode[j] != FLYING
-            if held and (now + t_j > tick or (mode[j] == CARRIED and mode[i] == CARRIED)):
+            mine, held = int(mode[i]), other != FLYING
+            if held and (now + t_j > tick or (other == CARRIED and mine == CARRIED)):
                 continue
-            if (mode[i] != FLYING or crowd[i]) and (held or crowd[j]):
-                floor = run.crowd.least_approach(max(impacts[i], impacts[j]))
+            if (mine != FLYING or crowd[i]) and (held or crowd[j]):
+                floor = self._least(i, j)
             else:
-                floor = ROUNDING * (hypot(everybody[2][i], everybody[3][i]) + run.soft)
+                floor = ROUNDING * (hypot(everybody[2, i], everybody[3, i]) + run.soft)
             if speed > floor:
                 self._pair(now + t_j, i, j)
+
+    def _least(self, i: int, j: int) -> float:
+        """Return what two that are stepped approach too slowly with to be foretold, m/s."""
+        crowd = self._run.crowd
+        return crowd.least_approach(max(int(crowd.impacts[i]), int(crowd.impacts[j])))
 
     def _pair(self, t: float, i: int, j: int) -> None:
         if max(self._run.crowd.impacts[i], self._run.crowd.impacts[j]) > MOST:
@@ -175,40 +168,52 @@ class Forecast:
     def window(self, now: float, tick: float) -> None:
         """Foretell up to the next step what those meet that do not fly, and pairs with them."""
         run, k = self._run, self._run.tracks
-        resting = k.mode == RESTING
+        resting, carried, flying = k.mode == RESTING, k.mode == CARRIED, k.mode == FLYING
         self._solids(resting, now, tick)
         self.beside[:] = False
-        carried, flying = k.mode == CARRIED, k.mode == FLYING
         some = np.count_nonzero
-        if not self._crowd or not (some(resting) or (some(carried) and some(flying))):
+        belt = some(carried)
+        if not self._crowd or not (some(resting) or (belt and some(flying))):
             return
+        everybody, span = k.all_at(now), tick - now
         who = (resting | carried | flying).nonzero()[0]
-        x, v = k.flight(who, now)
-        span = tick - now
-        way = span * (v + 0.5 * span * run.gravity)
+        x, way = everybody.take(who, axis=1).reshape(2, 2, -1)
+        way[1] += 0.5 * span * run.gravity[1]
+        way *= span
         margin = run.radius * (1.0 + NEAR)
         low = np.minimum(way, 0.0) + x
-        a, b = neighbours(low - margin, low + np.abs(way) + margin)
-        i, j = who[a], who[b]
+        i, j = neighbours(low - margin, low + np.abs(way) + margin)
+        i, j = who.take(i), who.take(j)
+        kind = k.mode.take(i)
         # Two in flight were foretold when they took off; two on the belt never meet.
-        asked = (~(flying[i] & flying[j]) & ~(carried[i] & carried[j])).nonzero()[0]
-        if not len(asked):
+        asked = (kind != k.mode.take(j)) | (kind == RESTING)
+        if not some(asked):
             return
-        a, b, i, j = a[asked], b[asked], i[asked], j[asked]
-        (dx, dy), (du, dv) = (x[b] - x[a]).T, (v[b] - v[a]).T
-        t, approach = meeting(dx, dy, du, dv, 2.0 * run.radius)
+        i, j = i.compress(asked), j.compress(asked)
+        apart = everybody.take(j, axis=1) - everybody.take(i, axis=1)
+        which, t, approach = meeting(apart, 2.0 * run.radius, span)
         free = flying & ~run.crowd.stepped
-        flies = free[i] | free[j]
-        impacts = run.crowd.impacts
-        least = run.crowd.least_approach(np.maximum(impacts[i], impacts[j]))
-        floor = np.where(flies, ROUNDING * run.soft, least)
-        for n in ((t <= span) & (approach > floor)).nonzero()[0].tolist():
-            self._pair(now + float(t[n]), int(i[n]), int(j[n]))
-        held = carried[i] | carried[j]
-        touching = (~flies & ~held & (dx * dx + dy * dy <= 4.0 * margin * margin)).nonzero()[0]
-        run.idle.stir(i[touching], j[touching], np.where(t <= span, approach, 0.0)[touching])
-        beside = (held & ~flies).nonzero()[0]
-        self.beside[i[beside]] = self.beside[j[beside]] = True
+        flies = free.take(i) | free.take(j)
+        closing = np.zeros(len(i))
+        soon = (t <= span).nonzero()[0]
+        if len(soon):
+            which, t, approach = which.take(soon), t.take(soon), approach.take(soon)
+            closing[which] = approach
+            first, second = i.take(which), j.take(which)
+            # Most are at rest to each other, but for rounding.
+            fast = (flies.take(which) & (approach > ROUNDING * run.soft)) | (approach > run.slow)
+            for n in fast.nonzero()[0].tolist():
+                one, other = int(first[n]), int(second[n])
+                if flies[which[n]] or approach[n] > self._least(one, other):
+                    self._pair(now + float(t[n]), one, other)
+        if belt:
+            held = carried.take(i) | carried.take(j)
+            beside = held & ~flies
+            self.beside[i[beside]] = self.beside[j[beside]] = True
+            flies |= held
+        parts = apart[:2] * apart[:2]
+        touching = (~flies & (parts[0] + parts[1] <= 4.0 * margin * margin)).nonzero()[0]
+        run.idle.stir(i.take(touching), j.take(touching), closing.take(touching))
 
     def _solids(self, resting: Mask, now: float, tick: float) -> None:
         """Foretell impacts on solids of those in contact; most are far from any other solid."""

@@ -52,7 +52,7 @@ class Idle:
         self._alike = np.zeros(count, dtype=np.int64)
         self._until = np.full(count, np.inf)
         # Per step: change of vx, vy and ω; belt work, friction loss and what that changes by.
-        self._change = np.zeros((count, 3))
+        self._change = np.zeros((3, count)).T
         self._lever = np.array([1.0, 1.0, run.radius])
         self._dues = np.zeros((count, 3))
         self._slides, self._pays = np.zeros((2, count), dtype=bool)
@@ -154,8 +154,10 @@ class Idle:
         run.calm += resumed & ~self._slides
         pays = (resumed & self._pays).nonzero()[0]
         if len(pays):
-            dues = self._dues[pays]
-            run.recorder.book(run.ids[pays], run.stays.on[pays], dues[:, 0], 0.0, dues[:, 1])
+            dues = self._dues.take(pays, axis=0)
+            entries = np.zeros((len(pays), 3))
+            entries[:, ::2] = dues[:, :2]
+            run.recorder.enter(run.ids.take(pays), run.stays.on.take(pays), entries)
             self._dues[pays, 1] += dues[:, 2]
         self.wake((self.asleep & (self._until <= tick)).nonzero()[0])
 
@@ -185,10 +187,9 @@ class Idle:
         """Wake a particle that is hit, and what touches it."""
         if self.asleep[i]:
             k = self._run.tracks
-            who = self.asleep.nonzero()[0]
-            apart = k.from_x[who] - k.from_x[i]
+            x, y = (k.from_x - k.from_x[i]).T
             reach = 2.0 * self._run.radius * (1.0 + CONTACT)
-            self.wake(who[np.hypot(apart[:, 0], apart[:, 1]) <= reach])
+            self.wake((self.asleep & (np.hypot(x, y) <= reach)).nonzero()[0])
 
     def stir(self, first: Ints, second: Ints, approach: Floats) -> None:
         """Wake whoever touches somebody awake, or approaches somebody, of pairs in contact (k,)."""
@@ -196,7 +197,11 @@ class Idle:
         if not np.count_nonzero(self.asleep):
             return
         awake = run.crowd.stepped | ((run.tracks.mode == RESTING) & ~self.asleep)
-        awake[first[approach > QUIET]] = True
+        loud = approach > QUIET
+        if np.count_nonzero(loud):
+            awake[first.compress(loud)] = True
+        elif not np.count_nonzero(awake.take(first) != awake.take(second)):
+            return
         spread(awake, first, second)
         self.wake((awake & self.asleep).nonzero()[0])
 

@@ -8,37 +8,45 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+ROUNDING = 1e-9
+"""Share by which rounding may hide a meeting from the bound on how fast distances fall."""
 
-def meeting(x: Floats, y: Floats, u: Floats, v: Floats, reach: float) -> tuple[Floats, Floats]:
-    """Return when the distance of disks falls to `reach`, and the speed of approach then.
+
+def meeting(apart: Floats, reach: float, span: Floats | float) -> tuple[Ints, Floats, Floats]:
+    """Return which distances of disks fall to `reach`, when, and the speed of approach then.
 
     Parameters
     ----------
-    x, y, u, v : ndarray
-        Position and velocity of one disk relative to another, m and m/s.
+    apart : ndarray, (4, ...)
+        Position x, y and velocity of one disk relative to another, m and m/s.
     reach : float
         Sum of their radii, m.
+    span : array_like
+        s from now, within which it is asked; broadcast against (...).
 
     Returns
     -------
-    t, approach : ndarray
-        s, inf if they never meet and 0 if they overlap and approach; m/s.
+    which : ndarray, (k,)
+        Flat indices of all that meet within `span`, and of some others.
+    t, approach : ndarray, (k,)
+        s, 0 if they overlap and approach; m/s.
     """
-    closing = -(x * u + y * v)
-    # closing² - square gap, without cancellation where they graze.
-    across = x * v - y * u
-    under = (reach * reach) * (u * u + v * v) - across * across
-    t, approach = np.empty(x.shape), np.zeros(x.shape)
-    t.fill(np.inf)
-    meets = ((closing > 0.0) & (under > 0.0)).nonzero()
-    if len(meets[0]):
-        xm, ym, closing = x[meets], y[meets], closing[meets]
-        gap = xm * xm + ym * ym - reach * reach
-        root = np.where(gap > 0.0, np.sqrt(under[meets]), closing)
-        # The form of the first root without cancellation.
-        t[meets] = np.maximum(gap, 0.0) / (closing + root)
-        approach[meets] = root / np.sqrt(reach * reach + np.minimum(gap, 0.0))
-    return t, approach
+    x, v, square = apart[:2], apart[2:], reach * reach
+    parts, areas, squares = x * v, x * v[::-1], apart * apart
+    opening, across = parts[0] + parts[1], areas[0] - areas[1]
+    distance, speed = squares[::2] + squares[1::2]
+    # opening² - square gap, without cancellation where they graze.
+    under = square * speed - across * across
+    # No distance falls faster than at first.
+    soon = distance + (2.0 + ROUNDING) * span * opening <= square * (1.0 + ROUNDING)
+    which = ((opening < 0.0) & (under > 0.0) & soon).ravel().nonzero()[0]
+    if not len(which):
+        return which, np.empty(0), np.empty(0)
+    closing, gap = -opening.take(which), distance.take(which) - square
+    root = np.where(gap > 0.0, np.sqrt(under.take(which)), closing)
+    # The form of the first root without cancellation.
+    t = np.maximum(gap, 0.0) / (closing + root)
+    return which, t, root / np.sqrt(square + np.minimum(gap, 0.0))
 
 
 def neighbours(low: Floats, high: Floats) -> tuple[Ints, Ints]:
@@ -46,7 +54,7 @@ def neighbours(low: Floats, high: Floats) -> tuple[Ints, Ints]:
 
     Parameters
     ----------
-    low, high : ndarray, (n, 2)
+    low, high : ndarray, (2, n)
         Corners of the boxes, m.
 
     Returns
@@ -54,14 +62,11 @@ def neighbours(low: Floats, high: Floats) -> tuple[Ints, Ints]:
     first, second : ndarray, (k,)
         Indices; each pair once. Time and memory grow with the pairs that overlap along x.
     """
-    order = np.argsort(low[:, 0], kind="stable")
-    left, right = low[order, 0], high[order, 0]
-    end = np.searchsorted(left, right, side="right")
+    order = low[0].argsort(kind="stable")
+    (left, bottom), (right, top) = low.take(order, axis=1), high.take(order, axis=1)
     begin = np.arange(1, len(order) + 1)
-    width = np.maximum(end - begin, 0)
-    total = int(width.sum())
-    a = np.repeat(np.arange(len(order)), width)
-    b = np.arange(total) - np.repeat(np.cumsum(width) - width, width) + a + 1
-    a, b = order[a], order[b]
-    near = (low[a, 1] <= high[b, 1]) & (low[b, 1] <= high[a, 1])
-    return a[near], b[near]
+    width = left.searchsorted(right, side="right") - begin
+    a = (begin - 1).repeat(width)
+    b = (begin - width.cumsum() + width).repeat(width) + np.arange(len(a))
+    near = (bottom.take(a) <= top.take(b)) & (bottom.take(b) <= top.take(a))
+    return order.take(a.compress(near)), order.take(b.compress(near))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import hypot, inf
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -61,8 +60,7 @@ _Box = tuple[float, float, float, float]
 """Least x and y, largest x and y, m."""
 
 
-@dataclass(frozen=True)
-class _Slab:
+class _Slab(NamedTuple):
     """A slab by its struck face: start a, unit tangent t and normal n, length and thickness, m."""
 
     solid: int
@@ -144,21 +142,34 @@ class Outline:
             left, right = _range(x, vx, 0.0, until)
             bottom, top = _range(y, vy, -self._gravity, until)
         near = [
-            circle
-            for circle, (west, south, east, north) in self._circles
-            if left < east and right > west and bottom < north and top > south
+            (circle, box)
+            for circle, box in self._circles
+            if left < box[2] and right > box[0] and bottom < box[3] and top > box[1]
         ]
-        if near:
-            return self._round(np.array([x, y]), np.array([vx, vy]), near, until, first)
+        if any(self._passes((x, y, vx, vy), until, box) for _, box in near):
+            circles = [circle for circle, _ in near]
+            return self._round(np.array([x, y]), np.array([vx, vy]), circles, until, first)
         return first
+
+    def _passes(self, path: tuple[float, float, float, float], until: float, box: _Box) -> bool:
+        """Tell whether a path may come within the height of a box while within its width."""
+        (x, y, vx, vy), (west, south, east, north), g = path, box, self._gravity
+        if vx == 0.0:
+            return True
+        begin, end = sorted(((west - x) / vx, (east - x) / vx))
+        begin = max(begin, 0.0)
+        span, hair = max(min(end, until) - begin, 0.0), END * self._radius
+        at = y + begin * (vy - 0.5 * begin * g)
+        bottom, top = _range(at, vy - begin * g, -g, span)
+        return bottom - hair < north and top + hair > south
 
     def _faces(
         self, slab: _Slab, path: tuple[float, float, float, float], until: float, first: Touch
     ) -> Touch:
         """Return the first touch with a face, or `first` if that is sooner."""
         x, y, vx, vy = path
-        (ax, ay), (tx, ty), (nx, ny) = slab.a, slab.t, slab.n
-        r, length, thickness = self._radius, slab.length, slab.thickness
+        solid, (ax, ay), (tx, ty), (nx, ny), length, thickness = slab
+        r = self._radius
         still, free, hair = PARALLEL * hypot(vx, vy), PARALLEL * self._gravity, END * r
         u, w = (x - ax) * tx + (y - ay) * ty, (x - ax) * nx + (y - ay) * ny
         ru, rw = vx * tx + vy * ty, vx * nx + vy * ny
@@ -178,7 +189,7 @@ class Outline:
                 there, speed = foot + t * (pace + 0.5 * t * turn), pace + t * turn
                 # Moving out over the very end is not a touch of the face.
                 if hair * (speed < 0.0) <= there <= wide - hair * (speed > 0.0):
-                    first = Touch(t, slab.solid, out, gap=gap if inside else 0.0)
+                    first = Touch(t, solid, out, gap=gap if inside else 0.0)
         return first
 
     def _round(
@@ -232,9 +243,9 @@ class Outline:
         (vx, vy), (ax, ay) = velocity, acceleration
         out = []
         for slab, _ in self._slabs:
-            (x0, y0), (tx, ty), (nx, ny) = slab.a, slab.t, slab.n
+            _, (x0, y0), (tx, ty), (nx, ny), length, thickness = slab
             u, w = (x - x0) * tx + (y - y0) * ty, (x - x0) * nx + (y - y0) * ny
-            u, w = u - min(max(u, 0.0), slab.length), w - min(max(w, -slab.thickness), 0.0)
+            u, w = u - min(max(u, 0.0), length), w - min(max(w, -thickness), 0.0)
             dx, dy = u * tx + w * nx, u * ty + w * ny
             far = hypot(dx, dy)
             if far > 0.0:

@@ -228,8 +228,8 @@ class Run:
         """
         k = self.tracks
         k.rest(i)
-        k.leave(i, k.x[i], k.v[i], k.omega[i])
-        k.from_t[i], k.from_x[i], k.from_v[i] = k.t[i], k.x[i], k.v[i]
+        _, x, y, vx, vy = k.begin(i)
+        k.leave(i, (x, y), (vx, vy), k.omega[i])
         k.upon[i], self.bend[i], self.sunk[i] = normal, curvature, sunk
         k.face[i] = solid if curvature == 0.0 else -1
         self.changed(i)
@@ -241,9 +241,10 @@ class Run:
 
     def book(self, i: int, surface: int, belt: float, restitution: float, friction: float) -> None:
         """Book ledger entries (J) on one particle, and on the surface it met."""
-        entries = belt, restitution, friction
-        self.recorder.entries[self.ids[i]] += entries
-        self.recorder.by_surface[surface] += entries
+        for book, row in (self.recorder.entries, self.ids[i]), (self.recorder.by_surface, surface):
+            book[row, 0] += belt
+            book[row, 1] += restitution
+            book[row, 2] += friction
 
     def tell(
         self,

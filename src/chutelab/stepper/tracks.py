@@ -67,7 +67,7 @@ class Tracks:
 
     def __init__(self, machine: Machine, recorder: Recorder, ids: Ints) -> None:
         count = len(ids)
-        self.ids = ids
+        self.ids, self._names = ids, ids.tolist()
         self._machine = machine
         self._recorder = recorder
         self._g = np.array([0.0, -machine.gravity])
@@ -77,8 +77,10 @@ class Tracks:
         self._knot = np.zeros((count, 6))
         self.t, self.omega = self._knot[:, 0], self._knot[:, 5]
         self.x, self.v = self._knot[:, 1:3], self._knot[:, 3:5]
-        self.spin, self.at, self.w, self.aim = np.zeros(count), *np.zeros((3, count, 2))
-        self.from_t, self.from_x, self.from_v = np.zeros(count), *np.zeros((2, count, 2))
+        # Column by column: what concerns all is done in runs of N, not of 2.
+        self.at, self.w, self.aim = np.zeros((3, 2, count)).transpose(0, 2, 1)
+        self.spin, self.from_t, self._path = *np.zeros((2, count)), np.zeros((4, count))
+        self.from_x, self.from_v = self._path.reshape(2, 2, count).transpose(0, 2, 1)
         self.upon = np.zeros((count, 2))
         self.face = np.full(count, -1)
         self.exit = np.full(count, np.inf)
@@ -102,13 +104,13 @@ class Tracks:
         self, i: int, t: float, x: float, y: float, vx: float, vy: float, omega: float
     ) -> None:
         """Write a knot for one particle."""
-        n = int(self.ids[i])
-        self._write(i, n, (t, x, y, vx, vy, omega), self._recorder.entries[n])
+        self._knot[i] = t, x, y, vx, vy, omega
+        n = self._names[i]
+        self._write(i, n, self._recorder.entries[n])
 
-    def _write(self, i: int, n: int, state: tuple[float, ...], entries: Floats) -> None:
-        self._knot[i] = state
+    def _write(self, i: int, n: int, entries: Floats) -> None:
         self._owners.append(n)
-        self._knots.extend((*state, *entries.tolist()))
+        self._knots.frombytes(self._knot[i].tobytes() + entries.tobytes())
 
     def flush(self) -> None:
         """Hand over the knots written."""
@@ -122,22 +124,19 @@ class Tracks:
         v = self.from_v[who]
         return self.from_x[who] + s * (v + 0.5 * s * self._g), v + s * self._g
 
-    def all_at(self, t: float) -> tuple[Floats, Floats, Floats, Floats]:
-        """Return x, y and velocities, each (N,), of all particles on their present paths."""
-        s, g = t - self.from_t, self._machine.gravity
-        u, v = self.from_v[:, 0], self.from_v[:, 1]
-        fall = s * g
-        return (
-            self.from_x[:, 0] + s * u,
-            self.from_x[:, 1] + s * (v - 0.5 * fall),
-            u,
-            v - fall,
-        )
+    def all_at(self, t: float) -> Floats:
+        """Return x, y and velocities, (4, N), of all particles on their present paths."""
+        s, out = t - self.from_t, self._path.copy()
+        fall = s * self._machine.gravity
+        out[3] -= 0.5 * fall
+        out[:2] += s * out[2:]
+        np.subtract(self._path[3], fall, out=out[3])
+        return out
 
     def state(self, i: int, t: float) -> tuple[float, float, float, float]:
         """Return position and velocity of one particle on its present path at a time."""
         s = t - float(self.from_t[i])
-        (x, y), (vx, vy) = self.from_x[i].tolist(), self.from_v[i].tolist()
+        x, y, vx, vy = self._path[:, i].tolist()
         g = self._machine.gravity
         return x + s * vx, y + s * (vy - 0.5 * s * g), vx, vy - s * g
 
@@ -148,8 +147,14 @@ class Tracks:
     def fly(self, i: int) -> None:
         """Let a particle go from its last knot."""
         self.mode[i] = FLYING
-        self.from_t[i], self.from_x[i], self.from_v[i] = self.t[i], self.x[i], self.v[i]
-        self.exit[i] = self.t[i] + self._way_out(*self.x[i].tolist(), *self.v[i].tolist())
+        t, x, y, vx, vy = self.begin(i)
+        self.exit[i] = t + self._way_out(x, y, vx, vy)
+
+    def begin(self, i: int) -> tuple[float, float, float, float, float]:
+        """Let a path begin at the last knot, and return it, but for its ω."""
+        t, x, y, vx, vy, _ = self._knot[i].tolist()
+        self.from_t[i], self._path[:, i] = t, (x, y, vx, vy)
+        return t, x, y, vx, vy
 
     def _way_out(self, x: float, y: float, vx: float, vy: float) -> float:
         """Return when a flight leaves the scene, s; at once if it is beyond the edge already."""
@@ -242,9 +247,9 @@ class Tracks:
         """Write the last state of one particle in contact, if it is not a knot yet."""
         if self.held[i]:
             self.held[i] = False
-            state = float(self._held_t[i]), *self._held_x[i].tolist(), *self._held_v[i].tolist()
-            n = int(self.ids[i])
-            self._write(i, n, state, self._recorder.entries[n] - self.ahead[i])
+            state, n = self._knot[i], self._names[i]
+            state[0], state[1:3], state[3:] = self._held_t[i], self._held_x[i], self._held_v[i]
+            self._write(i, n, self._recorder.entries[n] - self.ahead[i])
 
     def finish(self, who: Ints, reason: str) -> None:
         """End tracks at their last knots."""

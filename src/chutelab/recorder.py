@@ -194,7 +194,8 @@ class Recorder:
             knots = np.insert(knots, offsets[lonely], knots[offsets[lonely]])
             np.cumsum(np.where(sizes == 1, 2, sizes), out=offsets[1:])
         events = _joined(self._events, EVENT)
-        if count > 1:
+        t = events["t"]
+        if count > 1 or np.count_nonzero(t[1:] < t[:-1]):
             events = events.take(_in_time(events))
         if any(origin):
             knots = knots.copy()

@@ -309,6 +309,22 @@ def test_repeats_end_when_patience_does(monkeypatch):
     assert MEASURE.repeated(lambda: None, 5.0, 9, 3.5) == []
 
 
+def test_what_is_over_at_once_is_measured_several_times_in_a_row(monkeypatch):
+    clock = iter(np.arange(0.0, 1000.0, 0.5))
+    monkeypatch.setattr(MEASURE, "perf_counter", lambda: float(next(clock)))
+    calls = []
+    # Half a second on this clock, whatever is called.
+    assert MEASURE.clocked(lambda: calls.append(1) or "last", 4) == (0.125, "last")
+    assert len(calls) == 4
+    trial = MEASURE.Trial(KNOWN["transfer"], METHODS["exact"], None, patience=2.0)
+    runs = []
+    monkeypatch.setattr(MEASURE, "clocked", lambda run, number: (runs.append(number) or 0.004, 0))
+    for _ in range(3):
+        trial.repeat()
+    # 20 ms each, whatever the last one took: 0.5 s, then 4 ms, and 4 ms again.
+    assert runs == [1, 5, 5]
+
+
 def test_memory_is_the_peak_of_a_run():
     peak = MEASURE.traced(lambda: np.ones(1_000_000).sum())
     assert 8_000_000 < peak < 8_200_000
@@ -316,7 +332,7 @@ def test_memory_is_the_peak_of_a_run():
 
 def test_the_first_run_is_told_apart(monkeypatch):
     times = iter([7.0, 1.0, 2.0, 9.0])
-    monkeypatch.setattr(MEASURE, "clocked", lambda run: (next(times), run()))
+    monkeypatch.setattr(MEASURE, "clocked", lambda run, number=1: (next(times), run()))
     trial = MEASURE.Trial(KNOWN["transfer"], METHODS["exact"], None, patience=12.0)
     for _ in range(5):
         trial.repeat()

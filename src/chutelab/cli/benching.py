@@ -90,7 +90,8 @@ def bench(
 
     Errors are relative to the closed form, the worst of all quantities and machines; of particles
     that meet each other, how deep they overlap. The first run is told apart from the median of the
-    repeats; imports are never timed. Memory is the peak of what Python and NumPy allocate.
+    repeats (what is over in less than 20 ms runs several times in a row); imports are never timed.
+    Memory is the peak of what Python and NumPy allocate.
 
     Measuring everything takes some minutes.
     """  # noqa: D301 - click wants the backspace

@@ -6,6 +6,7 @@ import gc
 import tracemalloc
 from dataclasses import replace
 from functools import partial
+from math import ceil
 from statistics import median
 from time import perf_counter
 from typing import TYPE_CHECKING, cast
@@ -39,6 +40,10 @@ TRACEABLE = 4.0
 takes two to three times as long."""
 
 REPEATS = 9
+
+LEAST = 0.02
+"""s that a repeat takes at least: what is faster runs several times in a row, and the mean counts,
+as with `timeit`. A single run of a millisecond would measure what others left in the caches."""
 
 
 def measure(
@@ -108,7 +113,7 @@ class Trial:
     def __init__(self, case: Case, method: Method, value: float | None, *, patience: float) -> None:
         self._case, self._method, self._patience = case, method, patience
         self._times: list[float] = []
-        self._first = 0.0
+        self._first = self._spent = 0.0
         parameter = "" if value is None else method.parameter
         self._said = Record(case.name, method.name, parameter, value)
         try:
@@ -123,10 +128,12 @@ class Trial:
             self._said = replace(self._said, failed=reason(error))
 
     def repeat(self) -> None:
-        """Run once more, unless it failed or patience is at its end."""
+        """Measure once more, unless it failed or patience is at its end."""
         last = self._times[-1] if self._times else self._first
-        if not self._said.failed and sum(self._times) + last <= self._patience:
-            self._times.append(clocked(self._run)[0])
+        if not self._said.failed and self._spent + last <= self._patience:
+            number = ceil(LEAST / max(last, 1e-6))
+            self._times.append(clocked(self._run, number)[0])
+            self._spent += number * self._times[-1]
 
     def record(self) -> Record:
         """Return what is known, with the memory of one more run."""
@@ -148,12 +155,13 @@ def reason(error: Exception) -> str:
     return said if expected else f"{type(error).__name__}: {said}"
 
 
-def clocked(run: Callable[[], object]) -> tuple[float, object]:
-    """Return the seconds that a call takes, and what it returns."""
+def clocked(run: Callable[[], object], number: int = 1) -> tuple[float, object]:
+    """Return the seconds that a call takes, the mean of a number, and what the last returns."""
     gc.collect()
     begin = perf_counter()
-    found = run()
-    return perf_counter() - begin, found
+    for _ in range(number):
+        found = run()
+    return (perf_counter() - begin) / number, found
 
 
 def repeated(run: Callable[[], object], first: float, repeats: int, patience: float) -> list[float]:

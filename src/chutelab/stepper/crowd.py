@@ -28,6 +28,10 @@ LOAD = 100, 0.05
 """Impacts of all particles lately, at least and per particle, beyond which each counts for more:
 some tens are resolved within the time of a step of pymunk's and its books."""
 
+DEEPER = 0.02
+"""Share of the radius by which a step may bring two deeper into each other, in whatever crowd: what
+approaches faster is foretold. Many such steps add up, for overlaps are parted slowly."""
+
 BOUND = 10_000, 1_000
 """Impacts within one step, and of these per particle, beyond which a run does not get on."""
 
@@ -51,6 +55,7 @@ class Crowd:
         # The largest number of impacts, and whether anybody is stepped.
         self._most, self._any = 0, False
         self._allowed = max(LOAD[0], LOAD[1] * run.count)
+        self._fast = max(run.slow, DEEPER * run.radius / run.dt)
         self._bound = BOUND[0] + BOUND[1] * run.count
 
     def count(self, i: int, j: int, t: float) -> int:
@@ -117,7 +122,7 @@ class Crowd:
         """
         p = self._pressure
         factor = p * max(impacts * p / MANY, 1.0)
-        return self._run.slow * (factor * factor)
+        return min(self._run.slow * (factor * factor), self._fast)
 
     @property
     def _pressure(self) -> float:

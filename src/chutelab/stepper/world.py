@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pymunk import batch
 
 from chutelab.stepper.clash import move
+from chutelab.stepper.partners import Partners
 from chutelab.stepper.solids import SLOP, Solids
 
 if TYPE_CHECKING:
@@ -35,7 +36,6 @@ _ARBITER = (
     | batch.ArbiterFields.BODY_B_ID
     | batch.ArbiterFields.TOTAL_IMPULSE
     | batch.ArbiterFields.NORMAL
-    | batch.ArbiterFields.DISTANCE_1
 )
 _BODY = (
     batch.BodyFields.BODY_ID
@@ -48,7 +48,7 @@ _BODY = (
 _Disk = tuple[pymunk.Body, pymunk.Circle]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False, slots=True)
 class Contacts:
     """Contacts of one step that pressed, sorted by their keys.
 
@@ -64,10 +64,10 @@ class Contacts:
         Unit normal towards the first.
     j_n, j_t : ndarray, (M,)
         Impulses of the whole step on the first, along the normal n and along (n_y, -n_x), N s.
-    depth : ndarray, (M,)
-        How far the two are in each other, m.
     pairs, fixed : ndarray
         Rows of contacts with particles, and with solids.
+    uses : ndarray, (N + K,)
+        Number of contacts of each particle, and of each solid.
     """
 
     keys: Ints
@@ -76,9 +76,9 @@ class Contacts:
     normal: Floats
     j_n: Floats
     j_t: Floats
-    depth: Floats
     pairs: Ints
     fixed: Ints
+    uses: Ints
 
     def __len__(self) -> int:
         return len(self.first)
@@ -98,10 +98,16 @@ class World:
 
     Velocities given and returned are those pymunk moves bodies with: half a step of gravity ahead
     in flight (a step moves positions first, velocities then).
+
+    Attributes
+    ----------
+    partners : Partners
+        What particles find in each other and in solids.
     """
 
     def __init__(self, machine: Machine, solids: Solids, count: int) -> None:
         self.count = count
+        self.partners = Partners(machine, solids, count)
         self._machine = machine
         self._space = pymunk.Space()
         self._space.gravity = (0.0, -machine.gravity)
@@ -211,38 +217,45 @@ class World:
         raw = self._buffer.int_buf()
         if not len(raw):
             return None
-        ids, values = np.frombuffer(raw, dtype=np.uintp), np.frombuffer(self._buffer.float_buf())
-        a, b = self._codes[self._ids.searchsorted(ids)].reshape(-1, 2).T
-        # Pymunk's impulse acts on body A, its normal points from A to B.
-        px, py, nx, ny, distance = values.reshape(-1, 5).T
+        codes = self._codes[self._ids.searchsorted(np.frombuffer(raw, dtype=np.uintp))]
+        values = np.frombuffer(self._buffer.float_buf()).reshape(-1, 4)
+        a, b = codes[::2], codes[1::2]
         span = self.count + len(self._fixed)
         keys = np.minimum(a, b) * span + np.maximum(a, b)
         order = keys.argsort()
-        order = order[((px != 0.0) | (py != 0.0))[order]]
-        if not len(order):
-            return None
-        keys = keys[order]
-        first, other = np.divmod(keys, span)
-        toward = np.where(a <= b, -1.0, 1.0)
-        normal = (toward * np.stack([nx, ny])).T[order]
+        # What does not press has an impulse of 0.
+        pressed = (values[:, 0] != 0.0) | (values[:, 1] != 0.0)
+        if np.count_nonzero(pressed) < len(pressed):
+            order = order[pressed[order]]
+            if not len(order):
+                return None
+        # Pymunk's impulse acts on body A, its normal points from A to B.
+        a, b = a[order], b[order]
+        first, other = np.minimum(a, b), np.maximum(a, b)
+        px, py, nx, ny = values.take(order, axis=0).T
+        toward = np.sign(a - b)
+        normal = np.empty((len(order), 2))
+        normal[:, 0], normal[:, 1] = toward * nx, toward * ny
         solid = other >= self.count
         return Contacts(
-            keys, first, other, normal, -(px * nx + py * ny)[order], (py * nx - px * ny)[order],
-            -distance[order], (~solid).nonzero()[0], solid.nonzero()[0],
+            keys[order], first, other, normal, -(px * nx + py * ny), py * nx - px * ny,
+            (~solid).nonzero()[0], solid.nonzero()[0],
+            np.bincount(np.concatenate((first, other)), minlength=span),
         )  # fmt: skip
 
     def states(self) -> tuple[Floats, Floats]:
-        """Return positions (N, 2) and motions (N + K, 3): vx, vy (m/s) and ω (rad/s).
+        """Return positions (N + K, 2) and motions (N + K, 3): vx, vy (m/s) and ω (rad/s).
 
-        Particles that are not inside have NaN, solids have 0: what a surface moves with is its
+        Particles that are not inside have 0, as have solids: what a surface moves with is its
         belt's.
         """
         self._buffer.clear()
         batch.get_space_bodies(self._space, _BODY, self._buffer)
         ids = np.frombuffer(self._buffer.int_buf(), dtype=np.uintp)
-        out = np.full((self.count + len(self._fixed), 5), np.nan)
-        out[self._codes[self._ids.searchsorted(ids)]] = np.frombuffer(
-            self._buffer.float_buf()
-        ).reshape(-1, 5)
-        out[self.count :] = 0.0
-        return out[: self.count, :2], out[:, 2:]
+        codes = self._codes[self._ids.searchsorted(ids)]
+        values = np.frombuffer(self._buffer.float_buf()).reshape(-1, 5)
+        span = self.count + len(self._fixed)
+        x, motion = np.zeros((span, 2)), np.zeros((span, 3))
+        x[codes], motion[codes] = values[:, :2], values[:, 2:]
+        motion[self.count :] = 0.0
+        return x, motion

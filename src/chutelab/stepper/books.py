@@ -47,7 +47,7 @@ class Deeds:
     ----------
     belt : ndarray, (M,)
         Speed of the surface, m/s.
-    before_n, before_t, after_n, after_t : ndarray, (M,)
+    before, after : ndarray, (2, M)
         Normal speed and slip before and after, m/s.
     pace : ndarray, (M,)
         The greater of both after, m/s.
@@ -66,10 +66,8 @@ class Deeds:
     """
 
     belt: Floats
-    before_n: Floats
-    before_t: Floats
-    after_n: Floats
-    after_t: Floats
+    before: Floats
+    after: Floats
     pace: Floats
     rounded: NDArray[np.bool_]
     lone: Ints
@@ -81,9 +79,7 @@ class Deeds:
     change: Floats
 
 
-def settle_books(
-    run: Run, contacts: Contacts, x: Floats, before: Floats, after: Floats, t: float
-) -> None:
+def settle_books(run: Run, contacts: Contacts, x: Floats, motion: Floats, t: float) -> None:
     """Book the contacts of a step, write knots and events, and keep the particles in contact.
 
     Parameters
@@ -92,25 +88,24 @@ def settle_books(
         The first of a pair is never carried.
     x : ndarray, (N + K, 2)
         Positions after the step, m.
-    before, after : ndarray, (N + K, 3)
+    motion : ndarray, (2, N + K, 3)
         vx, vy and ω that pymunk had before and after the step; 0 for solids.
     """
-    k = run.tracks
+    k, (before, after) = run.tracks, motion
     if np.count_nonzero(run.bend):
         # Led round the pulley along a chord, a particle only seems to press outwards.
         led = (run.bend[contacts.first] > 0.0).nonzero()[0]
         i, n = contacts.first[led], contacts.normal[led]
         before[i, :2] -= (before[i, :2] * n).sum(axis=1)[:, None] * n
-    deeds = _deeds(run, contacts, x, before, after)
+    deeds = _deeds(run, contacts, x, motion)
     who = deeds.who
     flew = k.mode[who] == FLYING
-    faster, higher, _ = np.abs(deeds.change).T
-    limit = SHOCK + 4.0 * run.machine.gravity * run.dt
-    shock = flew | (faster > limit) | (higher > limit)
-    place, motion = x.take(who, axis=0), after.take(who, axis=0)
+    u, v, _ = np.abs(deeds.change).T
+    shock = flew | (np.maximum(u, v) > SHOCK + 4.0 * run.machine.gravity * run.dt)
+    place, velocity = x.take(who, axis=0), after.take(who, axis=0)
     # The mean of the velocities before and after is that halfway through the step's impulses.
     states = np.empty((len(who), 6))
-    states[:, 0], states[:, 1:3], states[:, 3:] = t, place, motion - 0.5 * deeds.change
+    states[:, 0], states[:, 1:3], states[:, 3:] = t, place, velocity - 0.5 * deeds.change
     hit = who[shock]
     if len(hit):
         smooth = ~shock
@@ -125,14 +120,13 @@ def settle_books(
     book(run, contacts, deeds, after)
     if len(hit):
         k.knot(hit, t, x[hit], after[hit, :2], after[hit, 2])
-    _events(run, contacts, deeds, x, before, after, t)
+    come = who[flew]
+    _events(run, contacts, deeds, come, x, motion, t)
 
-    landed = who[flew]
-    if len(landed):
-        k.rest(landed)
-    k.leave(who, place, motion)
+    k.rest(come)
+    k.leave(who, place, velocity)
     run.bent[who], run.bend[who] = run.bend[who], 0.0
-    _surfaces(run, contacts, deeds, landed, x, after, t)
+    _surfaces(run, contacts, deeds, come, x, after, t)
     _calm(run, contacts, deeds)
     if run.machine.align:
         run.idle.settle(contacts, deeds)
@@ -140,17 +134,15 @@ def settle_books(
         run.finish(who[run.landed[who]], "landed")
 
 
-def _deeds(run: Run, contacts: Contacts, x: Floats, before: Floats, after: Floats) -> Deeds:
+def _deeds(run: Run, contacts: Contacts, x: Floats, motion: Floats) -> Deeds:
     """Return what the contacts did."""
     i, j, fixed, uses = contacts.first, contacts.other, contacts.fixed, contacts.uses
     partners, mode = run.world.partners, run.tracks.mode
     nx, ny = contacts.normal.T
     belt, rounded = partners.belt(j, nx, ny), partners.rounded(j, x.take(i, axis=0))
-    (before_n, before_t), (after_n, after_t) = (
-        _relative(motion.take(i, axis=0), motion.take(j, axis=0), nx, ny, run.radius)
-        for motion in (before, after)
-    )
-    before_t, after_t = before_t - belt, after_t - belt
+    before, after = (_relative(contacts, nx, ny, of, run.radius) for of in motion)
+    before[1] -= belt
+    after[1] -= belt
     flat = lone = fixed[uses[i[fixed]] == 1]
     if np.count_nonzero(rounded):
         flat = lone[~rounded[lone]]
@@ -158,34 +150,36 @@ def _deeds(run: Run, contacts: Contacts, x: Floats, before: Floats, after: Float
     who = uses[: run.count].nonzero()[0]
     who = who[mode[who] != CARRIED]
     return Deeds(
-        belt, before_n, before_t, after_n, after_t, np.maximum(np.abs(after_n), np.abs(after_t)),
-        rounded, lone, flat, contacts.pairs[~carried], contacts.pairs[carried], uses, who,
-        after.take(who, axis=0) - before.take(who, axis=0),
+        belt, before, after, np.maximum(*np.abs(after)), rounded, lone, flat,
+        contacts.pairs[~carried], contacts.pairs[carried], uses, who,
+        motion[1].take(who, axis=0) - motion[0].take(who, axis=0),
     )  # fmt: skip
 
 
-def _relative(
-    mine: Floats, theirs: Floats, nx: Floats, ny: Floats, radius: float
-) -> tuple[Floats, Floats]:
-    """Return normal speeds and slips (M,) of motions (M, 3) relative to others, disks or solids."""
+def _relative(contacts: Contacts, nx: Floats, ny: Floats, motion: Floats, radius: float) -> Floats:
+    """Return normal speeds and slips on solids at rest, (2, M), of disks in motion (N + K, 3)."""
+    mine, theirs = motion.take(contacts.first, axis=0), motion.take(contacts.other, axis=0)
     u, v, _ = (mine - theirs).T
-    return u * nx + v * ny, u * ny - v * nx + radius * (mine[:, 2] + theirs[:, 2])
+    speeds = np.empty((2, len(u)))
+    speeds[0] = u * nx + v * ny
+    speeds[1] = u * ny - v * nx + radius * (mine[:, 2] + theirs[:, 2])
+    return speeds
 
 
 def _events(
-    run: Run, contacts: Contacts, deeds: Deeds, x: Floats, before: Floats, after: Floats, t: float
+    run: Run, contacts: Contacts, deeds: Deeds, flew: Ints, x: Floats, motion: Floats, t: float
 ) -> None:
     """Write impacts and collisions: contacts that were not there a step ago, and hit."""
     rows = run.begun(contacts.keys).nonzero()[0]
     if not len(rows):
         return
-    i, j = contacts.first[rows], contacts.other[rows]
+    (before, after), i, j = motion, contacts.first[rows], contacts.other[rows]
     fixed = (j >= run.count).nonzero()[0]
     solid = j[fixed] - run.count
     # In flight the true velocity is half a step of gravity on from pymunk's.
     flown = np.zeros(len(before))
-    flown[: run.count] = (run.tracks.mode == FLYING) * 0.5 * run.dt * run.machine.gravity
-    approach = (flown[i] - flown[j]) * contacts.normal[rows, 1] - deeds.before_n[rows]
+    flown[flew] = 0.5 * run.dt * run.machine.gravity
+    approach = (flown[i] - flown[j]) * contacts.normal[:, 1][rows] - deeds.before[0][rows]
     told, known = approach > run.soft, run.met[i[fixed], solid]
     if not np.count_nonzero(told) and np.count_nonzero(known) == len(known):
         return
@@ -205,7 +199,7 @@ def _events(
         kind[told], who, t, x[who], after[who, :2], after[who, 2], surface[told],
         np.where(other < run.count, run.ids[np.where(other < run.count, other, 0)], -1),
         velocity_before=came[:, :2], omega_before=came[:, 2],
-        impulse=(contacts.j_n[rows], contacts.j_t[rows]),
+        impulse=(contacts.impulse[0][rows], contacts.impulse[1][rows]),
     )  # fmt: skip
     run.recorder.contacts += len(who)
 
@@ -218,18 +212,18 @@ def _surfaces(
     alone = contacts.first[lone]
     surface[alone] = run.world.partners.surface[contacts.other[lone]]
     run.stays.arrive(deeds.who, surface[deeds.who], t)
-    speed = np.abs(deeds.after_t[lone])
+    speed = np.abs(deeds.after[1][lone])
     slipping = run.stays.slipping[alone]
     # A blow out of flight that ends the slip is no sticking yet.
     stops = slipping & (speed < SETTLED[0])
     if len(flew):
         stops &= ~np.isin(alone, flew)
     starts = ~slipping & (speed > SLIPS)
-    run.stays.slipping[alone] = (slipping & ~stops) | starts
     _lie(run, contacts, deeds)
     for kind, which in ((Kind.STICK, stops), (Kind.SLIP, starts)):
         if np.count_nonzero(which):
             these = alone[which]
+            run.stays.slipping[these] = kind is Kind.SLIP
             run.event(kind, these, t, x[these], after[these, :2], after[these, 2], surface[these])
 
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_THREE = np.arange(3)[:, None]
+_ROWS = np.arange(6)[:, None]
 
 
 def book(run: Run, contacts: Contacts, deeds: Deeds, after: Floats) -> None:
@@ -43,36 +43,35 @@ def book(run: Run, contacts: Contacts, deeds: Deeds, after: Floats) -> None:
     # In the first three rows all of the step, in the others the second half of its impulses.
     # Behind its contacts what the other one of two particles gets.
     entries = np.empty((6, count + len(free)))
-    j_n, j_t = share * contacts.j_n, share * contacts.j_t
     own = entries[:, :count]
-    own[0] = contacts.j_t * deeds.belt
-    own[1] = j_n * (deeds.before_n + deeds.after_n)
-    own[2] = j_t * (deeds.before_t + deeds.after_t)
+    own[0] = contacts.impulse[1] * deeds.belt
     own[3] = 0.5 * own[0]
-    own[4] = 0.25 * j_n * (deeds.before_n + 3.0 * deeds.after_n)
-    own[5] = 0.25 * j_t * (deeds.before_t + 3.0 * deeds.after_t)
+    push = share * contacts.impulse
+    own[1:3] = push * (deeds.before + deeds.after)
+    own[4:] = 0.25 * push * (deeds.before + 3.0 * deeds.after)
     surface = partners.surface[j]
     if len(free):
         i, surface = np.concatenate((i, j[free])), np.concatenate((surface, surface[free]))
         entries[:, count:] = own.take(free, axis=1)
     if len(held):
         (nx, ny), (u, v, _) = contacts.normal[held].T, after[j[held]].T
-        given = np.zeros((6, len(held)))
-        given[0] = contacts.j_n[held] * (u * nx + v * ny) + contacts.j_t[held] * (u * ny - v * nx)
+        (j_n, j_t), given = contacts.impulse[:, held], np.zeros((6, len(held)))
+        given[0] = j_n * (u * nx + v * ny) + j_t * (u * ny - v * nx)
         given[3] = 0.5 * given[0]
         i, surface = np.concatenate((i, i[held])), np.concatenate((surface, 0 * held))
         entries = np.concatenate((entries, given), axis=1)
-    books = run.recorder
-    run.entries += _totals(i, entries[:3], run.count)
-    run.tracks.ahead[:] = _totals(i, entries[3:], run.count)
-    books.by_surface += _totals(surface, entries[:3], len(books.by_surface))
+    totals, by_surface = _totals(i, entries, run.count), run.recorder.by_surface
+    run.entries += totals[:, :3]
+    run.tracks.ahead[:] = totals[:, 3:]
+    by_surface += _totals(surface, entries[:3], len(by_surface))
     run.ahead = i, surface, entries[3:].T
 
 
 def _totals(where: Ints, entries: Floats, count: int) -> Floats:
-    """Return the sums (count, 3) of entries (3, M)."""
-    cells = (where + count * _THREE).ravel()
-    return np.asarray(np.bincount(cells, entries.ravel(), 3 * count).reshape(3, count).T)
+    """Return the sums (count, n) of entries (n, M), n up to 6."""
+    n = len(entries)
+    cells = (where + count * _ROWS[:n]).ravel()
+    return np.asarray(np.bincount(cells, entries.ravel(), n * count).reshape(n, count).T)
 
 
 def end_contacts(run: Run, who: Ints) -> None:

@@ -71,12 +71,13 @@ class Idle:
         """
         run, who = self._run, deeds.who
         i, j, flat = contacts.first, contacts.other, deeds.flat
-        alone, restless = np.zeros((2, len(deeds.uses)), dtype=bool)
+        alone = np.zeros(len(deeds.uses), dtype=bool)
         alone[i[flat]] = True
         # Who lies alone may slide, but always alike; of the others none may move.
         loud = (deeds.pace > QUIET) | deeds.rounded | run.world.partners.slope[j]
         loud[deeds.held] = True
-        loud[flat] = np.abs(deeds.after_n[flat]) > QUIET
+        loud[flat] = np.abs(deeds.after[0][flat]) > QUIET
+        restless = np.zeros(len(alone), dtype=bool)
         restless[i[loud]] = True
         restless[j[loud]] = True
         single = alone[who]
@@ -103,8 +104,9 @@ class Idle:
             n, solid = int(i[row]), int(j[row]) - run.count
             self._until[n] = min(self._until[n], self._end(n, solid))
         for row in flat[~awake[i[flat]]].tolist():
-            slip, push, belt = (float(of[row]) for of in (deeds.after_t, contacts.j_t, deeds.belt))
-            self._slide(int(i[row]), slip, slip - float(deeds.before_t[row]), push, belt)
+            slip, push = float(deeds.after[1, row]), float(contacts.impulse[1, row])
+            brakes = slip - float(deeds.before[1, row])
+            self._slide(int(i[row]), slip, brakes, push, float(deeds.belt[row]))
 
     def hold(self, who: Ints) -> None:
         """Put particles to sleep as they move, for good, and at no cost."""

@@ -93,8 +93,9 @@ def _resolve(run: Run, contacts: Contacts, flying: Mask, t: float) -> None:
     """Book what a step did, and remember who touches whom."""
     k = run.tracks
     x, after = run.world.states()
-    before = np.zeros(after.shape)
-    before[: run.count] = k.sent
+    motion = np.zeros((2, *after.shape))
+    before = motion[0]
+    before[: run.count], motion[1] = k.sent, after
     if np.count_nonzero(flying):
         who = flying.nonzero()[0]
         before[who, :2] = k.flight(who, t)[1] - 0.5 * run.dt * run.gravity
@@ -105,5 +106,5 @@ def _resolve(run: Run, contacts: Contacts, flying: Mask, t: float) -> None:
         rows = k.mode[contacts.first] == CARRIED
         if np.count_nonzero(rows):
             contacts = contacts.turned(rows)
-    settle_books(run, contacts, x, before, after, t)
+    settle_books(run, contacts, x, motion, t)
     run.touching = contacts.keys

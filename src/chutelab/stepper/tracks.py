@@ -203,10 +203,11 @@ class Tracks:
 
         Half a step of gravity is given back at once, the other half is lost until then: a hop.
         """
-        both = who[:, None]
-        np.copyto(self.from_t, t, where=who)
-        np.copyto(self.from_x, self.at, where=both)
-        np.subtract(self.aim, 0.5 * dt * self._g, out=self.from_v, where=both)
+        those = who.nonzero()[0]
+        states = self._left.take(those, axis=0)
+        states[:, 5] += 0.5 * dt * self._machine.gravity
+        self.from_t[those], self.from_x[those] = t, states[:, :2]
+        self.from_v[those] = states[:, 4:6]
 
     def lift(self, i: int, t: float, dt: float) -> None:
         """Let a particle go that was in contact a step ago, at t, and is no more.
@@ -243,8 +244,9 @@ class Tracks:
         if np.count_nonzero(beyond):
             turn = (beyond.any(axis=1) & self.held[who]).nonzero()[0]
             them = who[turn]
-            self.close(them)
-            self._bend(them, states[turn] - self._knot[them])
+            for i in them.tolist():
+                self.close_one(i)
+            self._bend(them, states[turn] - self._held[them])
         self.hold(who, states)
 
     def _bend(self, who: Ints, gone: Floats) -> None:

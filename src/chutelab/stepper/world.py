@@ -45,7 +45,7 @@ _BODY = (
 )
 
 
-_Disk = tuple[pymunk.Body, pymunk.Circle]
+_Disk = tuple[pymunk.Body, pymunk.Circle, np.uintp]
 
 
 @dataclass(eq=False, slots=True)
@@ -62,7 +62,7 @@ class Contacts:
         Partner: another particle, or the number of particles plus a solid's index.
     normal : ndarray, (M, 2)
         Unit normal towards the first.
-    j_n, j_t : ndarray, (M,)
+    impulse : ndarray, (2, M)
         Impulses of the whole step on the first, along the normal n and along (n_y, -n_x), N s.
     pairs, fixed : ndarray
         Rows of contacts with particles, and with solids.
@@ -74,8 +74,7 @@ class Contacts:
     first: Ints
     other: Ints
     normal: Floats
-    j_n: Floats
-    j_t: Floats
+    impulse: Floats
     pairs: Ints
     fixed: Ints
     uses: Ints
@@ -120,8 +119,7 @@ class World:
         if machine.interact:
             self._restitution = sqrt(max(machine.pair_restitution, SMALLEST_SHARE))
             self._friction = sqrt(max(machine.pair_friction, SMALLEST_SHARE))
-        self._bodies: dict[int, pymunk.Body] = {}
-        self._shapes: dict[int, pymunk.Circle] = {}
+        self._disks: dict[int, _Disk] = {}
         # Bodies to use again, of free and of carried particles: a new one costs more than a step.
         self._spare: tuple[list[_Disk], list[_Disk]] = [], []
         self._fixed = [self._solid(solids, k) for k in range(len(solids.reach))]
@@ -154,15 +152,17 @@ class World:
     def add(self, particle: int, *, carried: bool = False) -> None:
         """Put a particle in, to be placed; a carried one pushes but is not pushed."""
         spare = self._spare[carried]
-        body, shape = spare.pop() if spare else self._disk(carried=carried)
+        disk = body, shape, name = spare.pop() if spare else self._disk(carried=carried)
         self._space.add(body, shape)
-        self._bodies[particle], self._shapes[particle] = body, shape
-        self._codes[self._ids.searchsorted(body.id)] = particle
+        self._disks[particle] = disk
+        self._codes[self._ids.searchsorted(name)] = particle
 
-    def _enrol(self, body: pymunk.Body, code: int) -> None:
-        place = self._ids.searchsorted(body.id)
-        self._ids = np.insert(self._ids, place, body.id)
+    def _enrol(self, body: pymunk.Body, code: int) -> np.uintp:
+        name = np.uintp(body.id)
+        place = self._ids.searchsorted(name)
+        self._ids = np.insert(self._ids, place, name)
         self._codes = np.insert(self._codes, place, code)
+        return name
 
     def _disk(self, *, carried: bool) -> _Disk:
         p = self._machine.particle
@@ -177,15 +177,14 @@ class World:
             if carried
             else pymunk.ShapeFilter(categories=FREE)
         )
-        self._enrol(body, -1)
-        return body, shape
+        return body, shape, self._enrol(body, -1)
 
     def remove(self, particle: int) -> None:
         """Take a particle out."""
-        body, shape = self._bodies.pop(particle), self._shapes.pop(particle)
+        disk = body, shape, _ = self._disks.pop(particle)
         self._space.remove(body, shape)
         body.force = 0.0, 0.0
-        self._spare[body.body_type == pymunk.Body.KINEMATIC].append((body, shape))
+        self._spare[body.body_type == pymunk.Body.KINEMATIC].append(disk)
 
     def place(
         self,
@@ -195,7 +194,7 @@ class World:
         omega: float = 0.0,
     ) -> None:
         """Overwrite the state of a particle."""
-        body = self._bodies[particle]
+        body = self._disks[particle][0]
         body.position = position
         move(body, velocity, omega)
 
@@ -203,7 +202,7 @@ class World:
         self, particle: int, velocity: tuple[float, float], force: tuple[float, float]
     ) -> None:
         """Overwrite a velocity, and add a force (N) that acts in the next step, after the move."""
-        body = self._bodies[particle]
+        body = self._disks[particle][0]
         body.velocity, body.force = velocity, force
 
     def step(self, dt: float) -> None:
@@ -234,12 +233,12 @@ class World:
         first, other = np.minimum(a, b), np.maximum(a, b)
         px, py, nx, ny = values.take(order, axis=0).T
         toward = np.sign(a - b)
-        normal = np.empty((len(order), 2))
+        normal, impulse = np.empty((len(order), 2)), np.empty((2, len(order)))
         normal[:, 0], normal[:, 1] = toward * nx, toward * ny
+        impulse[0], impulse[1] = -(px * nx + py * ny), py * nx - px * ny
         solid = other >= self.count
         return Contacts(
-            keys[order], first, other, normal, -(px * nx + py * ny), py * nx - px * ny,
-            (~solid).nonzero()[0], solid.nonzero()[0],
+            keys[order], first, other, normal, impulse, (~solid).nonzero()[0], solid.nonzero()[0],
             np.bincount(np.concatenate((first, other)), minlength=span),
         )  # fmt: skip
 

@@ -85,7 +85,7 @@ class Idle:
         u, v, turn = np.abs(deeds.change - before).T
         self._change[who] = deeds.change
         news = np.maximum(np.maximum(u, v), turn * run.radius)
-        restless = restless[who] | (news > _LIMITS[single.view(np.int8)])
+        restless = restless[who] | (news > _LIMITS.take(single))
         alike = self._alike[who] + 1
         alike[restless] = 0
         self._alike[who] = alike

@@ -143,7 +143,7 @@ class Run:
         known = self.touching
         if not len(known):
             return np.ones(len(keys), dtype=bool)
-        return np.asarray(known[np.minimum(np.searchsorted(known, keys), len(known) - 1)] != keys)
+        return np.asarray(known.take(known.searchsorted(keys), mode="clip") != keys)
 
     @property
     def particles(self) -> int:

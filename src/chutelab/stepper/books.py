@@ -57,8 +57,6 @@ class Deeds:
         Rows of contacts with a solid that are their particle's only one, and those on a face.
     free, held : ndarray
         Rows of contacts with particles, free and carried.
-    uses : ndarray, (N + K,)
-        Number of contacts of each particle, and of each solid.
     who : ndarray, (P,)
         Particles in contact, not carried.
     change : ndarray, (P, 3)
@@ -74,7 +72,6 @@ class Deeds:
     flat: Ints
     free: Ints
     held: Ints
-    uses: Ints
     who: Ints
     change: Floats
 
@@ -151,7 +148,7 @@ def _deeds(run: Run, contacts: Contacts, x: Floats, motion: Floats) -> Deeds:
     who = who[mode[who] != CARRIED]
     return Deeds(
         belt, before, after, np.maximum(*np.abs(after)), rounded, lone, flat,
-        contacts.pairs[~carried], contacts.pairs[carried], uses, who,
+        contacts.pairs[~carried], contacts.pairs[carried], who,
         motion[1].take(who, axis=0) - motion[0].take(who, axis=0),
     )  # fmt: skip
 
@@ -248,7 +245,7 @@ def _in_line(run: Run, contacts: Contacts, deeds: Deeds) -> Ints:
     """Return the rows of several surfaces in line with each other; note the mean of the normals."""
     rows = contacts.fixed
     i, n = contacts.first[rows], contacts.normal[rows]
-    uses = deeds.uses[i]
+    uses = contacts.uses[i]
     in_line = np.zeros(len(rows), dtype=bool)
     several = (uses > 1) & (np.bincount(i, minlength=run.count)[i] == uses)
     for row in several.nonzero()[0].tolist():
@@ -266,7 +263,7 @@ def _calm(run: Run, contacts: Contacts, deeds: Deeds) -> None:
     who = deeds.who
     limit = STILL[0] if run.machine.interact else SETTLED[0]
     restless = (deeds.pace > limit) | run.world.partners.unsettling[contacts.other]
-    stirred = np.zeros(len(deeds.uses), dtype=bool)
+    stirred = np.zeros(len(contacts.uses), dtype=bool)
     stirred[contacts.first[restless]] = True
     stirred[contacts.other[restless]] = True
     if not run.machine.interact:

@@ -71,7 +71,7 @@ class Idle:
         """
         run, who = self._run, deeds.who
         i, j, flat = contacts.first, contacts.other, deeds.flat
-        alone = np.zeros(len(deeds.uses), dtype=bool)
+        alone = np.zeros(len(contacts.uses), dtype=bool)
         alone[i[flat]] = True
         # Who lies alone may slide, but always alike; of the others none may move.
         loud = (deeds.pace > QUIET) | deeds.rounded | run.world.partners.slope[j]

@@ -39,7 +39,7 @@ SLIPS = 1e-3
 """m/s; slip above which a contact that held is said to slip."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False, slots=True)
 class Deeds:
     """What the M contacts of a step did, in the frames of their normals, to P particles.
 
@@ -47,14 +47,16 @@ class Deeds:
     ----------
     belt : ndarray, (M,)
         Speed of the surface, m/s.
-    before_n, before_t, after_n, after_t : ndarray, (M,)
+    before, after : ndarray, (2, M)
         Normal speed and slip before and after, m/s.
     pace : ndarray, (M,)
         The greater of both after, m/s.
     rounded : ndarray of bool, (M,)
         Whether the solid is round there.
-    uses : ndarray, (N + K,)
-        Number of contacts of each particle, and of each solid.
+    lone, flat : ndarray
+        Rows of contacts with a solid that are their particle's only one, and those on a face.
+    free, held : ndarray
+        Rows of contacts with particles, free and carried.
     who : ndarray, (P,)
         Particles in contact, not carried.
     change : ndarray, (P, 3)
@@ -62,13 +64,14 @@ class Deeds:
     """
 
     belt: Floats
-    before_n: Floats
-    before_t: Floats
-    after_n: Floats
-    after_t: Floats
+    before: Floats
+    after: Floats
     pace: Floats
     rounded: NDArray[np.bool_]
-    uses: Ints
+    lone: Ints
+    flat: Ints
+    free: Ints
+    held: Ints
     who: Ints
     change: Floats
 
@@ -80,7 +83,7 @@ def settle_books(run: Run, contacts: Contacts, x: Floats, motion: Floats, t: flo
     ----------
     contacts : Contacts
         The first of a pair is never carried.
-    x : ndarray, (N, 2)
+    x : ndarray, (N + K, 2)
         Positions after the step, m.
     motion : ndarray, (2, N + K, 3)
         vx, vy and ω that pymunk had before and after the step; 0 for solids.
@@ -94,27 +97,33 @@ def settle_books(run: Run, contacts: Contacts, x: Floats, motion: Floats, t: flo
     deeds = _deeds(run, contacts, x, motion)
     who = deeds.who
     flew = k.mode[who] == FLYING
-    shock = flew | (
-        np.abs(deeds.change[:, :2]).max(axis=1) > SHOCK + 4.0 * run.machine.gravity * run.dt
-    )
-    smooth = ~shock
-    bend, hit = who[smooth], who[shock]
+    u, v, _ = np.abs(deeds.change).T
+    shock = flew | (np.maximum(u, v) > SHOCK + 4.0 * run.machine.gravity * run.dt)
+    place, velocity = x.take(who, axis=0), after.take(who, axis=0)
     # The mean of the velocities before and after is that halfway through the step's impulses.
-    k.go_smoothly(bend, t, x[bend], after[bend] - 0.5 * deeds.change[smooth])
+    states = np.empty((len(who), 6))
+    states[:, 0], states[:, 1:3], states[:, 3:] = t, place, velocity - 0.5 * deeds.change
+    hit = who[shock]
     if len(hit):
+        smooth = ~shock
+        k.go_smoothly(who[smooth], states[smooth])
         # A flight comes in with the true velocity, half a step on from pymunk's.
         came = before[hit]
         came[:, :2] += 0.5 * run.dt * run.gravity * flew[shock, None]
         k.close(hit)
         k.knot(hit, t, x[hit], came[:, :2], came[:, 2])
+    else:
+        k.go_smoothly(who, states)
     book(run, contacts, deeds, after)
-    k.knot(hit, t, x[hit], after[hit, :2], after[hit, 2])
-    _events(run, contacts, deeds, x, before, after, t)
+    if len(hit):
+        k.knot(hit, t, x[hit], after[hit, :2], after[hit, 2])
+    come = who[flew]
+    _events(run, contacts, deeds, come, x, motion, t)
 
-    k.rest(who[flew])
-    k.leave(who, x[who], after[who, :2], after[who, 2])
+    k.rest(come)
+    k.leave(who, place, velocity)
     run.bent[who], run.bend[who] = run.bend[who], 0.0
-    _surfaces(run, contacts, deeds, hit[flew[shock]], x, after, t)
+    _surfaces(run, contacts, deeds, come, x, after, t)
     _calm(run, contacts, deeds)
     if run.machine.align:
         run.idle.settle(contacts, deeds)
@@ -124,42 +133,56 @@ def settle_books(run: Run, contacts: Contacts, x: Floats, motion: Floats, t: flo
 
 def _deeds(run: Run, contacts: Contacts, x: Floats, motion: Floats) -> Deeds:
     """Return what the contacts did."""
-    i, j, fixed = contacts.first, contacts.other, contacts.fixed
-    solid = j[fixed] - run.count
-    belt, rounded = np.zeros(len(i)), np.zeros(len(i), dtype=bool)
-    belt[fixed] = run.solids.belt(solid, contacts.normal[fixed])
-    rounded[fixed] = run.solids.rounded(solid, x[i[fixed]])
+    i, j, fixed, uses = contacts.first, contacts.other, contacts.fixed, contacts.uses
+    partners, mode = run.world.partners, run.tracks.mode
     nx, ny = contacts.normal.T
-    mine, theirs = motion[:, i], motion[:, j]
-    (u, v), rim = (mine - theirs)[..., :2].transpose(2, 0, 1), mine[..., 2] + theirs[..., 2]
-    before_n, after_n = u * nx + v * ny
-    before_t, after_t = u * ny - v * nx + run.radius * rim - belt
-    uses = np.bincount(np.concatenate([i, j]), minlength=motion.shape[1])
-    who = ((uses[: run.count] > 0) & (run.tracks.mode != CARRIED)).nonzero()[0]
+    belt, rounded = partners.belt(j, nx, ny), partners.rounded(j, x.take(i, axis=0))
+    before, after = (_relative(contacts, nx, ny, of, run.radius) for of in motion)
+    before[1] -= belt
+    after[1] -= belt
+    flat = lone = fixed[uses[i[fixed]] == 1]
+    if np.count_nonzero(rounded):
+        flat = lone[~rounded[lone]]
+    carried = mode[j[contacts.pairs]] == CARRIED
+    who = uses[: run.count].nonzero()[0]
+    who = who[mode[who] != CARRIED]
     return Deeds(
-        belt, before_n, before_t, after_n, after_t, np.maximum(np.abs(after_n), np.abs(after_t)),
-        rounded, uses, who, motion[1, who] - motion[0, who],
+        belt, before, after, np.maximum(*np.abs(after)), rounded, lone, flat,
+        contacts.pairs[~carried], contacts.pairs[carried], who,
+        motion[1].take(who, axis=0) - motion[0].take(who, axis=0),
     )  # fmt: skip
 
 
+def _relative(contacts: Contacts, nx: Floats, ny: Floats, motion: Floats, radius: float) -> Floats:
+    """Return normal speeds and slips on solids at rest, (2, M), of disks in motion (N + K, 3)."""
+    mine, theirs = motion.take(contacts.first, axis=0), motion.take(contacts.other, axis=0)
+    u, v, _ = (mine - theirs).T
+    speeds = np.empty((2, len(u)))
+    speeds[0] = u * nx + v * ny
+    speeds[1] = u * ny - v * nx + radius * (mine[:, 2] + theirs[:, 2])
+    return speeds
+
+
 def _events(
-    run: Run, contacts: Contacts, deeds: Deeds, x: Floats, before: Floats, after: Floats, t: float
+    run: Run, contacts: Contacts, deeds: Deeds, flew: Ints, x: Floats, motion: Floats, t: float
 ) -> None:
     """Write impacts and collisions: contacts that were not there a step ago, and hit."""
     rows = run.begun(contacts.keys).nonzero()[0]
     if not len(rows):
         return
-    i, j = contacts.first[rows], contacts.other[rows]
+    (before, after), i, j = motion, contacts.first[rows], contacts.other[rows]
     fixed = (j >= run.count).nonzero()[0]
+    solid = j[fixed] - run.count
     # In flight the true velocity is half a step of gravity on from pymunk's.
     flown = np.zeros(len(before))
-    flown[: run.count] = (run.tracks.mode == FLYING) * 0.5 * run.dt * run.machine.gravity
-    approach = (flown[i] - flown[j]) * contacts.normal[rows, 1] - deeds.before_n[rows]
-    told = approach > run.soft
-    kind, surface = np.full(len(rows), Kind.COLLISION), np.full(len(rows), run.particles)
-    solid = j[fixed] - run.count
-    kind[fixed], surface[fixed] = Kind.IMPACT, run.solids.surface[solid]
-    told[fixed] |= (approach[fixed] > FAINT * run.soft) & ~run.met[i[fixed], solid]
+    flown[flew] = 0.5 * run.dt * run.machine.gravity
+    approach = (flown[i] - flown[j]) * contacts.normal[:, 1][rows] - deeds.before[0][rows]
+    told, known = approach > run.soft, run.met[i[fixed], solid]
+    if not np.count_nonzero(told) and np.count_nonzero(known) == len(known):
+        return
+    kind, surface = np.full(len(rows), Kind.COLLISION), run.world.partners.surface[j]
+    kind[fixed] = Kind.IMPACT
+    told[fixed] |= (approach[fixed] > FAINT * run.soft) & ~known
     run.met[i[fixed], solid] = True
     landing = fixed[(surface[fixed] == run.machine.landing) & ~run.landed[i[fixed]]]
     kind[landing], told[landing] = Kind.LANDING, True
@@ -173,7 +196,7 @@ def _events(
         kind[told], who, t, x[who], after[who, :2], after[who, 2], surface[told],
         np.where(other < run.count, run.ids[np.where(other < run.count, other, 0)], -1),
         velocity_before=came[:, :2], omega_before=came[:, 2],
-        impulse=(contacts.j_n[rows], contacts.j_t[rows]),
+        impulse=(contacts.impulse[0][rows], contacts.impulse[1][rows]),
     )  # fmt: skip
     run.recorder.contacts += len(who)
 
@@ -182,59 +205,70 @@ def _surfaces(
     run: Run, contacts: Contacts, deeds: Deeds, flew: Ints, x: Floats, after: Floats, t: float
 ) -> None:
     """Keep account of which single surface particles lie on, and whether they slip there."""
-    surface = np.full(run.count, -1)
-    rows = contacts.fixed[deeds.uses[contacts.first[contacts.fixed]] == 1]
-    alone = contacts.first[rows]
-    surface[alone] = run.solids.surface[contacts.other[rows] - run.count]
+    lone, surface = deeds.lone, np.full(run.count, -1)
+    alone = contacts.first[lone]
+    surface[alone] = run.world.partners.surface[contacts.other[lone]]
     run.stays.arrive(deeds.who, surface[deeds.who], t)
-    speed = np.abs(deeds.after_t[rows])
+    speed = np.abs(deeds.after[1][lone])
     slipping = run.stays.slipping[alone]
     # A blow out of flight that ends the slip is no sticking yet.
     stops = slipping & (speed < SETTLED[0])
     if len(flew):
         stops &= ~np.isin(alone, flew)
     starts = ~slipping & (speed > SLIPS)
-    run.stays.slipping[alone] = (slipping & ~stops) | starts
     _lie(run, contacts, deeds)
     for kind, which in ((Kind.STICK, stops), (Kind.SLIP, starts)):
-        these = alone[which]
-        run.event(kind, these, t, x[these], after[these, :2], after[these, 2], surface[these])
+        if np.count_nonzero(which):
+            these = alone[which]
+            run.stays.slipping[these] = kind is Kind.SLIP
+            run.event(kind, these, t, x[these], after[these, :2], after[these, 2], surface[these])
 
 
 def _lie(run: Run, contacts: Contacts, deeds: Deeds) -> None:
     """Note the normals of surfaces that particles lie on, one or several in line; follow curves."""
-    k, rows = run.tracks, contacts.fixed
-    i, n, uses = contacts.first[rows], contacts.normal[rows], deeds.uses[contacts.first[rows]]
-    rounded = deeds.rounded[rows]
-    one = uses == 1
-    k.upon[i[one]] = n[one]
-    flat = one & ~rounded
-    k.face[i[flat]] = contacts.other[rows[flat]] - run.count
-    in_line = one.copy()
-    several = ~one & (np.bincount(i, minlength=run.count)[i] == uses)
+    k, i = run.tracks, contacts.first
+    k.upon[i[deeds.lone]] = contacts.normal.take(deeds.lone, axis=0)
+    k.face[i[deeds.flat]] = contacts.other[deeds.flat] - run.count
+    rows = contacts.fixed
+    its = i[rows]
+    led = deeds.lone
+    # Contacts are sorted: those of a particle with several solids follow each other.
+    if np.count_nonzero(its[1:] == its[:-1]):
+        led = np.concatenate((led, _in_line(run, contacts, deeds)))
+    for row in led[deeds.rounded[led]].tolist():
+        solid = contacts.other[row] - run.count
+        reach = float(run.solids.reach[solid]) + run.radius
+        follow(run, int(i[row]), contacts.normal[row], reach)
+
+
+def _in_line(run: Run, contacts: Contacts, deeds: Deeds) -> Ints:
+    """Return the rows of several surfaces in line with each other; note the mean of the normals."""
+    rows = contacts.fixed
+    i, n = contacts.first[rows], contacts.normal[rows]
+    uses = contacts.uses[i]
+    in_line = np.zeros(len(rows), dtype=bool)
+    several = (uses > 1) & (np.bincount(i, minlength=run.count)[i] == uses)
     for row in several.nonzero()[0].tolist():
         same = i == i[row]
         total = n[same].sum(axis=0)
         length = float(np.hypot(*total))
         in_line[row] = length > (1.0 - IN_LINE) * uses[row]
         if in_line[row]:
-            k.upon[i[row]] = total / length
-    for row in (in_line & rounded).nonzero()[0].tolist():
-        solid = contacts.other[rows[row]] - run.count
-        follow(run, int(i[row]), n[row], float(run.solids.reach[solid]) + run.radius)
+            run.tracks.upon[i[row]] = total / length
+    return rows[in_line]
 
 
 def _calm(run: Run, contacts: Contacts, deeds: Deeds) -> None:
     """Count steps in a row in which particles lay still on what they can settle on."""
     who = deeds.who
     limit = STILL[0] if run.machine.interact else SETTLED[0]
-    restless = deeds.pace > limit
-    fixed = contacts.fixed
-    restless[fixed] |= ~run.settles_on[contacts.other[fixed] - run.count]
-    stirred = np.zeros(len(deeds.uses), dtype=bool)
+    restless = (deeds.pace > limit) | run.world.partners.unsettling[contacts.other]
+    stirred = np.zeros(len(contacts.uses), dtype=bool)
     stirred[contacts.first[restless]] = True
     stirred[contacts.other[restless]] = True
     if not run.machine.interact:
         # Rolling down a slope is not lying on it.
         stirred[who] |= np.abs(deeds.change[:, :2]).max(axis=1) > limit
-    run.calm[who] = np.where(stirred[who], 0, run.calm[who] + 1)
+    calm = run.calm[who] + 1
+    calm[stirred[who]] = 0
+    run.calm[who] = calm

@@ -15,8 +15,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.stepper.tracks import CARRIED
-
 if TYPE_CHECKING:
     from chutelab.stepper.books import Deeds
     from chutelab.stepper.state import Run
@@ -24,6 +22,8 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+_ROWS = np.arange(6)[:, None]
 
 
 def book(run: Run, contacts: Contacts, deeds: Deeds, after: Floats) -> None:
@@ -36,44 +36,42 @@ def book(run: Run, contacts: Contacts, deeds: Deeds, after: Floats) -> None:
     after : ndarray, (N + K, 3)
         vx, vy and ω after it.
     """
-    i, j, pairs, fixed = contacts.first, contacts.other, contacts.pairs, contacts.fixed
-    carried = run.tracks.mode[j[pairs]] == CARRIED
-    free, held = pairs[~carried], pairs[carried]
-    share = np.full(len(i), -0.5)
-    share[free] = -0.25
-    # In the first three columns all of the step, in the others the second half of its impulses.
-    entries = np.empty((len(i), 6))
-    entries[:, 0] = contacts.j_t * deeds.belt
-    entries[:, 1] = share * contacts.j_n * (deeds.before_n + deeds.after_n)
-    entries[:, 2] = share * contacts.j_t * (deeds.before_t + deeds.after_t)
-    entries[:, 3] = 0.5 * entries[:, 0]
-    entries[:, 4] = 0.25 * share * contacts.j_n * (deeds.before_n + 3.0 * deeds.after_n)
-    entries[:, 5] = 0.25 * share * contacts.j_t * (deeds.before_t + 3.0 * deeds.after_t)
-    surface = np.full(len(i), run.particles)
-    surface[fixed] = run.solids.surface[j[fixed] - run.count]
+    i, j, free, held = contacts.first, contacts.other, deeds.free, deeds.held
+    partners, count = run.world.partners, len(contacts)
+    share = partners.share[j]
+    share[held] = -0.5
+    # In the first three rows all of the step, in the others the second half of its impulses.
+    # Behind its contacts what the other one of two particles gets.
+    entries = np.empty((6, count + len(free)))
+    own = entries[:, :count]
+    own[0] = contacts.impulse[1] * deeds.belt
+    own[3] = 0.5 * own[0]
+    push = share * contacts.impulse
+    own[1:3] = push * (deeds.before + deeds.after)
+    own[4:] = 0.25 * push * (deeds.before + 3.0 * deeds.after)
+    surface = partners.surface[j]
     if len(free):
-        i, surface = np.concatenate([i, j[free]]), np.concatenate([surface, surface[free]])
-        entries = np.concatenate([entries, entries[free]])
+        i, surface = np.concatenate((i, j[free])), np.concatenate((surface, surface[free]))
+        entries[:, count:] = own.take(free, axis=1)
     if len(held):
         (nx, ny), (u, v, _) = contacts.normal[held].T, after[j[held]].T
-        given = np.zeros((len(held), 6))
-        given[:, 0] = contacts.j_n[held] * (u * nx + v * ny) + contacts.j_t[held] * (
-            u * ny - v * nx
-        )
-        given[:, 3] = 0.5 * given[:, 0]
-        i, surface = np.concatenate([i, i[held]]), np.concatenate([surface, 0 * held])
-        entries = np.concatenate([entries, given])
-    books, totals = run.recorder, _totals(i, entries, run.count)
-    books.entries[run.ids] += totals[:, :3]
-    books.by_surface += _totals(surface, entries, len(books.by_surface))[:, :3]
+        (j_n, j_t), given = contacts.impulse[:, held], np.zeros((6, len(held)))
+        given[0] = j_n * (u * nx + v * ny) + j_t * (u * ny - v * nx)
+        given[3] = 0.5 * given[0]
+        i, surface = np.concatenate((i, i[held])), np.concatenate((surface, 0 * held))
+        entries = np.concatenate((entries, given), axis=1)
+    totals, by_surface = _totals(i, entries, run.count), run.recorder.by_surface
+    run.entries += totals[:, :3]
     run.tracks.ahead[:] = totals[:, 3:]
-    run.ahead = i, surface, entries[:, 3:]
+    by_surface += _totals(surface, entries[:3], len(by_surface))
+    run.ahead = i, surface, entries[3:].T
 
 
 def _totals(where: Ints, entries: Floats, count: int) -> Floats:
-    """Return the sums (count, 6) of entries (M, 6)."""
-    cells = (6 * where[:, None] + np.arange(6)).ravel()
-    return np.asarray(np.bincount(cells, entries.ravel(), 6 * count).reshape(-1, 6))
+    """Return the sums (count, n) of entries (n, M), n up to 6."""
+    n = len(entries)
+    cells = (where + count * _ROWS[:n]).ravel()
+    return np.asarray(np.bincount(cells, entries.ravel(), n * count).reshape(n, count).T)
 
 
 def end_contacts(run: Run, who: Ints) -> None:
@@ -88,5 +86,5 @@ def end_contacts(run: Run, who: Ints) -> None:
     books.book(run.ids[slept], run.stays.on[slept], *-k.ahead[slept].T)
     owner, surface, ahead = run.ahead
     rows = stepped[owner].nonzero()[0]
-    np.subtract.at(books.entries, run.ids[owner[rows]], ahead[rows])
+    np.subtract.at(run.entries, owner[rows], ahead[rows])
     np.subtract.at(books.by_surface, surface[rows], ahead[rows])

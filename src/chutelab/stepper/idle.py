@@ -8,12 +8,13 @@ comes to lie on them, or their support or their slip ends.
 
 from __future__ import annotations
 
+from math import floor, inf, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.stepper.tracks import CARRIED, RESTING
+from chutelab.stepper.tracks import RESTING
 
 if TYPE_CHECKING:
     from chutelab.stepper.books import Deeds
@@ -35,6 +36,8 @@ STEPS = 3
 CONTACT = 1e-3
 """Share of the radius: what is closer touches."""
 
+_LIMITS = np.array([QUIET, ALIKE])
+
 
 class Idle:
     """Who goes on as before.
@@ -52,14 +55,9 @@ class Idle:
         self._alike = np.zeros(count, dtype=np.int64)
         self._until = np.full(count, np.inf)
         # Per step: change of vx, vy and ω; belt work, friction loss and what that changes by.
-        self._change = np.zeros((3, count)).T
-        self._lever = np.array([1.0, 1.0, run.radius])
+        self._change = np.zeros((count, 3))
         self._dues = np.zeros((count, 3))
         self._slides, self._pays = np.zeros((2, count), dtype=bool)
-        # What a belt pays on a slope it pays for good.
-        solids = run.solids
-        self._slope = (solids.speed != 0.0) & (np.abs(solids.tangent[:, 1]) > 0.0)
-        self._length = np.hypot(*(solids.b - solids.a).T)
 
     def settle(self, contacts: Contacts, deeds: Deeds) -> None:
         """Put to sleep what was the same for some steps.
@@ -71,29 +69,30 @@ class Idle:
         deeds : Deeds
             What the contacts did.
         """
-        run, k, who = self._run, self._run.tracks, deeds.who
-        i, j, pairs, fixed = contacts.first, contacts.other, contacts.pairs, contacts.fixed
-        lone = (deeds.uses[i[fixed]] == 1) & ~deeds.rounded[fixed]
-        flat = fixed[lone]
-        alone = np.zeros(len(deeds.uses), dtype=bool)
+        run, who = self._run, deeds.who
+        i, j, flat = contacts.first, contacts.other, deeds.flat
+        alone = np.zeros(len(contacts.uses), dtype=bool)
         alone[i[flat]] = True
         # Who lies alone may slide, but always alike; of the others none may move.
-        loud = deeds.pace > QUIET
-        loud[fixed] |= deeds.rounded[fixed] | self._slope[j[fixed] - run.count]
-        loud[pairs] |= k.mode[j[pairs]] == CARRIED
-        loud[flat] = np.abs(deeds.after_n[flat]) > QUIET
-        single = alone[who]
-        before = self._change[who] * single[:, None]
-        news = (np.abs(deeds.change - before) * self._lever).max(axis=1)
-        self._change[who] = deeds.change
-        restless = np.zeros(len(deeds.uses), dtype=bool)
-        restless[who] = news > np.where(single, ALIKE, QUIET)
+        loud = (deeds.pace > QUIET) | deeds.rounded | run.world.partners.slope[j]
+        loud[deeds.held] = True
+        loud[flat] = np.abs(deeds.after[0][flat]) > QUIET
+        restless = np.zeros(len(alone), dtype=bool)
         restless[i[loud]] = True
         restless[j[loud]] = True
-        self._alike[who] = np.where(restless[who], 0, self._alike[who] + 1)
-        awake = self._alike < STEPS
-        if np.count_nonzero(awake[who]) == len(who):
+        single = alone[who]
+        before = self._change.take(who, axis=0) * single.repeat(3).reshape(-1, 3)
+        u, v, turn = np.abs(deeds.change - before).T
+        self._change[who] = deeds.change
+        news = np.maximum(np.maximum(u, v), turn * run.radius)
+        restless = restless[who] | (news > _LIMITS.take(single))
+        alike = self._alike[who] + 1
+        alike[restless] = 0
+        self._alike[who] = alike
+        if np.count_nonzero(alike < STEPS) == len(who):
             return
+        awake = self._alike < STEPS
+        pairs, fixed = contacts.pairs, contacts.fixed
         spread(awake, i[pairs], j[pairs])
         new = who[~awake[who]]
         if not len(new):
@@ -101,43 +100,41 @@ class Idle:
         kept = self._change[new] * alone[new, None]
         self.hold(new)
         self._change[new] = kept
-        supported = fixed[~awake[i[fixed]]]
-        left = self._way_left(i[supported], j[supported] - run.count)
-        np.minimum.at(self._until, i[supported], left)
-        self._slide(contacts, flat[~awake[i[flat]]], deeds)
+        for row in fixed[~awake[i[fixed]]].tolist():
+            n, solid = int(i[row]), int(j[row]) - run.count
+            self._until[n] = min(self._until[n], self._end(n, solid))
+        for row in flat[~awake[i[flat]]].tolist():
+            slip, push = float(deeds.after[1, row]), float(contacts.impulse[1, row])
+            brakes = slip - float(deeds.before[1, row])
+            self._slide(int(i[row]), slip, brakes, push, float(deeds.belt[row]))
 
     def hold(self, who: Ints) -> None:
         """Put particles to sleep as they move, for good, and at no cost."""
         self.asleep[who], self._slides[who], self._pays[who] = True, False, False
         self._until[who], self._change[who] = np.inf, 0.0
 
-    def _slide(self, contacts: Contacts, rows: Ints, deeds: Deeds) -> None:
-        """Note what sliding costs, and when it ends."""
-        run = self._run
-        who, slip, push = contacts.first[rows], deeds.after_t[rows], contacts.j_t[rows]
-        brakes = deeds.after_t[rows] - deeds.before_t[rows]
-        moving = np.abs(slip) > QUIET
-        self._slides[who] = moving
-        with np.errstate(divide="ignore", invalid="ignore"):
-            steps = np.where(moving & (slip * brakes < 0.0), np.floor(-slip / brakes) - 1.0, np.inf)
-        self._until[who] = np.minimum(self._until[who], run.now + steps * run.dt)
-        self._dues[who, 0] = push * deeds.belt[rows]
-        self._dues[who, 1] = -push * (slip + 0.5 * brakes)
-        self._dues[who, 2] = -push * brakes
-        self._pays[who] = self._dues[who].any(axis=1)
+    def _slide(self, i: int, slip: float, brakes: float, push: float, belt: float) -> None:
+        """Note what sliding on, by how much it slows down in a step, costs, and when it ends."""
+        run, moving = self._run, abs(slip) > QUIET
+        self._slides[i] = moving
+        if moving and slip * brakes < 0.0:
+            end = run.now + (floor(-slip / brakes) - 1.0) * run.dt
+            self._until[i] = min(self._until[i], end)
+        dues = push * belt, -push * (slip + 0.5 * brakes), -push * brakes
+        self._dues[i], self._pays[i] = dues, any(dues)
 
-    def _way_left(self, who: Ints, solid: Ints) -> Floats:
-        """Return when particles will come to the ends of what they lie on, s."""
-        k, s = self._run.tracks, self._run.solids
-        line = (s.b[solid] - s.a[solid]) / self._length[solid, None]
-        foot = np.einsum("md,md->m", k.at[who] - s.a[solid], line)
-        pace = np.einsum("md,md->m", k.w[who], line)
-        push = np.einsum("md,md->m", self._change[who, :2], line) / self._run.dt
+    def _end(self, i: int, solid: int) -> float:
+        """Return when a particle will come to the end of what it lies on, s."""
+        run = self._run
+        ax, ay, lx, ly, length = run.solids.lines[solid]
+        x, y, u, v = run.tracks.left(i)
+        du, dv, _ = self._change[i].tolist()
+        foot, pace = (x - ax) * lx + (y - ay) * ly, u * lx + v * ly
+        push = (du * lx + dv * ly) / run.dt
         # The speed it will have at most on the way, if it gains any.
-        way = np.where(pace > 0.0, self._length[solid] - foot, foot)
-        fastest = np.sqrt(pace**2 + 2.0 * np.abs(push) * self._length[solid])
-        with np.errstate(divide="ignore"):
-            return np.asarray(self._run.now + way / fastest)
+        way = length - foot if pace > 0.0 else foot
+        fastest = sqrt(pace * pace + 2.0 * abs(push) * length)
+        return run.now + way / fastest if fastest > 0.0 else inf
 
     def move(self, t: float, tick: float) -> None:
         """Move sleepers on to t; wake those who need the step that ends at `tick`."""
@@ -175,8 +172,11 @@ class Idle:
             self._alike[who] = 0
             run.moved[who] = True
             # Seen from halfway between two steps, as what is stepped.
-            motion = np.column_stack([k.w[who], k.spin[who]]) - 0.5 * self._change[who]
-            k.hold(who, k.from_t[who], k.from_x[who], motion)
+            states = np.empty((len(who), 6))
+            states[:, 0], states[:, 1:3], states[:, 3:5] = k.from_t[who], k.from_x[who], k.w[who]
+            states[:, 5] = k.spin[who]
+            states[:, 3:] -= 0.5 * self._change[who]
+            k.hold(who, states)
             # Half of what the last step paid: slip and what it pays change evenly.
             dues = self._dues[who] * self._pays[who, None]
             k.ahead[who] = 0.0

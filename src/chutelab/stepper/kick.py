@@ -37,35 +37,31 @@ def kick(run: Run, carried: Mask, t0: float, t: float) -> None:
     _enter(run, resting | flying, carried, t)
     run.world.step(run.dt)
     contacts = run.world.contacts()
-    if contacts is not None and run.count == 1 and run.machine.align and squeezed(run, contacts):
-        hold_fast(run, 0, int(contacts.other[0]) - run.count)
-        return
-    lost = resting.copy()
-    if contacts is not None:
-        lost[contacts.first] = False
-        lost[contacts.other[contacts.pairs]] = False
-    if np.count_nonzero(lost):
-        run.lift(lost.nonzero()[0], t0)
     if contacts is None:
+        run.lift(resting.nonzero()[0], t0)
         run.touching = np.empty(0, dtype=np.int64)
         return
-    _resolve(run, contacts, flying | lost, t)
-    run.go_on((k.mode == RESTING) & (resting | flying), t)
+    if run.count == 1 and run.machine.align and squeezed(run, contacts):
+        hold_fast(run, 0, int(contacts.other[0]) - run.count)
+        return
+    run.lift((resting & (contacts.uses[: run.count] == 0)).nonzero()[0], t0)
+    _resolve(run, contacts, flying, t)
+    run.go_on((k.mode == RESTING) & run.inside, t)
 
 
 def _enter(run: Run, free: Mask, carried: Mask, t: float) -> None:
     """Have pymunk's own move bring every body to where its path is at t."""
     world, want = run.world, free | carried
-    for n in (run.inside & ~want).nonzero()[0].tolist():
+    for n in (run.inside > want).nonzero()[0].tolist():
         world.remove(n)
-    new = (want & ~run.inside).nonzero()[0]
+    new = (want > run.inside).nonzero()[0]
     for n in new.tolist():
         world.add(n, carried=bool(carried[n]))
     run.inside = want
     run.moved[new] = True
     for n in (free & run.moved).nonzero()[0].tolist():
         _place(run, n, t)
-    run.moved[want] = False
+    run.moved &= ~want
     for n in carried.nonzero()[0].tolist():
         x0, y0, _, _ = run.tracks.state(n, t - run.dt)
         x1, y1, _, _ = run.tracks.state(n, t)
@@ -89,7 +85,7 @@ def _place(run: Run, n: int, t: float) -> None:
         off = wx * nx + wy * ny
         wx, wy = wx - off * nx, wy - off * ny
     run.sunk[n] = 0.0
-    k.aim[n] = k.w[n] = wx, wy
+    k.send(n, wx, wy)
     run.world.place(n, (x - dt * wx, y - dt * wy), (wx, wy), k.turn(n))
 
 
@@ -99,7 +95,7 @@ def _resolve(run: Run, contacts: Contacts, flying: Mask, t: float) -> None:
     x, after = run.world.states()
     motion = np.zeros((2, *after.shape))
     before = motion[0]
-    before[: run.count, :2], before[: run.count, 2], motion[1] = k.aim, k.spin, after
+    before[: run.count], motion[1] = k.sent, after
     if np.count_nonzero(flying):
         who = flying.nonzero()[0]
         before[who, :2] = k.flight(who, t)[1] - 0.5 * run.dt * run.gravity

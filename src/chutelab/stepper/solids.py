@@ -73,11 +73,13 @@ class Solids:
     surface: NDArray[np.int64]
     pulley: int
 
-    def belt(self, solid: NDArray[np.int64], normal: Floats) -> Floats:
-        """Speed of the surface along (n_y, -n_x) at contacts (M,) with outward normals (M, 2)."""
-        t = self.tangent[solid]
-        along = t[:, 0] * normal[:, 1] - t[:, 1] * normal[:, 0]
-        return self.speed[solid] * np.where(solid == self.pulley, 1.0, along)
+    @cached_property
+    def lines(self) -> list[tuple[float, ...]]:
+        """Beginnings of the faces, unit vectors along them and lengths: x, y, x, y and m, of K."""
+        line = self.b - self.a
+        length = np.hypot(*line.T)
+        unit = line / np.where(length > 0.0, length, 1.0)[:, None]
+        return [tuple(row) for row in np.column_stack([self.a, unit, length]).tolist()]
 
     def belt_at(self, solid: int, normal: tuple[float, float]) -> float:
         """Speed of the surface along (n_y, -n_x) at one contact."""
@@ -95,20 +97,6 @@ class Solids:
         return np.asarray(
             np.linalg.norm(from_a - share[..., None] * line, axis=2) - self.reach - radius
         )
-
-    def rounded(self, solid: NDArray[np.int64], points: Floats) -> NDArray[np.bool_]:
-        """Tell where disks around points (M, 2) touch the pulley or the end of a face, (M,)."""
-        line, from_a = self._line[solid], points - self.a[solid]
-        along = from_a[:, 0] * line[:, 0] + from_a[:, 1] * line[:, 1]
-        return np.asarray((along <= 0.0) | (along >= self._square[solid]))
-
-    @cached_property
-    def _line(self) -> Floats:
-        return self.b - self.a
-
-    @cached_property
-    def _square(self) -> Floats:
-        return np.asarray((self._line**2).sum(axis=1))
 
 
 def solids(machine: Machine) -> Solids:

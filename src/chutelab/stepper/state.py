@@ -59,8 +59,8 @@ class Run:
         Keys of the contacts a step ago, sorted.
     ahead : tuple of ndarray, (M,), (M,) and (M, 3)
         Particles, surfaces and entries (J) of the second half of the last step's impulses.
-    settles_on : ndarray of bool, (K,)
-        Solids at rest, and the outgoing belt.
+    entries : ndarray, (N, 3)
+        Ledger entries (J) of each particle.
     start, now : float
         s, from where steps are counted, and when the last one ended.
     inside : ndarray of bool, (N,)
@@ -96,6 +96,8 @@ class Run:
     ) -> None:
         count = len(ids)
         self.machine, self.solids, self.recorder, self.ids = machine, solids, recorder, ids
+        # Particles of one world follow each other.
+        self.entries = recorder.entries[ids[0] : ids[-1] + 1]
         self.start, self.dt, self.now = start, step(machine, start), start
         self.clashes = clashes
         self._world: World | None = None
@@ -123,9 +125,6 @@ class Run:
         self.idle = Idle(self)
         self.crowd = Crowd(self)
         self._told: list[tuple[Any, ...]] = []
-        self.settles_on: NDArray[np.bool_] = (solids.speed == 0.0) | (
-            solids.surface == machine.landing
-        )
 
     @property
     def world(self) -> World:
@@ -144,7 +143,7 @@ class Run:
         known = self.touching
         if not len(known):
             return np.ones(len(keys), dtype=bool)
-        return np.asarray(known[np.minimum(np.searchsorted(known, keys), len(known) - 1)] != keys)
+        return np.asarray(known.take(known.searchsorted(keys), mode="clip") != keys)
 
     @property
     def particles(self) -> int:
@@ -226,12 +225,8 @@ class Run:
         sunk : tuple of float
             By how much the next step is to find it deeper in what it rests on, m.
         """
-        k = self.tracks
-        k.rest(i)
-        _, x, y, vx, vy = k.begin(i)
-        k.leave(i, (x, y), (vx, vy), k.omega[i])
-        k.upon[i], self.bend[i], self.sunk[i] = normal, curvature, sunk
-        k.face[i] = solid if curvature == 0.0 else -1
+        self.tracks.stay(i, normal, solid if curvature == 0.0 else -1)
+        self.bend[i], self.sunk[i] = curvature, sunk
         self.changed(i)
 
     def take_off(self, i: int) -> None:
@@ -241,10 +236,11 @@ class Run:
 
     def book(self, i: int, surface: int, belt: float, restitution: float, friction: float) -> None:
         """Book ledger entries (J) on one particle, and on the surface it met."""
-        for book, row in (self.recorder.entries, self.ids[i]), (self.recorder.by_surface, surface):
-            book[row, 0] += belt
-            book[row, 1] += restitution
-            book[row, 2] += friction
+        entries = self.entries[i], self.recorder.by_surface[surface]
+        for row in entries:
+            row[0] += belt
+            row[1] += restitution
+            row[2] += friction
 
     def tell(
         self,
@@ -285,10 +281,9 @@ class Run:
 
     def lift(self, who: Ints, t: float) -> None:
         """Let go what is in contact no more; whether it separated, its flight will tell."""
-        k = self.tracks
-        curved = (self.bend[who] > 0.0) & (k.from_t[who] == t)
-        left = [i for i in who[curved].tolist() if leave(self, i, t)]
-        k.lift(np.setdiff1d(who, left) if left else who, t, self.dt)
         for i in who.tolist():
+            curved = self.bend[i] > 0.0 and self.tracks.from_t[i] == t
+            if not (curved and leave(self, i, t)):
+                self.tracks.lift(i, t, self.dt)
             self.changed(i)
-        self.stays.left(who, t)
+            self.stays.left(i, t)

@@ -38,16 +38,14 @@ class Stays:
         self._left = np.full(count, np.nan)
         self._left_state = np.zeros((count, 5))
 
-    def left(self, who: Ints, t: float) -> None:
-        """Note who lost its contact at t; whether it separated, its flight will tell."""
-        parts = who[
-            (self.on[who] >= 0)
-            & np.isnan(self._left[who])
-            & (t - self._since[who] > (HOP - 0.5) * self._run.dt)
-        ]
-        k = self._run.tracks
-        self._left[parts] = t
-        self._left_state[parts] = np.column_stack([k.x[parts], k.v[parts], k.omega[parts]])
+    def left(self, i: int, t: float) -> None:
+        """Note that a particle lost its contact at t; if it separated, its flight will tell."""
+        lasted = t - self._since[i] > (HOP - 0.5) * self._run.dt
+        if self.on[i] >= 0 and isnan(self._left[i]) and lasted:
+            k = self._run.tracks
+            self._left[i] = t
+            self._left_state[i, :2], self._left_state[i, 2:4] = k.x[i], k.v[i]
+            self._left_state[i, 4] = k.omega[i]
 
     def hopped(self, particle: int, surface: int, t: float) -> bool:
         """Tell whether a contact renews one with the same surface that ended a moment ago."""
@@ -55,9 +53,8 @@ class Stays:
         return bool(surface == self.on[particle] and since < HOP * self._run.dt)
 
     def arrive(self, who: Ints, surface: Ints, t: float) -> None:
-        """Note contacts of particles with one surface each, -1 for several or another particle."""
-        same = (surface == self.on[who]) & (self._run.tracks.mode[who] == RESTING)
-        news = (~same | ~np.isnan(self._left[who])).nonzero()[0]
+        """Note what particles in contact lie on: one surface each; -1: several, or another one."""
+        news = ((surface != self.on[who]) | ~np.isnan(self._left[who])).nonzero()[0]
         for i, on in zip(who[news].tolist(), surface[news].tolist(), strict=True):
             self.arrive_one(i, on, t)
 

@@ -18,6 +18,7 @@ from chutelab.ballistics import crossing
 from chutelab.recording import KNOT, REASONS
 
 if TYPE_CHECKING:
+
     from chutelab.machine import Machine
     from chutelab.recorder import Recorder
 
@@ -52,6 +53,8 @@ class Tracks:
         Of particles in contact: position, velocity and ω as pymunk left them at the last step.
     aim : ndarray, (N, 2)
         Velocity that moves particles in contact in the next step: w, or, round a curve, the chord.
+    sent : ndarray, (N, 3)
+        The same, and `spin`: the motion with which the next step begins.
     upon : ndarray, (N, 2)
         Normal of the surface that a particle in contact lies on; 0 with another particle, or in a
         corner.
@@ -73,24 +76,28 @@ class Tracks:
         self._g = np.array([0.0, -machine.gravity])
         self.mode = np.full(count, WAITING, dtype=np.int8)
         self._radius = machine.particle.radius
-        self._lever = np.array([1.0, 1.0, self._radius])
+        rim = KNOT_SPEED / self._radius
+        place = KNOT_POSITION * self._radius
+        self._limits = np.tile([inf, place, place, KNOT_SPEED, KNOT_SPEED, rim], (count, 1))
         self._knot = np.zeros((count, 6))
         self.t, self.omega = self._knot[:, 0], self._knot[:, 5]
         self.x, self.v = self._knot[:, 1:3], self._knot[:, 3:5]
+        self._left = np.zeros((count, 9))
+        self.at, self.w, self.upon = self._left[:, :2], self._left[:, 2:4], self._left[:, 7:]
+        self.sent = self._left[:, 4:7]
+        self.aim, self.spin = self.sent[:, :2], self.sent[:, 2]
         # Column by column: what concerns all is done in runs of N, not of 2.
-        self.at, self.w, self.aim = np.zeros((3, 2, count)).transpose(0, 2, 1)
-        self.spin, self.from_t, self._path = *np.zeros((2, count)), np.zeros((4, count))
+        self.from_t, self._path = np.zeros(count), np.zeros((4, count))
         self.from_x, self.from_v = self._path.reshape(2, 2, count).transpose(0, 2, 1)
-        self.upon = np.zeros((count, 2))
         self.face = np.full(count, -1)
         self.exit = np.full(count, np.inf)
         self.held, self.ahead = np.zeros(count, dtype=bool), np.zeros((count, 3))
-        self._held_t, self._held_x, self._held_v = (
-            np.zeros(count), np.zeros((count, 2)), np.zeros((count, 3))
-        )  # fmt: skip
+        self._held = np.zeros((count, 6))
         self._box = machine.exit_box
         self._owners, self._knots = array("q"), array("d")
-        self._bend = np.zeros((count, 3))
+        # Of the state that a track in contact is to have: s (rate + s curve) later than its knot.
+        self._rate, self._curve = np.zeros((2, count, 6))
+        self._rate[:, 0] = 1.0
         self._bend_known = np.zeros(count, dtype=bool)
 
     def knot(self, who: Ints, t: ArrayLike, x: ArrayLike, v: ArrayLike, omega: ArrayLike) -> None:
@@ -168,73 +175,96 @@ class Tracks:
             for gap, rate in ((x - left, vx), (right - x, -vx), (y - bottom, vy), (top - y, -vy))
         )
 
-    def rest(self, who: Ints | int) -> None:
+    def rest(self, who: Ints) -> None:
         """Keep particles in contact from their last knots on."""
         self.mode[who], self.exit[who] = RESTING, np.inf
         self.held[who] = self._bend_known[who] = False
 
-    def leave(self, who: Ints | int, x: ArrayLike, w: ArrayLike, omega: ArrayLike) -> None:
-        """Note the states in which pymunk leaves particles in contact."""
-        self.at[who], self.w[who], self.aim[who], self.spin[who] = x, w, w, omega
-        self.upon[who], self.face[who] = 0.0, -1
+    def stay(self, i: int, normal: tuple[float, float], face: int) -> None:
+        """Keep one particle in contact, as its last knot has it, upon a normal and a face."""
+        self.mode[i], self.exit[i], self.face[i] = RESTING, inf, face
+        self.held[i] = self._bend_known[i] = False
+        t, x, y, vx, vy, omega = self._knot[i].tolist()
+        self._left[i] = x, y, vx, vy, vx, vy, omega, *normal
+        self.from_t[i], self.from_x[i], self.from_v[i] = t, (x, y), (vx, vy)
+
+    def leave(self, who: Ints, x: Floats, motion: Floats) -> None:
+        """Note the states (k, 2) and (k, 3) in which pymunk leaves particles in contact."""
+        rows = np.zeros((len(who), 9))
+        rows[:, :2], rows[:, 2:4], rows[:, 4:7] = x, motion[:, :2], motion
+        self._left[who], self.face[who] = rows, -1
+
+    def send(self, i: int, wx: float, wy: float) -> None:
+        """Have pymunk move a particle in contact with a velocity."""
+        self._left[i, 2:6] = wx, wy, wx, wy
+
+    def left(self, i: int) -> tuple[float, ...]:
+        """Return position and velocity in which pymunk left a particle in contact."""
+        return tuple(self._left[i, :4].tolist())
 
     def go_on(self, who: Mask, t: float, dt: float) -> None:
         """Put particles (N,) in contact on the paths to the next step, dt later.
 
         Half a step of gravity is given back at once, the other half is lost until then: a hop.
         """
-        both = who[:, None]
-        np.copyto(self.from_t, t, where=who)
-        np.copyto(self.from_x, self.at, where=both)
-        np.subtract(self.aim, 0.5 * dt * self._g, out=self.from_v, where=both)
+        those = who.nonzero()[0]
+        states = self._left.take(those, axis=0)
+        states[:, 5] += 0.5 * dt * self._machine.gravity
+        self.from_t[those], self.from_x[those] = t, states[:, :2]
+        self.from_v[those] = states[:, 4:6]
 
-    def lift(self, who: Ints, t: float, dt: float) -> None:
-        """Let particles go that were in contact a step ago, at t, and are no more.
+    def lift(self, i: int, t: float, dt: float) -> None:
+        """Let a particle go that was in contact a step ago, at t, and is no more.
 
-        Off a surface they go along the tangent; only along it is w half a step of gravity ahead.
+        Off a surface it goes along the tangent; only along it is w half a step of gravity ahead.
         """
-        stood = who[self.from_t[who] <= t]
-        n = self.upon[stood]
-        lead = 0.5 * dt * (self._g - (n @ self._g)[:, None] * n)
-        self.close(stood)
-        self.knot(stood, t, self.at[stood], self.w[stood] - lead, self.spin[stood])
-        for i in who.tolist():
-            self.fly(i)
+        if self.from_t[i] <= t:
+            self.close_one(i)
+            x, y, wx, wy, _, _, spin, nx, ny = self._left[i].tolist()
+            lead, g = 0.5 * dt, -self._machine.gravity
+            off = ny * g
+            self.mark(i, t, x, y, wx - lead * (0.0 - off * nx), wy - lead * (g - off * ny), spin)
+        self.fly(i)
 
-    def go_smoothly(self, who: Ints, t: float, x: Floats, motion: Floats) -> None:
-        """Note a step in contact, to vx, vy and ω (k, 3) at places (k, 2).
+    def go_smoothly(self, who: Ints, states: Floats) -> None:
+        """Note the states (k, 6), as those of knots, after a step in contact.
 
         Where the curve deviates from the one foretold, the state before is written.
         """
         if not len(who):
             return
-        last = self._knot[who]
-        s, change = t - last[:, :1], motion - last[:, 3:]
-        new = (~self._bend_known[who]).nonzero()[0]
-        if len(new):
-            self._bend[who[new]] = change[new] / s[new]
+        last = self._knot.take(who, axis=0)
+        gone = states - last
+        known = self._bend_known[who]
+        if np.count_nonzero(known) < len(known):
+            new = (~known).nonzero()[0]
+            self._bend(who[new], gone[new])
             self._bend_known[who[new]] = True
-        bend = s * self._bend[who]
-        off_v = change - bend
-        off_x = x - last[:, 1:3] - s * (last[:, 3:5] + 0.5 * bend[:, :2])
-        off = (np.abs(off_x) > KNOT_POSITION * self._radius).any(axis=1)
-        off |= (np.abs(off_v) * self._lever > KNOT_SPEED).any(axis=1)
-        if np.count_nonzero(off):
-            turn = (off & self.held[who]).nonzero()[0]
+        s = gone[:, 0].repeat(6).reshape(-1, 6)
+        rate = self._rate.take(who, axis=0)
+        rate[:, 1:3] = last[:, 3:5]
+        off = np.abs(gone - s * (rate + s * self._curve.take(who, axis=0)))
+        beyond = off > self._limits[: len(who)]
+        if np.count_nonzero(beyond):
+            turn = (beyond.any(axis=1) & self.held[who]).nonzero()[0]
             them = who[turn]
-            self.close(them)
-            last = self._knot[them]
-            self._bend[them] = (motion[turn] - last[:, 3:]) / (t - last[:, :1])
-        self.hold(who, t, x, motion)
+            for i in them.tolist():
+                self.close_one(i)
+            self._bend(them, states[turn] - self._held[them])
+        self.hold(who, states)
 
-    def hold(self, who: Ints, t: ArrayLike, x: Floats, motion: Floats) -> None:
-        """Remember states as knots that may not be needed."""
-        self.held[who] = True
-        self._held_t[who], self._held_x[who], self._held_v[who] = t, x, motion
+    def _bend(self, who: Ints, gone: Floats) -> None:
+        """Foretell curves by what changed (k, 6) since the last knots."""
+        rate = gone[:, 3:] / gone[:, :1]
+        self._rate[who, 3:], self._curve[who, 1:3] = rate, 0.5 * rate[:, :2]
+
+    def hold(self, who: Ints, states: Floats) -> None:
+        """Remember states (k, 6), as those of knots, that may not be needed as knots."""
+        self.held[who], self._held[who] = True, states
 
     def give_up(self, i: int, t: float) -> None:
         """Write the last state of a particle in contact if it is from before t, else forget it."""
-        if self._held_t[i] < t:
+        if self._held[i, 0] < t:
             self.close_one(i)
         self.held[i] = False
 
@@ -247,8 +277,7 @@ class Tracks:
         """Write the last state of one particle in contact, if it is not a knot yet."""
         if self.held[i]:
             self.held[i] = False
-            state, n = self._knot[i], self._names[i]
-            state[0], state[1:3], state[3:] = self._held_t[i], self._held_x[i], self._held_v[i]
+            self._knot[i], n = self._held[i], self._names[i]
             self._write(i, n, self._recorder.entries[n] - self.ahead[i])
 
     def finish(self, who: Ints, reason: str) -> None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pymunk import batch
 
 from chutelab.stepper.clash import move
+from chutelab.stepper.partners import Partners
 from chutelab.stepper.solids import SLOP, Solids
 
 if TYPE_CHECKING:
@@ -35,7 +36,6 @@ _ARBITER = (
     | batch.ArbiterFields.BODY_B_ID
     | batch.ArbiterFields.TOTAL_IMPULSE
     | batch.ArbiterFields.NORMAL
-    | batch.ArbiterFields.DISTANCE_1
 )
 _BODY = (
     batch.BodyFields.BODY_ID
@@ -45,10 +45,10 @@ _BODY = (
 )
 
 
-_Disk = tuple[pymunk.Body, pymunk.Circle]
+_Disk = tuple[pymunk.Body, pymunk.Circle, np.uintp]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False, slots=True)
 class Contacts:
     """Contacts of one step that pressed, sorted by their keys.
 
@@ -62,23 +62,22 @@ class Contacts:
         Partner: another particle, or the number of particles plus a solid's index.
     normal : ndarray, (M, 2)
         Unit normal towards the first.
-    j_n, j_t : ndarray, (M,)
+    impulse : ndarray, (2, M)
         Impulses of the whole step on the first, along the normal n and along (n_y, -n_x), N s.
-    depth : ndarray, (M,)
-        How far the two are in each other, m.
     pairs, fixed : ndarray
         Rows of contacts with particles, and with solids.
+    uses : ndarray, (N + K,)
+        Number of contacts of each particle, and of each solid.
     """
 
     keys: Ints
     first: Ints
     other: Ints
     normal: Floats
-    j_n: Floats
-    j_t: Floats
-    depth: Floats
+    impulse: Floats
     pairs: Ints
     fixed: Ints
+    uses: Ints
 
     def __len__(self) -> int:
         return len(self.first)
@@ -98,10 +97,16 @@ class World:
 
     Velocities given and returned are those pymunk moves bodies with: half a step of gravity ahead
     in flight (a step moves positions first, velocities then).
+
+    Attributes
+    ----------
+    partners : Partners
+        What particles find in each other and in solids.
     """
 
     def __init__(self, machine: Machine, solids: Solids, count: int) -> None:
         self.count = count
+        self.partners = Partners(machine, solids, count)
         self._machine = machine
         self._space = pymunk.Space()
         self._space.gravity = (0.0, -machine.gravity)
@@ -114,8 +119,7 @@ class World:
         if machine.interact:
             self._restitution = sqrt(max(machine.pair_restitution, SMALLEST_SHARE))
             self._friction = sqrt(max(machine.pair_friction, SMALLEST_SHARE))
-        self._bodies: dict[int, pymunk.Body] = {}
-        self._shapes: dict[int, pymunk.Circle] = {}
+        self._disks: dict[int, _Disk] = {}
         # Bodies to use again, of free and of carried particles: a new one costs more than a step.
         self._spare: tuple[list[_Disk], list[_Disk]] = [], []
         self._fixed = [self._solid(solids, k) for k in range(len(solids.reach))]
@@ -148,15 +152,17 @@ class World:
     def add(self, particle: int, *, carried: bool = False) -> None:
         """Put a particle in, to be placed; a carried one pushes but is not pushed."""
         spare = self._spare[carried]
-        body, shape = spare.pop() if spare else self._disk(carried=carried)
+        disk = body, shape, name = spare.pop() if spare else self._disk(carried=carried)
         self._space.add(body, shape)
-        self._bodies[particle], self._shapes[particle] = body, shape
-        self._codes[self._ids.searchsorted(body.id)] = particle
+        self._disks[particle] = disk
+        self._codes[self._ids.searchsorted(name)] = particle
 
-    def _enrol(self, body: pymunk.Body, code: int) -> None:
-        place = self._ids.searchsorted(body.id)
-        self._ids = np.insert(self._ids, place, body.id)
+    def _enrol(self, body: pymunk.Body, code: int) -> np.uintp:
+        name = np.uintp(body.id)
+        place = self._ids.searchsorted(name)
+        self._ids = np.insert(self._ids, place, name)
         self._codes = np.insert(self._codes, place, code)
+        return name
 
     def _disk(self, *, carried: bool) -> _Disk:
         p = self._machine.particle
@@ -171,15 +177,14 @@ class World:
             if carried
             else pymunk.ShapeFilter(categories=FREE)
         )
-        self._enrol(body, -1)
-        return body, shape
+        return body, shape, self._enrol(body, -1)
 
     def remove(self, particle: int) -> None:
         """Take a particle out."""
-        body, shape = self._bodies.pop(particle), self._shapes.pop(particle)
+        disk = body, shape, _ = self._disks.pop(particle)
         self._space.remove(body, shape)
         body.force = 0.0, 0.0
-        self._spare[body.body_type == pymunk.Body.KINEMATIC].append((body, shape))
+        self._spare[body.body_type == pymunk.Body.KINEMATIC].append(disk)
 
     def place(
         self,
@@ -189,7 +194,7 @@ class World:
         omega: float = 0.0,
     ) -> None:
         """Overwrite the state of a particle."""
-        body = self._bodies[particle]
+        body = self._disks[particle][0]
         body.position = position
         move(body, velocity, omega)
 
@@ -197,7 +202,7 @@ class World:
         self, particle: int, velocity: tuple[float, float], force: tuple[float, float]
     ) -> None:
         """Overwrite a velocity, and add a force (N) that acts in the next step, after the move."""
-        body = self._bodies[particle]
+        body = self._disks[particle][0]
         body.velocity, body.force = velocity, force
 
     def step(self, dt: float) -> None:
@@ -211,38 +216,45 @@ class World:
         raw = self._buffer.int_buf()
         if not len(raw):
             return None
-        ids, values = np.frombuffer(raw, dtype=np.uintp), np.frombuffer(self._buffer.float_buf())
-        a, b = self._codes[self._ids.searchsorted(ids)].reshape(-1, 2).T
-        # Pymunk's impulse acts on body A, its normal points from A to B.
-        px, py, nx, ny, distance = values.reshape(-1, 5).T
+        codes = self._codes[self._ids.searchsorted(np.frombuffer(raw, dtype=np.uintp))]
+        values = np.frombuffer(self._buffer.float_buf()).reshape(-1, 4)
+        a, b = codes[::2], codes[1::2]
         span = self.count + len(self._fixed)
         keys = np.minimum(a, b) * span + np.maximum(a, b)
         order = keys.argsort()
-        order = order[((px != 0.0) | (py != 0.0))[order]]
-        if not len(order):
-            return None
-        keys = keys[order]
-        first, other = np.divmod(keys, span)
-        toward = np.where(a <= b, -1.0, 1.0)
-        normal = (toward * np.stack([nx, ny])).T[order]
+        # What does not press has an impulse of 0.
+        pressed = (values[:, 0] != 0.0) | (values[:, 1] != 0.0)
+        if np.count_nonzero(pressed) < len(pressed):
+            order = order[pressed[order]]
+            if not len(order):
+                return None
+        # Pymunk's impulse acts on body A, its normal points from A to B.
+        a, b = a[order], b[order]
+        first, other = np.minimum(a, b), np.maximum(a, b)
+        px, py, nx, ny = values.take(order, axis=0).T
+        toward = np.sign(a - b)
+        normal, impulse = np.empty((len(order), 2)), np.empty((2, len(order)))
+        normal[:, 0], normal[:, 1] = toward * nx, toward * ny
+        impulse[0], impulse[1] = -(px * nx + py * ny), py * nx - px * ny
         solid = other >= self.count
         return Contacts(
-            keys, first, other, normal, -(px * nx + py * ny)[order], (py * nx - px * ny)[order],
-            -distance[order], (~solid).nonzero()[0], solid.nonzero()[0],
+            keys[order], first, other, normal, impulse, (~solid).nonzero()[0], solid.nonzero()[0],
+            np.bincount(np.concatenate((first, other)), minlength=span),
         )  # fmt: skip
 
     def states(self) -> tuple[Floats, Floats]:
-        """Return positions (N, 2) and motions (N + K, 3): vx, vy (m/s) and ω (rad/s).
+        """Return positions (N + K, 2) and motions (N + K, 3): vx, vy (m/s) and ω (rad/s).
 
-        Particles that are not inside have NaN, solids have 0: what a surface moves with is its
+        Particles that are not inside have 0, as have solids: what a surface moves with is its
         belt's.
         """
         self._buffer.clear()
         batch.get_space_bodies(self._space, _BODY, self._buffer)
         ids = np.frombuffer(self._buffer.int_buf(), dtype=np.uintp)
-        out = np.full((self.count + len(self._fixed), 5), np.nan)
-        out[self._codes[self._ids.searchsorted(ids)]] = np.frombuffer(
-            self._buffer.float_buf()
-        ).reshape(-1, 5)
-        out[self.count :] = 0.0
-        return out[: self.count, :2], out[:, 2:]
+        codes = self._codes[self._ids.searchsorted(ids)]
+        values = np.frombuffer(self._buffer.float_buf()).reshape(-1, 5)
+        span = self.count + len(self._fixed)
+        x, motion = np.zeros((span, 2)), np.zeros((span, 3))
+        x[codes], motion[codes] = values[:, :2], values[:, 2:]
+        motion[self.count :] = 0.0
+        return x, motion

@@ -142,12 +142,9 @@ class Idle:
             return
         run, k = self._run, self._run.tracks
         resumed = self.asleep & (k.from_t < t)
-        both = resumed[:, None]
-        np.copyto(k.at, k.from_x + run.dt * k.w, where=both)
-        np.add(k.w, self._change[:, :2], out=k.w, where=both)
-        np.copyto(k.aim, k.w, where=both)
-        np.add(k.spin, self._change[:, 2], out=k.spin, where=resumed)
-        run.go_on(resumed, t)
+        those = resumed.nonzero()[0]
+        k.move_on(those, self._change.take(those, axis=0), t, run.dt)
+        run.version[those] += 1
         run.calm += resumed & ~self._slides
         pays = (resumed & self._pays).nonzero()[0]
         if len(pays):

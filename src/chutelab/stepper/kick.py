@@ -46,7 +46,9 @@ def kick(run: Run, carried: Mask, t0: float, t: float) -> None:
         return
     run.lift((resting & (contacts.uses[: run.count] == 0)).nonzero()[0], t0)
     _resolve(run, contacts, flying, t)
-    run.go_on((k.mode == RESTING) & run.inside, t)
+    who = ((k.mode == RESTING) & run.inside).nonzero()[0]
+    k.go_on(who, t, run.dt)
+    run.version[who] += 1
 
 
 def _enter(run: Run, free: Mask, carried: Mask, t: float) -> None:

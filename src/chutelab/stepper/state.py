@@ -274,11 +274,6 @@ class Run:
         self.moved[i] = True
         self.fresh.append(i)
 
-    def go_on(self, who: NDArray[np.bool_], t: float) -> None:
-        """Put particles (N,) in contact on their paths to the step after t."""
-        self.tracks.go_on(who, t, self.dt)
-        self.version += who
-
     def lift(self, who: Ints, t: float) -> None:
         """Let go what is in contact no more; whether it separated, its flight will tell."""
         for i in who.tolist():

@@ -18,7 +18,6 @@ from chutelab.ballistics import crossing
 from chutelab.recording import KNOT, REASONS
 
 if TYPE_CHECKING:
-
     from chutelab.machine import Machine
     from chutelab.recorder import Recorder
 
@@ -202,16 +201,26 @@ class Tracks:
         """Return position and velocity in which pymunk left a particle in contact."""
         return tuple(self._left[i, :4].tolist())
 
-    def go_on(self, who: Mask, t: float, dt: float) -> None:
-        """Put particles (N,) in contact on the paths to the next step, dt later.
+    def move_on(self, who: Ints, change: Floats, t: float, dt: float) -> None:
+        """Move particles in contact to t as pymunk would, by changes (k, 3) of vx, vy and ω."""
+        rows = self._left.take(who, axis=0)
+        rows[:, :2] = self.from_x[who] + dt * rows[:, 2:4]
+        rows[:, 2:4] += change[:, :2]
+        rows[:, 4:6] = rows[:, 2:4]
+        rows[:, 6] += change[:, 2]
+        self._left[who] = rows
+        self._hop(who, rows, t, dt)
+
+    def go_on(self, who: Ints, t: float, dt: float) -> None:
+        """Put particles in contact on the paths to the next step, dt later.
 
         Half a step of gravity is given back at once, the other half is lost until then: a hop.
         """
-        those = who.nonzero()[0]
-        states = self._left.take(those, axis=0)
-        states[:, 5] += 0.5 * dt * self._machine.gravity
-        self.from_t[those], self.from_x[those] = t, states[:, :2]
-        self.from_v[those] = states[:, 4:6]
+        self._hop(who, self._left.take(who, axis=0), t, dt)
+
+    def _hop(self, who: Ints, left: Floats, t: float, dt: float) -> None:
+        left[:, 5] += 0.5 * dt * self._machine.gravity
+        self.from_t[who], self._path[:2, who], self._path[2:, who] = t, left.T[:2], left.T[4:6]
 
     def lift(self, i: int, t: float, dt: float) -> None:
         """Let a particle go that was in contact a step ago, at t, and is no more.

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from chutelab.ledger import ledger
 from chutelab.machine import build
-from chutelab.recording import REASONS, Kind
+from chutelab.recording import REASONS, Kind, balance
 from chutelab.scene import find, load, parse
 from chutelab.stepper import HALF_THICKNESS, run
 from machines import two_disks
@@ -649,7 +649,8 @@ restitution = 0.9
 
 @pytest.mark.parametrize("restitution", [0.0, 0.3, 0.8])
 @pytest.mark.parametrize("spin", [True, False])
-def test_a_disk_that_belts_wedge_rests_where_it_touches_both(spin, restitution):
+@pytest.mark.parametrize("dt", [1e-3, 1e-4])
+def test_a_disk_that_belts_wedge_rests_where_it_touches_both(dt, spin, restitution):
     # Belts at 40° to each other draw it in, and tan 20° < µ: friction holds it against any push.
     wedge = f"""
 [particle]
@@ -660,6 +661,7 @@ at = [0.0, 1.2]
 velocity = [0.0, 0.0]
 [run]
 until = 3.0
+dt = {dt}
 [[surface]]
 name = "left"
 from = [-0.37, 1.0]
@@ -686,6 +688,33 @@ speed = 0.7
     assert relative_residual(recording) < 1e-6
 
 
+@pytest.mark.parametrize("speed", [0.1, 0.5, 2.0])
+@pytest.mark.parametrize("degrees", [0.5, 2.0, 8.0])
+def test_a_narrow_wedge_of_slow_belts_is_no_way_through(speed, degrees):
+    # Both faces touch a disk at the origin, and go on below it.
+    r, c, s = 0.02, cos(radians(degrees)), sin(radians(degrees))
+    walls = "".join(
+        f"""
+[[surface]]
+name = "{name}"
+from = [{side * (r * c + s)}, {-r * s + c}]
+to = [{side * (r * c - 0.1 * s)}, {-r * s - 0.1 * c}]
+friction = 0.6
+speed = {speed}
+"""
+        for name, side in (("left", -1.0), ("right", 1.0))
+    )
+    recording = simulated(
+        f"[particle]\nradius = {r}\n[stream]\nat = [0.0, 0.1]\nvelocity = [0.0, 0.0]\n"
+        f"[run]\nuntil = 1.0\n{walls}"
+    )
+    last = recording.track(0)[-1]
+    assert not last["velocity"].any()
+    # Half a percent of the radius in each face at most.
+    assert -last["position"][1] * s < 0.005 * r
+    assert last["position"][1] < 1e-3 * r
+
+
 def test_no_belt_wedges_a_disk_that_it_rolls_out_of_a_corner():
     # The belt under it runs away from the wall: it rests there only as long as it does not grip.
     corner = """
@@ -710,3 +739,38 @@ speed = 0.7
     last = simulated(corner).track(0)[-1]
     assert last["velocity"] == pytest.approx([0.7, 0.0], abs=1e-6)
     assert last["position"][1] == pytest.approx(0.05, abs=1e-3 * 0.05)
+
+
+def test_what_a_carried_partner_gives_is_booked_when_it_is_given():
+    machine = build(load(find("stream"), ["stream.count=2", "stream.rate=1.0", "run.max_time=0.3"]))
+    releases = replace(
+        machine.releases,
+        t=np.array([0.0, 0.01]),
+        position=np.array([[-1.0, 0.104], [-0.78, 0.16]]),
+        velocity=np.array([[2.0, 0.0], [0.0, 0.0]]),
+        carried=np.array([True, False]),
+    )
+    recording = run(replace(machine, releases=releases))
+    assert len(recording.select(Kind.COLLISION)) >= 1
+    track, p = recording.track(1), recording.particle
+    kinetic = p.kinetic(track["velocity"][:, 0], track["velocity"][:, 1], track["omega"])
+    energy = kinetic + p.mass * recording.gravity * track["position"][:, 1]
+    unbooked = energy - energy[0] - balance(track["entries"])
+    # m (g dt)²/8 is what a hop has; the blow, m v²/2, is ten thousand times as much.
+    assert np.abs(unbooked).max() < p.mass * (recording.gravity * 1e-3) ** 2
+    assert np.ptp(track["entries"][:, 0]) > 1e-3
+
+
+@pytest.mark.parametrize("spin", [False, True])
+def test_books_of_surfaces_and_particles_agree_however_a_slide_is_cut(spin):
+    # At the end of the slip, µ g t = v, and around it, where a sleeper is woken for its last step.
+    mu, v = 0.3, 1.0
+    end = v / (mu * G) / (3.0 if spin else 1.0)
+    for until in np.linspace(end - 3e-3, end + 3e-3, 25):
+        belt = floor(friction=mu, speed=v)
+        recording = lone((0.0, R), (0.0, 0.0), until, surface=belt, spin=spin)
+        entries = recording.track(0)[-1]["entries"]
+        assert recording.by_surface.sum(axis=0) == pytest.approx(entries, abs=1e-15)
+        # Steps: the last one may end within the slip.
+        paid = mu * M * G * v * min(until, end)
+        assert entries[0] == pytest.approx(paid, abs=0.5 * mu * M * G * v * 1e-3)

@@ -5,7 +5,8 @@ Seen as a jump of the true velocity at the end of the step, from v to v', the su
 whatever gravity does: J·(w + w')/2 is the work of an impulse to the last bit, at rest as in a blow.
 
 The velocity at the end of the step is the mean of both, halfway through the jump. What its second
-half does is ahead of a knot that has this velocity, and of a track that ends there.
+half does, J·(w + 3 w')/8, is ahead of a knot that has this velocity, and of a track that ends
+there; but for a hop's m (g dt)²/8, which does not add up.
 """
 
 from __future__ import annotations
@@ -65,6 +66,7 @@ def book(run: Run, contacts: Contacts, deeds: Deeds, after: Floats) -> None:
     run.tracks.ahead[:] = totals[:, 3:]
     by_surface += _totals(surface, entries[:3], len(by_surface))
     run.ahead = i, surface, entries[3:].T
+    run.idle.woken[:] = False
 
 
 def _totals(where: Ints, entries: Floats, count: int) -> Floats:
@@ -77,13 +79,15 @@ def _totals(where: Ints, entries: Floats, count: int) -> Floats:
 def end_contacts(run: Run, who: Ints) -> None:
     """Close the tracks of particles in contact, and take back what is booked beyond their ends."""
     k, books = run.tracks, run.recorder
-    slept = who[run.idle.asleep[who]]
-    stepped = np.zeros(run.count, dtype=bool)
-    stepped[who] = k.held[who]
-    stepped[slept] = False
     run.idle.wake(who)
+    who = who[k.held[who]]
     k.close(who)
-    books.book(run.ids[slept], run.stays.on[slept], *-k.ahead[slept].T)
+    # Who slept since the last step of pymunk had no part in it.
+    slept = run.idle.woken[who]
+    woken = who[slept]
+    books.book(run.ids[woken], run.stays.on[woken], *-k.ahead[woken].T)
+    stepped = np.zeros(run.count, dtype=bool)
+    stepped[who[~slept]] = True
     owner, surface, ahead = run.ahead
     rows = stepped[owner].nonzero()[0]
     np.subtract.at(run.entries, owner[rows], ahead[rows])

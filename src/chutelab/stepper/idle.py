@@ -46,12 +46,14 @@ class Idle:
     ----------
     asleep : ndarray of bool, (N,)
         Particles in contact that are not stepped.
+    woken : ndarray of bool, (N,)
+        Who woke after the last step.
     """
 
     def __init__(self, run: Run) -> None:
         self._run = run
         count = run.count
-        self.asleep = np.zeros(count, dtype=bool)
+        self.asleep, self.woken = np.zeros((2, count), dtype=bool)
         self._alike = np.zeros(count, dtype=np.int64)
         self._until = np.full(count, np.inf)
         # Per step: change of vx, vy and ω; belt work, friction loss and what that changes by.
@@ -165,7 +167,7 @@ class Idle:
         who = who[self.asleep[who]]
         if len(who):
             run, k = self._run, self._run.tracks
-            self.asleep[who] = False
+            self.asleep[who], self.woken[who] = False, True
             self._alike[who] = 0
             run.moved[who] = True
             # Seen from halfway between two steps, as what is stepped.

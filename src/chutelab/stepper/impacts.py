@@ -127,9 +127,6 @@ def strike(run: Run, i: int, partner: Partner, t: float) -> None:
     who = [(i, (x, y, vx, vy), spin, 1.0)]
     if partner.free:
         who.append((j, k.state(j, t), partner.omega, -1.0))
-    elif j >= 0:
-        # Whoever is carried is held by the belt: what it gives, the drive pays.
-        run.book(i, 0, j_t * belt + j_n * partner.velocity[1], 0.0, 0.0)
     for n, state, omega, _ in who:
         if k.mode[n] == RESTING:
             run.idle.disturb(n)
@@ -137,6 +134,9 @@ def strike(run: Run, i: int, partner: Partner, t: float) -> None:
         k.mark(n, t, *state, omega)
         paid = j_t * belt if partner.solid >= 0 else 0.0
         run.book(n, surface, paid, share * lost[0], share * lost[1])
+    if j >= 0 and not partner.free:
+        # Whoever is carried is held by the belt: what it gives, the drive pays.
+        run.book(i, 0, j_t * belt + j_n * partner.velocity[1], 0.0, 0.0)
     for n, (xn, yn, un, wn), omega, sign in who:
         un, wn = un + sign * px / run.mass, wn + sign * py / run.mass
         k.mark(n, t, xn, yn, un, wn, omega + spun - spin)

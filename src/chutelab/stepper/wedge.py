@@ -10,18 +10,32 @@ if TYPE_CHECKING:
     from chutelab.stepper.state import Run
     from chutelab.stepper.world import Contacts
 
+SQUEEZED = 4e-3
+"""Share of the radius; what a step leaves in contact it leaves less deep in a solid, see `HAIR` and
+`SLOP`."""
+
+REMAINDER = 10.0, 1e-3
+"""Shares of what gravity gives in a step, and of the speed of a belt: what approaches more slowly
+after the step may do so because the solver is iterative."""
+
 
 def squeezed(run: Run, contacts: Contacts) -> bool:
     """Tell whether a step left a lone disk on its way into one of several solids it touches.
 
-    Solved, no contact approaches. Where belts grip in a wedge there is no solution: whatever speed
-    one surface imposes leads into another.
+    Where surfaces that move or grip form a wedge a step has no solution: whatever speed one of them
+    imposes leads into another.
     """
     if len(contacts) < 2:
         return False
-    _, after = run.world.states()
-    approach = -(after[contacts.first, :2] * contacts.normal).sum(axis=1)
-    return bool(approach.max() > run.slow)
+    solids = contacts.other - run.count
+    places, after = run.world.states()
+    belts = float(np.abs(run.solids.speed[solids]).max())
+    limit = max(REMAINDER[0] * run.soft, REMAINDER[1] * belts)
+    approach = -float((contacts.normal @ after[0, :2]).min())
+    if 0.0 < limit < approach:
+        return True
+    now, then = run.solids.gaps(np.array([places[0], run.tracks.from_x[0]]), run.radius)[:, solids]
+    return bool(((now < then) & (now < -SQUEEZED * run.radius)).any())
 
 
 def hold_fast(run: Run, i: int, solid: int) -> None:

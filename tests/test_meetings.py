@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from chutelab.stepper.meetings import meeting, neighbours
+from chutelab.stepper.meetings import candidates, encounter, meeting, neighbours
 
 LONG = 1e250
 """s; longer than it takes any of these to meet."""
@@ -22,6 +22,18 @@ def meetings(x, y, u, v, reach, span=LONG):
     t, approach = np.full(apart.shape[1:], inf), np.zeros(apart.shape[1:])
     soon = when <= np.broadcast_to(span, t.shape).ravel()[which]
     t.ravel()[which[soon]], approach.ravel()[which[soon]] = when[soon], speed[soon]
+    assert (t.ravel().tolist(), approach.ravel().tolist()) == one_by_one(apart, reach, span)
+    return t, approach
+
+
+def one_by_one(apart, reach, span):
+    """The same, each of the candidates asked alone."""
+    t, approach = [inf] * apart[0].size, [0.0] * apart[0].size
+    spans, paths = np.broadcast_to(span, apart.shape[1:]).ravel(), apart.reshape(4, -1).T.tolist()
+    for n in candidates(apart, reach, span).tolist():
+        when, speed = encounter(paths[n], reach)
+        if when <= spans[n]:
+            t[n], approach[n] = when, speed
     return t, approach
 
 

@@ -137,9 +137,9 @@ def _deeds(run: Run, contacts: Contacts, x: Floats, motion: Floats) -> Deeds:
     partners, mode = run.world.partners, run.tracks.mode
     nx, ny = contacts.normal.T
     belt, rounded = partners.belt(j, nx, ny), partners.rounded(j, x.take(i, axis=0))
-    before, after = (_relative(contacts, nx, ny, of, run.radius) for of in motion)
-    before[1] -= belt
-    after[1] -= belt
+    speeds = _relative(contacts, nx, ny, motion, run.radius)
+    speeds[1] -= belt
+    before, after = speeds.transpose(1, 0, 2)
     flat = lone = fixed[uses[i[fixed]] == 1]
     if np.count_nonzero(rounded):
         flat = lone[~rounded[lone]]
@@ -154,12 +154,12 @@ def _deeds(run: Run, contacts: Contacts, x: Floats, motion: Floats) -> Deeds:
 
 
 def _relative(contacts: Contacts, nx: Floats, ny: Floats, motion: Floats, radius: float) -> Floats:
-    """Return normal speeds and slips on solids at rest, (2, M), of disks in motion (N + K, 3)."""
-    mine, theirs = motion.take(contacts.first, axis=0), motion.take(contacts.other, axis=0)
-    u, v, _ = (mine - theirs).T
-    speeds = np.empty((2, len(u)))
+    """Return normal speeds and slips on solids at rest, (2, 2, M), before and after a step."""
+    mine, theirs = motion.take(contacts.first, axis=1), motion.take(contacts.other, axis=1)
+    u, v, _ = (mine - theirs).transpose(2, 0, 1)
+    speeds = np.empty((2, *u.shape))
     speeds[0] = u * nx + v * ny
-    speeds[1] = u * ny - v * nx + radius * (mine[:, 2] + theirs[:, 2])
+    speeds[1] = u * ny - v * nx + radius * (mine[:, :, 2] + theirs[:, :, 2])
     return speeds
 
 

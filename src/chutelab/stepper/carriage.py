@@ -92,7 +92,8 @@ class Carriages:
         """Return positions (k, 2) at a time, m."""
         begin, x, speed, rho = self._columns[:, who]
         along = x + speed * (t - begin)
-        places = np.array([along, rho]).T
+        places = np.empty((len(along), 2))
+        places[:, 0], places[:, 1] = along, rho
         round_ = (along > 0.0).nonzero()[0]
         if len(round_):
             phi, rho = along[round_] / rho[round_], rho[round_]

@@ -132,11 +132,11 @@ class _Loop:
 
     def run(self, report: Report) -> None:
         """Run to the end."""
-        r, end = self.run_state, self.machine.end_time
+        end, exits = self.machine.end_time, self.run_state.tracks.exit
         now = begin = self.agenda[0][0] if self.agenda else end
         while True:
             self._prepare(now)
-            impact, exit_ = self.forecast.next(), float(r.tracks.exit.min())
+            impact, exit_ = self.forecast.next(), float(exits[exits.argmin()])
             due = self.agenda[0][0] if self.agenda else inf
             now = min(impact, exit_, due, self.tick)
             if now > end or now == inf:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from chutelab.ballistics import crossing
 from chutelab.stepper.crowd import MOST
 from chutelab.stepper.idle import QUIET
-from chutelab.stepper.meetings import meeting, neighbours
+from chutelab.stepper.meetings import candidates, encounter, meeting, neighbours
 from chutelab.stepper.solids import WEDGED
 from chutelab.stepper.tracks import CARRIED, DONE, FLYING, RESTING, WAITING
 from chutelab.stepper.wedge import hold_fast
@@ -32,6 +32,8 @@ ROUNDING = 1e-13
 NEAR = 1e-3
 """Share of the radius within which a solid that is approached slowly is left to pymunk's steps."""
 
+UNBOUND = -2, 0.0, 0.0
+"""No face (not even -1), since when (s) and what pace (m/s)."""
 
 AT_ONCE = 100_000
 """Pairs of which it is asked in one expression when they meet; more would not fit the caches."""
@@ -62,8 +64,10 @@ class Forecast:
         self._heap: list[tuple[float, int, int, int, Touch | None, int, int]] = []
         self._number = count()
         # Until when who is in contact can meet no other solid; who slept then, if it sleeps on.
+        # Awake that is bound by the pace it began with, and holds asleep if near one face alone.
         self._safe_until = np.full(run.count, -inf)
         self._slept = np.zeros(run.count, dtype=bool)
+        self._bound = [UNBOUND] * run.count
         self._fastest = float(np.abs(run.solids.speed).max(initial=0.0))
         self._crowd = run.machine.interact and run.count > 1
         self.beside = np.zeros(run.count, dtype=bool)
@@ -136,12 +140,16 @@ class Forecast:
         """Foretell what some particles meet within their spans, of all there are."""
         run, mode = self._run, self._run.tracks.mode
         apart = everybody[:, None] - everybody.take(who, axis=1)[:, :, None]
-        which, t, approach = meeting(apart, 2.0 * run.radius, np.array(spans)[:, None])
-        crowd = run.crowd.stepped
-        for flat, t_j, speed in zip(which.tolist(), t.tolist(), approach.tolist(), strict=True):
+        reach, crowd = 2.0 * run.radius, run.crowd.stepped
+        which = candidates(apart, reach, np.array(spans)[:, None])
+        paths = apart.reshape(4, -1).take(which, axis=1).T.tolist()
+        for flat, path in zip(which.tolist(), paths, strict=True):
             n, j = divmod(flat, run.count)
+            t_j, speed = encounter(path, reach)
+            if t_j > spans[n]:
+                continue
             i, other = who[n], int(mode[j])
-            if t_j > spans[n] or other in (WAITING, DONE):
+            if other in (WAITING, DONE):
                 continue
             mine, held = int(mode[i]), other != FLYING
             if held and (now + t_j > tick or (other == CARRIED and mine == CARRIED)):
@@ -217,33 +225,55 @@ class Forecast:
 
     def _solids(self, resting: Mask, now: float, tick: float) -> None:
         """Foretell impacts on solids of those in contact; most are far from any other solid."""
-        run, k = self._run, self._run.tracks
+        run = self._run
         due = resting & ((self._safe_until < tick) | (self._slept != run.idle.asleep))
         for i in due.nonzero()[0].tolist():
-            path = k.state(i, now)
-            self._slept[i] = run.idle.asleep[i]
-            self._safe_until[i] = now + self._undisturbed(i, path)
-            if self._safe_until[i] < tick:
-                if run.idle.asleep[i]:
+            asleep = bool(run.idle.asleep[i])
+            self._slept[i] = asleep
+            if self._safe_until[i] >= tick and self._holds(i, now):
+                continue
+            until = now + (self._dormant(i, now) if asleep else self._undisturbed(i, now))
+            self._safe_until[i] = until
+            if until < tick:
+                if asleep:
                     # What is asleep is not stepped: nothing would stop it there.
                     run.idle.wake(np.array([i]))
                 self._solid(i, now, tick - now)
 
-    def _undisturbed(self, i: int, path: tuple[float, float, float, float]) -> float:
-        """Return for how long a particle in contact can meet no other solid, s."""
+    def _holds(self, i: int, now: float) -> bool:
+        """Tell whether a bound found awake holds for who fell asleep since, or woke up."""
+        alone_on, begin, pace = self._bound[i]
+        if alone_on != self._run.tracks.face[i]:
+            return False
+        u, v = self._run.tracks.w[i].tolist()
+        return hypot(u, v) <= pace + (now - begin) * self._run.machine.gravity
+
+    def _dormant(self, i: int, now: float) -> float:
+        """Return for how long a sleeper can meet no other solid, s."""
         run, out = self._run, inf
-        x, y, *velocity = path
-        asleep, near = run.idle.asleep[i], NEAR * run.radius
-        force = (0.0, 0.0)
-        if asleep:
-            velocity, force = run.tracks.w[i].tolist(), run.idle.acceleration(i)
-        pace = max(hypot(*velocity), self._fastest)
-        for gap, approach, pull in self._outline.around(x, y, (velocity[0], velocity[1]), force):
-            if asleep:
-                # What it lies on it neither leaves nor approaches.
-                if gap <= near and abs(approach) <= QUIET and abs(pull) * run.dt <= QUIET:
-                    continue
+        x, y, _, _ = run.tracks.state(i, now)
+        velocity, force = tuple(run.tracks.w[i].tolist()), run.idle.acceleration(i)
+        self._bound[i] = UNBOUND
+        for gap, approach, pull in self._outline.around(x, y, velocity, force):
+            # What it lies on it neither leaves nor approaches.
+            lies = gap <= NEAR * run.radius and abs(approach) <= QUIET
+            if not (lies and abs(pull) * run.dt <= QUIET):
                 out = min(out, crossing(max(gap, 0.0), -approach, -pull))
-            elif gap > near or approach > run.soft:
-                out = min(out, crossing(max(gap, 0.0), -pace, -run.machine.gravity))
         return out
+
+    def _undisturbed(self, i: int, now: float) -> float:
+        """Return for how long a particle in contact can meet no other solid, s."""
+        run, near, nearest = self._run, NEAR * self._run.radius, inf
+        x, y, u, v = run.tracks.state(i, now)
+        beside = []
+        around = self._outline.around(x, y, (u, v), (0.0, 0.0))
+        for solid, (gap, approach, _) in enumerate(around):
+            if gap <= near:
+                beside.append(solid)
+            if gap < nearest and (gap > near or approach > run.soft):
+                nearest = gap
+        face, pace = int(run.tracks.face[i]), max(hypot(u, v), self._fastest)
+        self._bound[i] = (face, now, pace) if beside == [face] else UNBOUND
+        if nearest == inf:
+            return inf
+        return crossing(max(nearest, 0.0), -pace, -run.machine.gravity)

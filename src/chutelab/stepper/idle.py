@@ -56,9 +56,11 @@ class Idle:
         self.asleep, self.woken = np.zeros((2, count), dtype=bool)
         self._alike = np.zeros(count, dtype=np.int64)
         self._until = np.full(count, np.inf)
+        # None of them is sooner than this.
+        self._soonest = inf
         # Per step: change of vx, vy and ω; belt work, friction loss and what that changes by.
         self._change = np.zeros((count, 3))
-        self._dues = np.zeros((count, 3))
+        self._dues = np.zeros((3, count)).T
         self._slides, self._pays = np.zeros((2, count), dtype=bool)
 
     def settle(self, contacts: Contacts, deeds: Deeds) -> None:
@@ -83,7 +85,7 @@ class Idle:
         restless[i[loud]] = True
         restless[j[loud]] = True
         single = alone[who]
-        before = self._change.take(who, axis=0) * single.repeat(3).reshape(-1, 3)
+        before = self._change.take(who, axis=0) * single[:, None]
         u, v, turn = np.abs(deeds.change - before).T
         self._change[who] = deeds.change
         news = np.maximum(np.maximum(u, v), turn * run.radius)
@@ -109,6 +111,7 @@ class Idle:
             slip, push = float(deeds.after[1, row]), float(contacts.impulse[1, row])
             brakes = slip - float(deeds.before[1, row])
             self._slide(int(i[row]), slip, brakes, push, float(deeds.belt[row]))
+        self._soonest = min(self._soonest, float(self._until[new].min()))
 
     def hold(self, who: Ints) -> None:
         """Put particles to sleep as they move, for good, and at no cost."""
@@ -146,16 +149,19 @@ class Idle:
         resumed = self.asleep & (k.from_t < t)
         those = resumed.nonzero()[0]
         k.move_on(those, self._change.take(those, axis=0), t, run.dt)
-        run.version[those] += 1
+        run.version += resumed
         run.calm += resumed & ~self._slides
-        pays = (resumed & self._pays).nonzero()[0]
-        if len(pays):
-            dues = self._dues.take(pays, axis=0)
-            entries = np.zeros((len(pays), 3))
-            entries[:, ::2] = dues[:, :2]
-            run.recorder.enter(run.ids.take(pays), run.stays.on.take(pays), entries)
-            self._dues[pays, 1] += dues[:, 2]
-        self.wake((self.asleep & (self._until <= tick)).nonzero()[0])
+        pays = resumed & self._pays
+        if np.count_nonzero(pays):
+            belt, friction, slower = self._dues.T
+            on, books = run.stays.on.compress(pays), run.recorder.by_surface
+            for entry, due in ((0, belt), (2, friction)):
+                np.add(run.entries[:, entry], due, out=run.entries[:, entry], where=pays)
+                np.add.at(books[:, entry], on, due.compress(pays))
+            np.add(friction, slower, out=friction, where=pays)
+        if self._soonest <= tick:
+            self.wake((self.asleep & (self._until <= tick)).nonzero()[0])
+            self._soonest = float(self._until[self.asleep].min(initial=inf))
 
     def acceleration(self, i: int) -> tuple[float, float]:
         """Return by how much the velocity of a sleeper changes, m/s²."""

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+from math import inf, sqrt
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -47,6 +53,39 @@ def meeting(apart: Floats, reach: float, span: Floats | float) -> tuple[Ints, Fl
     # The form of the first root without cancellation.
     t = np.maximum(gap, 0.0) / (closing + root)
     return which, t, root / np.sqrt(square + np.minimum(gap, 0.0))
+
+
+def candidates(apart: Floats, reach: float, span: Floats) -> Ints:
+    """Return which distances of disks may fall to `reach`, as `meeting`: all that do, and others.
+
+    For who asks `encounter` then, where few are left.
+    """
+    x, square = apart[:2], reach * reach
+    products = apart.reshape(2, 2, *apart.shape[1:]) * x
+    distance, opening = products[:, 0] + products[:, 1]
+    # No distance falls faster than at first.
+    soon = distance + (2.0 + ROUNDING) * span * opening <= square * (1.0 + ROUNDING)
+    return np.asarray(soon.ravel().nonzero()[0])
+
+
+def encounter(apart: Sequence[float], reach: float) -> tuple[float, float]:
+    """Return when one distance falls to `reach`, and the speed of approach then, as `meeting`.
+
+    In plain numbers, for who asks for one after another; inf if it never does.
+    """
+    x, y, u, v = apart
+    opening, square = x * u + y * v, reach * reach
+    if opening >= 0.0:
+        return inf, 0.0
+    across = x * v - y * u
+    under = square * (u * u + v * v) - across * across
+    if under <= 0.0:
+        return inf, 0.0
+    gap = x * x + y * y - square
+    if gap > 0.0:
+        root = sqrt(under)
+        return gap / (root - opening), root / sqrt(square)
+    return 0.0, -opening / sqrt(square + gap)
 
 
 def neighbours(low: Floats, high: Floats) -> tuple[Ints, Ints]:

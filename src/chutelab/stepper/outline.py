@@ -59,6 +59,9 @@ NOTHING = Touch(inf)
 _Box = tuple[float, float, float, float]
 """Least x and y, largest x and y, m."""
 
+_Circle = tuple[float, float, float, int]
+"""Centre and reach, m, and which solid it belongs to."""
+
 
 class _Slab(NamedTuple):
     """A slab by its struck face: start a, unit tangent t and normal n, length and thickness, m."""
@@ -102,13 +105,15 @@ class Outline:
 
     def __init__(self, solids: Solids, rim: float, radius: float, gravity: float) -> None:
         self._radius, self._gravity = radius, gravity
-        self._slabs: list[tuple[_Slab, _Box]] = []
-        circles: list[tuple[float, float, float, int]] = []
+        # Faces, the box that holds all that touch a slab, and corners.
+        self._slabs: list[tuple[_Slab, _Box, list[tuple[_Circle, _Box]]]] = []
+        self._pulley: list[tuple[_Circle, _Box]] = []
         for k, (a, b, behind) in enumerate(
             zip(solids.a.tolist(), solids.b.tolist(), solids.behind.tolist(), strict=True)
         ):
             if solids.reach[k] > 0.0:
-                circles.append((*a, rim + radius, k))
+                reach = rim + radius
+                self._pulley.append(((*a, reach, k), _box([tuple(a)], reach)))
                 continue
             length = hypot(b[0] - a[0], b[1] - a[1])
             thickness = 2.0 * HALF_THICKNESS
@@ -116,9 +121,8 @@ class Outline:
             out = -behind[0] / thickness, -behind[1] / thickness
             slab = _Slab(k, tuple(a), tangent, out, length, thickness)
             corners = slab.corners()
-            self._slabs.append((slab, _box(corners, radius * (1.0 + END))))
-            circles += [(*c, radius, k) for c in corners]
-        self._circles = [(c, _box([c[:2]], c[2])) for c in circles]
+            round_ = [((*c, radius, k), _box([c], radius)) for c in corners]
+            self._slabs.append((slab, _box(corners, radius * (1.0 + END)), round_))
 
     def first(self, x: float, y: float, vx: float, vy: float, until: float) -> Touch:
         """Return the first touch of a flight, at once where a disk that overlaps moves inwards.
@@ -130,20 +134,21 @@ class Outline:
         until : float
             s from now.
         """
-        first = NOTHING
+        first, round_ = NOTHING, []
         left, right = _range(x, vx, 0.0, until)
         bottom, top = _range(y, vy, -self._gravity, until)
-        for slab, (west, south, east, north) in self._slabs:
+        for slab, (west, south, east, north), corners in self._slabs:
             # What touches the box of a slab from outside may touch the slab.
             if left <= east and right >= west and bottom <= north and top >= south:
                 first = self._faces(slab, (x, y, vx, vy), until, first)
+                round_ += corners
         if first.t < until:
             until = first.t
             left, right = _range(x, vx, 0.0, until)
             bottom, top = _range(y, vy, -self._gravity, until)
         near = [
             (circle, box)
-            for circle, box in self._circles
+            for circle, box in round_ + self._pulley
             if left < box[2] and right > box[0] and bottom < box[3] and top > box[1]
         ]
         if any(self._passes((x, y, vx, vy), until, box) for _, box in near):
@@ -196,7 +201,7 @@ class Outline:
         self,
         x: Floats,
         v: Floats,
-        near: list[tuple[float, float, float, int]],
+        near: list[_Circle],
         until: float,
         first: Touch,
     ) -> Touch:
@@ -240,18 +245,19 @@ class Outline:
         All are convex: on a straight way no gap is ever less than these three have it (m, m/s and
         m/s²).
         """
-        (vx, vy), (ax, ay) = velocity, acceleration
-        out = []
-        for slab, _ in self._slabs:
+        (vx, vy), (ax, ay), out = velocity, acceleration, []
+        for slab, _, _ in self._slabs:
             _, (x0, y0), (tx, ty), (nx, ny), length, thickness = slab
-            u, w = (x - x0) * tx + (y - y0) * ty, (x - x0) * nx + (y - y0) * ny
-            u, w = u - min(max(u, 0.0), length), w - min(max(w, -thickness), 0.0)
+            dx, dy = x - x0, y - y0
+            u, w = dx * tx + dy * ty, dx * nx + dy * ny
+            u = u if u < 0.0 else u - length if u > length else 0.0
+            w = w if w > 0.0 else w + thickness if w < -thickness else 0.0
             dx, dy = u * tx + w * nx, u * ty + w * ny
             far = hypot(dx, dy)
             if far > 0.0:
                 dx, dy = dx / far, dy / far
             out.append((far - self._radius, -dx * vx - dy * vy, -dx * ax - dy * ay))
-        for (cx, cy, reach, _), _ in self._circles[4 * len(self._slabs) :]:
+        for (cx, cy, reach, _), _ in self._pulley:
             far = hypot(x - cx, y - cy)
             dx, dy = (x - cx) / far, (y - cy) / far
             out.append((far - reach, -dx * vx - dy * vy, -dx * ax - dy * ay))

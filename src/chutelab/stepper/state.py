@@ -43,6 +43,8 @@ class Run:
 
     Attributes
     ----------
+    count : int
+        Number of particles in this world.
     dt : float
         s, the step.
     landed : ndarray of bool, (N,)
@@ -94,7 +96,7 @@ class Run:
         start: float,
         clashes: Clashes,
     ) -> None:
-        count = len(ids)
+        self.count = count = len(ids)
         self.machine, self.solids, self.recorder, self.ids = machine, solids, recorder, ids
         # Particles of one world follow each other.
         self.entries = recorder.entries[ids[0] : ids[-1] + 1]
@@ -132,11 +134,6 @@ class Run:
         if self._world is None:
             self._world = World(self.machine, self.solids, self.count)
         return self._world
-
-    @property
-    def count(self) -> int:
-        """Number of particles in this world."""
-        return len(self.ids)
 
     def begun(self, keys: Ints) -> NDArray[np.bool_]:
         """Tell which contacts, by their sorted keys (M,), were not there a step ago."""

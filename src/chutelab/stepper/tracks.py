@@ -82,8 +82,8 @@ class Tracks:
         self.t, self.omega = self._knot[:, 0], self._knot[:, 5]
         self.x, self.v = self._knot[:, 1:3], self._knot[:, 3:5]
         self._left = np.zeros((count, 9))
-        self.at, self.w, self.upon = self._left[:, :2], self._left[:, 2:4], self._left[:, 7:]
-        self.sent = self._left[:, 4:7]
+        self.at, self.w, self.upon = self._left[:, :2], self._left[:, 5:7], self._left[:, 7:]
+        self.sent = self._left[:, 2:5]
         self.aim, self.spin = self.sent[:, :2], self.sent[:, 2]
         # Column by column: what concerns all is done in runs of N, not of 2.
         self.from_t, self._path = np.zeros(count), np.zeros((4, count))
@@ -184,30 +184,32 @@ class Tracks:
         self.mode[i], self.exit[i], self.face[i] = RESTING, inf, face
         self.held[i] = self._bend_known[i] = False
         t, x, y, vx, vy, omega = self._knot[i].tolist()
-        self._left[i] = x, y, vx, vy, vx, vy, omega, *normal
+        self._left[i] = x, y, vx, vy, omega, vx, vy, *normal
         self.from_t[i], self.from_x[i], self.from_v[i] = t, (x, y), (vx, vy)
 
     def leave(self, who: Ints, x: Floats, motion: Floats) -> None:
         """Note the states (k, 2) and (k, 3) in which pymunk leaves particles in contact."""
         rows = np.zeros((len(who), 9))
-        rows[:, :2], rows[:, 2:4], rows[:, 4:7] = x, motion[:, :2], motion
+        rows[:, :2], rows[:, 2:5], rows[:, 5:7] = x, motion, motion[:, :2]
         self._left[who], self.face[who] = rows, -1
 
     def send(self, i: int, wx: float, wy: float) -> None:
         """Have pymunk move a particle in contact with a velocity."""
-        self._left[i, 2:6] = wx, wy, wx, wy
+        row = self._left[i]
+        row[2:4] = row[5:7] = wx, wy
 
     def left(self, i: int) -> tuple[float, ...]:
         """Return position and velocity in which pymunk left a particle in contact."""
-        return tuple(self._left[i, :4].tolist())
+        return (*self.at[i].tolist(), *self.w[i].tolist())
 
     def move_on(self, who: Ints, change: Floats, t: float, dt: float) -> None:
         """Move particles in contact to t as pymunk would, by changes (k, 3) of vx, vy and ω."""
         rows = self._left.take(who, axis=0)
-        rows[:, :2] = self.from_x[who] + dt * rows[:, 2:4]
-        rows[:, 2:4] += change[:, :2]
-        rows[:, 4:6] = rows[:, 2:4]
-        rows[:, 6] += change[:, 2]
+        w = rows[:, 5:7]
+        rows[:, :2] = self._path[:2].take(who, axis=1).T + dt * w
+        w += change[:, :2]
+        rows[:, 2:4] = w
+        rows[:, 4] += change[:, 2]
         self._left[who] = rows
         self._hop(who, rows, t, dt)
 
@@ -219,8 +221,8 @@ class Tracks:
         self._hop(who, self._left.take(who, axis=0), t, dt)
 
     def _hop(self, who: Ints, left: Floats, t: float, dt: float) -> None:
-        left[:, 5] += 0.5 * dt * self._machine.gravity
-        self.from_t[who], self._path[:2, who], self._path[2:, who] = t, left.T[:2], left.T[4:6]
+        left[:, 3] += 0.5 * dt * self._machine.gravity
+        self.from_t[who], self._path[:, who] = t, left.T[:4]
 
     def lift(self, i: int, t: float, dt: float) -> None:
         """Let a particle go that was in contact a step ago, at t, and is no more.
@@ -229,7 +231,7 @@ class Tracks:
         """
         if self.from_t[i] <= t:
             self.close_one(i)
-            x, y, wx, wy, _, _, spin, nx, ny = self._left[i].tolist()
+            x, y, _, _, spin, wx, wy, nx, ny = self._left[i].tolist()
             lead, g = 0.5 * dt, -self._machine.gravity
             off = ny * g
             self.mark(i, t, x, y, wx - lead * (0.0 - off * nx), wy - lead * (g - off * ny), spin)

@@ -220,7 +220,8 @@ class World:
         values = np.frombuffer(self._buffer.float_buf()).reshape(-1, 4)
         a, b = codes[::2], codes[1::2]
         span = self.count + len(self._fixed)
-        keys = np.minimum(a, b) * span + np.maximum(a, b)
+        first, other = np.minimum(a, b), np.maximum(a, b)
+        keys = first * span + other
         order = keys.argsort()
         # What does not press has an impulse of 0.
         pressed = (values[:, 0] != 0.0) | (values[:, 1] != 0.0)
@@ -229,10 +230,9 @@ class World:
             if not len(order):
                 return None
         # Pymunk's impulse acts on body A, its normal points from A to B.
-        a, b = a[order], b[order]
-        first, other = np.minimum(a, b), np.maximum(a, b)
+        toward = np.sign(a - b)[order]
+        first, other = first[order], other[order]
         px, py, nx, ny = values.take(order, axis=0).T
-        toward = np.sign(a - b)
         normal, impulse = np.empty((len(order), 2)), np.empty((2, len(order)))
         normal[:, 0], normal[:, 1] = toward * nx, toward * ny
         impulse[0], impulse[1] = -(px * nx + py * ny), py * nx - px * ny

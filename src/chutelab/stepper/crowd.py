@@ -2,7 +2,8 @@
 
 Particles that lose energy when they meet would meet infinitely often within a moment (inelastic
 collapse). Who is in a crowd is stepped even in flight, and what comes together slowly there is left
-to the step; the faster a crowd would meet, the more counts as slow, up to plain steps in a pile.
+to the step; the faster a crowd would meet, the more counts as slow, but for what a step would press
+together by `DEEPER`.
 """
 
 from __future__ import annotations
@@ -28,9 +29,10 @@ LOAD = 100, 0.05
 """Impacts of all particles lately, at least and per particle, beyond which each counts for more:
 some tens are resolved within the time of a step of pymunk's and its books."""
 
-DEEPER = 0.02
-"""Share of the radius by which a step may bring two deeper into each other, in whatever crowd: what
-approaches faster is foretold. Many such steps add up, for overlaps are parted slowly."""
+DEEPER = 0.01
+"""Share of the radius by which a step may bring two deeper into each other: up to `MOST`, what
+approaches faster is foretold in whatever crowd. Many such steps would add up, for overlaps are
+parted slowly."""
 
 BOUND = 10_000, 1_000
 """Impacts within one step, and of these per particle, beyond which a run does not get on."""

@@ -59,7 +59,7 @@ def book(run: Run, contacts: Contacts, deeds: Deeds, after: Floats) -> None:
         (j_n, j_t), given = contacts.impulse[:, held], np.zeros((6, len(held)))
         given[0] = j_n * (u * nx + v * ny) + j_t * (u * ny - v * nx)
         given[3] = 0.5 * given[0]
-        i, surface = np.concatenate((i, i[held])), np.concatenate((surface, 0 * held))
+        i, surface = np.concatenate((i, i[held])), np.concatenate((surface, np.zeros_like(held)))
         entries = np.concatenate((entries, given), axis=1)
     totals, by_surface = _totals(i, entries, run.count), run.recorder.by_surface
     run.entries += totals[:, :3]

@@ -114,6 +114,7 @@ class Forecast:
     def _solid(self, i: int, now: float, span: float) -> float:
         """Foretell what solid a particle meets; return when, or inf."""
         k = self._run.tracks
+        self._safe_until[i] = -inf
         x, y, vx, vy = k.state(i, now)
         rests, speed = bool(k.mode[i] == RESTING), hypot(vx, vy)
         worn_out = rests and self._run.crowd.impacts[i] > MOST
@@ -125,7 +126,6 @@ class Forecast:
             hold_fast(self._run, i, touch.solid)
             return inf
         if rests:
-            self._safe_until[i] = -inf
             fall = vy - touch.t * self._run.machine.gravity
             if -(vx * touch.normal[0] + fall * touch.normal[1]) <= self._run.soft:
                 return inf

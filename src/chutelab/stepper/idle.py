@@ -113,9 +113,9 @@ class Idle:
             self._slide(int(i[row]), slip, brakes, push, float(deeds.belt[row]))
         self._soonest = min(self._soonest, float(self._until[new].min()))
 
-    def hold(self, who: Ints) -> None:
-        """Put particles to sleep as they move, for good, and at no cost."""
-        self.asleep[who], self._slides[who], self._pays[who] = True, False, False
+    def hold(self, who: Ints, *, calm: bool = True) -> None:
+        """Put particles to sleep as they move, for good and at no cost; calm ones may settle."""
+        self.asleep[who], self._slides[who], self._pays[who] = True, not calm, False
         self._until[who], self._change[who] = np.inf, 0.0
 
     def _slide(self, i: int, slip: float, brakes: float, push: float, belt: float) -> None:
@@ -206,7 +206,7 @@ class Idle:
         if np.count_nonzero(loud):
             awake[first.compress(loud)] = True
         elif not np.count_nonzero(awake.take(first) != awake.take(second)):
-            return
+            first = second = first[:0]
         spread(awake, first, second)
         self.wake((awake & self.asleep).nonzero()[0])
 

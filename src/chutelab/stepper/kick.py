@@ -54,9 +54,9 @@ def kick(run: Run, carried: Mask, t0: float, t: float) -> None:
 def _enter(run: Run, free: Mask, carried: Mask, t: float) -> None:
     """Have pymunk's own move bring every body to where its path is at t."""
     world, want = run.world, free | carried
-    for n in (run.inside > want).nonzero()[0].tolist():
+    for n in (run.inside & ~want).nonzero()[0].tolist():
         world.remove(n)
-    new = (want > run.inside).nonzero()[0]
+    new = (want & ~run.inside).nonzero()[0]
     for n in new.tolist():
         world.add(n, carried=bool(carried[n]))
     run.inside = want

@@ -48,11 +48,12 @@ def meeting(apart: Floats, reach: float, span: Floats | float) -> tuple[Ints, Fl
     which = ((opening < 0.0) & (under > 0.0) & soon).ravel().nonzero()[0]
     if not len(which):
         return which, np.empty(0), np.empty(0)
-    closing, gap = -opening.take(which), distance.take(which) - square
+    closing, apart = -opening.take(which), distance.take(which)
+    gap = apart - square
     root = np.where(gap > 0.0, np.sqrt(under.take(which)), closing)
     # The form of the first root without cancellation.
     t = np.maximum(gap, 0.0) / (closing + root)
-    return which, t, root / np.sqrt(square + np.minimum(gap, 0.0))
+    return which, t, root / np.sqrt(np.minimum(apart, square))
 
 
 def candidates(apart: Floats, reach: float, span: Floats) -> Ints:
@@ -81,11 +82,11 @@ def encounter(apart: Sequence[float], reach: float) -> tuple[float, float]:
     under = square * (u * u + v * v) - across * across
     if under <= 0.0:
         return inf, 0.0
-    gap = x * x + y * y - square
-    if gap > 0.0:
+    distance = x * x + y * y
+    if distance > square:
         root = sqrt(under)
-        return gap / (root - opening), root / sqrt(square)
-    return 0.0, -opening / sqrt(square + gap)
+        return (distance - square) / (root - opening), root / sqrt(square)
+    return 0.0, -opening / sqrt(distance)
 
 
 def neighbours(low: Floats, high: Floats) -> tuple[Ints, Ints]:

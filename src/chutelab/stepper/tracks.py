@@ -234,7 +234,7 @@ class Tracks:
             x, y, _, _, spin, wx, wy, nx, ny = self._left[i].tolist()
             lead, g = 0.5 * dt, -self._machine.gravity
             off = ny * g
-            self.mark(i, t, x, y, wx - lead * (0.0 - off * nx), wy - lead * (g - off * ny), spin)
+            self.mark(i, t, x, y, wx + lead * off * nx, wy - lead * (g - off * ny), spin)
         self.fly(i)
 
     def go_smoothly(self, who: Ints, states: Floats) -> None:

@@ -41,7 +41,8 @@ def squeezed(run: Run, contacts: Contacts) -> bool:
 def hold_fast(run: Run, i: int, solid: int) -> None:
     """Let a disk rest for good where its path began, its energy turned to heat by a solid.
 
-    A real drive would stall there; nothing more is booked (as in the exact engine).
+    A real drive would stall there; nothing more is booked, and on what moves nothing settles (as in
+    the exact engine).
     """
     k = run.tracks
     t, (x, y), (vx, vy), omega = (
@@ -54,4 +55,5 @@ def hold_fast(run: Run, i: int, solid: int) -> None:
     run.book(i, int(run.solids.surface[solid]), 0.0, kinetic, 0.0)
     k.mark(i, t, x, y, 0.0, 0.0, 0.0)
     run.rest(i)
-    run.idle.hold(np.array([i]))
+    touched = run.solids.gaps(np.array([[x, y]]), run.radius)[0] < SQUEEZED * run.radius
+    run.idle.hold(np.array([i]), calm=not run.solids.speed[touched].any())

@@ -25,7 +25,7 @@ SMALLEST_SHARE = 1e-12
 """Pymunk multiplies the values of two shapes; a pair value of 0 becomes this, so that the others
 can be divided by its root."""
 
-ITERATIONS = 60
+ITERATIONS = 30
 """Of the contact solver; pymunk's 10 leave the lower layers of a pile pressed into each other."""
 
 FREE, CARRIED, SOLID = 1, 2, 4

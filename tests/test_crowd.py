@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from chutelab.recorder import StalledError
 from chutelab.recording import Kind
 from chutelab.scene import parse
 from chutelab.stepper import crowd, run
+from chutelab.stepper.crowd import Crowd
 
 R, GAP, SPEED, START = 0.004, 1e-6, 2.0, 0.1
 
@@ -76,3 +78,19 @@ def test_too_many_impacts_within_a_step_say_who_when_and_where(monkeypatch):
     assert len(recording.select(Kind.COLLISION)) == 3
     assert recording.track(2)[-1]["t"] == error.t
     assert recording.track(2)[-1]["velocity"] == pytest.approx([SPEED, 0.0], abs=1e-12)
+
+
+@pytest.mark.parametrize("dt", [1e-2, 1e-3, 1e-5])
+def test_however_thick_a_crowd_a_step_presses_it_together_by_a_hundredth_of_a_radius(dt):
+    slow = max(9.81 * dt, 2e-3 * R / dt)
+    state = SimpleNamespace(start=0.0, dt=dt, radius=R, slow=slow, count=6)
+    thick = Crowd(state)
+    impacts = [0, 1, 10, 100, 200]
+    alone = [thick.least_approach(n) for n in impacts]
+    assert alone[:3] == [slow] * 3
+    assert alone == sorted(alone)
+    thick._load = 10_000
+    pressed = [thick.least_approach(n) for n in impacts]
+    # m/s times s: what two that are left to the step may overlap after it.
+    assert max(*alone, *pressed) * dt <= max(0.01 * R, slow * dt)
+    assert pressed[-1] == max(0.01 * R / dt, slow)

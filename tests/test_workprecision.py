@@ -521,7 +521,7 @@ def rows_for_a_picture():
                 Record(case, method, "dt", dt, failed="it never met the plate, in 5 of 5 machines")
                 for method, dt in (("plain", 1e-2), ("plain", 3e-3), ("fixed", 1e-2))
             ),
-            Record(case, "dop853", failed="scipy is not installed"),
+            Record(case, "dop853", failed='scipy is missing: pip install "chutelab[bench]"'),
         ]
     return rows
 
@@ -544,7 +544,7 @@ def test_the_picture_shows_every_method_slope_and_failure(tmp_path):
         assert slopes["slope fixed"] == "−1.0"
         failed = " ".join(slopes["failed"].split())
         assert "✕ plain Pymunk: dt 0.01, 0.003" in failed
-        assert "✕ SciPy DOP853: scipy is not installed" in failed
+        assert '✕ SciPy DOP853: scipy is missing: pip install "chutelab[bench]"' in failed
         low, high = ax.get_xlim()
         for line in lines.values():
             assert ((line.get_xdata() > low) & (line.get_xdata() < high)).all()

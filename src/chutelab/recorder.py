@@ -120,12 +120,8 @@ class Recorder:
         owner = np.atleast_1d(np.asarray(particle, dtype=np.int64))
         entry = np.empty((len(owner), 3))
         entry[:, 0], entry[:, 1], entry[:, 2] = belt_work, restitution_loss, friction_loss
-        self.enter(owner, np.broadcast_to(surface, owner.shape), entry)
-
-    def enter(self, particle: Ints, surface: Ints, entries: NDArray[Any]) -> None:
-        """Book ledger entries (k, 3) on particles (k,), each once, and on surfaces (k,)."""
-        self.entries[particle] += entries
-        np.add.at(self.by_surface, surface, entries)
+        self.entries[owner] += entry
+        np.add.at(self.by_surface, np.broadcast_to(surface, owner.shape), entry)
 
     def events(
         self,

@@ -132,7 +132,8 @@ class Clashes:
         self._particles = Pair(machine.pair_restitution, machine.pair_friction)
         self._solids = solids
         self._known: dict[tuple[int, bool], Clash] = {}
-        self._grips = [*solids.friction.tolist(), machine.pair_friction]
+        # The last one, -1, is that of particles with each other.
+        self._grips: list[float] = [*solids.friction.tolist(), machine.pair_friction]
 
     def of(self, solid: int, *, free: bool) -> Clash:
         """Return a particle with a solid, or if that is -1 with a particle, free or carried."""
@@ -143,8 +144,7 @@ class Clashes:
 
     def grip(self, solid: int) -> float:
         """Return the coefficient of friction with a solid, or if that is -1 with a particle."""
-        grip: float = self._grips[solid]
-        return grip
+        return self._grips[solid]
 
     def _pair(self, solid: int) -> Pair:
         if solid < 0:

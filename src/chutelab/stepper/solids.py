@@ -32,7 +32,7 @@ contact. The pulley is smaller by twice as much: what lies a hair inside the bel
 behind x = 0."""
 
 WEDGED = 0.1
-"""Share of the radius; what faces drive into each other is stepped if a step leads less far."""
+"""Share of the radius; what faces drive to and fro is left to a step that leads less far."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -74,9 +74,8 @@ class Tracks:
         self._recorder = recorder
         self._g = np.array([0.0, -machine.gravity])
         self.mode = np.full(count, WAITING, dtype=np.int8)
-        self._radius = machine.particle.radius
-        rim = KNOT_SPEED / self._radius
-        place = KNOT_POSITION * self._radius
+        rim = KNOT_SPEED / machine.particle.radius
+        place = KNOT_POSITION * machine.particle.radius
         self._limits = np.tile([inf, place, place, KNOT_SPEED, KNOT_SPEED, rim], (count, 1))
         self._knot = np.zeros((count, 6))
         self.t, self.omega = self._knot[:, 0], self._knot[:, 5]
@@ -153,14 +152,9 @@ class Tracks:
     def fly(self, i: int) -> None:
         """Let a particle go from its last knot."""
         self.mode[i] = FLYING
-        t, x, y, vx, vy = self.begin(i)
-        self.exit[i] = t + self._way_out(x, y, vx, vy)
-
-    def begin(self, i: int) -> tuple[float, float, float, float, float]:
-        """Let a path begin at the last knot, and return it, but for its ω."""
         t, x, y, vx, vy, _ = self._knot[i].tolist()
         self.from_t[i], self._path[:, i] = t, (x, y, vx, vy)
-        return t, x, y, vx, vy
+        self.exit[i] = t + self._way_out(x, y, vx, vy)
 
     def _way_out(self, x: float, y: float, vx: float, vy: float) -> float:
         """Return when a flight leaves the scene, s; at once if it is beyond the edge already."""

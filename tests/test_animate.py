@@ -263,6 +263,7 @@ def test_flight_is_told_from_contact() -> None:
     (landing,) = recording.select(Kind.LANDING)
     assert going_on(recording, landing, flying=False) == "slides on the outgoing belt"
     assert going_on(recording, landing, flying=True) == "in flight"
+    assert going_on(recording, landing, flying=False, still=True) == "lies on the outgoing belt"
 
 
 @pytest.mark.parametrize(("rode", "said"), [(2.0, False), (2.001, False), (2.1, True)])

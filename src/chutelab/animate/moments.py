@@ -189,17 +189,19 @@ def _words(
     gone = float(recording.track(0)["t"][-1])
     near = 0.25 * float(np.diff(times).min(initial=np.inf))
     flying = in_flight(recording, times, near)
+    still = ~subset(recording, [0]).at(times)[1].any(axis=(1, 2))
     captions = []
-    for t, flies in zip(times, flying, strict=True):
+    for t, flies, lies in zip(times, flying.tolist(), still.tolist(), strict=True):
         story = int(np.searchsorted(mine["t"][stories], t, side="right")) - 1
-        if story >= 0 and _still_told(mine[stories[story]], t, slow, flying=bool(flies)):
+        if story >= 0 and _still_told(mine[stories[story]], t, slow, flying=flies):
             captions.append(lines[story])
         elif story < 0 and carried:
             captions.append(carried)
         else:
             latest = int(np.searchsorted(mine["t"], t, side="right")) - 1
             known = latest >= 0 and t <= gone
-            captions.append(going_on(recording, mine[latest], flying=bool(flies)) if known else "")
+            event = mine[latest]
+            captions.append(going_on(recording, event, flying=flies, still=lies) if known else "")
     for i in held:
         # What else happens in the same instant has to wait for the next picture.
         at = int(np.searchsorted(times, mine["t"][i]))

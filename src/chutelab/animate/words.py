@@ -118,14 +118,14 @@ def _impact(recording: Recording, event: Any, kind: Kind, name: str) -> str:
     return f"{text}\n{', '.join(said) or 'no energy lost'}"
 
 
-def going_on(recording: Recording, event: Any, *, flying: bool) -> str:
-    """Return what particle 0 does some time after an event, in contact or `flying`."""
+def going_on(recording: Recording, event: Any, *, flying: bool, still: bool = False) -> str:
+    """Return what particle 0 does some time after an event: `flying`, `still`, or in contact."""
     kind = Kind(int(event["kind"]))
     if flying:
         return "in flight"
     if kind in (Kind.RELEASE, Kind.COLLISION) or event["surface"] < 0:
         return ""
-    verb = "slides" if kind in (*STRUCK, Kind.SLIP) else "rides"
+    verb = "lies" if still else "slides" if kind in (*STRUCK, Kind.SLIP) else "rides"
     return f"{verb} on {surface_words(recording.surfaces[event['surface']])}"
 
 

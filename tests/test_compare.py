@@ -205,9 +205,11 @@ def test_a_rebound_up_along_the_plate_has_one_angle():
 
 
 def test_what_the_belt_pays_is_compared_only_where_it_alone_brings_to_rest():
-    # It bounces from the belt back to the plate, whose friction the closed form does not know.
-    nook = ("plate.angle_deg=-20", "plate.below=0.6", "outgoing.restitution=0.8")
-    again = run("perpendicular", *nook, "run.until=settled", "outgoing.speed=3.0")
+    # It bounces from the belt back to the plate, whose blow the closed form does not know.
+    nook = ("plate.angle_deg=20", "plate.restitution=0.1", "outgoing.restitution=0.8")
+    way = ("incoming.speed=3", "outgoing.drop=1.0", "outgoing.speed=4", "outgoing.length=60")
+    again = run("perpendicular", *nook, *way, "run.until=settled")
+    assert again.ended[0] == 2
     after = again.events["t"] > again.select(Kind.LANDING)["t"][0]
     assert "plate" in [again.surfaces[s] for s in again.events["surface"][after]]
     assert isnan(compare(again).simulated["belt_work"])

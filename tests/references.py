@@ -623,12 +623,17 @@ def overlaps(recording, times):
     Of all pairs of free disks that touch then; disks carried by adhesion do not count, as nothing
     can push them.
     """
-    r, found = recording.particle.radius, []
-    for x in _free(recording, times):
-        pairs = cKDTree(x).query_pairs(2.0 * r, output_type="ndarray")
-        apart = x[pairs[:, 0]] - x[pairs[:, 1]]
-        found.append(2.0 * r - np.hypot(apart[:, 0], apart[:, 1]))
-    return Depth.of(found, r)
+    r = recording.particle.radius
+    return Depth.of([pair_overlaps(x, r) for x in _free(recording, times)], r)
+
+
+def pair_overlaps(x, r):
+    """Return the overlaps (m) of all disks of radius r at places x (k, 2) that touch."""
+    if not len(x):
+        return np.zeros(0)
+    pairs = cKDTree(x).query_pairs(2.0 * r, output_type="ndarray")
+    apart = x[pairs[:, 0]] - x[pairs[:, 1]]
+    return 2.0 * r - np.hypot(apart[:, 0], apart[:, 1])
 
 
 def inside_surfaces(recording, machine, times):

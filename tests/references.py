@@ -223,19 +223,21 @@ def likeness(found, recording, most=3, tolerance=1e-10):
     own = _impacts_of(recording)
     known, places = found.followed.copy(), [0] * len(own)
     alike, times, approaches, unlike, unknown = 0, [0.0], [0.0], [], 0
-    for t, i in sorted((one.t, i) for i, each in enumerate(own) for one in each[:most]):
+    # All of them: what a particle does after its first ones, others may feel.
+    for t, i in sorted((one.t, i) for i, each in enumerate(own) for one in each):
         if t > known[i] + tolerance:
             continue
-        one, k = own[i][places[i]], places[i]
-        expected = found.of[i][k] if k < len(found.of[i]) else None
+        k = places[i]
         places[i] += 1
+        one, expected = own[i][k], found.of[i][k] if k < len(found.of[i]) else None
         if isinstance(one.partner, int) and t > known[one.partner] + tolerance:
             known[i] = t
-            unknown += 1
+            unknown += k < most
         elif expected is None or expected.partner != one.partner or abs(expected.t - t) > tolerance:
             known[i] = t
-            unlike.append((i, expected, one))
-        else:
+            if k < most:
+                unlike.append((i, expected, one))
+        elif k < most:
             alike += 1
             times.append(abs(expected.t - t))
             if isinstance(one.partner, str):

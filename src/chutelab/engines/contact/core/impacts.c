@@ -168,7 +168,7 @@ static void give(Contact *c, double normal) {
     double *J = c->impulse, u[3], v[3], entries[3], given[3], most = c->friction * normal;
     relative(c, 0, u);
     J[0] = normal;
-    J[1] = MIN(MAX(-c->mass[1] * u[1], -most), most);
+    J[1] = MIN(MAX(-c->mass[1] * (u[1] + c->drift), -most), most);
     most = c->arm * normal;
     J[2] = MIN(MAX(-c->mass[2] * u[2], -most), most);
     push(c, J);
@@ -185,8 +185,16 @@ static void support(int i, int k, double t) {
     Contact c;
     describe(&c, i, -1 - k);
     hold(d, k);
-    double press = press_on(d, W.surfaces + k, c.nx, c.ny);
-    if (press > 0) give(&c, 0.5 * press * d->mass * (W.step_end - t));
+    double press = press_on(d, W.surfaces + k, c.nx, c.ny), left = W.step_end - t, u[3];
+    if (press <= 0) return;
+    relative(&c, 0, u);
+    c.drift = 0.5 * left * (W.gx * c.ny - W.gy * c.nx);
+    give(&c, 0.5 * press * d->mass * left);
+    /* Friction that need not slow it can hold it from now on. */
+    if (fabs(u[1]) <= 1e-12 * W.g * W.dt && fabs(c.impulse[1]) < c.friction * c.impulse[0]) {
+        d->slips = 0;
+        event_here(STICK, i, c.owner);
+    }
 }
 
 /* Bring a disk to rest that rattles without end where surfaces meet, as far as they let it: what
@@ -235,6 +243,7 @@ static void strike(int i, int j, double t) {
     Contact c;
     double u[3];
     describe(&c, i, j);
+    c.drift = 0;
     was_moved(i, t);
     if (c.two) was_moved(j, t);
     relative(&c, 0, u);

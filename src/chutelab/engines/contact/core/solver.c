@@ -178,7 +178,7 @@ static void note_grip(Disk *d, const Contact *c, const double *u, const double *
         /* Friction slows the slip evenly; it is used up so long after the last mid-step. */
         double s = fabs(u[1] - c->drift), rate = most / (c->mass[1] * h);
         double t = d->t - 0.5 * h + (rate > 0 ? s / rate : 0);
-        t = MIN(MAX(MAX(t, d->since), W.tracks[i].knot[0]), d->t + h);
+        t = MIN(MAX(t, d->since), d->t + h);
         double place[2] = {d->x + (t - d->t) * 0.5 * (d->ux + d->vx), d->y + (t - d->t) * 0.5 * (d->uy + d->vy)};
         double after[3] = {d->vx + 0.5 * W.gx * h, d->vy + 0.5 * W.gy * h, d->spin};
         write_event(STICK, i, -1, c->owner, t, place, after, after, 0, 0);
@@ -195,6 +195,37 @@ static int lies(const Disk *d, const Contact *c) {
     if (bending(s, d->x, d->y, d->radius) != 0 && (d->vx != 0 || c->other[1] != 0)) return 0;
     if (c->arm > 0 && d->spin != c->other[2]) return 0;
     return d->inertia == 0 || c->drift == 0;
+}
+
+/* End the track of a disk that came to rest on one surface, when its slip was used up: `d->since`.
+
+   From the velocity after the impulses to that in the middle of the step it is a hop, which is left
+   out: an impulse of its own. At that velocity it has gone since, and what gravity did then the
+   drive paid. */
+static void settle(int i, const Contact *last, double h) {
+    Disk *d = W.disks + i;
+    Contact hop = *last;
+    double u[3], v[3], entries[3], given[3], jx = 0.5 * h * d->mass * W.gx, jy = 0.5 * h * d->mass * W.gy;
+    hop.impulse[0] = jx * hop.nx + jy * hop.ny;
+    hop.impulse[1] = jx * hop.ny - jy * hop.nx;
+    hop.impulse[2] = 0;
+    for (int n = 0; n < 3; n++) d->entries[n] += d->gain[n];
+    relative(&hop, 0, u);
+    d->vx += jx / d->mass;
+    d->vy += jy / d->mass;
+    relative(&hop, 0, v);
+    share_out(&hop, u, v, 0, entries, given);
+    double back = d->t - d->since;
+    entries[0] += d->mass * (W.gx * d->vx + W.gy * d->vy) * back;
+    book(d->entries, 0, hop.owner, entries);
+    d->x -= d->vx * back;
+    d->y -= d->vy * back;
+    d->t = d->since;
+    if (W.tracks[i].open) knot_asleep(i);
+    W.tracks[i].lasted = 0;
+    knot_now(i);
+    event_here(SETTLE, i, hop.owner);
+    finish(i, BY_SETTLING);
 }
 
 /* After the solve: entries, supports, timers, tracks. */
@@ -290,26 +321,20 @@ void close_step(double h) {
             double u[3], v[3];
             relative(only, 1, u);
             relative(only, 0, v);
-            int gripped = !d->slips && d->on == only->owner;
             note_grip(d, only, u, v, h);
-            track_lasting(i);
-            for (int n = 0; n < 3; n++) d->entries[n] += d->gain[n];
-            d->changes++;
-            if (!W.interact && W.until == UNTIL_SETTLED && gripped && !d->slips && lies(d, only))
-                reason = BY_SETTLING;
-            else if (!W.interact && W.until == UNTIL_LANDED && d->landed)
-                reason = BY_LANDING;
+            if (!W.interact && W.until == UNTIL_SETTLED && !d->slips && lies(d, only)) settle(i, only, h);
+            else if (!W.interact && W.until == UNTIL_LANDED && d->landed) reason = BY_LANDING;
         } else {
-            track_lasting(i);
-            for (int n = 0; n < 3; n++) d->entries[n] += d->gain[n];
-            d->changes++;
             d->slips = 1;
             d->on = -1;
-            if (!W.interact && W.until == UNTIL_SETTLED) {
-                const double *s = track->held;
-                if (fabs(s[3]) + fabs(s[4]) + fabs(s[5]) * d->radius < 1e-9 && d->calm > 2 * h)
-                    reason = BY_SETTLING;
-            }
+        }
+        d->changes++;
+        if (d->mode == GONE) continue;
+        track_lasting(i);
+        for (int n = 0; n < 3; n++) d->entries[n] += d->gain[n];
+        if (owners > 1 && !W.interact && W.until == UNTIL_SETTLED && d->calm > 2 * h) {
+            const double *s = track->held;
+            if (fabs(s[3]) + fabs(s[4]) + fabs(s[5]) * d->radius < 1e-9) reason = BY_SETTLING;
         }
         if (reason >= 0) {
             take_back(i);
@@ -341,29 +366,18 @@ void take_back(int i) {
     }
 }
 
-/* End the track of a disk in lasting contact in the state halfway through this step's impulses.
-
-   One that settles ended when its slip was used up: it has ridden along at the same velocity since,
-   and the belt has done no more than gravity took. */
+/* End the track of a disk in lasting contact in the state halfway through this step's impulses. */
 void end_in_contact(int i, int reason) {
     Disk *d = W.disks + i;
     Track *track = W.tracks + i;
-    double *s = track->held;
-    double then = d->t;
-    if (reason == BY_SETTLING) then = MIN(MAX(d->since, track->knot[0]), then);
-    double back = d->t - then, work = d->mass * (W.gx * s[3] + W.gy * s[4]) * back;
-    d->x = s[1] - s[3] * back;
-    d->y = s[2] - s[4] * back;
+    const double *s = track->held;
+    d->x = s[1];
+    d->y = s[2];
     d->vx = s[3];
     d->vy = s[4];
     d->spin = s[5];
-    d->t = then;
-    if (back > 0 && d->on >= 0) {
-        d->entries[0] += work;
-        W.books[3 * d->on] += work;
-    }
-    if (track->lasted > 1 || then > track->knot[0]) knot_now(i);
+    if (d->t > track->knot[0]) knot_now(i);
     track->lasted = 0;
-    if (reason == BY_SETTLING) event_here(SETTLE, i, d->on);
+    if (reason == BY_SETTLING) event_here(SETTLE, i, W.surfaces[d->held[0]].owner);
     finish(i, reason);
 }

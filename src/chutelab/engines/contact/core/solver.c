@@ -14,6 +14,8 @@
 #define PART 0.1
 /* Gap, in radii, up to which what was pressed still touches: what sweeps leave open. */
 #define LEAVE 1e-4
+/* Friction from which on it is lowered where sweeps diverge: 76 degrees. */
+#define ROUGH 4.0
 /* Of momentum. */
 #define NOISE 1e-11
 /* Times the first change: sweeps whose changes grow so far never end. */
@@ -145,7 +147,7 @@ static double sweep(Contact *list, int count, int sweeps, double accurate, doubl
             }
             relative(c, 0, v);
             K[0] = MAX(J[0] - c->mass[0] * (x * c->nx + y * c->ny - c->need), 0);
-            most = share * c->friction * K[0];
+            most = (share < 1 ? share * MIN(c->friction, ROUGH) : c->friction) * K[0];
             K[1] = MIN(MAX(J[1] - c->mass[1] * (v[1] + c->drift), -most), most);
             most = share * c->arm * K[0];
             K[2] = MIN(MAX(J[2] - c->mass[2] * v[2], -most), most);
@@ -190,6 +192,15 @@ void sweep_contacts(Contact *list, int count, int sweeps, double accurate) {
 void solve_contacts(void) {
     for (int n = 0; n < W.contact_count; n++) push(W.contacts + n, W.contacts[n].impulse);
     sweep_contacts(W.contacts, W.contact_count, W.sweeps, W.accurate);
+    for (int n = 0; n < W.contact_count; n++) {
+        /* Rounding presses nobody; with endless friction even that would pull. */
+        Contact *c = W.contacts + n;
+        const Disk *a = W.disks + c->i;
+        if (c->impulse[0] >= NOISE * c->mass[0] * (fabs(a->vx) + fabs(a->vy))) continue;
+        for (int k = 0; k < 3; k++) c->impulse[k] = -c->impulse[k];
+        push(c, c->impulse);
+        c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
+    }
     W.solve_count++;
 }
 
@@ -306,8 +317,6 @@ void close_step(double h) {
             a->ahead[k] += (c->two ? 0.5 : 1) * entries[k] + given[k];
             if (c->two) b->ahead[k] += 0.5 * entries[k];
         }
-        /* Rounding presses nobody. */
-        if (c->impulse[0] < NOISE * c->mass[0] * (fabs(a->vx) + fabs(a->vy))) continue;
         a->supports++;
         if (b) b->supports++;
         /* Halfway through the impulses the hop is left out. */

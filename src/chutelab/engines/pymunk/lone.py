@@ -8,6 +8,7 @@ through the step, with the velocities at its ends.
 
 from __future__ import annotations
 
+from operator import itemgetter
 from math import acos, ceil, cos, inf, sin, sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -29,17 +30,26 @@ INSTANT = 1e-30
 TINY = 1e-12
 """Share of 1 m/s plus the particle's speed; an approach this slow is a touch, no blow."""
 
+SEAM = 1e-6
+"""The same in a lasting contact, where a surface goes on in the next one."""
+
 HOP = 1e-3
 """Share of a step; bounces this short are over, whatever the restitution."""
 
 STRIDE = 0.5
 """Share of the radius that a lasting contact moves on in a step, at most: it meets every end."""
 
+STILL = 1e-9
+"""Share of 1 m/s plus the speed; a step that changes the velocity by less changes nothing."""
+
+SLACK = 1e-9
+"""Share of the friction limit below which a contact is held to grip."""
+
 FIRST = 1e-3
 """Share of a step after which a surface just left is looked at again."""
 
-CLOSE = 1e-9
-"""Share of a step to which the end of a lasting contact is found."""
+SHORT = 1e-5
+"""Share of a step; a contact that lasts less has ended."""
 
 ARC = 0.025
 """rad between knots on an adhesion ride: R Δφ⁴/384, the curve's error, is 1e-9 of the radius."""
@@ -66,7 +76,7 @@ class Ridden(NamedTuple):
         """Whether friction was used up at a contact."""
         for c in self.contacts:
             push, rub = c.impulse.dot(c.normal), abs(c.impulse.cross(c.normal))
-            if push > 0.0 and rub >= c.face.friction * push * (1.0 - 1e-12):
+            if push > 0.0 and rub >= c.face.friction * push * (1.0 - SLACK):
                 return True
         return False
 
@@ -93,7 +103,7 @@ class Lone:
         self.on = -1
         self.slipping: bool | None = None
         self.ended = False
-        self.steps = 0
+        self.steps, self.last = 0, 0.0
         self.landed = False
         self.blows, self.since = 0, self.t
 
@@ -105,13 +115,13 @@ class Lone:
         self.track.event(Kind.RELEASE, self.t, self.x, (self.v, self.omega))
         if self.machine.releases.carried[self.particle]:
             self._carry()
+            if not (self.ended or self._approached(self._touching())):
+                self._fly(self._touching())
         while not self.ended:
-            slow = TINY * (1.0 + self.v.length)
             touching = self._touching()
-            rates = [self.v.dot(n) for n in touching.values()]
-            if any(rate < -slow for rate in rates):
+            if self._approached(touching):
                 self._blow()
-            elif not (any(rate <= slow for rate in rates) and self._ride(touching)):
+            elif not self._ride(touching):
                 self._fly(touching)
         self.world.space.remove(self.body, self.circle)
 
@@ -137,16 +147,16 @@ class Lone:
     ) -> list[Contact]:
         """Let Chipmunk step by h (s); return the contacts that it solved."""
         body, space = self.body, self.world.space
+        if h != self.last:
+            # Chipmunk keeps impulses for the next step, but right ones only if it is as long.
+            space.remove(self.circle)
+            space.add(self.circle)
+            self.last = h
         body.position, body.velocity, body.angular_velocity = x, v, self.omega
         self.law, space.gravity, self.contacts = law, pull, []
         space.step(h)
         self.steps += 1
         return self.contacts
-
-    def _forget(self) -> None:
-        """Drop Chipmunk's contact cache: it would apply the last impulses times h/last h."""
-        self.world.space.remove(self.circle)
-        self.world.space.add(self.circle)
 
     # Distances
 
@@ -159,6 +169,11 @@ class Lone:
         """Return the surfaces in touch and their normals."""
         found = ((face, *self._gap(face, self.x)) for face in self.world.faces)
         return {face: normal for face, gap, normal in found if gap <= self.world.hair}
+
+    def _approached(self, touching: dict[Face, Vec2d]) -> bool:
+        """Tell whether the particle moves into a surface in touch."""
+        slow = (TINY if self.on < 0 else SEAM) * (1.0 + self.v.length)
+        return any(self.v.dot(normal) < -slow for normal in touching.values())
 
     # Flight
 
@@ -258,7 +273,6 @@ class Lone:
         """Let Chipmunk resolve the blow at the present place."""
         before = self.v, self.omega
         contacts = self._step(self.x, self.v, INSTANT, Vec2d(0, 0), self._restitution)
-        self._forget()
         after = self.body.velocity, self.body.angular_velocity
         self.v, self.omega = after
         landed = False
@@ -278,7 +292,9 @@ class Lone:
         self.blows += 1
         if self.blows % WINDOW == 0:
             if self.t - self.since < self.dt:
-                raise self._stalled(f"{WINDOW} blows within one step; move the surfaces there apart")
+                raise self._stalled(
+                    f"{WINDOW} blows within one step; move the surfaces there apart"
+                )
             self.since = self.t
 
     def _restitution(self, face: Face, normal: Vec2d) -> float:
@@ -297,6 +313,9 @@ class Lone:
 
     def _ride(self, touching: dict[Face, Vec2d]) -> bool:
         """Step on in contact; False if no surface pushes."""
+        slow = SEAM * (1.0 + self.v.length)
+        if all(self.v.dot(normal) > slow for normal in touching.values()):
+            return False
         others = [face for face in self.world.faces if face not in touching]
         h = min(self.dt, self.machine.end_time - self.t)
         speed = self.v.length + self.g * self.dt
@@ -308,46 +327,55 @@ class Lone:
         def clear(end: Ridden) -> bool:
             return all(self._gap(face, end.x)[0] >= 0.0 for face in others)
 
-        end, floor = trial(h), CLOSE * h
-        if not end.holds:
+        # What half of a step twice as long finds goes for the end of this one.
+        floor = SHORT * h
+        if not trial(2.0 * h).holds:
             if not trial(floor).holds:
                 return False
-            # The contact is solved half-way: there it ends.
-            h = 0.5 * _longest(lambda span: trial(span).holds, h, floor)
+            h = 0.5 * _longest(lambda span: trial(span).holds, 2.0 * h, floor)
             if h <= floor:
                 return False
-            end = trial(h)
+        end = trial(h)
         if not clear(end):
             h = _longest(lambda span: clear(trial(span)), h, 0.0)
             end = trial(h)
-        sticks = not end.slips
-        if sticks and self.slipping is not False and trial(floor).slips:
+        if self.slipping and not end.slips:
             h = _longest(lambda span: trial(span).slips, h, floor, upper=True)
             end = trial(h)
-        self._accept(end, h)
+        if self.machine.until == "settled" and self._lies(end):
+            self._settle(end)
+        else:
+            self._accept(end, h)
         return True
 
     def _ridden(self, h: float, touching: dict[Face, Vec2d]) -> Ridden:
         """Return where a step in contact leads, without taking it.
 
-        ε = 1 turns the midpoint's normal velocity round: what goes in at the beginning of the step
-        comes out at its end. On a face it is 0; round a circle this is the exact rotation.
+        The contact is solved half-way. There ε turns round the normal velocity that a curved
+        surface gives the particle: v_n goes out as -v_n (v1/v0)², which keeps it on the circle, and
+        gives the normal impulse of the speed half-way. On a face v_n is 0.
         """
-        x = self.x + 0.5 * h * self.v
-        gap, normal = min((self._gap(face, x) for face in touching), key=lambda found: found[0])
-        x -= gap * normal
-        contacts = self._step(
-            x - h * self.v, self.v, h, self.pull, lambda face, _: 1.0 if face in touching else None
-        )
+        middle = self.x + 0.5 * h * self.v
+        gap, normal = min((self._gap(face, middle) for face in touching), key=itemgetter(0))
+        middle -= gap * normal
+        turn = 1.0
+
+        def law(face: Face, _normal: Vec2d) -> float | None:
+            return turn if face in touching else None
+
+        contacts = self._step(middle - h * self.v, self.v, h, self.pull, law)
+        if self.v.dot(normal) > SEAM * self.v.length:
+            turn = self.body.velocity.get_length_sqrd() / self.v.get_length_sqrd()
+            contacts = self._step(middle - h * self.v, self.v, h, self.pull, law)
         v, omega = self.body.velocity, self.body.angular_velocity
-        x += 0.5 * h * v
+        x = middle + 0.5 * h * v
         pushed = [c.face for c in contacts if c.impulse.dot(c.normal) > 0.0]
         for face in pushed:
             gap, normal = self._gap(face, x)
             x -= gap * normal
             if len(pushed) == 1:
                 v -= v.dot(normal) * normal
-        return Ridden(x, v, omega, list(contacts))
+        return Ridden(x, v, omega, contacts)
 
     def _accept(self, end: Ridden, h: float) -> None:
         """Take a step that was tried."""
@@ -364,31 +392,34 @@ class Lone:
             self.track.event(kind, self.t, self.x, after, surface=on)
         self.on, self.slipping = on, slips
         self.track.sample(self.t, self.x, self.v, self.omega)
-        if self.machine.until == "settled" and self._lies(pushed, before, end):
-            self.track.event(Kind.SETTLE, self.t, self.x, after, surface=on)
-            self._end("settled")
-        elif self.t >= self.machine.end_time:
+        if self.t >= self.machine.end_time:
             self._end("time")
 
-    def _lies(self, pushed: list[Contact], before: tuple[Vec2d, float], end: Ridden) -> bool:
+    def _lies(self, end: Ridden) -> bool:
         """Tell whether a step without slip changed nothing, on a surface to settle on."""
-        still = 1e-9 * (1.0 + end.v.length)
+        still = STILL * (1.0 + end.v.length)
         return (
             not end.slips
-            and (end.v - before[0]).length <= still
-            and self.r * abs(end.omega - before[1]) <= still
+            and (end.v - self.v).length <= still
+            and self.r * abs(end.omega - self.omega) <= still
             and all(
-                c.face.speed == 0.0 or c.face.surface == self.machine.landing for c in pushed
+                c.face.speed == 0.0 or c.face.surface == self.machine.landing for c in end.contacts
             )
         )
+
+    def _settle(self, end: Ridden) -> None:
+        surface = end.contacts[0].face.surface
+        if self.slipping:
+            self.track.event(Kind.STICK, self.t, self.x, (self.v, self.omega), surface=surface)
+        self.track.knot(self.t, self.x, self.v, self.omega)
+        self.track.event(Kind.SETTLE, self.t, self.x, (self.v, self.omega), surface=surface)
+        self._end("settled")
 
     def _part(self) -> None:
         """Write that a lasting contact has ended."""
         if self.on >= 0:
             self.track.knot(self.t, self.x, self.v, self.omega)
-            self.track.event(
-                Kind.SEPARATION, self.t, self.x, (self.v, self.omega), surface=self.on
-            )
+            self.track.event(Kind.SEPARATION, self.t, self.x, (self.v, self.omega), surface=self.on)
         self.on, self.slipping = -1, None
 
     # The adhesion ride
@@ -401,9 +432,7 @@ class Lone:
         assert belt is not None
         if speed == 0.0:
             if self.machine.until == "settled":
-                self.track.event(
-                    Kind.SETTLE, begin, self.x, (self.v, 0.0), surface=belt.surface
-                )
+                self.track.event(Kind.SETTLE, begin, self.x, (self.v, 0.0), surface=belt.surface)
                 self._end("settled")
             else:
                 self.t += rest
@@ -429,9 +458,7 @@ class Lone:
         if speed * rest <= path:
             self._end("time")
             return
-        self.track.event(
-            Kind.SEPARATION, self.t, self.x, (self.v, 0.0), surface=belt.surface
-        )
+        self.track.event(Kind.SEPARATION, self.t, self.x, (self.v, 0.0), surface=belt.surface)
 
     def _met(self, start: float, rho: float, path: float, own: int) -> float:
         """Return how far (m) a ride gets before it meets a surface other than its own belt."""

@@ -107,7 +107,9 @@ class World:
         self.rounding = DIGITS * size
         self.hair = max(HAIR * r, 4.0 * self.rounding)
         self.faces: list[Face] = []
-        for n, (start, end) in enumerate(zip(parts.start.tolist(), parts.end.tolist(), strict=True)):
+        for n, (start, end) in enumerate(
+            zip(parts.start.tolist(), parts.end.tolist(), strict=True)
+        ):
             body = pymunk.Body(body_type=pymunk.Body.STATIC)
             self._add(
                 pymunk.Segment(body, start, end, 0.0), int(parts.surface[n]),
@@ -169,7 +171,9 @@ class Track:
         if len(self.pending) > SAMPLES:
             del self.pending[:-1:2]
 
-    def book(self, contact: Contact, before: tuple[Vec2d, float], after: tuple[Vec2d, float]) -> None:
+    def book(
+        self, contact: Contact, before: tuple[Vec2d, float], after: tuple[Vec2d, float]
+    ) -> None:
         """Book an impulse J: J·(u before + u after)/2, u the relative velocity at the contact."""
         face, n, impulse = contact
         t = Vec2d(n.y, -n.x)
@@ -178,9 +182,7 @@ class Track:
         spin = 0.5 * self.radius * (before[1] + after[1])
         slip = 0.5 * (before[0] + after[0]).dot(t) + spin - belt
         push, rub = impulse.dot(n), impulse.dot(t)
-        self.recorder.book(
-            self.particle, face.surface, rub * belt, -push * normal, -rub * slip
-        )
+        self.recorder.book(self.particle, face.surface, rub * belt, -push * normal, -rub * slip)
 
     def event(
         self, kind: Kind, t: float, x: Vec2d, after: tuple[Vec2d, float],
@@ -214,9 +216,8 @@ def _near(a: tuple[Any, ...], b: tuple[Any, ...], s: tuple[Any, ...], tolerance:
     u = (s[0] - a[0]) / h
     w = 1.0 - u
     for axis in (0, 1):
-        place = (
-            w * w * ((1.0 + 2.0 * u) * a[1][axis] + u * h * a[2][axis])
-            + u * u * ((1.0 + 2.0 * w) * b[1][axis] - w * h * b[2][axis])
+        place = w * w * ((1.0 + 2.0 * u) * a[1][axis] + u * h * a[2][axis]) + u * u * (
+            (1.0 + 2.0 * w) * b[1][axis] - w * h * b[2][axis]
         )
         if abs(place - s[1][axis]) > tolerance:
             return False

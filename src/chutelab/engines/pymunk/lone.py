@@ -8,12 +8,13 @@ through the step, with the velocities at its ends.
 
 from __future__ import annotations
 
-from math import acos, ceil, cos, inf, sin, sqrt
+from math import ceil, inf, sqrt
 from operator import itemgetter
 from typing import TYPE_CHECKING, NamedTuple
 
 from pymunk import Vec2d
 
+from chutelab.engines.pymunk.carriage import Carriage
 from chutelab.engines.pymunk.world import Contact, Face, Track, World
 from chutelab.recorder import StalledError
 from chutelab.recording import REASONS, Kind
@@ -51,9 +52,6 @@ FIRST = 1e-3
 
 SHORT = 1e-5
 """Share of a step; a contact that lasts less has ended."""
-
-ARC = 0.025
-"""rad between knots on an adhesion ride: R Δφ⁴/384, the curve's error, is 1e-9 of the radius."""
 
 WINDOW = 10_000
 """Blows after which it is asked whether the particle gets on; queries on one flight, at most."""
@@ -116,7 +114,7 @@ class Lone:
         self.blows, self.since = 0, self.t
         self.turns = self.t, 0
 
-    def run(self) -> None:
+    def run(self, _report: Callable[[float], None]) -> None:
         """Run to the end."""
         if self.t >= self.machine.end_time:
             return
@@ -402,8 +400,10 @@ class Lone:
         middle -= gap * normal
         turn = 1.0
 
-        def law(face: Face, _normal: Vec2d) -> float | None:
-            return turn if face in touching else None
+        def law(face: Face, normal: Vec2d) -> float | None:
+            if face not in touching:
+                return None
+            return turn if self.v.dot(normal) > 0.0 else 0.0
 
         contacts = self._step(middle - h * self.v, self.v, h, self.pull, law)
         if self.v.dot(normal) > SEAM * self.v.length:
@@ -441,16 +441,17 @@ class Lone:
         """Tell whether a step without slip changed nothing, on a surface to settle on."""
         still = STILL * (1.0 + end.v.length)
         return (
-            not end.slips
+            bool(end.pushed)
+            and not end.slips
             and (end.v - self.v).length <= still
             and self.r * abs(end.omega - self.omega) <= still
             and all(
-                c.face.speed == 0.0 or c.face.surface == self.machine.landing for c in end.contacts
+                c.face.speed == 0.0 or c.face.surface == self.machine.landing for c in end.pushed
             )
         )
 
     def _settle(self, end: Ridden) -> None:
-        surface = end.contacts[0].face.surface
+        surface = end.pushed[0].face.surface
         if self.slipping:
             self.track.event(Kind.STICK, self.t, self.x, (self.v, self.omega), surface=surface)
         self.track.knot(self.t, self.x, self.v, self.omega)
@@ -464,55 +465,25 @@ class Lone:
             self.track.event(Kind.SEPARATION, self.t, self.x, (self.v, self.omega), surface=self.on)
         self.on, self.slipping = -1, None
 
-    # The adhesion ride
-
     def _carry(self) -> None:
-        """Ride along the belt and round the pulley, in closed form: cos φ1 = v²/(g ρ)."""
-        speed, rho, start, begin = self.v.x, self.x.y, self.x.x, self.t
-        rest = self.machine.end_time - begin
+        """Ride by adhesion, see `Carriage`."""
         belt = self.machine.pulley
         assert belt is not None
-        if speed == 0.0:
-            if self.machine.until == "settled":
-                self.track.event(Kind.SETTLE, begin, self.x, (self.v, 0.0), surface=belt.surface)
-                self._end("settled")
-            else:
-                self.t += rest
-                self.track.knot(self.t, self.x, self.v, 0.0)
-                self._end("time")
+        if self.v.x == 0.0 and self.machine.until == "settled":
+            self.track.event(Kind.SETTLE, self.t, self.x, (self.v, 0.0), surface=belt.surface)
+            self._end("settled")
             return
-        cosine = speed * speed / (self.g * rho) if self.g > 0.0 else inf
-        path = max(0.0, -start) + rho * acos(min(cosine, 1.0))
-        whole = min(path, speed * rest)
-        met = self._met(start, rho, whole, belt.surface)
-        path = min(whole, met)
-        turn = max(0.0, start + path) / rho
-        pieces = ceil(turn / ARC)
-        stops = [min(-start, path)] if start < 0.0 else []
-        stops += [path - rho * turn * (1.0 - n / pieces) for n in range(1, pieces + 1)]
-        for along in stops:
-            x, v = carried(start + along, rho, speed)
-            self.recorder.book(
-                self.particle, belt.surface, -self.track.mass * self.g * (self.x.y - x.y)
-            )
-            self.t, self.x, self.v = begin + along / speed, x, v
-            self.track.knot(self.t, x, v, 0.0)
-        if speed * rest <= path:
+        ride = Carriage(self.machine, self.world, self.particle)
+        for t in ride.times():
+            self.t, (self.x, self.v) = t, ride.state(t)
+            ride.book(self.recorder, t)
+            self.track.knot(t, self.x, self.v, 0.0)
+        if self.t >= self.machine.end_time:
             self._end("time")
-            return
-        self.track.event(Kind.SEPARATION, self.t, self.x, (self.v, 0.0), surface=belt.surface)
-
-    def _met(self, start: float, rho: float, path: float, own: int) -> float:
-        """Return how far (m) a ride gets before it meets a surface other than its own belt."""
-        for face in self.world.faces:
-            along = 0.0
-            while face.surface != own and along < path:
-                x, v = carried(start + along, rho, 1.0)
-                gap, normal = self._gap(face, x)
-                if gap <= self.world.rounding and v.dot(normal) < 0.0:
-                    path = along
-                along += max(gap, self.world.rounding)
-        return path
+        else:
+            self.track.event(
+                Kind.SEPARATION, self.t, self.x, (self.v, 0.0), surface=belt.surface
+            )
 
     # The end
 
@@ -523,14 +494,6 @@ class Lone:
     def _stalled(self, reason: str) -> StalledError:
         self._end("time")
         return StalledError(self.particle, self.t, (self.x.x, self.x.y), reason)
-
-
-def carried(along: float, rho: float, speed: float) -> tuple[Vec2d, Vec2d]:
-    """Return place (m) and velocity on the belt's path, `along` (m) from above the pulley's axis."""
-    if along <= 0.0:
-        return Vec2d(along, rho), Vec2d(speed, 0.0)
-    c, s = cos(along / rho), sin(along / rho)
-    return Vec2d(rho * s, rho * c), Vec2d(speed * c, -speed * s)
 
 
 def _ignore(_face: Face, _normal: Vec2d) -> None:

@@ -42,8 +42,8 @@ one less than the second."""
 STRIDE = 0.5
 """Share of the radius that a lasting contact moves on in a step, at most: it meets every end."""
 
-STILL = 1e-9
-"""Share of 1 m/s plus the speed; a step that changes the velocity by less changes nothing."""
+STILL = 1e-6
+"""Share of a free fall's gain; a step that changes the velocity by less changes nothing."""
 
 SLACK = 1e-9
 """Share of the friction limit below which a contact is held to grip."""
@@ -60,7 +60,7 @@ WINDOW = 10_000
 TICK = 1e-12
 """s; mean time between blows of a particle that does not get on."""
 
-LOW = 4.0
+LOW = 2.0
 """Hairs; bounces lower than this cannot be told from lying on the surface."""
 
 TURNS = 200
@@ -390,7 +390,7 @@ class Lone:
         if self.slipping and not end.slips:
             h = _longest(lambda span: trial(span).slips, h, floor, upper=True)
             end = trial(h)
-        if self.machine.until == "settled" and self._lies(end):
+        if self.machine.until == "settled" and self._lies(end, h):
             self._settle(end)
         else:
             self._accept(end, h)
@@ -445,9 +445,9 @@ class Lone:
         if self.t >= self.machine.end_time:
             self._end("time")
 
-    def _lies(self, end: Ridden) -> bool:
+    def _lies(self, end: Ridden, h: float) -> bool:
         """Tell whether a step without slip changed nothing, on a surface to settle on."""
-        still = STILL * (1.0 + end.v.length)
+        still = STILL * self.g * h
         return (
             bool(end.pushed)
             and not end.slips

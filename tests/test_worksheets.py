@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
-from math import acos, atan, cos, degrees, hypot, log, pi, radians, sin, sqrt
+from math import acos, atan, cos, degrees, erfc, hypot, log, pi, radians, sin, sqrt
 
 import numpy as np
 import pytest
@@ -171,12 +171,12 @@ def matching(r, d1=0.1, v=2.0):
     return low
 
 
-def leaving_at(vx):
+def leaving_at(vx, r=0.004, d1=0.1, v=2.0):
     """Angle, degrees, of the plate that the particle leaves with this forward velocity."""
-    low, high = 20.0, 60.0
+    low, high = 10.0, matching(r, d1, v) - 1e-3
     for _ in range(60):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if plate(middle)[1] < vx else (low, middle)
+        low, high = (middle, high) if plate(middle, r, d1, v)[1] < vx else (low, middle)
     return low
 
 
@@ -254,6 +254,15 @@ STATED = {
         "in J: {38.7} mJ": belt(2.0, plate(20)[1])[0],
         "38.7 mJ, {22.2} mJ": belt(2.0, plate(40)[1])[0],
         "and {6.3} mJ": belt(2.0, plate(60)[1])[0],
+        "forward saves {16} mJ": belt(2.0, 0.0)[0] - belt(2.0, 1.0)[0],
+        "makes it {-4.8} mJ": belt(1.0, plate(60)[1])[0],
+        "(v_b - v_x)²: {23.3} mJ": belt(2.0, plate(20)[1])[1],
+        "23.3 mJ, {7.7} mJ": belt(2.0, plate(40)[1])[1],
+        "7.7 mJ and {0.6} mJ": belt(2.0, plate(60)[1])[1],
+        "there, with {0.29} m/s": plate(20, 0.0, v=1.0)[1],
+        "20 mm, with {0.07} m/s": plate(20, 0.02, v=1.0)[1],
+        "It turns at {17.9}°": leaving_at(0.0, 0.02, v=1.0),
+        "the point at {14.2}°": leaving_at(0.0, 0.0, v=1.0),
         "on, where d1 (m) is the way from the axis to the pivot: {63.9}°": degrees(
             atan(4.0 / (2.0 * G * 0.1))
         ),
@@ -309,6 +318,10 @@ STATED = {
         "and {47.25}°": leaving_at(1.0),
         "wins, {6.3} mJ": belt(2.0, plate(60)[1])[0],
         "as much, {32.0} mJ": belt(2.0, 0.0)[0],
+        "makes it {-4.8} mJ": belt(1.0, plate(60)[1])[0],
+        "it is zero at {47.25}°": leaving_at(1.0),
+        "and {1.5} mJ at 60°": belt(1.0, plate(60)[1])[1],
+        "one plate in {3} stands": 1.0 / erfc(sqrt(0.5)),
         "It is least, {16} mJ": 500.0 * 0.008 * 4.0,
     },
 }
@@ -374,6 +387,30 @@ def test_the_plate_of_lesson_4_is_missed_from_69_degrees_on():
     assert "pulley" in str(
         chutelab("run", find(4).folder / "any-angle.toml", "--set", "plate.angle_deg=0").stdout
     )
+
+
+def test_the_papers_ball_of_lesson_4_goes_forward_in_the_engine_too():
+    def after(radius, angle):
+        settings = [f"particle.radius={radius}", f"plate.angle_deg={angle}", "incoming.speed=1"]
+        recording = simulate(load("inclined-20", settings), engine="exact")
+        return recording.select(Kind.IMPACT, surface="plate")["velocity_after"][0, 0]
+
+    assert after(0.0, 20.0) == pytest.approx(plate(20, 0.0, v=1.0)[1], rel=1e-12)
+    assert after(0.02, 20.0) == pytest.approx(plate(20, 0.02, v=1.0)[1], rel=1e-12)
+    assert after(0.02, 17.8) < 0.0 < after(0.02, 17.9)
+    assert after(0.0, 14.2) < 0.0 < after(0.0, 14.3)
+
+
+def test_belts_pay_less_the_faster_particles_land_as_lessons_4_and_9_say():
+    def paid(angle, speed):
+        settings = [f"outgoing.speed={speed}", "outgoing.length=20", "run.until=settled"]
+        recording = simulate(load(f"inclined-{angle}", settings), engine="exact")
+        entries = ledger(recording).by_surface["outgoing"]
+        return 1e3 * entries["belt_work"], 1e3 * entries["friction_loss"]
+
+    for speed in (1.0, 2.0):
+        for angle in (20, 40, 60):
+            assert paid(angle, speed) == pytest.approx(belt(speed, plate(angle)[1]), rel=1e-10)
 
 
 def test_the_slip_of_lesson_5_lasts_as_long_as_it_says():

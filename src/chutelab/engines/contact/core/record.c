@@ -64,8 +64,10 @@ void flush_track(int i) {
 static int foretold(const Track *track, const double *state, double radius) {
     double h = state[0] - track->knot[0];
     for (int n = 0; n < 3; n++) {
-        double v = track->knot[3 + n], a = track->bend[n], lever = n < 2 ? 1 : radius;
-        if (fabs(v + a * h - state[3 + n]) * lever > W.smooth_v) return 0;
+        double v = track->knot[3 + n], a = track->bend[n], off = fabs(v + a * h - state[3 + n]);
+        if (off * (n < 2 ? 1 : radius) > W.smooth_v) return 0;
+        /* A cubic whose end velocity is off by so much bulges by a seventh of off h. */
+        if (n < 2 && 0.15 * off * h > W.smooth_x) return 0;
         if (n < 2 && fabs(track->knot[1 + n] + (v + 0.5 * a * h) * h - state[1 + n]) > W.smooth_x)
             return 0;
     }

@@ -145,15 +145,15 @@ void hold(Disk *d, int k) {
     d->supports++;
 }
 
-/* Note that a disk gets an impulse at t; what it was before becomes a knot. */
-void was_moved(int i, double t) {
+/* Note that a disk gets an impulse now; what it was before becomes a knot. */
+void was_moved(int i) {
     Disk *d = W.disks + i;
     d->impacts++;
     d->calm = d->rest = 0;
     if (d->moved != W.stamp) {
         d->moved = W.stamp;
         W.moved[W.moved_count++] = i;
-        knot_before(i, t, d->vx, d->vy, d->spin);
+        knot_before_blow(i);
     }
 }
 
@@ -283,8 +283,8 @@ static void strike(int i, int j, double t) {
     double u[3];
     describe(&c, i, j);
     c.drift = 0;
-    was_moved(i, t);
-    if (c.two) was_moved(j, t);
+    was_moved(i);
+    if (c.two) was_moved(j);
     relative(&c, 0, u);
     if (u[0] >= 0) return;
     double back = -c.rest * u[0];

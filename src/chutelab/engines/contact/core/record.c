@@ -21,23 +21,26 @@ void knot_now(int i) {
     write_knot(i, state, d->entries);
 }
 
-/* Write the state in which a path ends, unless it is the last knot anyhow. In a crowd a rattling
-   disk has many impacts within a thousandth of a radius: of these the first and the last are told. */
+/* Write the state in which a path ends, unless it is the last knot anyhow. */
 void knot_before(int i, double t, double vx, double vy, double spin) {
     Disk *d = W.disks + i;
-    Track *track = W.tracks + i;
     double state[6] = {t, d->x, d->y, vx, vy, spin};
     flush_track(i);
-    if (!memcmp(state, track->knot, sizeof state)) return;
-    if (W.interact && track->blow >= 0 && track->drained == W.drained && t - track->knot[0] < W.step
-        && fabs(d->x - track->knot[1]) + fabs(d->y - track->knot[2]) < W.smooth_x) {
-        track->again = 1;
-        return;
-    }
-    write_knot(i, state, d->entries);
+    if (memcmp(state, W.tracks[i].knot, sizeof state)) write_knot(i, state, d->entries);
 }
 
-/* Write the state after a blow, over that of the blow before if `knot_before` said so. */
+/* The same before a blow. In a crowd a rattling disk has many of them within a thousandth of a
+   radius: of these the state before the first and that after the last are told. */
+void knot_before_blow(int i) {
+    const Disk *d = W.disks + i;
+    Track *track = W.tracks + i;
+    track->again = W.interact && !track->lasted && track->blow >= 0 && track->drained == W.drained
+        && d->t - track->knot[0] < W.step
+        && fabs(d->x - track->knot[1]) + fabs(d->y - track->knot[2]) < W.smooth_x;
+    if (!track->again) knot_before(i, d->t, d->vx, d->vy, d->spin);
+}
+
+/* Write the state after a blow, over that of the blow before if `knot_before_blow` said so. */
 void knot_after(int i) {
     Track *track = W.tracks + i;
     int end = W.knot_count, blow = track->again ? track->blow : end;

@@ -88,8 +88,9 @@ class _Line:
 class _Circle:
     """The pulley, the end of a segment, or the way round the pulley in a bed; `reach` includes r.
 
-    `left` is the left normal of the segment that ends here, None on the pulley; `joined` holds
-    segments that touch the circle, and the direction from there into each.
+    `left` points to the middle of the half that goes on as left faces: the sum of the left normals
+    of the segments that end here; None on the pulley. `joined` holds the segments that touch the
+    circle: which, where, and the direction from there along it.
     """
 
     center: Floats
@@ -150,6 +151,8 @@ class _Run:
         self.state[V] = releases.velocity[0]
         self.log = Recorder(1, machine.surfaces)
         self.things = _obstacles(machine)
+        # Face of each segment that was struck last: of a point on a line there is no telling.
+        self.sides: dict[int, float] = {}
         self.steps, self.landed, self.reason = 0, False, ""
 
     def result(self) -> Recording:
@@ -182,7 +185,8 @@ class _Run:
         """Return the unit normals (2, k) from a thing to places beside it."""
         thing = self.things[index]
         if isinstance(thing, _Line):
-            return np.outer(thing.left, np.where(thing.distance(place) >= 0.0, 1.0, -1.0))
+            aside = np.where(thing.distance(place) >= 0.0, 1.0, -1.0)
+            return np.outer(thing.left, aside if self.r > 0.0 else self.sides.get(index, 1.0))
         away = place - thing.center[:, None]
         return np.asarray(away / np.hypot(*away))
 
@@ -271,7 +275,7 @@ class _Run:
     # Forces, and what they do.
 
     def forces(self, on: _Lasting, y: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-        """Return normal, load and friction per mass, slip, and what would hold, at states (7, k)."""
+        """Return normal, load, friction, slip and what would hold (per mass) at states (7, k)."""
         thing = self.things[on.index]
         if on.normal is not None:
             n = on.normal[:, None] + np.zeros_like(y[X])
@@ -388,14 +392,12 @@ class _Run:
             earliest, which = inf, -1
             for k, (_, _, guard) in enumerate(guards):
                 seen = np.concatenate([[values[k]], guard(found)])
-                falls = np.flatnonzero((seen[:-1] > 0.0) & (seen[1:] <= 0.0))
                 values[k] = seen[-1]
-                if not len(falls):
-                    continue
-                low = step.t_old if falls[0] == 0 else times[falls[0] - 1]
-                t = self.moment(dense, guard, low, times[falls[0]])
-                if t < earliest:
-                    earliest, which = t, k
+                for at in np.flatnonzero((seen[:-1] > 0.0) & (seen[1:] <= 0.0)).tolist():
+                    low = step.t_old if at == 0 else times[at - 1]
+                    t = self.moment(dense, guard, low, times[at])
+                    if t < earliest and self.met(guards[k], dense(t)):
+                        earliest, which = t, k
             if which >= 0:
                 self.state, self.t0 = dense(earliest), self.t0 + earliest
                 return guards[which][:2]
@@ -403,6 +405,14 @@ class _Run:
                 self.knot(step.t, step.y)
         self.state, self.t0 = step.y.copy(), self.machine.end_time
         return "time", -1
+
+    def met(self, guard: tuple[str, int, Guard], y: Floats) -> bool:
+        """Whether the gap to a line that closes is that to the segment."""
+        name, k, _ = guard
+        thing = self.things[k]
+        return name not in ("left", "right") or (
+            isinstance(thing, _Line) and thing.within((self.base + y[X])[:, None])
+        )
 
     def moment(self, dense: Any, guard: Guard, low: float, high: float) -> float:
         """Return when a guard falls to 0 between two times."""
@@ -422,8 +432,8 @@ class _Run:
             aside = {on.index, *(j for j, _, _ in getattr(lies, "joined", ()))}
             aside |= {
                 k for k, thing in enumerate(self.things)
-                if isinstance(thing, _Circle) and on.index in [j for j, _, _ in thing.joined]
-                or on.carried and thing.surface == lies.surface
+                if (isinstance(thing, _Circle) and on.index in [j for j, _, _ in thing.joined])
+                or (on.carried and thing.surface == lies.surface)
             }  # fmt: skip
         for k, thing in enumerate(self.things):
             if k in aside:
@@ -431,21 +441,14 @@ class _Run:
             if isinstance(thing, _Circle):
                 yield "meets", k, self.to_circle(thing)
                 continue
-            for side in (1.0, -1.0):
-                yield "meets", k, self.to_line(thing, side)
+            yield "left", k, self.to_line(thing, 1.0)
+            yield "right", k, self.to_line(thing, -1.0)
 
     def to_line(self, thing: _Line, side: float) -> Guard:
         """Return the gap to a face; of one that is touched it starts as 0, to the last bit."""
         gap = side * float(thing.distance(self.base[:, None])[0]) - self.r
         gap = 0.0 if abs(gap) < TOUCH else gap
-        along = float(thing.foot(self.base[:, None])[0])
-
-        def left(y: Floats) -> Floats:
-            foot = along + thing.tangent @ y[X]
-            beside = (foot >= 0.0) & (foot <= thing.length)
-            return np.where(beside, gap + side * (thing.left @ y[X]), np.nan)
-
-        return left
+        return lambda y: gap + side * (thing.left @ y[X])
 
     def to_circle(self, thing: _Circle) -> Guard:
         """Return the gap to a circle, likewise."""
@@ -515,12 +518,15 @@ class _Run:
         elif name == "exit":
             self.tell(Kind.EXIT, -1)
             self.reason = "exit"
-        elif name == "meets":
+        elif name in ("left", "right", "meets"):
             if on is not None and on.carried:
                 raise UnableError("something is in the way of the ride")
+            self.sides[k] = -1.0 if name == "right" else 1.0
             self.blow(k, self.normal(k, self.base[:, None])[:, 0])
-            if not self.reason:
-                return self.contact()
+            lasting = None if self.reason else self.contact()
+            if on is not None and (lasting is None or lasting.index != on.index):
+                self.tell(Kind.SEPARATION, self.things[on.index].surface)
+            return lasting
         elif name == "lifts":
             assert on is not None
             self.tell(Kind.SEPARATION, self.things[on.index].surface)
@@ -625,8 +631,10 @@ def _obstacles(machine: Machine) -> list[_Line | _Circle]:
         assert isinstance(line, _Line)
         joined = tuple(end for end in ends if np.abs(end[1] - point).max() <= TOUCH)
         if joined[0][0] == k:  # of several that end here, the first
+            same = [lines[j] for j, _, _ in joined if s.surface[j] == line.surface]
+            crown = sum((other.left for other in same if isinstance(other, _Line)), np.zeros(2))
             circles.append(
-                _Circle(point, r, line.left, joined, line.speed, line.restitution, line.friction,
+                _Circle(point, r, crown, joined, line.speed, line.restitution, line.friction,
                         line.surface)
             )  # fmt: skip
     return lines + circles

@@ -1,0 +1,55 @@
+"""The machine in Pymunk: Chipmunk finds the contacts and solves them.
+
+Nothing here is shared with the other engines but the machine and the recorder: the check from
+outside.
+
+- `world`: the machine as a `pymunk.Space`; tracks and books.
+- `lone`: one particle whose steps end at its contacts.
+"""
+
+from __future__ import annotations
+
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+from chutelab.engines.pymunk.lone import Lone
+from chutelab.engines.pymunk.world import World
+from chutelab.machine import moved, origin
+from chutelab.recorder import Recorder, StalledError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from chutelab.machine import Machine
+    from chutelab.recording import Recording
+
+
+def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Recording:
+    """Run a machine in Pymunk."""
+    if machine.particle.radius <= 0.0:
+        raise ValueError("particle.radius = 0: pymunk needs disks with a radius above 0 m")
+    begin, steps = perf_counter(), 0
+    place = origin(machine)
+    machine = moved(machine, -place[0], -place[1])
+    recorder = Recorder(machine.count, machine.surfaces)
+
+    def finished() -> Recording:
+        return recorder.finish(
+            scene=machine.text, title=machine.title, engine="pymunk", particle=machine.particle,
+            gravity=machine.gravity, steps=steps, seconds=perf_counter() - begin, origin=place,
+        )  # fmt: skip
+
+    try:
+        world = World(machine)
+        for particle in range(machine.count):
+            lone = Lone(machine, world, recorder, particle)
+            lone.run()
+            steps += lone.steps
+            if progress is not None:
+                progress((particle + 1) / machine.count)
+    except StalledError as stalled:
+        stalled.recording = finished()
+        x, y = stalled.position
+        stalled.position = x + place[0], y + place[1]
+        raise
+    return finished()

@@ -9,8 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, Phase, given, settings
-from hypothesis import strategies as st
 
 from chutelab import ballistics, exact, impact, machine, reference, scene, theory
 from chutelab.accuracy import reach
@@ -19,37 +17,10 @@ from chutelab.agreement.pairs import order
 from chutelab.compare import QUANTITIES, compare
 from chutelab.compare import scene_of as scene_from
 from chutelab.exact import touch
-from chutelab.recording import Kind
+from chutelab.recording import REASONS, Kind
+from drawn import draw
 
 GRAVITY = 9.81
-
-draws = st.fixed_dictionaries(
-    {
-        "speed": st.floats(0.3, 6.0),
-        "pulley_radius": st.floats(0.03, 0.6),
-        "angle_deg": st.floats(-60.0, 60.0),
-        "restitution": st.floats(0.0, 1.0),
-        "radius": st.floats(0.0, 0.02).filter(lambda r: r == 0.0 or r > 1e-6),
-        "distance": st.floats(0.1, 1.5),
-    }
-)
-
-
-def scene_of(draw, *, outgoing=True, max_time=30.0):
-    return scene.from_dict(
-        {
-            "gravity": GRAVITY,
-            "run": {"max_time": max_time},
-            "particle": {"radius": draw["radius"]},
-            "incoming": {"speed": draw["speed"], "pulley_radius": draw["pulley_radius"]},
-            "plate": {
-                "distance": draw["distance"],
-                "angle_deg": draw["angle_deg"],
-                "restitution": draw["restitution"],
-            },
-            **({"outgoing": {"drop": 0.5, "drop_from": "impact"}} if outgoing else {}),
-        }
-    )
 
 
 def contacts_of(recording):
@@ -58,29 +29,22 @@ def contacts_of(recording):
     return [recording.surfaces[event["surface"]] for event in struck if event["particle"] == 0]
 
 
-def built_or_none(drawn):
-    try:
-        return machine.build(drawn)
-    except scene.SceneError:
-        return None
-
-
 def plate_normal(recording):
     alpha = radians(scene_from(recording).plate.angle_deg)
     return np.array([-cos(alpha), -sin(alpha)])
 
 
-def allowance(draw, found):
-    """1e-12, divided by how near the draw is to a grazing impact or to the critical speed."""
-    rc = draw["pulley_radius"] + draw["radius"]
-    critical = abs(1.0 - draw["speed"] ** 2 / (GRAVITY * rc))
-    grazing = abs(found["v2"] and found["normal"] / found["v2"]) if found else 1.0
-    bound = 1e-12
-    if grazing < 1e-3:
-        bound /= grazing
-    if critical < 1e-6:
-        bound /= max(critical, 1e-300)
-    return bound
+def allowance(drawn, prediction):
+    """1e-12, divided by how near a scene is to a grazing impact or to the critical speed."""
+    worst = 1.0
+    if isfinite(prediction.phi2) and abs(sin(prediction.phi2)) < 1e-3:
+        worst = abs(sin(prediction.phi2))
+    if drawn.incoming is not None and drawn.gravity > 0.0:
+        ride = drawn.incoming.pulley_radius + drawn.particle.radius
+        critical = abs(1.0 - drawn.incoming.speed**2 / (drawn.gravity * ride))
+        if critical < 1e-6:
+            worst = min(worst, critical)
+    return 1e-12 / max(worst, 1e-300)
 
 
 def confirm(reason, recording):
@@ -106,47 +70,43 @@ def confirm(reason, recording):
         assert struck[1:2] != ["outgoing"], (reason, struck)
 
 
-def test_exact_agrees_with_the_closed_form_on_a_thousand_random_scenes():
+@pytest.mark.parametrize(
+    "seeds", [range(40), pytest.param(range(500), marks=pytest.mark.slow)], ids=["40", "500"]
+)
+def test_exact_is_the_closed_form_wherever_that_speaks(seeds):
     tally = Counter()
-
-    @settings(max_examples=1000, phases=[Phase.generate], suppress_health_check=list(HealthCheck))
-    @given(draws)
-    def one(draw):
-        prediction = theory.predict(scene_of(draw))
-        # Some rebounds rattle on in the nip of plate and pulley: stop once all is told.
-        told = [float(t) for t in (prediction.t2, prediction.t3) if isfinite(t)]
-        enough = 2.0 / draw["speed"] + sum(told) + 6.0
-        drawn = scene_of(draw, max_time=enough)
-        reason = str(prediction.reason)
-        tally["drawn"] += 1
-        built = built_or_none(drawn)
-        if built is None:
-            # The plate's line is missed, so there is nothing to hang the outgoing belt on; what
-            # the theory says of the same scene without one, the engine confirms.
-            assert theory.Reason.of(reason) is theory.Reason.NO_IMPACT, reason
-            alone = scene_of(draw, outgoing=False, max_time=enough)
-            confirm(str(theory.predict(alone).reason), exact.run(machine.build(alone)))
-            tally["refused"] += 1
-            return
-        recording = exact.run(built)
+    for seed in seeds:
+        drawn = draw(seed)
+        prediction = theory.predict(drawn)
+        reason, kind = str(prediction.reason), theory.Reason.of(prediction.reason)
+        tally[kind] += 1
+        try:
+            recording = exact.run(machine.build(drawn))
+        except exact.CornerError:
+            # A disk held between a belt and a wall; the theory has stopped before.
+            assert kind is not None, seed
+            tally["corner"] += 1
+            continue
         compared = compare(recording)
-        if reason:
+        tally["compared"] += bool(compared.errors)
+        assert (compared.max or 0.0) <= allowance(drawn, prediction), (seed, compared.errors)
+        if REASONS[recording.ended[0]] == "time" or kind is theory.Reason.OUTSIDE:
+            continue
+        free = drawn.incoming.friction != "adhesion"
+        if drawn.gravity == 0.0 and (free or "second contact: incoming" in reason):
+            # Nothing presses it on the belt: it flies along it, on the way there or back.
+            told = (Kind.IMPACT, Kind.SEPARATION) if free else (Kind.IMPACT,)
+            assert not len(recording.select(*told, surface="incoming"))
+        elif reason:
             confirm(reason, recording)
-            tally[reason.partition(":")[0]] += 1
-            return
-        assert contacts_of(recording) == ["plate", "outgoing"]
-        names = [n for n in QUANTITIES if n not in ("belt_work", "slip_heat")]
-        assert set(names) == set(compared.errors)
-        hit = recording.select(Kind.IMPACT)[0]
-        vx, vy = hit["velocity_before"]
-        alpha = radians(draw["angle_deg"])
-        found = {"v2": compared.simulated["v2"], "normal": vx * cos(alpha) + vy * sin(alpha)}
-        assert compared.max <= allowance(draw, found), (draw, compared.errors)
-        tally["reached"] += 1
-
-    one()
-    assert tally["drawn"] == sum(n for what, n in tally.items() if what != "drawn") >= 1000
-    assert tally["reached"] >= 0.4 * tally["drawn"], tally
+        else:
+            assert contacts_of(recording)[:2] == ["plate", "outgoing"], seed
+            # All but the two that only a particle has that settles.
+            assert len(compared.errors) >= len(QUANTITIES) - 2, (seed, compared.errors)
+            tally["landed"] += 1
+    assert tally["compared"] > 0.5 * len(seeds), tally
+    assert tally["landed"] >= 0.1 * len(seeds), tally
+    assert tally["corner"] < 0.05 * len(seeds), tally
 
 
 # What `verify` promises of one answer beside another.

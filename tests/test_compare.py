@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import acos, atan2, cos, hypot, isnan, nan, radians, sin
+from math import acos, atan2, cos, hypot, isnan, nan, pi, radians, sin
 
 import numpy as np
 import pytest
@@ -191,3 +191,27 @@ def test_a_particle_that_never_stops_slipping_is_not_compared_with_one_that_does
     assert "belt_work" not in found.errors
     assert found.theory["belt_work"] > 0.0
     assert found.max < 5e-15
+
+
+def test_a_rebound_up_along_the_plate_has_one_angle():
+    # ε = 0 and no friction: up along the plate, where φ2' is π and rounding could say -π.
+    angles = np.linspace(-59.0, -21.0, 20)
+    for angle in angles:
+        compared = compare(
+            run("perpendicular", f"plate.angle_deg={angle}", "plate.restitution=0",
+                "incoming.speed=5.0")
+        )  # fmt: skip
+        assert compared.simulated["phi2r"] == pytest.approx(pi, abs=1e-13)
+
+
+def test_what_the_belt_pays_is_compared_only_where_it_alone_brings_to_rest():
+    # It bounces from the belt back to the plate, whose blow the closed form does not know.
+    nook = ("plate.angle_deg=20", "plate.restitution=0.1", "outgoing.restitution=0.8")
+    way = ("incoming.speed=3", "outgoing.drop=1.0", "outgoing.speed=4", "outgoing.length=60")
+    again = run("perpendicular", *nook, *way, "run.until=settled")
+    assert again.ended[0] == 2
+    after = again.events["t"] > again.select(Kind.LANDING)["t"][0]
+    assert "plate" in [again.surfaces[s] for s in again.events["surface"][after]]
+    assert isnan(compare(again).simulated["belt_work"])
+    alone = run("perpendicular", "run.until=settled")
+    assert compare(alone).errors["belt_work"] < 1e-12

@@ -7,7 +7,7 @@ from math import acos, atan, cos, degrees, hypot, radians, sin, sqrt
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -254,6 +254,146 @@ def test_beyond_the_matching_angle_the_plate_is_passed():
             }
         )
         assert bool(len(recording.select(Kind.IMPACT))) is meets
+
+
+# The ends of moving surfaces
+
+
+def rim_speed(tangent, speed, normal):
+    """Speed of the surface along (n_y, -n_x): v s, s = 1 where n·L >= 0 (L left of it), else -1."""
+    left = np.array([-tangent[1], tangent[0]])
+    return speed if normal @ left >= 0.0 else -speed
+
+
+def blown(normal, velocity, points, *, speed, restitution, friction, spin):
+    """Throw a disk, r = 0.05, at the origin without gravity, to meet it at a normal."""
+    r, way = 0.05, 0.2
+    return run(
+        {
+            "gravity": 0.0,
+            "particle": {"radius": r, "spin": spin, "mass": 0.1},
+            "surface": [
+                {
+                    "name": "belt",
+                    "points": np.asarray(points).tolist(),
+                    "speed": speed,
+                    "restitution": restitution,
+                    "friction": friction,
+                }
+            ],
+            "stream": {
+                "at": (r * normal - way * velocity).tolist(),
+                "velocity": velocity.tolist(),
+            },
+            "run": {"until": 0.3},
+        }
+    )
+
+
+def direction(angle):
+    return np.array([cos(angle), sin(angle)])
+
+
+@given(
+    st.floats(-3.0, 3.0),
+    st.sampled_from([1.0, -1.0]),
+    st.floats(-1.4, 1.4),
+    st.floats(-1.3, 1.3),
+    st.floats(-3.0, 3.0),
+    st.sampled_from([0.0, 0.2, 1.0, 1e6]),
+    st.booleans(),
+)
+def test_the_end_of_a_belt_strikes_like_a_roller(lean, course, turn, aim, speed, friction, spin):
+    # The belt lies along `inward` from the origin and runs towards the origin, or away from it;
+    # the normal is up to 80° off straight out, the way in up to 75° off the normal.
+    inward = direction(lean)
+    tangent = -course * inward
+    normal = direction(lean + np.pi + turn)
+    velocity = -direction(lean + np.pi + turn + aim)
+    # At the very tip, where the rim changes its direction, rounding decides.
+    assume(abs(turn) > 1e-9 and velocity @ inward > 1e-3)
+    restitution, share = 0.6, 1.0 / 3.0 if spin else 1.0
+    far = 2.0 * inward
+    points = [far, [0.0, 0.0]] if course > 0.0 else [[0.0, 0.0], far]
+    recording = blown(
+        normal, velocity, points,
+        speed=speed, restitution=restitution, friction=friction, spin=spin,
+    )  # fmt: skip
+    hit = recording.select(Kind.IMPACT)[0]
+    np.testing.assert_allclose(hit["position"], 0.05 * normal, atol=1e-14)
+    along = np.array([normal[1], -normal[0]])
+    approach = -velocity @ normal
+    slip = velocity @ along - rim_speed(tangent, speed, normal)
+    most = friction * (1.0 + restitution) * approach
+    push = np.clip(-share * slip, -most, most)
+    after = restitution * approach * normal + (velocity @ along + push) * along
+    np.testing.assert_allclose(hit["velocity_after"], after, atol=1e-12)
+    assert hit["omega_after"] == pytest.approx(2.0 * push / 0.05 if spin else 0.0, abs=1e-11)
+
+
+@pytest.mark.parametrize("share", [0.02, 0.3, 0.5, 0.7, 0.98])
+def test_a_belt_bent_sharply_runs_on_round_its_joint(share):
+    # It turns right by 150° at the origin: normals from the first face's to the second's.
+    bend = radians(150.0)
+    first, second = direction(0.0), direction(-bend)
+    normal = direction(0.5 * np.pi - share * bend)
+    recording = blown(
+        normal, -normal, [-first, [0.0, 0.0], second],
+        speed=0.7, restitution=0.5, friction=1e6, spin=False,
+    )  # fmt: skip
+    after = recording.select(Kind.IMPACT)[0]["velocity_after"]
+    np.testing.assert_allclose(
+        after, 0.5 * normal + 0.7 * np.array([normal[1], -normal[0]]), atol=1e-12
+    )
+
+
+@pytest.mark.parametrize("upward", [1.0, -1.0])
+@pytest.mark.parametrize("spin", [True, False])
+def test_a_ride_over_the_tip_of_a_belt_feels_the_rim_turn_round(upward, spin):
+    # On the end of an upright belt, let go left of the top and pushed over it: φ from the top,
+    # ρ φ' = w, w' = g sin φ + F, F = -µ N sign(u), N = g cos φ - w²/ρ, u = w + z - belt(φ).
+    r, friction, speed, start, push = 0.05, 0.1, 5.0 * upward, -0.2, 0.3
+    post = {"name": "post", "from": [0.0, -1.0], "to": [0.0, 0.0], "speed": speed}
+    place = [r * sin(start), r * cos(start)]
+    drop = [push * cos(start), -push * sin(start)]
+    recording = thrown(
+        place,
+        drop,
+        {**post, "friction": friction, "restitution": 0.0},
+        radius=r,
+        spin=spin,
+        until=0.5,
+    )
+
+    def riding(belt):
+        def rates(_, y):
+            phi, w, z = y
+            load = G * cos(phi) - w**2 / r
+            force = -friction * load * np.sign(w + z - belt)
+            return [w / r, G * sin(phi) + force, 2.0 * force if spin else 0.0]
+
+        return rates
+
+    def over(_, y):
+        return y[0]
+
+    def lifts(_, y):
+        return G * cos(y[0]) - y[1] ** 2 / r
+
+    precise = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-15}
+    rise = solve_ivp(
+        riding(speed), [0.0, 1.0], [start, push, 0.0], events=[stop(over), stop(lifts)], **precise
+    )
+    fall = solve_ivp(
+        riding(-speed), [rise.t[-1], 1.0], [0.0, *rise.y[1:, -1]], events=stop(lifts), **precise
+    )
+    parting = recording.select(Kind.SEPARATION)[0]
+    assert parting["t"] == pytest.approx(fall.t[-1], rel=1e-10)
+    phi, w, z = fall.y[:, -1]
+    assert np.arctan2(*parting["position"]) == pytest.approx(phi, abs=1e-10)
+    assert hypot(*parting["velocity_after"]) == pytest.approx(w, rel=1e-10)
+    assert r * parting["omega_after"] == pytest.approx(z, abs=1e-10)
+    assert ledger(recording).relative_residual < 1e-13
 
 
 # Round the pulley

@@ -63,6 +63,10 @@ MEANINGS = {
 }
 
 
+ALONG = 1e-14
+"""Share of the rebound speed below which its part away from the plate is rounding."""
+
+
 @dataclass(frozen=True, repr=False)
 class Comparison(Shown):
     """Particle 0 of a recording beside the theory, SI units and radians.
@@ -181,12 +185,15 @@ def observed(recording: Recording, scene: Scene) -> dict[str, float]:
     left = _first(recording, own, "incoming", Kind.SEPARATION)
     hit = _first(recording, own, "plate", Kind.IMPACT)
     down = _first(recording, own, "outgoing", Kind.LANDING)
+    landing = recording.surface_index("outgoing")
     hit = hit if left is not None else None
     down = down if hit is not None else None
     events = (_NEVER if event is None else event for event in (left, hit, down))
     out |= {name: float(value) for name, value in from_events(scene, *events).items()}
-    # What the belt pays until there is no slip is known only of a particle that got there.
-    if recording.count == 1 and REASONS[recording.ended[0]] == "settled":
+    # What the belt pays until there is no slip is known only of a particle that got there, and had
+    # nothing but the belt to do with since it landed.
+    settled = recording.count == 1 and REASONS[recording.ended[0]] == "settled"
+    if down is not None and settled and (own["surface"][own["t"] > down["t"]] == landing).all():
         entries = ledger(recording).by_surface.get("outgoing")
         if entries is not None:
             out["belt_work"], out["slip_heat"] = entries["belt_work"], entries["friction_loss"]
@@ -215,6 +222,9 @@ def from_events(scene: Scene, left: Any, hit: Any, down: Any) -> dict[str, Any]:
     (ux, uy), (wx, wy) = (np.moveaxis(hit[f"velocity_{w}"], -1, 0) for w in ("before", "after"))
     vx, vy = np.moveaxis(down["velocity_before"], -1, 0)
     sine, cosine = np.sin(alpha), np.cos(alpha)
+    away, along = -(wx * cosine + wy * sine), wx * sine - wy * cosine
+    # Rounding must not choose between π and -π for a rebound up along the plate.
+    away = np.where(np.abs(away) <= ALONG * np.hypot(wx, wy), 0.0, away)
     energy = 0.5 * scene.particle.mass * (vx * vx + belt * belt)
     return {
         "phi1": np.arctan2(x1, y1),
@@ -224,7 +234,7 @@ def from_events(scene: Scene, left: Any, hit: Any, down: Any) -> dict[str, Any]:
         "v2": np.hypot(ux, uy),
         "v2r": np.hypot(wx, wy),
         "phi2": np.arctan2(ux * cosine + uy * sine, ux * sine - uy * cosine),
-        "phi2r": np.arctan2(-(wx * cosine + wy * sine), wx * sine - wy * cosine),
+        "phi2r": np.arctan2(away, along + 0.0),  # + 0.0: the angle of no rebound is 0, not -π
         "t3": down["t"] - hit["t"],
         "x3": x2 - x3,
         "y3": y2 - y3,

@@ -24,8 +24,9 @@ GRAZING = 1e-9
 class Bounds:
     """Nearest angles (rad) below and above where a ride ends, and what is there; arrays (k,).
 
-    ∓inf and obstacle -1 where the way is free. `handover` marks an end of the circle itself, where
-    a face of the segment it belongs to takes over without a blow.
+    ∓inf and obstacle -1 where the way is free. `handover` marks where something takes over without
+    a blow: at an end of the circle a face of its segment, at the tip of a moving one, where the rim
+    changes its direction, the other half of the circle.
     """
 
     low: Floats
@@ -53,7 +54,7 @@ class Bounds:
 
     def narrow(
         self, phi: Floats, angle: Floats, closing: Floats, met: NDArray[np.bool_],
-        obstacle: int, side: Floats | int, handover: bool = False,
+        obstacle: Ints | int, side: Floats | int, handover: bool = False,
     ) -> None:  # fmt: skip
         """Take in one more obstacle, whose gap falls with φ at the rate `closing` at `angle`."""
         turn = 2.0 * np.pi
@@ -72,8 +73,9 @@ class Bounds:
 
 
 def bounds(
-    obstacles: Obstacles, rows: Ints, circle: Ints, rho: Floats, phi: Floats, radius: Value
-) -> Bounds:
+    obstacles: Obstacles, rows: Ints, circle: Ints, side: Floats, rho: Floats, phi: Floats,
+    radius: Value,
+) -> Bounds:  # fmt: skip
     """Find what stops rides round circles in both directions.
 
     Parameters
@@ -82,6 +84,8 @@ def bounds(
         All of them.
     rows, circle : ndarray, (k,)
         Particles, and the circles (obstacle number less S) they ride.
+    side : ndarray, (k,)
+        On which half of it, see `Obstacles.rim_side`.
     rho, phi : ndarray, (k,)
         Radius of the centre's path (m) and angle now, from the top, clockwise (rad).
     radius : float, or ndarray, (k,)
@@ -96,16 +100,16 @@ def bounds(
         normal = rows_of(obstacles.normal[:, segment], rows)
         length = rows_of(obstacles.length[segment], rows)
         owned = obstacles.owns[circle, segment] | (on_pulley & (segment == 0))
-        for side in (1, -1):
+        for face in (1, -1):
             # The gap to a face is ρ (cos(φ - tilt) - level).
-            tilt = np.arctan2(side * normal[0], side * normal[1])
-            level = (side * dot(start - center, normal) + radius) / rho
+            tilt = np.arctan2(face * normal[0], face * normal[1])
+            level = (face * dot(start - center, normal) + radius) / rho
             half = np.arccos(np.clip(level, -1.0, 1.0))
-            met = (np.abs(level) <= 1.0) & ~(owned & (~on_pulley | (side == 1)))
+            met = (np.abs(level) <= 1.0) & ~(owned & (~on_pulley | (face == 1)))
             for angle in (tilt - half, tilt + half):
                 foot = dot(center + rho * _up(angle) - start, tangent)
                 there = met & (foot >= 0.0) & (foot <= length)
-                found.narrow(phi, angle, np.sin(angle - tilt), there, segment, side)
+                found.narrow(phi, angle, np.sin(angle - tilt), there, segment, face)
         # The circle belongs to a segment on the outer side of that segment's end.
         middle = start + 0.5 * length * tangent
         outward = np.where(dot(center - middle, tangent) > 0.0, 1.0, -1.0) * tangent
@@ -113,6 +117,11 @@ def bounds(
         for angle in (tilt - 0.5 * np.pi, tilt + 0.5 * np.pi):
             side_there = np.where(dot(_up(angle), normal) > 0.0, 1, -1)
             found.narrow(phi, angle, np.sin(angle - tilt), owned, segment, side_there, True)
+    crown, here = pick(obstacles.crown, rows, circle), circle + obstacles.segments
+    tilt = np.arctan2(crown[0], crown[1])
+    moves = ~on_pulley & (pick(obstacles.material, rows, here)[0] != 0.0)
+    for angle in (tilt - 0.5 * np.pi, tilt + 0.5 * np.pi):
+        found.narrow(phi, angle, side * np.sin(angle - tilt), moves, here, -side, True)
     for other in range(obstacles.center.shape[1]):
         # The gap to a circle grows with -cos(φ - tilt).
         apart = rows_of(obstacles.center[:, other], rows) - center

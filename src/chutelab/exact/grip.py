@@ -29,7 +29,6 @@ def settle_law(s: Swarm, who: Ints) -> None:
         return
     c = s.contact(who, s.on[who], s.side[who])
     arc = s.mode[who] == Mode.ARC
-    c = c._replace(belt=np.where(arc, s.belt[who], c.belt))
     w = dot(s.v.take(who, axis=1), c.tangent)
     slip = s.slip_of(who, c, w)
     still = slip == 0.0
@@ -56,11 +55,10 @@ def end_slip(s: Swarm, who: Ints) -> None:
     if not len(who):
         return
     c = s.contact(who, s.on[who], s.side[who])
-    belt = np.where(s.mode[who] == Mode.ARC, s.belt[who], c.belt)
     if s.spins:
-        s.z[who] = belt - dot(s.v.take(who, axis=1), c.tangent)
+        s.z[who] = c.belt - dot(s.v.take(who, axis=1), c.tangent)
     else:
-        s.v[:, who] = belt * c.tangent
+        s.v[:, who] = c.belt * c.tangent
     settle_law(s, who)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sys import float_info
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -68,11 +68,12 @@ def obstacles(machine: Machine, origin: tuple[float, float] = (0.0, 0.0)) -> Obs
     rho = np.empty(center.shape[1:])
     rho[:] = r
     material, surface = _material(seg, owner)
-    pulley, pulley_speed = NONE, cast("Value", 0.0)
+    pulley = NONE
     if wheel is not None:
-        pulley, pulley_speed = flat + len(ends), wheel.speed
+        pulley = flat + len(ends)
         center[:, -1], rho[-1], surface[-1] = 0.0, wheel.radius + r, wheel.surface
-        material[:2, -1], material[2, -1], material[3, -1] = 0.0, wheel.restitution, wheel.friction
+        for row, value in enumerate((wheel.speed, wheel.restitution, wheel.friction)):
+            material[row, -1] = value
     first, second = corners[:, :flat], corners[:, flat:]
     # A circle's box is smaller: what only touches it does not meet it.
     reach, inner = r + BOX_TOUCHES * touch, rho - touch
@@ -88,7 +89,6 @@ def obstacles(machine: Machine, origin: tuple[float, float] = (0.0, 0.0)) -> Obs
         spots=tuple(spots),
         end_circle=np.array(end_circle, dtype=np.int64).reshape(-1, 2),
         pulley=pulley,
-        pulley_speed=pulley_speed,
         touch=touch,
     )
 
@@ -127,10 +127,8 @@ def _faces(start: Floats, tangent: Floats, length: Floats) -> Floats:
 
 def _material(segments: Segments, owner: list[int]) -> tuple[Floats, Ints]:
     """Return `Obstacles.material` and `Obstacles.surface` of obstacles that belong to segments."""
-    tangent = _vectors(segments.tangent)
-    material = np.empty((4, *tangent.shape[1:]))
-    material[:2] = _scalars(segments.speed) * tangent
-    material[2], material[3] = _scalars(segments.restitution), _scalars(segments.friction)
+    each = (segments.speed, segments.restitution, segments.friction)
+    material = np.stack([_scalars(values) for values in each])
     which = np.array(owner, dtype=np.int64)
     return material.take(which, axis=1), segments.surface.take(which)
 

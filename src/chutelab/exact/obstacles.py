@@ -47,9 +47,9 @@ class Obstacles:
         Centres of the circles: segment ends, then the pulley.
     rho : ndarray, (C, n)
         Distance of a particle's centre from the circle's at contact, m.
-    material : ndarray, (4, S + C, n)
-        Surface velocity of segments and ends as a world vector (two rows, m/s), and the pair
-        values: restitution, friction.
+    material : ndarray, (3, S + C, n)
+        Speed of the surface, of segments and their ends along the segment, of the pulley clockwise
+        (m/s), and the pair values: restitution, friction.
     low, high : ndarray, (2, S + C, n)
         Box that a particle's centre is in when it touches, m.
     surface : ndarray, (S + C,)
@@ -60,8 +60,6 @@ class Obstacles:
         Obstacle number of the circle at a segment's first and second end, or -1 for a point.
     pulley : int
         Obstacle number of the pulley, or -1.
-    pulley_speed : float, or ndarray, (n,)
-        Speed of the pulley's rim, clockwise, m/s.
     touch : float, or ndarray, (n,)
         m; gaps smaller than this are rounding.
     """
@@ -77,7 +75,6 @@ class Obstacles:
     spots: tuple[tuple[int, int], ...]
     end_circle: Ints
     pulley: int
-    pulley_speed: Value
     touch: Value
 
     @property
@@ -154,6 +151,24 @@ class Obstacles:
                         follow[s, e], follow[other, f] = other, s
         return follow
 
+    @cached_property
+    def crown(self) -> Floats:
+        """Vectors, (2, C, n), to the middle of the half that joins the left face of a segment.
+
+        At an end that is the segment's left normal, at a joint the sum of both. The pulley, which
+        turns clockwise all round, has 0.
+        """
+        crown = np.zeros((2, len(self.rho), self.length.shape[-1]))
+        for segment, end in reversed(list(np.ndindex(self.end_circle.shape))):
+            circle, joined = self.end_circle[segment, end], self.follow[segment, end]
+            if circle in (NONE, self.pulley):
+                continue
+            crown[:, circle - self.segments] = self.normal[:, segment]
+            if joined != NONE:
+                goes_on = self.end_circle[joined, 1 - end] == circle
+                crown[:, circle - self.segments] += (1 if goes_on else -1) * self.normal[:, joined]
+        return crown
+
     def of(self, first: int, last: int) -> Obstacles:
         """Return the obstacles of the particles from `first` up to `last`."""
         if self.length.shape[-1] == 1:
@@ -162,7 +177,6 @@ class Obstacles:
         return replace(
             self,
             **{name: getattr(self, name)[..., first:last] for name in PER_PARTICLE},
-            pulley_speed=of(self.pulley_speed, slice(first, last)),
             touch=of(self.touch, slice(first, last)),
         )
 
@@ -178,6 +192,15 @@ class Obstacles:
             away = position[:, rows[round_]] - pick(self.center, rows[round_], circle)
             normal[:, round_] = away / np.hypot(away[0], away[1])
         return np.asarray(normal)
+
+    def rim_side(self, rows: Ints, obstacle: Ints, normal: Floats) -> Floats:
+        """Return which half of circles (k,) normals (2, k) are on: 1, or -1 away from the crown.
+
+        Round the end of a segment of speed v the surface moves with ±v along (n_y, -n_x), which is
+        v along the segment on both its faces.
+        """
+        crown = pick(self.crown, rows, obstacle - self.segments)
+        return np.where(dot(normal, crown) >= 0.0, 1.0, -1.0)
 
     def snapped(
         self, rows: Ints, obstacle: Ints, side: Floats, position: Floats, r: Value

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from chutelab.exact.arcs import bounds
-from chutelab.exact.grip import end_slip, settle_law
+from chutelab.exact.grip import end_slip
 from chutelab.exact.obstacles import Floats, Ints, dot, pick
-from chutelab.exact.swarm import Mode, Swarm
 from chutelab.exact.touch import rest_on, strike
 from chutelab.many import of
 from chutelab.recording import Kind
 from chutelab.ride import STEP_ANGLE, Circle, Outcome, advance, normal_force
+
+if TYPE_CHECKING:
+    from chutelab.exact.swarm import Swarm
 
 
 def ride_on(s: Swarm, who: Ints, circle: Ints) -> None:
@@ -49,7 +53,8 @@ def carry_round(s: Swarm, who: Ints) -> None:
     if np.count_nonzero(cosine < 1.0):
         end = np.arctan2(np.sqrt((1.0 - cosine) * (1.0 + cosine)), cosine)
         pulley = np.full(len(who), o.pulley - o.segments)
-        found = bounds(o, who, pulley, rho, np.zeros(len(who)), of(s.radius, who))
+        top, clockwise = np.zeros(len(who)), np.ones(len(who))
+        found = bounds(o, who, pulley, clockwise, rho, top, of(s.radius, who))
         struck = ~found.high_handover & (found.high < end)
         end = np.where(struck, found.high, end)
         end = np.where(end * rho / v > left, left * v / rho, end)
@@ -93,7 +98,7 @@ def ride(s: Swarm, who: Ints) -> None:
         rho=rho,
         gravity=np.full(len(who), of(s.gravity, who)),
         friction=c.friction,
-        belt=s.belt[who],
+        belt=c.belt,
         slip=s.slip[who],
         turns=np.full(len(who), s.spins),
         low=s.bounds.low[who],
@@ -112,7 +117,7 @@ def ride(s: Swarm, who: Ints) -> None:
     s.book(
         who[go],
         c.surface[go],
-        (mass * step.work * s.belt[who])[go],
+        (mass * step.work * c.belt)[go],
         0.0,
         (mass * step.heat)[go],
     )
@@ -133,9 +138,7 @@ def ride(s: Swarm, who: Ints) -> None:
         obstacle = getattr(s.bounds, f"{name}_obstacle")[who]
         side = getattr(s.bounds, f"{name}_side")[who]
         joins = at & getattr(s.bounds, f"{name}_handover")[who]
-        s.mode[who[joins]] = Mode.FACE
-        s.on[who[joins]], s.side[who[joins]] = obstacle[joins], side[joins]
-        settle_law(s, who[joins])
+        rest_on(s, who[joins], obstacle[joins], side[joins], np.zeros(np.count_nonzero(joins)))
         hit = at & ~joins
         if hit.any():
             strike(s, who[hit], obstacle[hit], side[hit])

@@ -11,7 +11,7 @@ import numpy as np
 from chutelab.exact.arcs import Bounds
 from chutelab.exact.journal import STATE, Journal
 from chutelab.exact.motion import Past
-from chutelab.exact.obstacles import NONE, Floats, Ints, along, dot, pick
+from chutelab.exact.obstacles import NONE, Floats, Ints, along, pick
 from chutelab.impact import DISK_SHARE
 from chutelab.many import Value, at, of
 from chutelab.recorder import StalledError
@@ -74,13 +74,11 @@ class Swarm:
     mode : ndarray, (k,)
         See `Mode`.
     on, side, slip : ndarray, (k,)
-        Obstacle touched while sliding or riding and its face (±1, 0 for circles); sign of the slip,
-        0 without (and 1 in flight, where there is nothing to grip).
+        Obstacle touched while sliding or riding and its face (±1; see `Obstacles.rim_side` for
+        circles), 0 in flight; sign of the slip, 0 without (and 1 in flight, where there is nothing
+        to grip).
     left, left_side, order : ndarray, (k,)
         See `detect.Motion`.
-    belt : ndarray, (k,)
-        Speed of the surface under a ride round a circle, fixed when the ride begins: the end of a
-        belt carries like a roller turning as fast as the belt does there.
     everyone : ndarray, (k,)
         Their numbers.
     stop : ndarray, (k,)
@@ -122,7 +120,7 @@ class Swarm:
         integers = np.zeros((5, count), dtype=np.int64)
         integers[3:] = NONE
         self.order, self.idle, self.crawls, self.on, self.left = integers
-        self.side, self.left_side, self.belt, self.slip = np.zeros((4, count))
+        self.side, self.left_side, self.slip = np.zeros((3, count))
         self.slip[:] = 1.0
         self.stop = of(machine.end_time, mine) - self.released
         self.landed = np.zeros(count, dtype=bool)
@@ -189,17 +187,20 @@ class Swarm:
     def contact(
         self, who: Ints, obstacle: Ints, side: Floats, normal: Floats | None = None
     ) -> Contact:
-        """Return what a contact with an obstacle is like where the particles are now."""
+        """Return what a contact with an obstacle is like where the particles are now.
+
+        The side of a circle may be left open, 0: it is that where they are.
+        """
         o = self.obstacles
         if normal is None:
             normal = o.normal_at(who, obstacle, side, self.p)
         tangent, material = along(normal), pick(o.material, who, obstacle)
-        belt = dot(material[:2], tangent)
-        if at(o.pulley_speed, 0) != 0.0:
-            round_ = (obstacle == o.pulley).nonzero()[0]
-            if len(round_):
-                belt[round_] = of(o.pulley_speed, who[round_])
-        return Contact(normal, tangent, belt, material[3], material[2], o.surface[obstacle])
+        open_ = (side == 0.0).nonzero()[0]
+        if len(open_):
+            side = side.copy()
+            side[open_] = o.rim_side(who[open_], obstacle[open_], normal[:, open_])
+        speed, restitution, friction = material
+        return Contact(normal, tangent, side * speed, friction, restitution, o.surface[obstacle])
 
     def at(self, who: Ints) -> Ints | slice:
         """Return what to assign by: a slice is several times as fast where it is everyone."""

@@ -259,14 +259,15 @@ def _last_bounces(s: Swarm, who: Ints, obstacle: Ints, side: Floats, rebound: Fl
 
 
 def _ride(s: Swarm, who: Ints) -> None:
-    """Begin a ride round a circle: find its ends, fix the speed of the surface."""
+    """Begin a ride round a circle, or round its other half: find where that ends."""
     if not len(who):
         return
-    c = s.contact(who, s.on[who], s.side[who])
-    s.belt[who] = c.belt
-    circle = s.on[who] - s.obstacles.segments
-    phi = np.arctan2(c.normal[0], c.normal[1])
-    rho = pick(s.obstacles.rho, who, circle)
-    found = bounds(s.obstacles, who, circle, rho, phi, of(s.radius, who))
+    o, on, side = s.obstacles, s.on[who], s.side[who]
+    normal = o.normal_at(who, on, side, s.p)
+    side = np.where(side == 0.0, o.rim_side(who, on, normal), side)
+    s.side[who] = side
+    phi = np.arctan2(normal[0], normal[1])
+    rho = pick(o.rho, who, on - o.segments)
+    found = bounds(o, who, on - o.segments, side, rho, phi, of(s.radius, who))
     for field in fields(found):
         getattr(s.bounds, field.name)[who] = getattr(found, field.name)

@@ -1,0 +1,101 @@
+/* One contact: its frame, what it feels of its partners, impulses, and their work. */
+
+#include "core.h"
+
+/* Fill in a contact of disk i as both partners are now; impulses are left alone. */
+void describe(Contact *c, int i, int j) {
+    const Disk *a = W.disks + i;
+    const Pair *pair;
+    double r = a->radius, mass = 1 / a->mass, turn = a->inertia > 0 ? 1 / a->inertia : 0, rb = 0;
+    double reach = r, spin_mass = turn;
+    mass = 1 / a->mass;
+    c->i = i;
+    c->j = j;
+    c->two = 0;
+    c->owner = W.owner_count;
+    c->mass[1] = mass + r * r * turn;
+    if (j < 0) {
+        const Surface *s = W.surfaces + (-1 - j);
+        c->gap = gap_to(s, a->x, a->y, r, &c->nx, &c->ny);
+        pair = surface_pair(a, -1 - j);
+        c->owner = s->owner;
+        c->other[0] = 0;
+        c->other[1] = surface_speed(s, c->nx, c->ny, a->x, a->y);
+        c->other[2] = s->shape == CIRCLE ? -s->speed / s->radius : 0;
+    } else {
+        const Disk *b = W.disks + j;
+        double x = a->x - b->x, y = a->y - b->y, d = sqrt(x * x + y * y);
+        rb = b->radius;
+        reach = r * rb / (r + rb);
+        c->nx = d > 0 ? x / d : 0;
+        c->ny = d > 0 ? y / d : 1;
+        c->gap = d - r - rb;
+        pair = pair_of(a->kind, b->kind);
+        c->two = b->mode == FREE;
+        c->other[0] = b->vx * c->nx + b->vy * c->ny;
+        c->other[1] = b->vx * c->ny - b->vy * c->nx;
+        c->other[2] = 0;
+        if (c->two) {
+            double turn_b = b->inertia > 0 ? 1 / b->inertia : 0;
+            mass += 1 / b->mass;
+            c->mass[1] += 1 / b->mass + rb * rb * turn_b;
+            spin_mass += turn_b;
+        }
+    }
+    c->mass[0] = 1 / mass;
+    c->mass[1] = 1 / c->mass[1];
+    c->mass[2] = spin_mass > 0 ? 1 / spin_mass : 0;
+    c->rest = pair->restitution;
+    c->friction = pair->friction;
+    c->arm = pair->rolling * reach;
+}
+
+/* Relative velocities at a contact, now or before the step's impulses: normal, slip, spin. */
+void relative(const Contact *c, int earlier, double *out) {
+    const Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
+    const double *v = earlier ? &a->ux : &a->vx;
+    out[0] = v[0] * c->nx + v[1] * c->ny - c->other[0];
+    out[1] = v[0] * c->ny - v[1] * c->nx + a->radius * v[2] - c->other[1];
+    out[2] = v[2] - c->other[2];
+    if (c->two) {
+        v = earlier ? &b->ux : &b->vx;
+        out[0] += c->other[0] - (v[0] * c->nx + v[1] * c->ny);
+        out[1] += c->other[1] - (v[0] * c->ny - v[1] * c->nx) + b->radius * v[2];
+        out[2] -= v[2];
+    }
+}
+
+/* Give an impulse to disk i, and the opposite one to a free partner. */
+void push(const Contact *c, const double *J) {
+    Disk *a = W.disks + c->i;
+    double x = J[0] * c->nx + J[1] * c->ny, y = J[0] * c->ny - J[1] * c->nx;
+    a->vx += x / a->mass;
+    a->vy += y / a->mass;
+    if (a->inertia > 0) a->spin += (a->radius * J[1] + J[2]) / a->inertia;
+    if (c->two) {
+        Disk *b = W.disks + c->j;
+        b->vx -= x / b->mass;
+        b->vy -= y / b->mass;
+        if (b->inertia > 0) b->spin += (b->radius * J[1] - J[2]) / b->inertia;
+    }
+}
+
+/* Ledger entries of a contact's impulses, which changed its relative velocities from u to v: an
+   impulse J does the work J (u + v) / 2, its second half alone J (u + 3 v) / 8. `given` is the work
+   of the belt that carries the partner, if that is a rider. */
+void share_out(const Contact *c, const double *u, const double *v, double half, double *entries,
+               double *given) {
+    const double *J = c->impulse;
+    double first = half ? 0.125 : 0.5, then = half ? 0.375 : 0.5, all = half ? 0.5 : 1;
+    entries[0] = c->j < 0 ? all * (J[1] * c->other[1] + J[2] * c->other[2]) : 0;
+    entries[1] = -J[0] * (first * u[0] + then * v[0]);
+    entries[2] = -J[1] * (first * u[1] + then * v[1]) - J[2] * (first * u[2] + then * v[2]);
+    given[0] = c->j >= 0 && !c->two ? all * (J[0] * c->other[0] + J[1] * c->other[1]) : 0;
+    given[1] = given[2] = 0;
+}
+
+/* How hard gravity and the curved way press a disk on a surface, m/s2. */
+double press_on(const Disk *d, const Surface *s, double nx, double ny) {
+    double along = d->vx * ny - d->vy * nx;
+    return -(W.gx * nx + W.gy * ny) - along * along * bending(s, d->x, d->y, d->radius);
+}

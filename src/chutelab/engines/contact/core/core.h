@@ -1,0 +1,112 @@
+/* What the files of the core share: the world, small helpers, and one line a function. */
+
+#ifndef CORE_H
+#define CORE_H
+#include <math.h>
+#include "layout.h"
+
+#define MIN(a, b) ((a) < (b) ? (a) : (b))
+#define MAX(a, b) ((a) > (b) ? (a) : (b))
+#define ALARM (-1000000) /* partner of a release or of a ride's end; no surface has that number */
+
+extern World W;
+
+/* Contacts are looked for where a gap is below this share of the radius: what lasts stays a
+   thousandth of it apart at most, and nothing crosses the rest within a step unseen. */
+#define TOUCH 5e-3
+/* Approach, in radii per step, that is left to the next step instead of an impact at its instant:
+   a tenth of TOUCH, so that what is left is in reach of the contacts before it overlaps. */
+#define SKIP 5e-4
+/* The same once a disk had MANY impacts in a step; it grows by GROW with each, up to MOST_SKIP. */
+#define MOST_SKIP 5e-3
+#define MANY 20
+#define GROW 1.2
+/* Impacts of a disk in a step from which on a slow one (below SLOW times what gravity does in a
+   step) has no restitution, and a fast one: the infinitely many of an inelastic collapse end. */
+#define FEW 10
+#define SLOW 20.0
+#define TOO_MANY 200
+/* Impacts of a disk in a step that no collapse needs: something is wrong, the run stops. */
+#define STALL 20000
+
+static inline double square(double a) { return a * a; }
+
+static inline const Pair *pair_of(int kind, int other) {
+    return W.pairs + kind * (W.kind_count + W.material_count) + other;
+}
+static inline const Pair *surface_pair(const Disk *d, int k) {
+    return pair_of(d->kind, W.kind_count + W.surfaces[k].material);
+}
+/* Whether a surface is there and near the box that a disk can reach in this step. */
+static inline int is_near(const Surface *s, const Disk *d) {
+    return s->there && s->box[0] < d->right && s->box[2] > d->left && s->box[1] < d->top
+        && s->box[3] > d->bottom;
+}
+static inline int is_live(const Disk *d) { return d->mode >= RIDING && d->mode <= ASLEEP; }
+
+/* Move a disk along its parabola. */
+static inline void advance(Disk *d, double t) {
+    double h = t - d->t;
+    d->x += (d->vx + 0.5 * W.gx * h) * h;
+    d->y += (d->vy + 0.5 * W.gy * h) * h;
+    d->vx += W.gx * h;
+    d->vy += W.gy * h;
+    d->t = t;
+}
+
+/* geometry.c */
+double gap_to(const Surface *s, double x, double y, double r, double *nx, double *ny);
+double surface_speed(const Surface *s, double nx, double ny, double x, double y);
+double bending(const Surface *s, double x, double y, double r);
+double meet_surface(const Surface *s, const Disk *d, double span, double *approach);
+double meet_disk(double x, double y, double u, double v, double reach, double span, double *approach);
+double free_span(const Disk *d, double least);
+
+/* grid.c */
+int list_near(double end);
+void enter_again(int i, double end);
+int reachable(int i);
+int place_is_free(int i, double x, double y, double t);
+
+/* record.c */
+void knot_now(int i);
+void knot_before(int i, double t, double vx, double vy, double spin);
+void flush_track(int i);
+void track_lasting(int i);
+void knot_asleep(int i);
+void finish(int i, int reason);
+void write_event(int kind, int i, int other, int owner, double t, const double *place,
+                 const double *before, const double *after, double normal, double tangent);
+void event_here(int kind, int i, int owner);
+void book(double *first, double *second, int owner, const double *entries);
+
+/* contact.c */
+void describe(Contact *c, int i, int j);
+void relative(const Contact *c, int earlier, double *out);
+void push(const Contact *c, const double *impulse);
+void share_out(const Contact *c, const double *u, const double *v, double half, double *entries,
+               double *given);
+double press_on(const Disk *d, const Surface *s, double nx, double ny);
+
+/* impacts.c */
+void foresee(int i);
+void foresee_all(void);
+void expect(int i, double due, int partner);
+int next_disk(void);
+void shock(int i, int j, double t);
+void hold(Disk *d, int k);
+void lie_down(int i);
+void was_moved(int i, double t);
+
+/* solver.c */
+int find_contacts(double h, int *woke);
+void solve_contacts(void);
+void close_step(double h);
+void take_back(int i);
+void end_in_contact(int i, int reason);
+
+/* sleep.c */
+void wake(int i, double t);
+void fall_asleep(void);
+
+#endif

@@ -1,0 +1,229 @@
+/* Where surfaces are, how fast they run, and when a disk on a parabola meets one. */
+
+#include "core.h"
+
+/* Whether a point, seen from the centre, is in the angle of an arc; all of a circle. */
+static int in_angle(const Surface *s, double dx, double dy) {
+    if (s->shape == CIRCLE) return 1;
+    return dx * s->tx + dy * s->ty >= s->cos_half * sqrt(dx * dx + dy * dy);
+}
+
+/* Distance of a point from the nearer end, and the unit vector from there. */
+static double from_end(const Surface *s, double x, double y, double *nx, double *ny) {
+    double ax = x - s->end[0], ay = y - s->end[1], bx = x - s->end[2], by = y - s->end[3];
+    double a = ax * ax + ay * ay, b = bx * bx + by * by, d = sqrt(MIN(a, b));
+    if (b < a) { ax = bx; ay = by; }
+    *nx = d > 0 ? ax / d : 0;
+    *ny = d > 0 ? ay / d : 1;
+    return d;
+}
+
+/* Gap between a disk and a surface, and the unit normal from the surface to the disk. */
+double gap_to(const Surface *s, double x, double y, double r, double *nx, double *ny) {
+    double dx = x - s->x, dy = y - s->y;
+    if (s->shape == SEGMENT) {
+        double along = dx * s->tx + dy * s->ty;
+        if (along >= 0 && along <= s->length) {
+            double off = dy * s->tx - dx * s->ty, side = off >= 0 ? 1 : -1;
+            *nx = -side * s->ty;
+            *ny = side * s->tx;
+            return side * off - r;
+        }
+    } else if (in_angle(s, dx, dy)) {
+        double d = sqrt(dx * dx + dy * dy), side = d >= s->radius ? 1 : -1;
+        *nx = d > 0 ? side * dx / d : 0;
+        *ny = d > 0 ? side * dy / d : 1;
+        return side * (d - s->radius) - r;
+    }
+    return from_end(s, x, y, nx, ny) - r;
+}
+
+/* Speed of the surface along (ny, -nx) at a contact with normal n of a disk at (x, y), m/s.
+
+   One rule for faces, ends and circles: the surface runs along its left side (a circle: its
+   outside) as `speed` says, and against it on the other side. On both faces of a segment that is
+   its velocity; round an end it is that of an end roller, continuous with the face on that side. */
+double surface_speed(const Surface *s, double nx, double ny, double x, double y) {
+    double side;
+    if (s->shape == SEGMENT) side = ny * s->tx - nx * s->ty;
+    else side = nx * (x - s->x) + ny * (y - s->y);
+    return side >= 0 ? s->speed : -s->speed;
+}
+
+/* Curvature (1/m) of the way of the centre of a disk that stays in contact; > 0: round an outside. */
+double bending(const Surface *s, double x, double y, double r) {
+    double dx = x - s->x, dy = y - s->y;
+    if (s->shape == SEGMENT) {
+        double along = dx * s->tx + dy * s->ty;
+        return along >= 0 && along <= s->length ? 0 : 1 / r;
+    }
+    if (!in_angle(s, dx, dy)) return 1 / r;
+    double inside = s->radius - r;
+    if (dx * dx + dy * dy >= s->radius * s->radius) return 1 / (s->radius + r);
+    return inside > 0 ? -1 / inside : 0;
+}
+
+/* When a point that moves on a parabola about a centre comes within `reach` of it, or from within
+   beyond it (side = -1); its speed of approach then. INFINITY if not within the span.
+
+   The chord of the parabola gives a bracket and a first guess, Newton's method the root. A way that
+   only grazes the circle between two outside ends of the chord, by less than the chord's sagitta
+   g h^2/8, is missed. */
+static double meet_round(double x, double y, double vx, double vy, double reach, double side,
+                         double span, double *approach) {
+    double c = side * (x * x + y * y - reach * reach);
+    *approach = 0;
+    if (c <= 0) {
+        double d = sqrt(x * x + y * y);
+        *approach = d > 0 ? -side * (x * vx + y * vy) / d : 0;
+        return 0;
+    }
+    double cx = vx + 0.5 * W.gx * span, cy = vy + 0.5 * W.gy * span;
+    double ex = x + cx * span, ey = y + cy * span;
+    double last = side * (ex * ex + ey * ey - reach * reach);
+    double a = cx * cx + cy * cy, b = x * cx + y * cy, low = 0, high = span, h;
+    double root = b * b - a * (x * x + y * y - reach * reach);
+    if (last > 0) {
+        if (side < 0 || b >= 0 || root <= 0 || a * span <= -b) return INFINITY;
+        high = -b / a;
+        double px = x + (vx + 0.5 * W.gx * high) * high, py = y + (vy + 0.5 * W.gy * high) * high;
+        if (px * px + py * py >= reach * reach) return INFINITY;
+    }
+    if (root < 0) root = 0;
+    /* The form without cancellation of either root. */
+    if (side > 0) h = c / (-b + sqrt(root));
+    else h = b > 0 ? c / (b + sqrt(root)) : (-b + sqrt(root)) / a;
+    if (!(h >= low && h <= high)) h = high;
+    for (int n = 0; n < 60; n++) {
+        double px = x + (vx + 0.5 * W.gx * h) * h, py = y + (vy + 0.5 * W.gy * h) * h;
+        double wx = vx + W.gx * h, wy = vy + W.gy * h;
+        double f = side * (px * px + py * py - reach * reach), slope = 2 * side * (px * wx + py * wy);
+        *approach = -0.5 * slope / reach;
+        if (f > 0) low = h;
+        else high = h;
+        double next = slope < 0 ? h - f / slope : 0.5 * (low + high);
+        if (!(next > low && next < high)) next = f == 0 ? h : 0.5 * (low + high);
+        if (fabs(next - h) <= 1e-16 * span || next == low || next == high) break;
+        h = next;
+    }
+    return h;
+}
+
+/* The same for a plane: its gap, the gap's rate and its acceleration. */
+static double meet_face(double gap, double rate, double pull, double span, double *approach) {
+    *approach = 0;
+    if (gap <= 0) {
+        *approach = -rate;
+        return 0;
+    }
+    double root = rate * rate - 2 * pull * gap;
+    if (root < 0) return INFINITY;
+    root = sqrt(root);
+    if (root - rate <= 0 || 2 * gap > span * (root - rate)) return INFINITY;
+    *approach = root;
+    return 2 * gap / (root - rate);
+}
+
+static double meet_ends(const Surface *s, const Disk *d, double span, double *approach) {
+    double first = INFINITY;
+    for (int e = 0; e < 4; e += 2) {
+        double speed, x = d->x - s->end[e], y = d->y - s->end[e + 1];
+        double h = meet_round(x, y, d->vx, d->vy, d->radius, 1, span, &speed);
+        if (h < first) {
+            first = h;
+            *approach = speed;
+        }
+    }
+    return first;
+}
+
+/* Time from d->t until a disk meets a surface, INFINITY if not within the span. */
+double meet_surface(const Surface *s, const Disk *d, double span, double *approach) {
+    double dx = d->x - s->x, dy = d->y - s->y, r = d->radius;
+    double sweep = (sqrt(d->vx * d->vx + d->vy * d->vy) + W.g * span) * span;
+    *approach = 0;
+    if (s->shape == SEGMENT) {
+        double off = dy * s->tx - dx * s->ty, rate = d->vy * s->tx - d->vx * s->ty;
+        double side = off >= 0 ? 1 : -1, gap = side * off - r;
+        double along = dx * s->tx + dy * s->ty;
+        double pull = side * (W.gy * s->tx - W.gx * s->ty);
+        rate *= side;
+        if (gap > sweep || along < -sweep - r || along > s->length + sweep + r) return INFINITY;
+        double h = meet_face(gap, rate, pull, span, approach);
+        if (h < INFINITY) {
+            double run = d->vx * s->tx + d->vy * s->ty, draw = W.gx * s->tx + W.gy * s->ty;
+            double there = along + (run + 0.5 * draw * h) * h;
+            if (there >= 0 && there <= s->length) return h;
+        }
+        if (along > sweep + r && along < s->length - sweep - r) return INFINITY;
+        return meet_ends(s, d, span, approach);
+    }
+    double away = sqrt(dx * dx + dy * dy), side = away >= s->radius ? 1 : -1;
+    if (side * (away - s->radius) > sweep + r) return INFINITY;
+    if (side > 0 || s->radius > r) {
+        double reach = s->radius + side * r;
+        double h = meet_round(dx, dy, d->vx, d->vy, reach, side, span, approach);
+        if (h < INFINITY) {
+            double px = dx + (d->vx + 0.5 * W.gx * h) * h, py = dy + (d->vy + 0.5 * W.gy * h) * h;
+            if (in_angle(s, px, py)) return h;
+        }
+    }
+    return s->shape == CIRCLE ? INFINITY : meet_ends(s, d, span, approach);
+}
+
+/* Time until two disks at a relative place (x, y) and velocity (u, v) are `reach` apart: as both
+   fall alike the way is straight. */
+double meet_disk(double x, double y, double u, double v, double reach, double span,
+                 double *approach) {
+    double b = x * u + y * v, c = x * x + y * y - reach * reach;
+    *approach = 0;
+    if (b >= 0) return INFINITY;
+    if (c <= 0) {
+        *approach = -b / sqrt(x * x + y * y);
+        return 0;
+    }
+    double a = u * u + v * v, root = b * b - a * c;
+    if (root <= 0) return INFINITY;
+    root = sqrt(root);
+    double h = c / (-b + root);
+    if (h > span) return INFINITY;
+    *approach = root / reach;
+    return h;
+}
+
+/* How long a disk that flies alone needs no step, s, `least` at least: until it could reach
+   something round, or has crossed the line of a segment. */
+double free_span(const Disk *d, double least) {
+    double span = INFINITY, v = sqrt(d->vx * d->vx + d->vy * d->vy), r = d->radius;
+    for (int k = 0; k < W.surface_count && span > least; k++) {
+        const Surface *s = W.surfaces + k;
+        double rounds[3][3], dx = d->x - s->x, dy = d->y - s->y;
+        int count = 0;
+        if (s->opens > d->t) span = MIN(span, s->opens - d->t);
+        if (s->closes > d->t) span = MIN(span, s->closes - d->t);
+        if (s->shape == SEGMENT) {
+            double off = dy * s->tx - dx * s->ty, side = off >= 0 ? 1 : -1, speed;
+            double rate = side * (d->vy * s->tx - d->vx * s->ty);
+            double pull = side * (W.gy * s->tx - W.gx * s->ty);
+            double h = meet_face(MAX(side * off - r, 0), rate, pull, INFINITY, &speed);
+            if (side * off - r <= 0) h = 0;
+            if (h < INFINITY) span = MIN(span, h + 0.5 * least);
+        } else {
+            rounds[count][0] = dx; rounds[count][1] = dy; rounds[count++][2] = s->radius;
+        }
+        if (s->shape != CIRCLE)
+            for (int e = 0; e < 4; e += 2) {
+                rounds[count][0] = d->x - s->end[e];
+                rounds[count][1] = d->y - s->end[e + 1];
+                rounds[count++][2] = 0;
+            }
+        for (int n = 0; n < count; n++) {
+            double x = rounds[n][0], y = rounds[n][1];
+            double room = fabs(sqrt(x * x + y * y) - rounds[n][2]) - r;
+            if (room <= 0) span = 0;
+            else if (W.g > 0) span = MIN(span, 2 * room / (v + sqrt(v * v + 2 * W.g * room)));
+            else if (v > 0) span = MIN(span, room / v);
+        }
+    }
+    return MAX(span, least);
+}

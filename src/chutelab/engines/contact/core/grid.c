@@ -1,0 +1,143 @@
+/* Who may meet whom in a step: a hash grid of the boxes that the disks can reach. */
+
+#include <string.h>
+#include "core.h"
+
+/* Most cells that one box is entered in. A larger box (a fast disk among slow ones) is asked by all:
+   the `W.wide_count` last entries of `W.found`, which has two for each disk. */
+#define MOST_CELLS 256
+
+static int bucket(int ix, int iy) {
+    unsigned h = (unsigned)ix * 73856093u ^ (unsigned)iy * 19349663u;
+    return (int)((h ^ h >> 15) & (unsigned)(W.bucket_count - 1));
+}
+
+static void box_of(const Disk *d, double end, double *box) {
+    double h = end - d->t, x = d->x + (d->vx + 0.5 * W.gx * h) * h;
+    double y = d->y + (d->vy + 0.5 * W.gy * h) * h;
+    /* Half of TOUCH for each of two disks, what the contact solver may change, and the sagitta. */
+    double margin = d->radius * (1 + TOUCH) + W.soft * h + 0.125 * W.g * h * h;
+    box[0] = MIN(d->x, x) - margin;
+    box[1] = MIN(d->y, y) - margin;
+    box[2] = MAX(d->x, x) + margin;
+    box[3] = MAX(d->y, y) + margin;
+}
+
+static int cell_at(double x) {
+    double n = floor(x / W.cell);
+    return n < -1e9 ? -1000000000 : n > 1e9 ? 1000000000 : (int)n;
+}
+
+static void enter(int i) {
+    Disk *d = W.disks + i;
+    int x0 = cell_at(d->left), x1 = cell_at(d->right), y0 = cell_at(d->bottom), y1 = cell_at(d->top);
+    double cells = ((double)x1 - x0 + 1) * ((double)y1 - y0 + 1);
+    if (cells > MOST_CELLS || W.cell_count + cells > W.cell_room) {
+        if (!d->wide) W.found[2 * W.disk_count - ++W.wide_count] = i;
+        d->wide = 1;
+        return;
+    }
+    for (int ix = x0; ix <= x1; ix++)
+        for (int iy = y0; iy <= y1; iy++) {
+            int b = bucket(ix, iy);
+            Cell *c = W.cells + W.cell_count;
+            c->disk = i; c->ix = ix; c->iy = iy; c->next = W.heads[b];
+            W.heads[b] = W.cell_count++;
+        }
+}
+
+static int overlaps(const Disk *a, const double *box) {
+    return a->left < box[2] && a->right > box[0] && a->bottom < box[3] && a->top > box[1];
+}
+
+/* Put the disks whose boxes overlap a box into `W.found`; return how many. */
+static int query(int i, const double *box) {
+    int x0 = cell_at(box[0]), x1 = cell_at(box[2]), y0 = cell_at(box[1]), y1 = cell_at(box[3]), n = 0;
+    int stamp = ++W.stamp;
+    W.disks[i].mark = stamp;
+    if (((double)x1 - x0 + 1) * ((double)y1 - y0 + 1) > MOST_CELLS) {
+        for (int j = W.low; j < W.high; j++)
+            if (j != i && is_live(W.disks + j) && overlaps(W.disks + j, box)) W.found[n++] = j;
+        return n;
+    }
+    for (int ix = x0; ix <= x1; ix++)
+        for (int iy = y0; iy <= y1; iy++)
+            for (int c = W.heads[bucket(ix, iy)]; c >= 0; c = W.cells[c].next) {
+                int j = W.cells[c].disk;
+                Disk *o = W.disks + j;
+                if (W.cells[c].ix != ix || W.cells[c].iy != iy || o->mark == stamp) continue;
+                o->mark = stamp;
+                if (is_live(o) && overlaps(o, box)) W.found[n++] = j;
+            }
+    for (int k = 1; k <= W.wide_count; k++) {
+        int j = W.found[2 * W.disk_count - k];
+        if (W.disks[j].mark == stamp) continue;
+        W.disks[j].mark = stamp;
+        if (is_live(W.disks + j) && overlaps(W.disks + j, box)) W.found[n++] = j;
+    }
+    return n;
+}
+
+/* List all pairs that may meet before `end`; 0 if they are more than there is room for. */
+int list_near(double end) {
+    double extent = 0;
+    int live = 0;
+    W.near_count = W.cell_count = W.wide_count = 0;
+    for (int i = W.low; i < W.high; i++) {
+        Disk *d = W.disks + i;
+        d->wide = 0;
+        d->left = d->bottom = INFINITY;
+        d->right = d->top = -INFINITY;
+        if (!is_live(d)) continue;
+        box_of(d, end, &d->left);
+        extent += MAX(d->right - d->left, d->top - d->bottom);
+        live++;
+    }
+    if (!W.interact) return 1;
+    /* With cells of 1.5 boxes most boxes touch two to four of them. */
+    W.cell = live ? 1.5 * extent / live : 1;
+    memset(W.heads, 0xff, (unsigned long)W.bucket_count * sizeof(int));
+    for (int i = W.low; i < W.high; i++) {
+        Disk *d = W.disks + i;
+        if (!is_live(d)) continue;
+        int n = query(i, &d->left);
+        for (int k = 0; k < n; k++) {
+            Disk *o = W.disks + W.found[k];
+            if (d->mode != FREE && o->mode != FREE) continue;
+            if (W.near_count >= W.near_room) return 0;
+            W.near[2 * W.near_count] = W.found[k];
+            W.near[2 * W.near_count++ + 1] = i;
+        }
+        enter(i);
+    }
+    return 1;
+}
+
+/* Enter a disk once more whose path changed within the step. */
+void enter_again(int i, double end) {
+    Disk *d = W.disks + i;
+    double box[4];
+    box_of(d, end, box);
+    if (box[0] >= d->left && box[1] >= d->bottom && box[2] <= d->right && box[3] <= d->top) return;
+    d->left = MIN(d->left, box[0]);
+    d->bottom = MIN(d->bottom, box[1]);
+    d->right = MAX(d->right, box[2]);
+    d->top = MAX(d->top, box[3]);
+    if (W.interact) enter(i);
+}
+
+/* Put the disks that disk i may meet in what is left of the step into `W.found`. */
+int reachable(int i) { return W.interact ? query(i, &W.disks[i].left) : 0; }
+
+/* Whether a disk released at (x, y) would overlap no other. */
+int place_is_free(int i, double x, double y, double t) {
+    double r = W.disks[i].radius, box[4] = {x - r, y - r, x + r, y + r};
+    if (!W.interact) return 1;
+    int n = query(i, box);
+    for (int k = 0; k < n; k++) {
+        Disk o = W.disks[W.found[k]];
+        advance(&o, t);
+        if (square(o.x - x) + square(o.y - y) < square(o.radius + r)) return 0;
+    }
+    return 1;
+}

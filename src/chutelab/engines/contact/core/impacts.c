@@ -1,0 +1,311 @@
+/* Impacts at their own instants: foreseen for each disk, resolved in the order of time. */
+
+#include "core.h"
+
+/* ------------------------------------------------------------------ the next event of each disk */
+
+static int sooner(int i, int j) {
+    double a = W.disks[i].due, b = W.disks[j].due;
+    return a < b || (a == b && i < j);
+}
+
+static void place(int k, int i) {
+    W.heap[k] = i;
+    W.disks[i].heap_place = k;
+}
+
+static void sift(int k) {
+    int i = W.heap[k];
+    for (; k > 0 && sooner(i, W.heap[(k - 1) / 2]); k = (k - 1) / 2) place(k, W.heap[(k - 1) / 2]);
+    for (;;) {
+        int c = 2 * k + 1;
+        if (c >= W.heap_count) break;
+        if (c + 1 < W.heap_count && sooner(W.heap[c + 1], W.heap[c])) c++;
+        if (!sooner(W.heap[c], i)) break;
+        place(k, W.heap[c]);
+        k = c;
+    }
+    place(k, i);
+}
+
+/* Set what disk i does next, and when; only what is due within the step is kept in the heap. */
+void expect(int i, double due, int partner) {
+    Disk *d = W.disks + i;
+    d->due = due;
+    d->partner = partner;
+    d->partner_changes = partner >= 0 ? W.disks[partner].changes : 0;
+    if (d->heap_place >= 0 && due < W.step_end) sift(d->heap_place);
+    else if (d->heap_place >= 0) {
+        int k = d->heap_place, last = W.heap[--W.heap_count];
+        d->heap_place = -1;
+        if (last != i) {
+            place(k, last);
+            sift(k);
+        }
+    } else if (due < W.step_end) {
+        place(W.heap_count++, i);
+        sift(d->heap_place);
+    }
+}
+
+/* The disk whose event is next in this step, or -1. */
+int next_disk(void) { return W.heap_count ? W.heap[0] : -1; }
+
+/* Approach up to which a contact is left to the next step, m/s. */
+static double left_over(const Disk *d, int impacts, int surface, double radius) {
+    if (surface >= 0)
+        for (int n = 0; n < d->held_count; n++)
+            /* What lies on a surface comes back to it at the end of each step, so fast. */
+            if (d->held[n] == surface) return 1.000001 * W.g * W.step;
+    double base = W.base * radius;
+    if (impacts <= MANY) return MIN(W.skip * radius, W.g * W.step);
+    return MIN(base * pow(GROW, impacts - MANY), base * (MOST_SKIP / SKIP));
+}
+
+static void foresee_pair(int i, int j, double *due, int *partner) {
+    const Disk *a = W.disks + i, *b = W.disks + j;
+    double ta = W.now - a->t, tb = W.now - b->t, approach;
+    double x = a->x + (a->vx + 0.5 * W.gx * ta) * ta - b->x - (b->vx + 0.5 * W.gx * tb) * tb;
+    double y = a->y + (a->vy + 0.5 * W.gy * ta) * ta - b->y - (b->vy + 0.5 * W.gy * tb) * tb;
+    double u = a->vx + W.gx * ta - b->vx - W.gx * tb, v = a->vy + W.gy * ta - b->vy - W.gy * tb;
+    double t = W.now + meet_disk(x, y, u, v, a->radius + b->radius, W.step_end - W.now, &approach);
+    double least = left_over(a, MAX(a->impacts, b->impacts), -1, MIN(a->radius, b->radius));
+    if (t < *due && t < W.step_end && approach > least) {
+        *due = t;
+        *partner = j;
+    }
+}
+
+static void foresee_surfaces(int i, double *due, int *partner) {
+    const Disk *d = W.disks + i;
+    for (int k = 0; k < W.surface_count; k++) {
+        double approach;
+        if (!is_near(W.surfaces + k, d)) continue;
+        double t = d->t + meet_surface(W.surfaces + k, d, W.step_end - d->t, &approach);
+        if (t < *due && t < W.step_end && approach > left_over(d, d->impacts, k, d->radius)) {
+            *due = MAX(t, W.now);
+            *partner = -1 - k;
+        }
+    }
+}
+
+/* Foresee the next event of a disk from now on. */
+void foresee(int i) {
+    Disk *d = W.disks + i;
+    double due = INFINITY;
+    int partner = ALARM;
+    if (d->mode == WAITING) due = d->waited ? MAX(d->release, W.step_end) : d->release;
+    else if (d->mode == RIDING) due = d->ride_to;
+    else if (d->mode == FREE || (d->mode == ASLEEP && (d->ux != 0 || d->uy != 0)))
+        foresee_surfaces(i, &due, &partner);
+    if (d->mode == FREE) {
+        int n = reachable(i);
+        for (int k = 0; k < n; k++) foresee_pair(i, W.found[k], &due, &partner);
+    }
+    expect(i, due, partner);
+}
+
+/* The same for all disks at the beginning of a step, from the list of pairs that may meet. */
+void foresee_all(void) {
+    W.heap_count = 0;
+    for (int i = W.low; i < W.high; i++) {
+        Disk *d = W.disks + i;
+        int partner = ALARM;
+        d->heap_place = -1;
+        d->due = INFINITY;
+        if (d->mode == WAITING) d->due = MAX(d->release, W.now);
+        else if (d->mode == RIDING) d->due = d->ride_to;
+        else if (d->mode == FREE || (d->mode == ASLEEP && (d->ux != 0 || d->uy != 0)))
+            foresee_surfaces(i, &d->due, &partner);
+        d->partner = partner;
+    }
+    for (int n = 0; n < W.near_count; n++) {
+        int i = W.near[2 * n], j = W.near[2 * n + 1];
+        if (W.disks[i].mode != FREE) { int k = i; i = j; j = k; }
+        if (W.disks[i].mode == FREE) foresee_pair(i, j, &W.disks[i].due, &W.disks[i].partner);
+    }
+    for (int i = W.low; i < W.high; i++)
+        if (W.disks[i].due < W.step_end) expect(i, W.disks[i].due, W.disks[i].partner);
+}
+
+/* ----------------------------------------------------------------------------------- the blow */
+
+/* Note that a disk lies on a surface. */
+void hold(Disk *d, int k) {
+    for (int n = 0; n < d->held_count; n++)
+        if (d->held[n] == k) return;
+    if (d->held_count < MAX_HELD) d->held[d->held_count++] = k;
+    d->supports++;
+}
+
+/* Note that a disk gets an impulse at t; what it was before becomes a knot. */
+void was_moved(int i, double t) {
+    Disk *d = W.disks + i;
+    d->impacts++;
+    d->calm = d->rest = 0;
+    if (d->moved != W.stamp) {
+        d->moved = W.stamp;
+        W.moved[W.moved_count++] = i;
+        knot_before(i, t, d->vx, d->vy, d->spin);
+    }
+}
+
+/* Let a lone flight end where a contact begins that lasts: its steps begin there. */
+static void cut_stride(double t, double length) {
+    if (W.high - W.low == 1 && W.step_end > t + length) W.step_end = t + length;
+}
+
+/* Give a contact a normal impulse, with the friction that it allows, and book what it does. */
+static void give(Contact *c, double normal) {
+    Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
+    double *J = c->impulse, u[3], v[3], entries[3], given[3], most = c->friction * normal;
+    relative(c, 0, u);
+    J[0] = normal;
+    J[1] = MIN(MAX(-c->mass[1] * u[1], -most), most);
+    most = c->arm * normal;
+    J[2] = MIN(MAX(-c->mass[2] * u[2], -most), most);
+    push(c, J);
+    relative(c, 0, v);
+    share_out(c, u, v, 0, entries, given);
+    book(a->entries, c->two ? b->entries : 0, c->owner, entries);
+    if (given[0] != 0) book(a->entries, 0, W.ride_owner, given);
+}
+
+/* Let a disk lie on a surface from t on: half of what gravity will take from it within the step it
+   gets now, and hops to the end, where the next step begins. */
+static void support(int i, int k, double t) {
+    Disk *d = W.disks + i;
+    Contact c;
+    describe(&c, i, -1 - k);
+    hold(d, k);
+    double press = press_on(d, W.surfaces + k, c.nx, c.ny);
+    if (press > 0) give(&c, 0.5 * press * d->mass * (W.step_end - t));
+}
+
+/* Resolve the impact of disk i with disk j, or with surface k as j = -1 - k, by Newton's restitution
+   and Coulomb's friction. */
+static void strike(int i, int j, double t) {
+    Disk *a = W.disks + i, *b = W.disks + MAX(j, 0);
+    if (a->mode == ASLEEP) wake(i, t);
+    if (j >= 0 && b->mode == ASLEEP) wake(j, t);
+    advance(a, t);
+    if (j >= 0) advance(b, t);
+    int impacts = j >= 0 ? MAX(a->impacts, b->impacts) : a->impacts;
+    Contact c;
+    double u[3];
+    describe(&c, i, j);
+    was_moved(i, t);
+    if (c.two) was_moved(j, t);
+    relative(&c, 0, u);
+    if (u[0] >= 0) return;
+    double back = -c.rest * u[0];
+    if (j >= 0 && -u[0] < W.soft && (a->supports || b->supports || !c.two)) back = 0;
+    if (c.rest < 1 && ((impacts >= FEW && -u[0] < SLOW * W.g * W.dt) || impacts >= TOO_MANY)) back = 0;
+    int rests = 0;
+    if (j < 0 && back <= press_on(a, W.surfaces + (-1 - j), c.nx, c.ny) * W.step) {
+        rests = 1;
+        back = 0;
+    }
+    double before[3] = {a->vx, a->vy, a->spin};
+    give(&c, c.mass[0] * (back - u[0]));
+    a->since = t;
+    if (c.two) b->since = t;
+    W.impact_count++;
+    int landing = j < 0 && c.owner == W.landing && !a->landed, kind = COLLISION;
+    if (j < 0) kind = landing ? LANDING : IMPACT;
+    if (landing || -u[0] > W.soft || W.g == 0 || (j < 0 && a->on != c.owner))
+        write_event(kind, i, j >= 0 ? j : -1, c.owner, t, &a->x, before, &a->vx,
+                    c.impulse[0], c.impulse[1]);
+    if (landing) a->landed = 1;
+    if (j < 0) {
+        a->on = c.owner;
+        a->slips = 1;
+    }
+    if (rests && !(a->landed && W.until == UNTIL_LANDED)) {
+        cut_stride(t, W.step);
+        support(i, -1 - j, t);
+    }
+}
+
+/* Whether a lasting contact of the step is struck now as well. */
+static int struck_too(const Contact *c, double t) {
+    Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
+    double nx, ny;
+    if (a->mode != FREE) return 0;
+    advance(a, t);
+    if (c->j < 0) {
+        const Surface *s = W.surfaces + (-1 - c->j);
+        double gap = gap_to(s, a->x, a->y, a->radius, &nx, &ny);
+        return gap < TOUCH * a->radius
+            && -(a->vx * nx + a->vy * ny) > left_over(a, a->impacts, -1 - c->j, a->radius);
+    }
+    if (b->mode != FREE) return 0;
+    advance(b, t);
+    double x = a->x - b->x, y = a->y - b->y, d = sqrt(x * x + y * y), r = MIN(a->radius, b->radius);
+    double approach = -(x * (a->vx - b->vx) + y * (a->vy - b->vy)) / d;
+    return d < a->radius + b->radius + TOUCH * r
+        && approach > left_over(a, MAX(a->impacts, b->impacts), -1, r);
+}
+
+static void queue_up(int i, int *tail) {
+    Disk *d = W.disks + i;
+    if (d->queued) return;
+    d->queued = 1;
+    W.queue[*tail] = i;
+    *tail = (*tail + 1) % (W.disk_count + 1);
+}
+
+/* Resolve an impact and what follows from it at the same instant: a disk that was pushed against
+   others it touches gives on what it got, first come first served. */
+void shock(int i, int j, double t) {
+    int head = 0, tail = 0, budget = 16 * W.contact_count + 64;
+    W.moved_count = 0;
+    W.stamp++;
+    W.now = t;
+    strike(i, j, t);
+    queue_up(i, &tail);
+    if (j >= 0 && W.disks[j].mode == FREE) queue_up(j, &tail);
+    while (head != tail) {
+        int m = W.queue[head];
+        head = (head + 1) % (W.disk_count + 1);
+        W.disks[m].queued = 0;
+        for (int link = W.disks[m].links; link >= 0; link = W.links[link]) {
+            const Contact *c = W.contacts + link / 2;
+            if (budget <= 0 || !struck_too(c, t)) continue;
+            budget--;
+            strike(c->i, c->j, t);
+            queue_up(c->i, &tail);
+            if (c->j >= 0) queue_up(c->j, &tail);
+        }
+    }
+    for (int k = 0; k < W.moved_count; k++) {
+        Disk *d = W.disks + W.moved[k];
+        d->changes++;
+        knot_now(W.moved[k]);
+        if (d->landed && W.until == UNTIL_LANDED) finish(W.moved[k], BY_LANDING);
+    }
+    cut_stride(t, W.disks[i].held_count ? W.step : 0);
+    for (int k = 0; k < W.moved_count; k++) {
+        int m = W.moved[k];
+        if (W.disks[m].mode == FREE) {
+            enter_again(m, W.step_end);
+            foresee(m);
+        } else expect(m, INFINITY, ALARM);
+    }
+}
+
+/* Let a disk that starts on a surface lie there at once, as one that was just struck. */
+void lie_down(int i) {
+    Disk *d = W.disks + i;
+    for (int k = 0; k < W.surface_count; k++) {
+        const Surface *s = W.surfaces + k;
+        double nx, ny;
+        if (!s->there || gap_to(s, d->x, d->y, d->radius, &nx, &ny) > 1e-9 * d->radius) continue;
+        double press = press_on(d, s, nx, ny);
+        if (press <= 0 || fabs(d->vx * nx + d->vy * ny) > press * W.dt) continue;
+        d->on = s->owner;
+        d->slips = 1;
+        if (W.step_end > d->t) support(i, k, d->t);
+        else hold(d, k);
+    }
+}

@@ -1,0 +1,184 @@
+/* What the core shares with its host: every array, every number, in SI units.
+
+   The host lays the arrays out in the memory of the module, writes their places into `World`, fills
+   in what is marked [in], and reads what is marked [out]. `tools/build_core.py` reads this file and
+   writes `layout.json`, from which hosts take sizes, offsets and names: so a field is declared once.
+   Only `double`, `int`, arrays of these and pointers stand here. */
+
+#ifndef LAYOUT_H
+#define LAYOUT_H
+
+#define MAX_HELD 4 /* surfaces that one disk can lie on at a time; a fifth is met as an impact */
+
+/* What a disk is doing. Free disks move on parabolas; riders and sleepers on a prescribed path. */
+enum Mode { WAITING, RIDING, FREE, ASLEEP, GONE };
+
+/* What ends a track, as in `recording.REASONS`. */
+enum Reason { BY_TIME, BY_LANDING, BY_SETTLING, BY_EXIT };
+
+/* Events, as in `recording.Kind`. */
+enum Kind { RELEASE, SEPARATION, SLIP, IMPACT, LANDING, COLLISION, STICK, SETTLE, EXIT };
+
+enum Shape { SEGMENT, CIRCLE, ARC };
+
+/* When a run ends: `run.until`. */
+enum Until { UNTIL_LANDED, UNTIL_SETTLED, UNTIL_TIME };
+
+/* Why `run` came back. PAUSED: the budget of steps is used up. FULL_...: make room and go on. */
+enum Status { DONE, PAUSED, FULL_KNOTS, FULL_EVENTS, FULL_NEAR, FULL_CONTACTS, STALLED };
+
+typedef struct {
+    double x, y, vx, vy, spin;  /* [in] at time t: centre, velocity, angular velocity */
+    double t;
+    double ux, uy, uspin;       /* velocity before the step's impulses; of a sleeper, its own */
+    double radius, mass;        /* [in] radius > 0 */
+    double inertia;             /* [in] kg m2; 0: it does not turn */
+    double release;             /* [in] s; it waits from then on until its place is free */
+    double ride_x;              /* [in] m along the belt where a ride by adhesion begins, <= 0 ... */
+    double ride_rho;            /* [in] ... and its distance from the axis of the pulley; 0: no ride */
+    double ride_speed;          /* [in] m/s */
+    double ride_from, ride_to;  /* s; when the ride began and ends */
+    double left, bottom, right, top; /* box that it can reach in this step */
+    double due;                 /* s; its next event, INFINITY if none is foreseen in this step */
+    double since;               /* s; latest impact */
+    double calm;                /* s; since when nothing at its contacts slips or moves apart */
+    double rest;                /* s; the same to the finer bound of falling asleep */
+    double entries[3];          /* J; belt work, restitution loss, friction loss so far */
+    double gain[3];             /* J; what this step's lasting contacts add to them */
+    double ahead[3];            /* J; the second half of it */
+    int kind;                   /* [in] row of the table of pairs */
+    int mode;                   /* [in] WAITING */
+    int changes;                /* counts changes of path, so that foreseen events can be outdated */
+    int impacts;                /* in this step */
+    int supports;               /* contacts that pressed in this step or the one before */
+    int partner;                /* of the next event: disk j >= 0, surface k as -1 - k, or ALARM */
+    int partner_changes;
+    int heap_place;
+    int links;                  /* first of its lasting contacts in `World.links`, or -1 */
+    int before;                 /* first of those of the step before, or -1 */
+    int queued, moved, mark;    /* marks of the shock and of queries */
+    int island;
+    int held_count;
+    int held[MAX_HELD];         /* surfaces it lies on */
+    int on;                     /* surface it lasts on by itself, or -1 */
+    int slips;                  /* whether it slips there */
+    int landed;                 /* has met the landing surface */
+    int reason;                 /* [out] why the track ended */
+    int waited;                 /* [out] 1 if its place was taken when it was due */
+    int wide;                   /* 1 if it is asked by all in this step, see grid.c */
+} Disk;
+
+/* The track of a disk between the knots that are written. */
+typedef struct {
+    double knot[6];       /* last knot written: t, x, y, vx, vy, spin */
+    double bend[3];       /* acceleration foretold from it on, of x, y and spin */
+    double held[6];       /* latest state in lasting contact, halfway through its impulses */
+    double held_entries[3];
+    double after[3];      /* velocity and spin after these impulses */
+    double after_entries[3];
+    double past[6];       /* the state before `held` */
+    double load[3];       /* normal impulse per time of the last three steps, newest first */
+    double load_t[3];
+    int bent, open;       /* bend is known; `held` is no knot yet */
+    int lasted;           /* steps of this contact, 0 in flight */
+    int pad;
+} Track;
+
+typedef struct {
+    double x, y;            /* [in] segment: first end; circle and arc: centre */
+    double tx, ty;          /* [in] segment: unit tangent; arc: unit vector to its middle */
+    double length;          /* [in] segment */
+    double radius;          /* [in] circle and arc */
+    double cos_half;        /* [in] arc: cosine of half its angle */
+    double end[4];          /* [in] segment and arc: both ends, x and y */
+    double speed;           /* [in] m/s along the tangent; round a circle or arc clockwise */
+    double opens, closes;   /* [in] s; it is there from the one to the other */
+    int shape;
+    int material;           /* [in] column of the table of pairs, behind the kinds of disks */
+    int owner;              /* [in] number of the surface it is part of */
+    int there;              /* whether it is there in this step */
+    double box[4];          /* m; left, bottom, right, top */
+} Surface;
+
+typedef struct { double restitution, friction, rolling; } Pair; /* [in] rolling: arm over radius */
+
+/* A contact of disk i with disk j, or with surface k as j = -1 - k. Its tangent is (ny, -nx). */
+typedef struct {
+    double nx, ny;          /* unit normal towards i */
+    double gap;             /* m */
+    double need;            /* m/s; least change of normal velocity that keeps the gap closed */
+    double drift;           /* m/s; by which slip grows by the middle of the step */
+    double impulse[3];      /* on i: normal, tangential (N s), rolling (N m s) */
+    double mass[3];         /* what the contact feels of masses and inertias, in the same order */
+    double friction, arm;   /* coefficient; rolling friction as an arm, m */
+    double other[3];        /* velocity of a surface or rider there: normal, tangential, spin */
+    double rest;            /* coefficient of restitution */
+    int i, j;
+    int two;                /* whether j is a free disk, which feels the impulse too */
+    int owner;              /* of the ledger entries */
+    int next;               /* of the contacts of disk i in the step before */
+    int pad;
+} Contact;
+
+typedef struct { double t, x, y, vx, vy, spin, entries[3]; int disk, pad; } Knot;       /* [out] */
+
+typedef struct {                                                                         /* [out] */
+    double t, x, y, before[3], after[3]; /* velocity and spin */
+    double normal, tangent;              /* N s, on `disk` */
+    int disk, other, kind, surface;
+} Event;
+
+typedef struct { int disk, next, ix, iy; } Cell; /* one disk in one cell of the grid */
+
+typedef struct {
+    /* arrays, laid out by the host */
+    Disk *disks;
+    Track *tracks;
+    Surface *surfaces;
+    Pair *pairs;         /* (kinds, kinds + materials) */
+    double *books;       /* (owners + 1, 3), J; the last row is the disks' among themselves */
+    Knot *knots;
+    Event *events;
+    Contact *contacts;   /* of this step */
+    Contact *earlier;    /* of the step before */
+    int *links;          /* (2 contacts) */
+    int *near;           /* (2 near) pairs that may meet in this step */
+    Cell *cells;
+    int *heads;          /* first entry of each bucket of the grid */
+    int *heap;           /* disks by their next events */
+    int *queue;          /* (disks + 1) */
+    int *moved;          /* (disks) */
+    int *found;          /* (2 disks) */
+    /* sizes */
+    int disk_count, surface_count, kind_count, material_count, owner_count;
+    int knot_room, event_room, contact_room, near_room, cell_room;
+    int bucket_count;    /* a power of two */
+    /* the run */
+    int interact;        /* disks meet each other */
+    int until;
+    int landing;         /* owner that a disk lands on, or -1 */
+    int ride_owner;      /* owner that rides are on */
+    int sweeps;          /* of the contact solver, at most */
+    int sleeps;          /* whether islands may fall asleep */
+    double gx, gy;       /* m/s2 */
+    double dt;           /* s; longest step */
+    double end_time;     /* s */
+    double exit_box[4];  /* m; left, bottom, right, top; tracks end outside */
+    double smooth_x, smooth_v; /* m, m/s; by how much a track may leave out what lasts */
+    double accurate;     /* m/s; changes at which sweeps end */
+    /* [out] */
+    int knot_count, event_count, contact_count, near_count, earlier_count;
+    int impact_count, step_count, solve_count, sweep_count;
+    int done;            /* disks ended, a measure of progress */
+    int stalled;         /* which disk */
+    /* within the step */
+    int low, high;       /* disks that this part of the run is about */
+    int phase, cell_count, heap_count, moved_count, wide_count, stamp;
+    double t, now, step, step_end, cell;
+    double g;            /* m/s2; size of gravity */
+    double soft;         /* m/s; twice what gravity does in a step: supported disks meet softly */
+    double skip;         /* of SKIP, 0 where each blow counts: a disk by itself */
+    double base;         /* m/s over radii; SKIP in a step */
+} World;
+
+#endif

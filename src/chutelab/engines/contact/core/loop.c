@@ -1,0 +1,477 @@
+/* The run: releases and rides, steps, and how tracks end. */
+
+#include "core.h"
+
+World W;
+
+/* s; within it everything of a settled crowd is calm. */
+#define SETTLED 0.1
+/* Of the radius: a hop under gravity stays below it, else the step is shorter than asked for. */
+#define HOP 1e-3
+/* rad; between knots round the pulley. A cubic through them is off by rho angle^4 / 384, 9e-10 rho. */
+#define ARC_ANGLE 0.024
+/* Knots and events that one impact may write per disk, and a few more for what goes along. */
+#define KNOTS_EACH 6
+#define EVENTS_EACH 20
+
+/* ------------------------------------------------------------------------------------------ rides */
+
+/* Place and velocity of a rider: along the belt, then round the pulley, at constant speed. */
+static void ride_at(const Disk *d, double t, double *place) {
+    double along = d->ride_x + d->ride_speed * (t - d->ride_from), rho = d->ride_rho;
+    double phi = MAX(along, 0) / rho, c = phi > 0 ? cos(phi) : 1, s = phi > 0 ? sin(phi) : 0;
+    place[0] = along <= 0 ? along : rho * s;
+    place[1] = rho * c;
+    place[2] = d->ride_speed * c;
+    place[3] = phi > 0 ? -d->ride_speed * s : 0;
+}
+
+/* When a ride ends: where cos phi = v^2 / (g rho), or where another surface is met. */
+static double ride_end(const Disk *d, double from) {
+    double v = d->ride_speed, rho = d->ride_rho, c = W.g > 0 ? v * v / (W.g * rho) : 1;
+    if (v <= 0) return INFINITY;
+    double end = from + (MAX(-d->ride_x, 0) + rho * acos(MIN(c, 1))) / v, t = from, safe = from;
+    while (t < end) {
+        double least = INFINITY, place[4], nx, ny;
+        Disk at = *d;
+        at.ride_from = from;
+        ride_at(&at, t, place);
+        for (int k = 0; k < W.surface_count; k++)
+            if (W.surfaces[k].owner != W.ride_owner)
+                least = MIN(least, gap_to(W.surfaces + k, place[0], place[1], d->radius, &nx, &ny));
+        if (least < 0) {
+            if (t == from) return from;
+            /* Between the last free place and this one; to the last bit. */
+            double mid = 0.5 * (safe + t);
+            if (mid <= safe || mid >= t) return safe;
+            end = t;
+            t = mid;
+            continue;
+        }
+        safe = t;
+        if (end - t <= 1e-3 * d->radius / v && least > 2e-3 * d->radius) return end;
+        t = MIN(t + MAX(least, 1e-3 * d->radius) / v, end);
+        if (t >= end && safe < end) {
+            ride_at(&at, end, place);
+            least = INFINITY;
+            for (int k = 0; k < W.surface_count; k++)
+                if (W.surfaces[k].owner != W.ride_owner)
+                    least = MIN(least, gap_to(W.surfaces + k, place[0], place[1], d->radius, &nx, &ny));
+            if (least >= 0) return end;
+            t = 0.5 * (safe + end);
+            if (t <= safe || t >= end) return safe;
+        }
+    }
+    return end;
+}
+
+/* Put a rider on a parabola that agrees with its ride now and at the end of the step. */
+static void ride_on(Disk *d, double t, double end) {
+    double now[4], then[4], h;
+    end = MIN(end, d->ride_to);
+    ride_at(d, t, now);
+    ride_at(d, end, then);
+    h = end - t;
+    d->x = now[0];
+    d->y = now[1];
+    d->t = t;
+    d->vx = h > 0 ? (then[0] - now[0]) / h - 0.5 * W.gx * h : now[2];
+    d->vy = h > 0 ? (then[1] - now[1]) / h - 0.5 * W.gy * h : now[3];
+    d->spin = 0;
+}
+
+/* Write a knot of a ride at t; the belt does the work by which gravity would change its speed. */
+static void ride_knot(int i, double t) {
+    Disk *d = W.disks + i;
+    double place[4], *knot = W.tracks[i].knot, entries[3] = {0, 0, 0};
+    ride_at(d, t, place);
+    entries[0] = -d->mass * (W.gx * (place[0] - knot[1]) + W.gy * (place[1] - knot[2]));
+    if (entries[0] != 0) book(d->entries, 0, W.ride_owner, entries);
+    d->x = place[0];
+    d->y = place[1];
+    d->vx = place[2];
+    d->vy = place[3];
+    d->spin = 0;
+    d->t = t;
+    knot_now(i);
+}
+
+static void write_ride(int i, double until) {
+    const Disk *d = W.disks + i;
+    double top = d->ride_from - d->ride_x / d->ride_speed;
+    if (d->ride_speed > 0 && until > top) {
+        int pieces = 1 + (int)((until - top) * d->ride_speed / d->ride_rho / ARC_ANGLE);
+        if (top > W.tracks[i].knot[0]) ride_knot(i, top);
+        for (int n = 1; n < pieces; n++) ride_knot(i, top + (until - top) * n / pieces);
+    }
+    if (until > W.tracks[i].knot[0]) ride_knot(i, until);
+}
+
+/* Knots that a ride may take, at the most. */
+static int ride_knots(const Disk *d) {
+    return d->mode <= RIDING && d->ride_rho > 0 ? 4 + (int)(1.6 / ARC_ANGLE) : 0;
+}
+
+static void take_off(int i) {
+    Disk *d = W.disks + i;
+    d->mode = FREE;
+    d->changes++;
+    d->ux = d->vx;
+    d->uy = d->vy;
+    d->uspin = d->spin;
+    W.tracks[i].lasted = 0;
+    lie_down(i);
+}
+
+/* Release a disk at t if its place is free; its event is then the end of a ride, or an impact. */
+static int release(int i, double t) {
+    Disk *d = W.disks + i;
+    if (!place_is_free(i, d->x, d->y, t)) {
+        d->waited = 1;
+        return 0;
+    }
+    d->t = d->since = t;
+    d->on = -1;
+    d->changes++;
+    d->mode = RIDING;
+    if (d->ride_rho > 0) {
+        d->ride_from = t;
+        d->ride_to = ride_end(d, t);
+    }
+    event_here(RELEASE, i, -1);
+    knot_now(i);
+    if (d->ride_rho > 0) ride_on(d, t, MAX(W.step_end, t));
+    else take_off(i);
+    return 1;
+}
+
+static void separate(int i) {
+    Disk *d = W.disks + i;
+    write_ride(i, d->ride_to);
+    event_here(SEPARATION, i, W.ride_owner);
+    take_off(i);
+}
+
+/* ------------------------------------------------------------------------------------------- ends */
+
+static int is_outside(double x, double y) {
+    return x < W.exit_box[0] || y < W.exit_box[1] || x > W.exit_box[2] || y > W.exit_box[3];
+}
+
+/* End the track of a disk that leaves the scene in this step, where it does. */
+static void leave(int i, double end) {
+    Disk *d = W.disks + i, there = *d;
+    double first = end, box[4];
+    advance(&there, end);
+    if (!is_outside(there.x, there.y)) return;
+    for (int n = 0; n < 4; n++) box[n] = W.exit_box[n];
+    for (int n = 0; n < 4; n++) {
+        int side = n < 2 ? -1 : 1, y = n % 2;
+        double gap = side * (box[n] - (y ? d->y : d->x)), rate = side * (y ? d->vy : d->vx);
+        double pull = side * (y ? W.gy : W.gx);
+        if (!(fabs(box[n]) < INFINITY) || gap - (rate + 0.5 * pull * (end - d->t)) * (end - d->t) > 0)
+            continue;
+        double root = sqrt(MAX(rate * rate + 2 * pull * gap, 0));
+        double t = gap <= 0 ? 0 : rate + root > 0 ? 2 * gap / (rate + root) : end - d->t;
+        first = MIN(first, d->t + t);
+    }
+    flush_track(i);
+    advance(d, MIN(first, end));
+    knot_now(i);
+    event_here(EXIT, i, -1);
+    finish(i, BY_EXIT);
+}
+
+/* End all tracks at the end of the run: what lasts in contact halfway through a step's impulses. */
+static void stop_all(int reason) {
+    for (int i = W.low; i < W.high; i++)
+        if (W.disks[i].mode == FREE && W.disks[i].supports && W.tracks[i].lasted) take_back(i);
+    for (int i = W.low; i < W.high; i++) {
+        Disk *d = W.disks + i;
+        if (d->mode == FREE && d->supports && W.tracks[i].lasted) end_in_contact(i, BY_TIME);
+        else if (d->mode == FREE) {
+            flush_track(i);
+            if (d->t > W.tracks[i].knot[0]) knot_now(i);
+            finish(i, BY_TIME);
+        } else if (d->mode == ASLEEP) {
+            d->vx = d->ux;
+            d->vy = d->uy;
+            if (d->t > W.tracks[i].knot[0]) knot_now(i);
+            finish(i, BY_TIME);
+        } else if (d->mode == RIDING) {
+            write_ride(i, MIN(W.t, d->ride_to));
+            finish(i, BY_TIME);
+        } else if (d->mode == WAITING) {
+            finish(i, BY_TIME);
+            continue;
+        } else continue;
+        if (reason == BY_SETTLING) {
+            event_here(SETTLE, i, d->held_count ? W.surfaces[d->held[0]].owner : -1);
+            d->reason = BY_SETTLING;
+        }
+    }
+}
+
+/* Whether everything of a crowd has been calm for long enough. */
+static int has_settled(void) {
+    for (int i = W.low; i < W.high; i++) {
+        const Disk *d = W.disks + i;
+        if (d->mode == WAITING || d->mode == RIDING || (d->mode == FREE && d->calm < SETTLED)) return 0;
+    }
+    return 1;
+}
+
+/* ------------------------------------------------------------------------------------------ steps */
+
+/* Tell which surfaces are there; what sleeps wakes when one comes or goes. Next change, s. */
+static double set_gates(double t) {
+    double next = INFINITY;
+    for (int k = 0; k < W.surface_count; k++) {
+        Surface *s = W.surfaces + k;
+        int there = t >= s->opens && t < s->closes;
+        if (there != s->there && W.step_count > 0)
+            for (int i = W.low; i < W.high; i++)
+                if (W.disks[i].mode == ASLEEP) wake(i, W.t);
+        s->there = there;
+        if (s->opens > t) next = MIN(next, s->opens);
+        if (s->closes > t) next = MIN(next, s->closes);
+    }
+    return next;
+}
+
+/* A sleeper that rides a belt wakes where that ends. */
+static void look_ahead(int i) {
+    Disk *d = W.disks + i;
+    if (d->ux == 0 && d->uy == 0) return;
+    for (int n = 0; n < d->held_count; n++) {
+        double nx, ny;
+        const Surface *s = W.surfaces + d->held[n];
+        if (gap_to(s, d->x + d->ux * W.step, d->y + d->uy * W.step, d->radius, &nx, &ny)
+                > 0.1 * TOUCH * d->radius
+            || bending(s, d->x + d->ux * W.step, d->y + d->uy * W.step, d->radius) != 0) {
+            wake(i, W.t);
+            return;
+        }
+    }
+}
+
+/* Begin a step: where prescribed paths lead, who may meet, what lasts. A status other than DONE says
+   what was too small, and nothing has happened yet. */
+static int begin_step(void) {
+    int woke;
+    double next = set_gates(W.t), h = W.dt;
+    if (W.g > 0)
+        for (int i = W.low; i < W.high; i++) h = MIN(h, sqrt(8 * HOP * W.disks[i].radius / W.g));
+    W.step = h;
+    W.soft = 2 * W.g * h;
+    W.base = SKIP / h;
+    W.skip = W.interact ? W.base : 0;
+    W.step_end = MIN(W.t + h, next);
+    if (!W.interact && W.disks[W.low].mode == FREE && !W.disks[W.low].supports)
+        W.step_end = W.t + free_span(W.disks + W.low, h);
+    /* At the very end a step is solved for what lasts, and not gone through. */
+    if (W.t < W.end_time) W.step_end = MIN(W.step_end, W.end_time);
+    else W.step_end = W.t + h;
+    W.now = W.t;
+    h = W.step_end - W.t;
+    do {
+        for (int i = W.low; i < W.high; i++) {
+            Disk *d = W.disks + i;
+            if (d->mode == ASLEEP) look_ahead(i);
+            if (d->mode == RIDING) ride_on(d, W.t, W.step_end);
+            if (d->mode == ASLEEP) {
+                d->vx = d->ux - 0.5 * W.gx * h;
+                d->vy = d->uy - 0.5 * W.gy * h;
+                d->spin = 0;
+            }
+            if (d->mode == FREE) {
+                d->ux = d->vx;
+                d->uy = d->vy;
+                d->uspin = d->spin;
+            }
+        }
+        if (!list_near(W.step_end)) return FULL_NEAR;
+        if (!find_contacts(h, &woke)) return FULL_CONTACTS;
+    } while (woke);
+    if (W.contact_count) solve_contacts();
+    close_step(h);
+    return DONE;
+}
+
+/* Resolve what happens within the step, in the order of time. */
+static int go_through(void) {
+    int i, count = W.high - W.low;
+    while ((i = next_disk()) >= 0) {
+        Disk *d = W.disks + i;
+        double t = d->due;
+        int j = d->partner;
+        if (W.knot_count + KNOTS_EACH * count + ride_knots(d) > W.knot_room) return FULL_KNOTS;
+        if (W.event_count + EVENTS_EACH * count + 64 + 16 * W.contact_count > W.event_room)
+            return FULL_EVENTS;
+        if (d->impacts > STALL) {
+            W.stalled = i;
+            W.now = t;
+            return STALLED;
+        }
+        if (j >= 0 && W.disks[j].changes != d->partner_changes) {
+            W.now = MAX(W.now, MIN(t, W.step_end));
+            foresee(i);
+            continue;
+        }
+        W.now = t;
+        if (j != ALARM) {
+            shock(i, j, t);
+            continue;
+        }
+        if (d->mode == WAITING) {
+            if (release(i, t)) enter_again(i, W.step_end);
+        } else {
+            separate(i);
+            enter_again(i, W.step_end);
+        }
+        foresee(i);
+    }
+    return DONE;
+}
+
+static void end_step(void) {
+    for (int i = W.low; i < W.high; i++) {
+        Disk *d = W.disks + i;
+        if (!is_live(d)) continue;
+        if (W.until != UNTIL_TIME && d->mode != RIDING) leave(i, W.step_end);
+        if (d->mode == FREE) advance(d, W.step_end);
+        else if (d->mode == ASLEEP) {
+            d->x += d->ux * (W.step_end - W.t);
+            d->y += d->uy * (W.step_end - W.t);
+            d->vx = d->ux;
+            d->vy = d->uy;
+            d->t = W.step_end;
+        }
+    }
+    W.t = W.step_end;
+    W.step_count++;
+    Contact *c = W.contacts;
+    W.contacts = W.earlier;
+    W.earlier = c;
+    W.earlier_count = W.contact_count;
+    if (W.stamp > 1000000000) {
+        W.stamp = 0;
+        for (int i = 0; i < W.disk_count; i++) W.disks[i].mark = W.disks[i].moved = 0;
+    }
+}
+
+/* Whether all of this part of the run have ended, or nothing can happen any more. */
+static int is_over(void) {
+    int awake = 0;
+    double next = INFINITY;
+    for (int i = W.low; i < W.high; i++) {
+        const Disk *d = W.disks + i;
+        if (d->mode == RIDING || d->mode == FREE || (d->mode == ASLEEP && (d->ux != 0 || d->uy != 0))) awake = 1;
+        if (d->mode == WAITING) next = MIN(next, MAX(d->release, W.t));
+    }
+    if (awake) return 0;
+    for (int k = 0; k < W.surface_count; k++) {
+        if (W.surfaces[k].opens > W.t) next = MIN(next, W.surfaces[k].opens);
+        if (W.surfaces[k].closes > W.t) next = MIN(next, W.surfaces[k].closes);
+    }
+    int asleep = 0;
+    for (int i = W.low; i < W.high; i++) asleep |= W.disks[i].mode == ASLEEP;
+    if (next >= W.end_time || next == INFINITY) next = W.end_time;
+    if (asleep || next < W.end_time) {
+        for (int i = W.low; i < W.high; i++)
+            if (W.disks[i].mode == ASLEEP) W.disks[i].t = next;
+    }
+    W.t = next;
+    return !(asleep && next < W.end_time) && next >= W.end_time;
+}
+
+/* Begin with the next disk of a run without contacts between them, or with all; 0 at the end. */
+static int begin_part(void) {
+    W.low = W.high;
+    if (W.low >= W.disk_count) return 0;
+    W.high = W.interact ? W.disk_count : W.low + 1;
+    W.contact_count = W.earlier_count = 0;
+    W.t = W.disks[W.low].release;
+    for (int i = W.low; i < W.high; i++) {
+        Disk *d = W.disks + i;
+        d->left = d->bottom = INFINITY;
+        d->right = d->top = -INFINITY;
+        d->before = d->links = -1;
+        d->heap_place = -1;
+        d->on = -1;
+        W.t = MIN(W.t, d->release);
+    }
+    return 1;
+}
+
+enum Phase { PART, STEP, WITHIN };
+
+/* A disk by itself needs no step before it flies. */
+static int begin_alone(void) {
+    int i = W.low;
+    Disk *d = W.disks + i;
+    if (W.interact || d->release >= W.end_time) return 1;
+    if (W.knot_count + KNOTS_EACH + ride_knots(d) > W.knot_room) return 0;
+    if (W.event_count + 64 > W.event_room) return 0;
+    W.step_end = W.t;
+    set_gates(W.t);
+    release(i, W.t);
+    if (d->mode == RIDING) {
+        if (d->ride_to >= W.end_time) {
+            if (d->ride_speed == 0 && W.until == UNTIL_SETTLED) {
+                event_here(SETTLE, i, W.ride_owner);
+                finish(i, BY_SETTLING);
+            } else W.t = W.end_time;
+        } else {
+            W.t = d->ride_to;
+            separate(i);
+        }
+    }
+    return 1;
+}
+
+/* Run on for at most so many steps; see `Status`. */
+__attribute__((visibility("default"))) int run(int steps) {
+    int status;
+    for (;;) {
+        int count = W.high - W.low;
+        if (W.phase == PART) {
+            if (!begin_part()) return DONE;
+            W.phase = STEP;
+            if (!begin_alone()) {
+                W.high = W.low;
+                W.phase = PART;
+                return FULL_KNOTS;
+            }
+        } else if (W.phase == STEP) {
+            int knots = (KNOTS_EACH + 2) * count + 64;
+            for (int i = W.low; i < W.high; i++)
+                if (W.disks[i].mode == RIDING) knots += ride_knots(W.disks + i);
+            if (W.knot_count + knots > W.knot_room) return FULL_KNOTS;
+            if (W.event_count + 4 * count + 64 > W.event_room) return FULL_EVENTS;
+            if (is_over()) {
+                stop_all(BY_TIME);
+                W.phase = PART;
+                continue;
+            }
+            if (steps-- <= 0) return PAUSED;
+            if ((status = begin_step()) != DONE) return status;
+            int settled = W.interact && W.until == UNTIL_SETTLED && has_settled();
+            if (settled || W.t >= W.end_time) {
+                stop_all(settled ? BY_SETTLING : BY_TIME);
+                W.phase = PART;
+                continue;
+            }
+            fall_asleep();
+            foresee_all();
+            W.phase = WITHIN;
+        } else {
+            if ((status = go_through()) != DONE) return status;
+            end_step();
+            W.phase = STEP;
+        }
+    }
+}
+
+/* Where `World` is. */
+__attribute__((visibility("default"))) World *world(void) { return &W; }

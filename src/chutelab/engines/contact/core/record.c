@@ -1,0 +1,143 @@
+/* What a run leaves behind: knots, events, entries of the ledger. */
+
+#include <string.h>
+#include "core.h"
+
+static void write_knot(int i, const double *state, const double *entries) {
+    Knot *k = W.knots + W.knot_count++;
+    Track *track = W.tracks + i;
+    memcpy(&k->t, state, 6 * sizeof(double));
+    memcpy(k->entries, entries, sizeof k->entries);
+    k->disk = i;
+    memcpy(track->knot, state, sizeof track->knot);
+    track->bent = track->open = 0;
+}
+
+/* Write the state of a disk as it is. */
+void knot_now(int i) {
+    Disk *d = W.disks + i;
+    double state[6] = {d->t, d->x, d->y, d->vx, d->vy, d->spin};
+    write_knot(i, state, d->entries);
+}
+
+/* Write the state in which a path ends, unless it is the last knot anyhow. */
+void knot_before(int i, double t, double vx, double vy, double spin) {
+    Disk *d = W.disks + i;
+    double state[6] = {t, d->x, d->y, vx, vy, spin};
+    flush_track(i);
+    if (memcmp(state, W.tracks[i].knot, sizeof state)) write_knot(i, state, d->entries);
+}
+
+/* End the smooth part of a track: the state halfway through the last impulses, and that after. */
+void flush_track(int i) {
+    Track *track = W.tracks + i;
+    if (!track->lasted) return;
+    double state[6];
+    memcpy(state, track->held, sizeof state);
+    if (track->open) write_knot(i, state, track->held_entries);
+    memcpy(state + 3, track->after, sizeof track->after);
+    write_knot(i, state, track->after_entries);
+    track->lasted = 0;
+}
+
+static int foretold(const Track *track, const double *state, double radius) {
+    double h = state[0] - track->knot[0];
+    for (int n = 0; n < 3; n++) {
+        double v = track->knot[3 + n], a = track->bend[n], lever = n < 2 ? 1 : radius;
+        if (fabs(v + a * h - state[3 + n]) * lever > W.smooth_v) return 0;
+        if (n < 2 && fabs(track->knot[1 + n] + (v + 0.5 * a * h) * h - state[1 + n]) > W.smooth_x)
+            return 0;
+    }
+    return 1;
+}
+
+static void foretell(Track *track, const double *from, const double *to) {
+    for (int n = 0; n < 3; n++) track->bend[n] = (to[3 + n] - from[3 + n]) / (to[0] - from[0]);
+    track->bent = 1;
+}
+
+/* Note the state of a disk in lasting contact, after the impulses of a step.
+
+   In contact a disk hops from step to step; its smooth track goes through the states halfway through
+   the impulses of each step. There its velocity is the mean of those before and after, and its
+   entries are short of what the second half does. One is written where constant acceleration from
+   the last knot on no longer foretells the next. */
+void track_lasting(int i) {
+    Disk *d = W.disks + i;
+    Track *track = W.tracks + i;
+    double state[6] = {d->t, d->x, d->y, 0.5 * (d->ux + d->vx), 0.5 * (d->uy + d->vy),
+                       0.5 * (d->uspin + d->spin)};
+    double entries[3];
+    for (int n = 0; n < 3; n++) entries[n] = d->entries[n] + d->gain[n] - d->ahead[n];
+    if (!track->lasted) {
+        knot_before(i, d->t, d->ux, d->uy, d->uspin);
+        write_knot(i, state, entries);
+    } else {
+        if (!track->bent) foretell(track, track->knot, state);
+        if (!foretold(track, state, d->radius)) {
+            double held[6];
+            memcpy(held, track->held, sizeof held);
+            if (track->open) write_knot(i, held, track->held_entries);
+            foretell(track, held, state);
+        }
+        track->open = 1;
+    }
+    track->lasted++;
+    memcpy(track->past, track->lasted > 1 ? track->held : state, sizeof track->past);
+    memcpy(track->held, state, sizeof state);
+    memcpy(track->held_entries, entries, sizeof entries);
+    memcpy(track->after, &d->vx, sizeof track->after);
+    for (int n = 0; n < 3; n++) track->after_entries[n] = d->entries[n] + d->gain[n];
+}
+
+/* Write the latest state in lasting contact, which sleep ends. */
+void knot_asleep(int i) {
+    Track *track = W.tracks + i;
+    double state[6];
+    memcpy(state, track->held, sizeof state);
+    if (track->open) write_knot(i, state, track->held_entries);
+    track->lasted = 0;
+}
+
+/* End a track at its last knot. */
+void finish(int i, int reason) {
+    Disk *d = W.disks + i;
+    d->mode = GONE;
+    d->reason = reason;
+    d->due = INFINITY;
+    d->changes++;
+    W.done++;
+}
+
+/* Write an event; states are velocity and spin, the impulses act on disk i. */
+void write_event(int kind, int i, int other, int owner, double t, const double *place,
+                 const double *before, const double *after, double normal, double tangent) {
+    Event *e = W.events + W.event_count++;
+    e->t = t;
+    e->x = place[0];
+    e->y = place[1];
+    memcpy(e->before, before, sizeof e->before);
+    memcpy(e->after, after, sizeof e->after);
+    e->normal = normal;
+    e->tangent = tangent;
+    e->disk = i;
+    e->other = other;
+    e->kind = kind;
+    e->surface = owner;
+}
+
+/* Write an event that changes nothing. */
+void event_here(int kind, int i, int owner) {
+    Disk *d = W.disks + i;
+    write_event(kind, i, -1, owner, d->t, &d->x, &d->vx, &d->vx, 0, 0);
+}
+
+/* Book entries of a contact on its owner, and on one disk, or half each on two. */
+void book(double *first, double *second, int owner, const double *entries) {
+    double share = second ? 0.5 : 1;
+    for (int n = 0; n < 3; n++) {
+        W.books[3 * owner + n] += entries[n];
+        first[n] += share * entries[n];
+        if (second) second[n] += share * entries[n];
+    }
+}

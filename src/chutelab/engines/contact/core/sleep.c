@@ -1,0 +1,118 @@
+/* Islands that lie still, or ride a belt all alike, fall asleep: they are not solved until something
+   touches them. */
+
+#include "core.h"
+
+/* s; so long an island has to be at rest. */
+#define CALM_DOWN 0.1
+
+static int root(int i) {
+    int *parent = W.queue;
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+}
+
+/* Wake the island of a disk at t. Within a step its disks hop like all that lies, for what is left
+   of it: half of what gravity takes until then they get from what they lie on. */
+void wake(int i, double t) {
+    int island = W.disks[i].island;
+    for (int n = W.low; n < W.high; n++) {
+        Disk *d = W.disks + n;
+        if (d->mode != ASLEEP || d->island != island) continue;
+        double h = t - W.t, left = W.step_end - t;
+        /* Where it lies, without the hop of the step so far. */
+        d->x += (d->ux - d->vx - 0.5 * W.gx * (d->t - W.t)) * (d->t - W.t);
+        d->y += (d->uy - d->vy - 0.5 * W.gy * (d->t - W.t)) * (d->t - W.t);
+        d->x += d->ux * (t - d->t);
+        d->y += d->uy * (t - d->t);
+        d->t = t;
+        d->vx = d->ux;
+        d->vy = d->uy;
+        d->spin = 0;
+        d->mode = FREE;
+        d->calm = d->rest = 0;
+        d->changes++;
+        if (h <= 0) continue;
+        was_moved(n, t);
+        double x = -0.5 * W.gx * left, y = -0.5 * W.gy * left;
+        double entries[3] = {0, -d->mass * (x * (d->vx + 0.5 * x) + y * (d->vy + 0.5 * y)), 0};
+        book(d->entries, 0, W.owner_count, entries);
+        d->vx += x;
+        d->vy += y;
+    }
+}
+
+/* The velocity of the surfaces that a disk lies on is `u`, if it is to sleep; 0 if it may not. */
+static int joins(const Contact *c, double *u, int *owner) {
+    const Surface *s = W.surfaces + (-1 - c->j);
+    double belt = c->other[1], x = belt * c->ny, y = -belt * c->nx;
+    if (s->speed != 0 && s->shape != SEGMENT) return 0;
+    if (fabs(W.gx * x + W.gy * y) > 1e-12 * W.g * fabs(belt)) return 0;
+    if (*owner >= 0 && (fabs(u[0] - x) > 1e-12 || fabs(u[1] - y) > 1e-12)) return 0;
+    u[0] = x;
+    u[1] = y;
+    *owner = c->owner;
+    return 1;
+}
+
+/* Let islands fall asleep that have been at rest for long enough, after a step's solve. */
+void fall_asleep(void) {
+    int *parent = W.queue, ready = 0;
+    for (int i = W.low; i < W.high; i++) {
+        parent[i] = i;
+        ready += W.disks[i].mode == FREE && W.disks[i].rest >= CALM_DOWN;
+    }
+    if (!ready || !W.sleeps) return;
+    for (int n = 0; n < W.contact_count; n++) {
+        const Contact *c = W.contacts + n;
+        if (c->two) parent[root(c->i)] = root(c->j);
+    }
+    /* Of each island, at its root: may it sleep, and how do its surfaces move? `found` counts who
+       may not, `ux`, `uy` are free to hold the velocity once the step is closed. */
+    for (int i = W.low; i < W.high; i++) {
+        W.found[i] = 0;
+        W.moved[i] = -1;
+    }
+    for (int i = W.low; i < W.high; i++) {
+        const Disk *d = W.disks + i;
+        if (d->mode == FREE && d->rest < CALM_DOWN) W.found[root(i)]++;
+    }
+    for (int n = 0; n < W.contact_count; n++) {
+        const Contact *c = W.contacts + n;
+        int k = root(c->i);
+        if (c->impulse[0] == 0 || c->two) continue;
+        if (c->j >= 0 || !joins(c, &W.tracks[k].past[4], W.moved + k)) W.found[k]++;
+    }
+    for (int i = W.low; i < W.high; i++) {
+        int k = root(i);
+        if (W.disks[i].mode == FREE && !W.found[k] && W.moved[k] >= 0) take_back(i);
+    }
+    for (int i = W.low; i < W.high; i++) {
+        Disk *d = W.disks + i;
+        Track *track = W.tracks + i;
+        int k = root(i);
+        if (d->mode != FREE || W.found[k] || W.moved[k] < 0) continue;
+        const double *s = track->held, *u = &W.tracks[k].past[4];
+        double x = u[0] - s[3], y = u[1] - s[4];
+        double entries[3] = {d->mass * (x * u[0] + y * u[1]),
+                             0.5 * d->mass * (x * x + y * y) + 0.5 * d->inertia * s[5] * s[5], 0};
+        knot_asleep(i);
+        book(d->entries, 0, W.moved[k], entries);
+        d->ux = u[0];
+        d->uy = u[1];
+        d->vx = u[0];
+        d->vy = u[1];
+        d->spin = d->uspin = 0;
+        d->island = k;
+        d->changes++;
+        knot_now(i);
+    }
+    for (int i = W.low; i < W.high; i++) {
+        Disk *d = W.disks + i;
+        int k = root(i);
+        if (d->mode != FREE || W.found[k] || W.moved[k] < 0) continue;
+        d->mode = ASLEEP;
+        d->vx -= 0.5 * W.gx * W.step;
+        d->vy -= 0.5 * W.gy * W.step;
+    }
+}

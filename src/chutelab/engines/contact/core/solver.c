@@ -1,0 +1,327 @@
+/* Lasting contacts, once a step: impulses such that no gap is negative at the step's end, and that
+   friction, within its bound, brings the slip in the middle of the step to zero.
+
+   Contact dynamics after Moreau and Jean: projected Gauss-Seidel, started from the impulses of the
+   step before. The gap at the end is that of the path without impulses, to the true surface: so
+   curves, ends and rolling over each other need no cases. What rests hops by g h^2/8 in each step
+   and is where it was at its end; positions at the steps are of second order in h. */
+
+#include "core.h"
+
+/* Overlap that is left alone, in radii; of what is beyond, a tenth is parted in each step: gently,
+   since parting does work. */
+#define SLOP 1e-3
+#define PART 0.1
+/* m/s; below it the contacts of a crowd count as calm: `settled` in the contract. */
+#define CALM 1e-3
+/* Of sqrt(g r): below it an island may fall asleep; 0.5 mm/s for r = 4 mm. */
+#define REST 2.5e-3
+
+static double gap_later(const Contact *c, double h) {
+    const Disk *a = W.disks + c->i;
+    double x = a->x + (a->vx + 0.5 * W.gx * h) * h, y = a->y + (a->vy + 0.5 * W.gy * h) * h, nx, ny;
+    if (c->j < 0) return gap_to(W.surfaces + (-1 - c->j), x, y, a->radius, &nx, &ny);
+    const Disk *b = W.disks + c->j;
+    x -= b->x + (b->vx + 0.5 * W.gx * h) * h;
+    y -= b->y + (b->vy + 0.5 * W.gy * h) * h;
+    return sqrt(x * x + y * y) - a->radius - b->radius;
+}
+
+/* Add a contact if it touches and hardly approaches; `least` is the smaller radius. */
+static int add(int i, int j, double least, double bound, double h) {
+    if (W.contact_count >= W.contact_room) return 0;
+    Contact *c = W.contacts + W.contact_count;
+    double u[3];
+    describe(c, i, j);
+    if (c->gap > TOUCH * least) return 1;
+    relative(c, 0, u);
+    if (-u[0] > bound) return 1;
+    double aim = MIN(c->gap, 0);
+    if (c->gap < -SLOP * least) aim = -SLOP * least + (1 - PART) * (c->gap + SLOP * least);
+    c->need = (aim - gap_later(c, h)) / h;
+    c->drift = j < 0 ? 0.5 * h * (W.gx * c->ny - W.gy * c->nx) : 0;
+    c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
+    for (int k = W.disks[i].before; k >= 0; k = W.earlier[k].next)
+        if (W.earlier[k].j == j)
+            for (int n = 0; n < 3; n++) c->impulse[n] = W.earlier[k].impulse[n];
+    W.contact_count++;
+    return 1;
+}
+
+/* List the contacts of the step, waking sleepers that are touched; 0 if there is no room. */
+int find_contacts(double h, int *woke) {
+    W.contact_count = 0;
+    *woke = 0;
+    for (int n = 0; n < W.near_count; n++) {
+        int i = W.near[2 * n], j = W.near[2 * n + 1];
+        Disk *a = W.disks + i, *b = W.disks + j;
+        double least = MIN(a->radius, b->radius), reach = a->radius + b->radius + TOUCH * least;
+        if (square(a->x - b->x) + square(a->y - b->y) > reach * reach) continue;
+        int soft = a->supports || b->supports || a->mode != FREE || b->mode != FREE;
+        if (a->mode == ASLEEP || b->mode == ASLEEP) {
+            wake(a->mode == ASLEEP ? i : j, W.t);
+            *woke = 1;
+        }
+        if (a->mode != FREE) { int k = i; i = j; j = k; }
+        if (!add(i, j, least, soft ? W.soft : MIN(W.skip * least, W.g * h), h)) return 0;
+    }
+    if (*woke) return 1;
+    for (int i = W.low; i < W.high; i++) {
+        Disk *d = W.disks + i;
+        if (d->mode != FREE) continue;
+        for (int k = 0; k < W.surface_count; k++) {
+            if (!is_near(W.surfaces + k, d)) continue;
+            double bound = d->supports ? W.soft : MIN(W.skip * d->radius, W.g * h);
+            if (!add(i, -1 - k, d->radius, bound, h)) return 0;
+        }
+    }
+    return 1;
+}
+
+void solve_contacts(void) {
+    int count = W.contact_count;
+    for (int n = 0; n < count; n++) push(W.contacts + n, W.contacts[n].impulse);
+    for (int sweep = 0; sweep < W.sweeps; sweep++) {
+        double worst = 0;
+        for (int m = 0; m < count; m++) {
+            /* To and fro, so that what one end of a pile does reaches the other in one sweep. */
+            Contact *c = W.contacts + (sweep % 2 == 0 ? m : count - 1 - m);
+            const Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
+            double *J = c->impulse, K[3], most, v[3];
+            double x = a->vx - a->ux, y = a->vy - a->uy;
+            if (c->two) {
+                x -= b->vx - b->ux;
+                y -= b->vy - b->uy;
+            }
+            relative(c, 0, v);
+            K[0] = MAX(J[0] - c->mass[0] * (x * c->nx + y * c->ny - c->need), 0);
+            most = c->friction * K[0];
+            K[1] = MIN(MAX(J[1] - c->mass[1] * (v[1] + c->drift), -most), most);
+            most = c->arm * K[0];
+            K[2] = MIN(MAX(J[2] - c->mass[2] * v[2], -most), most);
+            double change[3] = {K[0] - J[0], K[1] - J[1], K[2] - J[2]};
+            if (change[0] == 0 && change[1] == 0 && change[2] == 0) continue;
+            push(c, change);
+            for (int k = 0; k < 3; k++) J[k] = K[k];
+            worst = MAX(worst, fabs(change[0]) / c->mass[0]);
+            worst = MAX(worst, fabs(change[1]) / c->mass[1]);
+            if (c->mass[2] > 0) worst = MAX(worst, fabs(change[2]) / c->mass[2] * a->radius);
+        }
+        W.sweep_count++;
+        if (worst <= W.accurate) break;
+    }
+    W.solve_count++;
+}
+
+/* Note whether a disk that lasts on one surface slips there, sticks, or has come to rest. */
+static void note_grip(Disk *d, const Contact *c, const double *u, const double *v, double h) {
+    int i = c->i;
+    double most = c->friction * c->impulse[0], slip = v[1] + c->drift;
+    int grips = fabs(c->impulse[1]) < most * (1 - 1e-12) || (most == 0 && slip == 0 && c->drift == 0);
+    Track *track = W.tracks + i;
+    for (int n = 2; n > 0; n--) {
+        track->load[n] = track->load[n - 1];
+        track->load_t[n] = track->load_t[n - 1];
+    }
+    track->load[0] = c->impulse[0] / h;
+    track->load_t[0] = d->t;
+    if (d->on != c->owner) {
+        /* It came to lie there without an impact that was told. */
+        int kind = c->owner == W.landing && !d->landed ? LANDING : IMPACT;
+        write_event(kind, i, -1, c->owner, d->t, &d->x, &d->ux, &d->vx, c->impulse[0], c->impulse[1]);
+        d->landed |= kind == LANDING;
+        d->on = c->owner;
+        d->slips = 1;
+    }
+    if (grips && d->slips) {
+        /* Friction slows the slip evenly; it is used up so long after the last mid-step. */
+        double s = fabs(u[1] - c->drift), rate = most / (c->mass[1] * h);
+        double t = d->t - 0.5 * h + (rate > 0 ? s / rate : 0);
+        t = MIN(MAX(MAX(t, d->since), W.tracks[i].knot[0]), d->t + h);
+        double place[2] = {d->x + (t - d->t) * 0.5 * (d->ux + d->vx), d->y + (t - d->t) * 0.5 * (d->uy + d->vy)};
+        double after[3] = {d->vx + 0.5 * W.gx * h, d->vy + 0.5 * W.gy * h, d->spin};
+        write_event(STICK, i, -1, c->owner, t, place, after, after, 0, 0);
+        d->since = t;
+    } else if (!grips && !d->slips)
+        event_here(SLIP, i, c->owner);
+    d->slips = !grips;
+}
+
+/* Whether a disk by itself that grips stays as it is: on a face, and nothing pulls it along. */
+static int lies(const Disk *d, const Contact *c) {
+    const Surface *s = W.surfaces + (-1 - c->j);
+    if (s->speed != 0 && c->owner != W.landing) return 0;
+    if (bending(s, d->x, d->y, d->radius) != 0 && (d->vx != 0 || c->other[1] != 0)) return 0;
+    if (c->arm > 0 && d->spin != c->other[2]) return 0;
+    return d->inertia == 0 || c->drift == 0;
+}
+
+/* After the solve: entries, supports, timers, tracks. */
+void close_step(double h) {
+    double calm_bound = CALM;
+    for (int i = W.low; i < W.high; i++) {
+        Disk *d = W.disks + i;
+        d->links = d->before = -1;
+        d->held_count = d->supports = 0;
+        if (h > 0.01 * W.dt) d->impacts = 0;
+        for (int n = 0; n < 3; n++) d->gain[n] = d->ahead[n] = 0;
+        if (d->mode == FREE) {
+            d->calm += h;
+            d->rest += h;
+        }
+    }
+    for (int n = 0; n < W.contact_count; n++) {
+        Contact *c = W.contacts + n;
+        Disk *a = W.disks + c->i, *b = c->j >= 0 ? W.disks + c->j : 0;
+        double u[3], v[3], entries[3], given[3];
+        c->next = a->before;
+        a->before = n;
+        W.links[2 * n] = a->links;
+        a->links = 2 * n;
+        if (b) {
+            W.links[2 * n + 1] = b->links;
+            b->links = 2 * n + 1;
+        } else if (a->held_count < MAX_HELD) a->held[a->held_count++] = -1 - c->j;
+        if (c->impulse[0] == 0) continue;
+        relative(c, 1, u);
+        relative(c, 0, v);
+        share_out(c, u, v, 0, entries, given);
+        book(a->gain, c->two ? b->gain : 0, c->owner, entries);
+        if (given[0] != 0) book(a->gain, 0, W.ride_owner, given);
+        share_out(c, u, v, 1, entries, given);
+        for (int k = 0; k < 3; k++) {
+            a->ahead[k] += (c->two ? 0.5 : 1) * entries[k] + given[k];
+            if (c->two) b->ahead[k] += 0.5 * entries[k];
+        }
+        a->supports++;
+        if (b) b->supports++;
+        /* Halfway through the impulses the hop is left out. */
+        double off = fabs(0.5 * (u[0] + v[0])), slip = fabs(v[1] + c->drift);
+        double turn = fabs(v[2]) * a->radius, rest = REST * sqrt(W.g * a->radius);
+        int driven = !b && W.surfaces[-1 - c->j].speed != 0 && c->owner != W.landing;
+        if (off > calm_bound || slip > calm_bound || driven || (b && b->mode == RIDING)) {
+            a->calm = 0;
+            if (b) b->calm = 0;
+        }
+        if (off > rest || slip > rest || turn > rest || (b && b->mode == RIDING)) {
+            a->rest = 0;
+            if (b) b->rest = 0;
+        }
+    }
+    for (int i = W.low; i < W.high; i++) {
+        Disk *d = W.disks + i;
+        Track *track = W.tracks + i;
+        if (d->mode != FREE) continue;
+        if (!d->supports) {
+            d->calm = d->rest = 0;
+            if (track->lasted) {
+                /* The load fell to nothing between the last steps: where its line through two full
+                   ones crosses zero the contact ended. */
+                if (d->on >= 0 && track->lasted >= (W.interact ? 10 : 3)) {
+                    double t = track->load_t[1], fall = track->load[2] - track->load[1];
+                    if (fall > 0) t += track->load[1] / fall * (t - track->load_t[2]);
+                    t = MIN(MAX(t, track->load_t[1]), d->t);
+                    const double *from = t < track->held[0] ? track->past : track->held;
+                    double s = t - from[0], span = d->t - from[0];
+                    double place[2] = {from[1] + s * from[3] + 0.5 * s * s * (d->vx - from[3]) / span,
+                                       from[2] + s * from[4] + 0.5 * s * s * (d->vy - from[4]) / span};
+                    double after[3];
+                    for (int n = 0; n < 3; n++)
+                        after[n] = from[3 + n] + (s / span) * ((&d->vx)[n] - from[3 + n]);
+                    write_event(SEPARATION, i, -1, d->on, t, place, after, after, 0, 0);
+                }
+                d->on = -1;
+                flush_track(i);
+            }
+            continue;
+        }
+        const Contact *only = 0;
+        int reason = -1;
+        int owners = 0;
+        for (int link = d->links; link >= 0; link = W.links[link]) {
+            const Contact *c = W.contacts + link / 2;
+            if (c->impulse[0] == 0) continue;
+            if (!only || c->owner != only->owner || c->j >= 0) owners++;
+            if (!only || c->impulse[0] > only->impulse[0]) only = c;
+        }
+        if (owners == 1 && only->j < 0) {
+            double u[3], v[3];
+            relative(only, 1, u);
+            relative(only, 0, v);
+            int gripped = !d->slips && d->on == only->owner;
+            note_grip(d, only, u, v, h);
+            track_lasting(i);
+            for (int n = 0; n < 3; n++) d->entries[n] += d->gain[n];
+            d->changes++;
+            if (!W.interact && W.until == UNTIL_SETTLED && gripped && !d->slips && lies(d, only))
+                reason = BY_SETTLING;
+            else if (!W.interact && W.until == UNTIL_LANDED && d->landed)
+                reason = BY_LANDING;
+        } else {
+            track_lasting(i);
+            for (int n = 0; n < 3; n++) d->entries[n] += d->gain[n];
+            d->changes++;
+            d->slips = 1;
+            d->on = -1;
+            if (!W.interact && W.until == UNTIL_SETTLED) {
+                const double *s = track->held;
+                if (fabs(s[3]) + fabs(s[4]) + fabs(s[5]) * d->radius < 1e-9 && d->calm > 2 * h)
+                    reason = BY_SETTLING;
+            }
+        }
+        if (reason >= 0) {
+            take_back(i);
+            end_in_contact(i, reason);
+        }
+    }
+}
+
+/* Take back what the second half of this step's impulses did to the ledger by disk i. */
+void take_back(int i) {
+    Disk *d = W.disks + i;
+    for (int link = d->links; link >= 0; link = W.links[link]) {
+        const Contact *c = W.contacts + link / 2;
+        double u[3], v[3], entries[3], given[3];
+        if (c->impulse[0] == 0) continue;
+        relative(c, 1, u);
+        relative(c, 0, v);
+        share_out(c, u, v, 1, entries, given);
+        for (int n = 0; n < 3; n++) {
+            double back = (c->two ? 0.5 : 1) * entries[n];
+            if (c->i != i && !c->two) back = 0;
+            W.books[3 * c->owner + n] -= back;
+            d->entries[n] -= back;
+            if (c->i == i) {
+                W.books[3 * W.ride_owner + n] -= given[n];
+                d->entries[n] -= given[n];
+            }
+        }
+    }
+}
+
+/* End the track of a disk in lasting contact in the state halfway through this step's impulses.
+
+   One that settles ended when its slip was used up: it has ridden along at the same velocity since,
+   and the belt has done no more than gravity took. */
+void end_in_contact(int i, int reason) {
+    Disk *d = W.disks + i;
+    Track *track = W.tracks + i;
+    double *s = track->held;
+    double then = d->t;
+    if (reason == BY_SETTLING) then = MIN(MAX(d->since, track->knot[0]), then);
+    double back = d->t - then, work = d->mass * (W.gx * s[3] + W.gy * s[4]) * back;
+    d->x = s[1] - s[3] * back;
+    d->y = s[2] - s[4] * back;
+    d->vx = s[3];
+    d->vy = s[4];
+    d->spin = s[5];
+    d->t = then;
+    if (back > 0 && d->on >= 0) {
+        d->entries[0] += work;
+        W.books[3 * d->on] += work;
+    }
+    if (track->lasted > 1 || then > track->knot[0]) knot_now(i);
+    track->lasted = 0;
+    if (reason == BY_SETTLING) event_here(SETTLE, i, d->on);
+    finish(i, reason);
+}

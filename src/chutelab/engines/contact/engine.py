@@ -1,0 +1,264 @@
+"""`run`: a machine in, a recording out; the core does the rest."""
+
+from __future__ import annotations
+
+from math import inf
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from chutelab.engines.contact.module import Module, Status, borrow, constants, dtype, give_back
+from chutelab.machine import moved, origin
+from chutelab.recorder import Recorder, StalledError
+from chutelab.recording import EVENT, KNOT
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from chutelab.machine import Machine
+    from chutelab.recording import Recording
+
+    Progress = Callable[[float], None]
+
+GREATEST = 1e300
+"""Friction without a bound, as a number that can be multiplied by zero."""
+
+SLICE = 0.05
+"""s of wall time between two looks at Ctrl-C and reports of progress."""
+
+SWEEPS, SWEEPS_ALONE = 60, 500
+"""Most sweeps of the contact solver in a step."""
+
+
+def run(machine: Machine, progress: Progress | None = None) -> Recording:
+    """Run a machine with the contact engine.
+
+    Parameters
+    ----------
+    machine : Machine
+        From `chutelab.machine.build`; the radius must be more than 0.
+    progress : callable, optional
+        Called now and then with the share of the run that is done.
+
+    Returns
+    -------
+    Recording
+        Flights and blows to rounding error, lasting contacts of second order in `machine.dt`;
+        bit-identical on every machine, but for `seconds`.
+
+    Raises
+    ------
+    ValueError
+        If the particle has no radius.
+    StalledError
+        If a particle does not get on; it has the recording so far.
+    """
+    if machine.particle.radius <= 0.0:
+        raise ValueError("particle.radius = 0: the contact engine needs a radius above 0 m")
+    begin = perf_counter()
+    place = origin(machine)
+    module = borrow()
+    try:
+        job = _Job(module, moved(machine, -place[0], -place[1]))
+        stalled = job.run(progress)
+        recording = job.recording(machine, place, perf_counter() - begin)
+    finally:
+        give_back(module)
+    if stalled is not None:
+        particle, t, (x, y) = stalled
+        reason = "too many impacts in one step; make run.dt shorter, or lower the restitution there"
+        raise StalledError(particle, t, (x + place[0], y + place[1]), reason, recording)
+    return recording
+
+
+class _Job:
+    """One run: fills the module's memory, drains what it writes, makes room where it is full."""
+
+    def __init__(self, module: Module, machine: Machine) -> None:
+        self.module, self.machine = module, machine
+        self.knots: list[NDArray[Any]] = []
+        self.events: list[NDArray[Any]] = []
+        n = machine.count
+        count = self.surface_count = len(machine.segments.length) + (machine.pulley is not None)
+        self.owners = len(machine.surfaces)
+        self.rooms = {
+            "knot": max(64, 24 * n) + 80,
+            "event": 40 * n + 1200,
+            "contact": 6 * n + 16,
+            "near": 16 * n + 16 if machine.interact else 1,
+        }
+        integer, real = np.dtype("<i4"), np.dtype("<f8")
+        buckets = 1 << (4 * n + 16).bit_length() if machine.interact else 1
+        cells = 12 * n + 64 if machine.interact else 1
+        for name, kind, size in (
+            ("disks", dtype("Disk"), n), ("tracks", dtype("Track"), n),
+            ("surfaces", dtype("Surface"), count), ("pairs", dtype("Pair"), 1 + count),
+            ("books", real, 3 * (self.owners + 1)), ("cells", dtype("Cell"), cells),
+            ("heads", integer, buckets), ("heap", integer, n), ("queue", integer, n + 1),
+            ("moved", integer, n), ("found", integer, 2 * n),
+        ):  # fmt: skip
+            module.place(name, kind, size)
+        self.room("contact")
+        self.room("near")
+        self.room("knot")
+        self.room("event")
+        self.settings(buckets, cells)
+        self.fill()
+
+    def room(self, what: str, more: int = 1) -> None:
+        """Make room for `more` times as much of something as before; what was there is lost."""
+        self.rooms[what] *= more
+        size, place = self.rooms[what], self.module.place
+        if what == "contact":
+            place("contacts", dtype("Contact"), size)
+            old = int(self.module.world["earlier"][0])
+            kept = int(self.module.world["earlier_count"][0])
+            if kept:
+                before = self.module.array("earlier", dtype("Contact"), kept).copy()
+            place("earlier", dtype("Contact"), size)
+            if old and kept:
+                self.module.array("earlier", dtype("Contact"), kept)[:] = before
+            place("links", np.dtype("<i4"), 2 * size)
+        elif what == "near":
+            place("near", np.dtype("<i4"), 2 * size)
+        else:
+            place(f"{what}s", dtype(what.title()), size)
+        self.module.world[f"{what}_room"] = size
+
+    def settings(self, buckets: int, cells: int) -> None:
+        machine, world = self.machine, self.module.world
+        alone = not machine.interact
+        r = machine.particle.radius
+        left, right, bottom, top = machine.exit_box
+        for name, value in (
+            ("disk_count", machine.count), ("surface_count", self.surface_count),
+            ("kind_count", 1), ("material_count", self.surface_count),
+            ("owner_count", self.owners), ("bucket_count", buckets), ("cell_room", cells),
+            ("interact", machine.interact),
+            ("until", constants("Until")[f"UNTIL_{machine.until.upper()}"]),
+            ("landing", machine.landing), ("ride_owner", 0),
+            ("sweeps", SWEEPS_ALONE if alone else SWEEPS), ("sleeps", not alone),
+            ("gy", -machine.gravity), ("g", machine.gravity), ("dt", machine.dt),
+            ("end_time", machine.end_time), ("exit_box", (left, bottom, right, top)),
+            ("smooth_x", (1e-5 if alone else 1e-4) * r), ("smooth_v", 1e-4 if alone else 1e-3),
+            ("accurate", 1e-15 if alone else 1e-4),
+        ):  # fmt: skip
+            world[name] = value
+
+    def fill(self) -> None:
+        """Fill in disks, surfaces and pairs."""
+        machine, module = self.machine, self.module
+        releases, particle = machine.releases, machine.particle
+        disks = module.array("disks", dtype("Disk"), machine.count)
+        disks["x"], disks["y"] = releases.position.T
+        disks["vx"], disks["vy"] = releases.velocity.T
+        disks["release"] = releases.t
+        disks["radius"], disks["mass"] = particle.radius, particle.mass
+        disks["inertia"] = particle.inertia
+        carried = releases.carried
+        disks["ride_x"][carried] = releases.position[carried, 0]
+        disks["ride_rho"][carried] = releases.position[carried, 1]
+        disks["ride_speed"][carried] = releases.velocity[carried, 0]
+        surfaces = module.array("surfaces", dtype("Surface"), self.surface_count)
+        surfaces["material"] = np.arange(self.surface_count)
+        surfaces["opens"], surfaces["closes"] = -inf, inf
+        seg, wheel = machine.segments, machine.pulley
+        s = len(seg.length)
+        flat = surfaces[:s]
+        flat["x"], flat["y"] = seg.start.T
+        flat["tx"], flat["ty"] = seg.tangent.T
+        flat["length"], flat["speed"], flat["owner"] = seg.length, seg.speed, seg.surface
+        flat["end"][:, :2], flat["end"][:, 2:] = seg.start, seg.end
+        low, high = np.minimum(seg.start, seg.end), np.maximum(seg.start, seg.end)
+        flat["box"][:, :2], flat["box"][:, 2:] = low, high
+        restitution, friction = seg.restitution, seg.friction
+        if wheel is not None:
+            surfaces[s]["shape"] = constants("Shape")["CIRCLE"]
+            surfaces[s]["radius"], surfaces[s]["speed"] = wheel.radius, wheel.speed
+            surfaces[s]["owner"] = wheel.surface
+            surfaces[s]["box"] = -wheel.radius, -wheel.radius, wheel.radius, wheel.radius
+            restitution = np.append(restitution, wheel.restitution)
+            friction = np.append(friction, wheel.friction)
+        pairs = module.array("pairs", dtype("Pair"), 1 + self.surface_count)
+        pairs["restitution"][0] = machine.pair_restitution
+        pairs["friction"][0] = machine.pair_friction
+        pairs["restitution"][1:], pairs["friction"][1:] = restitution, friction
+        np.minimum(pairs["friction"], GREATEST, out=pairs["friction"])
+
+    def run(self, progress: Progress | None) -> tuple[int, float, tuple[float, float]] | None:
+        """Run to the end, or until a particle stalls: return which one, when and where."""
+        steps, module = 64, self.module
+        while True:
+            begin = perf_counter()
+            status = module.run(steps)
+            drained = self.drain()
+            if status is Status.DONE:
+                if progress is not None:
+                    progress(1.0)
+                return None
+            if status is Status.STALLED:
+                i = int(module.world["stalled"][0])
+                disk = module.array("disks", dtype("Disk"), self.machine.count)[i]
+                return i, float(module.world["now"][0]), (float(disk["x"]), float(disk["y"]))
+            if status is Status.FULL_NEAR:
+                self.room("near", 2)
+            elif status is Status.FULL_CONTACTS:
+                self.room("contact", 2)
+            elif status in (Status.FULL_KNOTS, Status.FULL_EVENTS):
+                what = "knot" if status is Status.FULL_KNOTS else "event"
+                if drained[what] < self.rooms[what] // 2:
+                    self.room(what, 2)
+            elif status is Status.PAUSED and perf_counter() - begin < SLICE:
+                steps *= 2
+            if progress is not None:
+                progress(self.share())
+
+    def share(self) -> float:
+        world, n = self.module.world, self.machine.count
+        ended = int(world["done"][0]) / n
+        if not self.machine.interact:
+            return ended
+        passed = float(world["t"][0]) / self.machine.end_time if self.machine.end_time > 0 else 1.0
+        return min(1.0, max(ended, passed))
+
+    def drain(self) -> dict[str, int]:
+        """Take what was written; return how much it was."""
+        counts = {}
+        for what, kept in (("knot", self.knots), ("event", self.events)):
+            counts[what] = count = int(self.module.world[f"{what}_count"][0])
+            if count:
+                kept.append(self.module.array(f"{what}s", dtype(what.title()), count).copy())
+                self.module.world[f"{what}_count"] = 0
+        return counts
+
+    def recording(self, machine: Machine, place: tuple[float, float], seconds: float) -> Recording:
+        """Return what was recorded."""
+        recorder = Recorder(machine.count, machine.surfaces)
+        world, module = self.module.world, self.module
+        for rows in self.knots:
+            owner = rows["disk"].astype(np.int64)
+            recorder.add(owner, rows.view("<f8").reshape(-1, 10)[:, :9].copy().view(KNOT)[:, 0])
+        for rows in self.events:
+            events = np.empty(len(rows), EVENT)
+            for name, source in (("t", "t"), ("particle", "disk"), ("other", "other"),
+                                 ("kind", "kind"), ("surface", "surface"),
+                                 ("normal_impulse", "normal"), ("tangential_impulse", "tangent")):  # fmt: skip
+                events[name] = rows[source]
+            events["position"][:, 0], events["position"][:, 1] = rows["x"], rows["y"]
+            for when in ("before", "after"):
+                events[f"velocity_{when}"] = rows[when][:, :2]
+                events[f"omega_{when}"] = rows[when][:, 2]
+            recorder.tell(events)
+        disks = module.array("disks", dtype("Disk"), machine.count)
+        recorder.ended[:] = disks["reason"]
+        books = module.array("books", np.dtype("<f8"), 3 * (self.owners + 1))
+        recorder.by_surface[:] = books.reshape(-1, 3)
+        recorder.contacts = int(world["impact_count"][0])
+        return recorder.finish(
+            scene=machine.text, title=machine.title, engine="contact", particle=machine.particle,
+            gravity=machine.gravity, steps=int(world["step_count"][0]), seconds=seconds,
+            origin=place,
+        )  # fmt: skip

@@ -1,0 +1,137 @@
+"""The core in memory: WebAssembly run by wasmtime, its arrays as NumPy's.
+
+Nothing else in the package knows that the core is WebAssembly.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+from enum import IntEnum
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+import wasmtime
+from numpy.typing import NDArray
+
+PAGE = 65536
+"""Bytes of a page of WebAssembly's memory."""
+
+LARGE = 64 * 2**20
+"""Bytes beyond which a used memory is let go rather than kept for the next run."""
+
+TYPES = {"double": "<f8", "int": "<i4", "pointer": "<u4"}
+
+
+@cache
+def _layout() -> dict[str, Any]:
+    text = (files(__package__) / "core" / "layout.json").read_text(encoding="utf-8")
+    described: dict[str, Any] = json.loads(text)
+    return described
+
+
+@cache
+def dtype(struct: str) -> np.dtype[Any]:
+    """Return a struct of layout.h as a NumPy type."""
+    described = _layout()["structs"][struct]
+    fields = described["fields"]
+    return np.dtype(
+        {
+            "names": list(fields),
+            "formats": [(TYPES[kind], (n,)) if n > 1 else TYPES[kind] for _, kind, n in fields.values()],
+            "offsets": [offset for offset, _, _ in fields.values()],
+            "itemsize": described["size"],
+        }
+    )
+
+
+def constants(enum: str) -> dict[str, int]:
+    """Return an enum of layout.h."""
+    values: dict[str, int] = _layout()["enums"][enum]
+    return values
+
+
+Status = IntEnum("Status", constants("Status"))  # type: ignore[misc]
+"""Why the core came back."""
+
+
+class Module:
+    """One instance of the module, with a memory of its own.
+
+    Arrays are placed one after the other behind the module's own data; `forget` frees them all.
+    """
+
+    def __init__(self) -> None:
+        engine, module = _compiled()
+        self._store = wasmtime.Store(engine)
+        exports = wasmtime.Instance(self._store, module, []).exports(self._store)
+        exports["_initialize"](self._store)
+        self._memory, self._run = exports["memory"], exports["run"]
+        self._base: int = exports["__heap_base"].value(self._store)
+        self._world: int = exports["world"](self._store)
+        self.forget()
+
+    def forget(self) -> None:
+        """Free all arrays and reset the world."""
+        self._end = self._base
+        self._look()
+        self.world.view(np.uint8)[:] = 0
+
+    def _look(self) -> None:
+        """Look at the memory anew; it moves when it grows, and with it every array."""
+        size = self._memory.data_len(self._store)
+        pointer = ctypes.cast(self._memory.data_ptr(self._store), ctypes.POINTER(ctypes.c_uint8))
+        self._bytes = np.ctypeslib.as_array(pointer, (size,))
+        shape = dtype("World")
+        self.world = self._bytes[self._world : self._world + shape.itemsize].view(shape)
+
+    @property
+    def size(self) -> int:
+        """Bytes of its memory."""
+        return len(self._bytes)
+
+    def place(self, name: str, kind: np.dtype[Any], count: int) -> None:
+        """Make room for an array of zeros, to which `World.name` points from now on."""
+        begin = (self._end + 15) // 16 * 16
+        self._end = begin + kind.itemsize * max(1, count)
+        if self._end > self.size:
+            self._memory.grow(self._store, -(-(self._end - self.size) // PAGE))
+            self._look()
+        self._bytes[begin : self._end] = 0
+        self.world[name] = begin
+
+    def array(self, name: str, kind: np.dtype[Any], count: int) -> NDArray[Any]:
+        """Return a view of the array that `World.name` points to; `place` makes it invalid."""
+        begin = int(self.world[name][0])
+        return self._bytes[begin : begin + kind.itemsize * count].view(kind)
+
+    def run(self, steps: int) -> Status:
+        """Run on for at most so many steps."""
+        return Status(self._run(self._store, steps))
+
+
+@cache
+def _compiled() -> tuple[wasmtime.Engine, wasmtime.Module]:
+    engine = wasmtime.Engine()
+    return engine, wasmtime.Module(engine, (files(__package__) / "core" / "core.wasm").read_bytes())
+
+
+_idle: list[Module] = []
+
+
+def borrow() -> Module:
+    """Return a module that nobody uses, reset; give it back with `give_back`."""
+    try:
+        module = _idle.pop()
+    except IndexError:
+        return Module()
+    module.forget()
+    return module
+
+
+def give_back(module: Module) -> None:
+    """Keep a module for the next run, unless its memory has grown large."""
+    if module.size <= LARGE:
+        _idle.append(module)

@@ -1,0 +1,96 @@
+"""Build the core of the contact engine: C to WebAssembly, and its memory layout to JSON.
+
+    python tools/build_core.py           # writes core.wasm and layout.json beside the C files
+    python tools/build_core.py --check   # builds anew and compares the bytes with what is there
+
+Needs the compiler of the `ziglang` package in the version that `pyproject.toml` pins (the `dev`
+extra): the same version gives the same bytes on every machine.
+"""
+
+import argparse
+import json
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+CORE = Path(__file__).parents[1] / "src" / "chutelab" / "engines" / "contact" / "core"
+
+FLAGS = (
+    "-target", "wasm32-wasi", "-mexec-model=reactor", "-std=c99", "-O3", "-flto", "-Wall",
+    "-Wextra", "-Werror", "-ffp-contract=off", "-fvisibility=hidden", "-Wl,--export=run",
+    "-Wl,--export=world", "-Wl,--export=__heap_base", "-Wl,--strip-all",
+)  # fmt: skip
+"""No fused multiply-add: every engine that runs the file has to round alike."""
+
+SIZES = {"double": 8, "int": 4, "pointer": 4}
+
+
+def layout(text: str) -> dict[str, object]:
+    """Read structs and enums of layout.h: field -> [offset, type, how many].
+
+    Raises
+    ------
+    ValueError
+        If a line is neither, or of a type that is not known.
+    """
+    text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+    constants = {name: int(value) for name, value in re.findall(r"#define (\w+) (\d+)", text)}
+    enums = {
+        name: {value.strip(): n for n, value in enumerate(values.split(","))}
+        for name, values in re.findall(r"enum (\w+) \{([^}]*)\}", text)
+    }
+    structs: dict[str, dict[str, object]] = {}
+    for body, struct in re.findall(r"typedef struct \{([^}]*)\} (\w+);", text):
+        fields, offset = {}, 0
+        for line in filter(None, map(str.strip, body.split(";"))):
+            kind, names = line.split(maxsplit=1)
+            for part in names.split(","):
+                match = re.fullmatch(r"\s*(\*?)(\w+)(?:\[(\w+)\])?\s*", part)
+                if match is None:
+                    raise ValueError(f"layout.h, {struct}: {line!r}")
+                star, name, many = match.groups()
+                count = int(constants.get(many, many)) if many else 1
+                type_ = "pointer" if star else kind
+                size = SIZES[type_]
+                offset = -(-offset // size) * size
+                fields[name] = [offset, type_, count]
+                offset += size * count
+        structs[struct] = {"size": -(-offset // 8) * 8, "fields": fields}
+    return {"structs": structs, "enums": enums, "constants": constants}
+
+
+def build(folder: Path) -> None:
+    """Write core.wasm and layout.json into a folder."""
+    sources = sorted(map(str, CORE.glob("*.c")))
+    output = str(folder / "core.wasm")
+    command = [sys.executable, "-m", "ziglang", "cc", *FLAGS, "-o", output, *sources, "-lm"]
+    subprocess.run(command, check=True, cwd=CORE)
+    described = layout((CORE / "layout.h").read_text(encoding="utf-8"))
+    text = json.dumps(described, indent=1) + "\n"
+    (folder / "layout.json").write_text(text, encoding="utf-8")
+
+
+def main() -> int:
+    """Build, or compare with what is committed; 1 if that is not what the sources give."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--check", action="store_true", help="compare, write nothing")
+    if not parser.parse_args().check:
+        build(CORE)
+        print(f"{(CORE / 'core.wasm').stat().st_size} bytes")
+        return 0
+    with tempfile.TemporaryDirectory() as folder:
+        build(Path(folder))
+        old = [
+            name
+            for name in ("core.wasm", "layout.json")
+            if (Path(folder) / name).read_bytes() != (CORE / name).read_bytes()
+        ]
+    if old:
+        print(f"{', '.join(old)}: not what the sources give; run python tools/build_core.py")
+    return bool(old)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,4 +1,4 @@
-"""The reference: one particle as an ODE, against closed forms written out here, and against exact."""
+"""The reference: one particle as an ODE, against closed forms written out here and against exact."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_a_carried_particle_leaves_where_its_weight_no_longer_holds_it():
 
 
 def test_a_slipping_particle_obeys_the_law_of_the_finite_friction():
-    """u = v²/(g Rc) = [(4µ²-2) cos φ - 6µ sin φ]/(1+4µ²) + C e^{2µφ}, from the onset to u = cos φ."""
+    """u = v²/(g Rc) = [(4µ²-2) cos φ - 6µ sin φ]/(1+4µ²) + C e^{2µφ}, until u = cos φ."""
     mu, u0 = 0.5, 2.0**2 / (G * 0.504)
     onset = brentq(lambda p: sin(p) - mu * (cos(p) - u0), 0.0, 1.0, xtol=1e-15)
 

@@ -19,9 +19,9 @@ A_CONTACT = 2.0
 """eps that one contact may move an energy by: half an ulp for each of two velocity components, a
 height and a sum."""
 
-CROWD = 1e-3
-"""Share of the energy turned over that interacting particles in pymunk may gain or lose: the
-promise of the engine, for the overlaps of a pile are parted with work that nobody books."""
+BOOKED = {"contact": 1e-9, "pymunk": 1e-3, "fixed": 1e-3}
+"""Share of the energy turned over that a crowd may gain or lose: the promises of the engines.
+Chipmunk parts overlaps with work that it does not tell of."""
 
 BALANCES = 2000
 """Times at which the energy of a crowd is summed."""
@@ -82,21 +82,18 @@ def residual(e: Evidence) -> Verdict | None:
 def _energy_bound(e: Evidence) -> float:
     """Bound what numbers may do to the energy, as a share of the energy in play.
 
-    Contacts round it. In pymunk a lone particle's is moved, besides, where an overlap of a step is
-    parted: each contact by the weight times what `Evidence.late` says of a particle that was at
-    rest, as impulses are booked to the last bit.
+    Contacts round it. In a stepped engine a lone particle's is moved, besides, where an overlap is
+    parted: each contact by the weight times `Evidence.late`, as impulses are booked to the last
+    bit.
     """
     rounding = EPS * (ROUNDINGS + A_CONTACT * e.recording.contacts)
     if e.dt is None:
         return rounding
     if e.crowd:
-        return CROWD
-    from chutelab.stepper.solids import SLOP
-
-    m = e.machine
-    sunk = SLOP * m.particle.radius + m.gravity * e.dt**2
+        return BOOKED[e.engine]
+    m, steps = e.machine, EPS * A_CONTACT * e.recording.steps
     touched = max(1, e.recording.contacts)
-    return rounding + touched * m.particle.mass * m.gravity * sunk / e.energy
+    return rounding + steps + touched * m.particle.mass * m.gravity * e.late / e.energy
 
 
 def momentum(e: Evidence) -> Verdict | None:

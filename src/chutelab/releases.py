@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chutelab.scene import Fault, SceneError
-
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -20,7 +18,7 @@ ON_BELT = 1e-9
 """m; a release point this close to the riding height counts as on the belt."""
 
 TRIES = 1000
-"""Draws of a height that may overlap an earlier particle before the scene is refused."""
+"""Draws of a height that may overlap an earlier particle before it has to wait for its place."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,12 +80,8 @@ def on_belt(scene: Scene) -> bool:
 def draw(scene: Scene) -> Releases:
     """Draw the releases of a scene; the same scene and seed give the same numbers.
 
-    Of a family each scene has one particle.
-
-    Raises
-    ------
-    SceneError
-        If interacting particles cannot be placed in the bed without overlap.
+    Of a family each scene has one particle. Particles that meet start where no other is, as far as
+    the bed has room: an engine lets the others wait until their place is free.
     """
     stream, count = scene.stream, scene.stream.count
     crowded = stream.interact and count > 1
@@ -131,7 +125,9 @@ def _spread_apart(
     floor: float,
     rng: np.random.Generator,
 ) -> None:
-    """Redraw heights, in place, until no particle starts inside one released before it.
+    """Redraw heights, in place, so that no particle starts inside one released before it.
+
+    One that finds no free place in the bed keeps what was drawn last, and waits when it is due.
 
     Earlier particles are taken to have moved on at their release velocity, and to have fallen by
     ``fall`` (m/s²) times their age squared, but not below ``floor`` (m above the lowest layer).
@@ -148,14 +144,7 @@ def _spread_apart(
         sinks = velocity[close, 1] <= 2.0 * fall * age
         near = (np.abs(dx) < diameter) & ~(sinks & (np.maximum(dy, floor) <= -diameter))
         close, dx, dy = close[near], dx[near], np.maximum(dy[near], floor)
-        for _ in range(TRIES):
+        for _ in range(TRIES if stream.bed_height > 0.0 else 0):
             if np.all(dx**2 + (dy - height[i]) ** 2 >= diameter**2):
                 break
             height[i] = stream.bed_height * rng.random()
-        else:
-            allowed = (
-                f"particle {i} finds no free place in the bed at stream.rate = {stream.rate} per"
-                " second: raise stream.bed_height, lower stream.rate, or set"
-                " stream.interact = false"
-            )
-            raise SceneError(scene.source, [Fault("stream.bed_height", stream.bed_height, allowed)])

@@ -28,6 +28,8 @@ extern World W;
 #define TOO_MANY 200
 /* Impacts of a disk in a step that no collapse needs: something is wrong, the run stops. */
 #define STALL 20000
+/* Blows that one impact may pass on at its instant, per lasting contact; the rest are foreseen. */
+#define SHOCKS 4
 
 static inline double square(double a) { return a * a; }
 

@@ -258,7 +258,7 @@ static void queue_up(int i, int *tail) {
 /* Resolve an impact and what follows from it at the same instant: a disk that was pushed against
    others it touches gives on what it got, first come first served. */
 void shock(int i, int j, double t) {
-    int head = 0, tail = 0, budget = 16 * W.contact_count + 64;
+    int head = 0, tail = 0, budget = SHOCKS * W.contact_count;
     W.moved_count = 0;
     W.stamp++;
     W.now = t;

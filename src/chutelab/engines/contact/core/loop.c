@@ -10,9 +10,8 @@ World W;
 #define HOP 1e-3
 /* rad; between knots round the pulley. A cubic through them is off by rho angle^4 / 384, 9e-10 rho. */
 #define ARC_ANGLE 0.024
-/* Knots and events that one impact may write per disk, and a few more for what goes along. */
+/* Knots that one impact may write per disk. */
 #define KNOTS_EACH 6
-#define EVENTS_EACH 20
 
 /* ------------------------------------------------------------------------------------------ rides */
 
@@ -306,7 +305,7 @@ static int go_through(void) {
         double t = d->due;
         int j = d->partner;
         if (W.knot_count + KNOTS_EACH * count + ride_knots(d) > W.knot_room) return FULL_KNOTS;
-        if (W.event_count + EVENTS_EACH * count + 64 + 16 * W.contact_count > W.event_room)
+        if (W.event_count + SHOCKS * W.contact_count + 64 > W.event_room)
             return FULL_EVENTS;
         if (d->impacts > STALL) {
             W.stalled = i;

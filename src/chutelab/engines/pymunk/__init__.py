@@ -13,6 +13,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 from chutelab.engines.pymunk.lone import Lone
+from chutelab.engines.pymunk.shared import Shared
 from chutelab.engines.pymunk.world import World
 from chutelab.machine import moved, origin
 from chutelab.recorder import Recorder, StalledError
@@ -39,14 +40,26 @@ def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Re
             gravity=machine.gravity, steps=steps, seconds=perf_counter() - begin, origin=place,
         )  # fmt: skip
 
+    def report(share: float) -> None:
+        if progress is not None:
+            progress(share)
+
+    everybody = range(machine.count)
+    groups = [everybody] if machine.interact else [range(i, i + 1) for i in everybody]
+    lone = machine.align and not machine.interact
+    world = World(machine)
     try:
-        world = World(machine)
-        for particle in range(machine.count):
-            lone = Lone(machine, world, recorder, particle)
-            lone.run()
-            steps += lone.steps
-            if progress is not None:
-                progress((particle + 1) / machine.count)
+        for n, group in enumerate(groups):
+            part: Lone | Shared
+            if lone:
+                part = Lone(machine, world, recorder, group[0])
+            else:
+                part = Shared(machine, World(machine), recorder, group)
+            try:
+                part.run(lambda share, n=n: report((n + share) / len(groups)))
+            finally:
+                steps += part.steps
+        report(1.0)
     except StalledError as stalled:
         stalled.recording = finished()
         x, y = stalled.position

@@ -8,12 +8,13 @@ through the step, with the velocities at its ends.
 
 from __future__ import annotations
 
+from math import ceil, inf, sqrt
 from operator import itemgetter
-from math import acos, ceil, cos, inf, sin, sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
 from pymunk import Vec2d
 
+from chutelab.engines.pymunk.carriage import Carriage
 from chutelab.engines.pymunk.world import Contact, Face, Track, World
 from chutelab.recorder import StalledError
 from chutelab.recording import REASONS, Kind
@@ -33,8 +34,9 @@ TINY = 1e-12
 SEAM = 1e-6
 """The same in a lasting contact, where a surface goes on in the next one."""
 
-HOP = 1e-3
-"""Share of a step; bounces this short are over, whatever the restitution."""
+LATE, HOP = 1e-3, 1e-6
+"""Shares of a step: bounces are over when all that are left take less than the first, or the next
+one less than the second."""
 
 STRIDE = 0.5
 """Share of the radius that a lasting contact moves on in a step, at most: it meets every end."""
@@ -51,11 +53,14 @@ FIRST = 1e-3
 SHORT = 1e-5
 """Share of a step; a contact that lasts less has ended."""
 
-ARC = 0.025
-"""rad between knots on an adhesion ride: R Δφ⁴/384, the curve's error, is 1e-9 of the radius."""
-
 WINDOW = 10_000
-"""Blows within one step that are taken for a stall; queries on one flight likewise."""
+"""Blows after which it is asked whether the particle gets on; queries on one flight, at most."""
+
+TICK = 1e-12
+"""s; mean time between blows of a particle that does not get on."""
+
+TURNS = 200
+"""Blows at one instant, one surface after the other, before all are solved together."""
 
 
 class Ridden(NamedTuple):
@@ -65,20 +70,21 @@ class Ridden(NamedTuple):
     v: Vec2d
     omega: float
     contacts: list[Contact]
+    middle: Vec2d
 
     @property
-    def holds(self) -> bool:
-        """Whether any surface pushed."""
-        return any(c.impulse.dot(c.normal) > 0.0 for c in self.contacts)
+    def pushed(self) -> list[Contact]:
+        """Contacts at which a surface pushed."""
+        return [c for c in self.contacts if c.impulse.dot(c.normal) > 0.0]
 
     @property
     def slips(self) -> bool:
         """Whether friction was used up at a contact."""
-        for c in self.contacts:
-            push, rub = c.impulse.dot(c.normal), abs(c.impulse.cross(c.normal))
-            if push > 0.0 and rub >= c.face.friction * push * (1.0 - SLACK):
-                return True
-        return False
+        return any(
+            abs(c.impulse.cross(c.normal))
+            >= c.face.friction * c.impulse.dot(c.normal) * (1.0 - SLACK)
+            for c in self.pushed
+        )
 
 
 class Lone:
@@ -106,8 +112,9 @@ class Lone:
         self.steps, self.last = 0, 0.0
         self.landed = False
         self.blows, self.since = 0, self.t
+        self.turns = self.t, 0
 
-    def run(self) -> None:
+    def run(self, _report: Callable[[float], None]) -> None:
         """Run to the end."""
         if self.t >= self.machine.end_time:
             return
@@ -120,7 +127,7 @@ class Lone:
         while not self.ended:
             touching = self._touching()
             if self._approached(touching):
-                self._blow()
+                self._blow(touching)
             elif not self._ride(touching):
                 self._fly(touching)
         self.world.space.remove(self.body, self.circle)
@@ -165,10 +172,17 @@ class Lone:
         found = face.shape.point_query(x)
         return found.distance - self.r, found.gradient
 
+    def _on_end(self, face: Face, x: Vec2d) -> bool:
+        """Tell whether the nearest point of a segment is one of its ends."""
+        if face.tangent is None:
+            return False
+        point = face.shape.point_query(x).point
+        return min((point - end).length for end in face.ends) <= self.world.hair
+
     def _touching(self) -> dict[Face, Vec2d]:
         """Return the surfaces in touch and their normals."""
         found = ((face, *self._gap(face, self.x)) for face in self.world.faces)
-        return {face: normal for face, gap, normal in found if gap <= self.world.hair}
+        return {face: normal for face, gap, normal in found if gap <= 0.5 * self.world.hair}
 
     def _approached(self, touching: dict[Face, Vec2d]) -> bool:
         """Tell whether the particle moves into a surface in touch."""
@@ -264,15 +278,28 @@ class Lone:
         """Return when, between two times, a flight enters a surface."""
         while (middle := 0.5 * (low + high)) not in (low, high):
             x = self.x + middle * (self.v + 0.5 * middle * self.pull)
-            low, high = (low, middle) if self._gap(face, x)[0] < 0.0 else (middle, high)
+            low, high = (
+                (low, middle) if self._gap(face, x)[0] < -0.5 * self.world.hair else (middle, high)
+            )
         return low
 
     # Blows
 
-    def _blow(self) -> None:
-        """Let Chipmunk resolve the blow at the present place."""
+    def _blow(self, touching: dict[Face, Vec2d]) -> None:
+        """Let Chipmunk resolve the blow from the surface that the particle moves into fastest."""
         before = self.v, self.omega
-        contacts = self._step(self.x, self.v, INSTANT, Vec2d(0, 0), self._restitution)
+        struck = min(touching, key=lambda face: self.v.dot(touching[face]))
+        gap, normal = self._gap(struck, self.x)
+        self.x -= gap * normal
+        if self.turns[0] != self.t:
+            self.turns = self.t, 0
+        self.turns = self.t, self.turns[1] + 1
+
+        def law(face: Face, normal: Vec2d) -> float | None:
+            together = self.turns[1] > TURNS
+            return self._restitution(face, normal) if together or face is struck else None
+
+        contacts = self._step(self.x, self.v, INSTANT, Vec2d(0, 0), law)
         after = self.body.velocity, self.body.angular_velocity
         self.v, self.omega = after
         landed = False
@@ -291,9 +318,10 @@ class Lone:
             self._end("landed")
         self.blows += 1
         if self.blows % WINDOW == 0:
-            if self.t - self.since < self.dt:
+            if self.t - self.since < WINDOW * TICK:
                 raise self._stalled(
-                    f"{WINDOW} blows within one step; move the surfaces there apart"
+                    f"{WINDOW} blows in no time: it is driven to and fro in a narrow place; move"
+                    " the surfaces there apart, or lower their restitution"
                 )
             self.since = self.t
 
@@ -305,7 +333,7 @@ class Lone:
             return 0.0
         if weight > 0.0:
             hop = 2.0 * e * approach / weight
-            if hop < self.dt * max(HOP, 1.0 - e):
+            if hop < self.dt * max(LATE * (1.0 - e), HOP):
                 return 0.0
         return e
 
@@ -316,23 +344,35 @@ class Lone:
         slow = SEAM * (1.0 + self.v.length)
         if all(self.v.dot(normal) > slow for normal in touching.values()):
             return False
-        others = [face for face in self.world.faces if face not in touching]
         h = min(self.dt, self.machine.end_time - self.t)
         speed = self.v.length + self.g * self.dt
         h = min(h, STRIDE * self.r / speed) if speed > 0.0 else h
 
+        rims = {face for face in touching if self._on_end(face, self.x)}
+
         def trial(span: float) -> Ridden:
             return self._ridden(span, touching)
 
+        def holds(span: float) -> bool:
+            end = trial(span)
+            return bool(end.pushed) and not any(
+                self._on_end(c.face, end.middle) for c in end.pushed if c.face not in rims
+            )
+
         def clear(end: Ridden) -> bool:
-            return all(self._gap(face, end.x)[0] >= 0.0 for face in others)
+            pushed = {c.face for c in end.pushed}
+            return all(
+                self._gap(face, end.x)[0] >= -0.25 * self.world.hair
+                for face in self.world.faces
+                if face not in pushed
+            )
 
         # What half of a step twice as long finds goes for the end of this one.
         floor = SHORT * h
-        if not trial(2.0 * h).holds:
-            if not trial(floor).holds:
+        if not holds(2.0 * h):
+            if not holds(floor):
                 return False
-            h = 0.5 * _longest(lambda span: trial(span).holds, 2.0 * h, floor)
+            h = 0.5 * _longest(holds, 2.0 * h, floor)
             if h <= floor:
                 return False
         end = trial(h)
@@ -360,8 +400,10 @@ class Lone:
         middle -= gap * normal
         turn = 1.0
 
-        def law(face: Face, _normal: Vec2d) -> float | None:
-            return turn if face in touching else None
+        def law(face: Face, normal: Vec2d) -> float | None:
+            if face not in touching:
+                return None
+            return turn if self.v.dot(normal) > 0.0 else 0.0
 
         contacts = self._step(middle - h * self.v, self.v, h, self.pull, law)
         if self.v.dot(normal) > SEAM * self.v.length:
@@ -375,15 +417,15 @@ class Lone:
             x -= gap * normal
             if len(pushed) == 1:
                 v -= v.dot(normal) * normal
-        return Ridden(x, v, omega, contacts)
+        return Ridden(x, v, omega, contacts, middle)
 
     def _accept(self, end: Ridden, h: float) -> None:
         """Take a step that was tried."""
         before = self.v, self.omega
-        self.x, self.v, self.omega, contacts = end
+        self.x, self.v, self.omega = end.x, end.v, end.omega
         after = self.v, self.omega
         self.t += h
-        pushed = [c for c in contacts if c.impulse.dot(c.normal) > 0.0]
+        pushed = end.pushed
         for contact in pushed:
             self.track.book(contact, before, after)
         slips, on = end.slips, pushed[0].face.surface if pushed else self.on
@@ -399,16 +441,17 @@ class Lone:
         """Tell whether a step without slip changed nothing, on a surface to settle on."""
         still = STILL * (1.0 + end.v.length)
         return (
-            not end.slips
+            bool(end.pushed)
+            and not end.slips
             and (end.v - self.v).length <= still
             and self.r * abs(end.omega - self.omega) <= still
             and all(
-                c.face.speed == 0.0 or c.face.surface == self.machine.landing for c in end.contacts
+                c.face.speed == 0.0 or c.face.surface == self.machine.landing for c in end.pushed
             )
         )
 
     def _settle(self, end: Ridden) -> None:
-        surface = end.contacts[0].face.surface
+        surface = end.pushed[0].face.surface
         if self.slipping:
             self.track.event(Kind.STICK, self.t, self.x, (self.v, self.omega), surface=surface)
         self.track.knot(self.t, self.x, self.v, self.omega)
@@ -422,55 +465,25 @@ class Lone:
             self.track.event(Kind.SEPARATION, self.t, self.x, (self.v, self.omega), surface=self.on)
         self.on, self.slipping = -1, None
 
-    # The adhesion ride
-
     def _carry(self) -> None:
-        """Ride along the belt and round the pulley, in closed form: cos φ1 = v²/(g ρ)."""
-        speed, rho, start, begin = self.v.x, self.x.y, self.x.x, self.t
-        rest = self.machine.end_time - begin
+        """Ride by adhesion, see `Carriage`."""
         belt = self.machine.pulley
         assert belt is not None
-        if speed == 0.0:
-            if self.machine.until == "settled":
-                self.track.event(Kind.SETTLE, begin, self.x, (self.v, 0.0), surface=belt.surface)
-                self._end("settled")
-            else:
-                self.t += rest
-                self.track.knot(self.t, self.x, self.v, 0.0)
-                self._end("time")
+        if self.v.x == 0.0 and self.machine.until == "settled":
+            self.track.event(Kind.SETTLE, self.t, self.x, (self.v, 0.0), surface=belt.surface)
+            self._end("settled")
             return
-        cosine = speed * speed / (self.g * rho) if self.g > 0.0 else inf
-        path = max(0.0, -start) + rho * acos(min(cosine, 1.0))
-        whole = min(path, speed * rest)
-        met = self._met(start, rho, whole, belt.surface)
-        path = min(whole, met)
-        turn = max(0.0, start + path) / rho
-        pieces = ceil(turn / ARC)
-        stops = [min(-start, path)] if start < 0.0 else []
-        stops += [path - rho * turn * (1.0 - n / pieces) for n in range(1, pieces + 1)]
-        for along in stops:
-            x, v = carried(start + along, rho, speed)
-            self.recorder.book(
-                self.particle, belt.surface, -self.track.mass * self.g * (self.x.y - x.y)
-            )
-            self.t, self.x, self.v = begin + along / speed, x, v
-            self.track.knot(self.t, x, v, 0.0)
-        if speed * rest <= path:
+        ride = Carriage(self.machine, self.world, self.particle)
+        for t in ride.times():
+            self.t, (self.x, self.v) = t, ride.state(t)
+            ride.book(self.recorder, t)
+            self.track.knot(t, self.x, self.v, 0.0)
+        if self.t >= self.machine.end_time:
             self._end("time")
-            return
-        self.track.event(Kind.SEPARATION, self.t, self.x, (self.v, 0.0), surface=belt.surface)
-
-    def _met(self, start: float, rho: float, path: float, own: int) -> float:
-        """Return how far (m) a ride gets before it meets a surface other than its own belt."""
-        for face in self.world.faces:
-            along = 0.0
-            while face.surface != own and along < path:
-                x, v = carried(start + along, rho, 1.0)
-                gap, normal = self._gap(face, x)
-                if gap <= self.world.rounding and v.dot(normal) < 0.0:
-                    path = along
-                along += max(gap, self.world.rounding)
-        return path
+        else:
+            self.track.event(
+                Kind.SEPARATION, self.t, self.x, (self.v, 0.0), surface=belt.surface
+            )
 
     # The end
 
@@ -481,14 +494,6 @@ class Lone:
     def _stalled(self, reason: str) -> StalledError:
         self._end("time")
         return StalledError(self.particle, self.t, (self.x.x, self.x.y), reason)
-
-
-def carried(along: float, rho: float, speed: float) -> tuple[Vec2d, Vec2d]:
-    """Return place (m) and velocity on the belt's path, `along` (m) from above the pulley's axis."""
-    if along <= 0.0:
-        return Vec2d(along, rho), Vec2d(speed, 0.0)
-    c, s = cos(along / rho), sin(along / rho)
-    return Vec2d(rho * s, rho * c), Vec2d(speed * c, -speed * s)
 
 
 def _ignore(_face: Face, _normal: Vec2d) -> None:

@@ -10,11 +10,9 @@ import numpy as np
 import pymunk
 from pymunk import Vec2d
 
-from chutelab.recording import EVENT, KNOT, Kind
+from chutelab.recording import KNOT, Kind
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from chutelab.machine import Machine
     from chutelab.recorder import Recorder
 
@@ -63,6 +61,11 @@ class Face:
     speed: float
     restitution: float
     friction: float
+
+    @property
+    def ends(self) -> tuple[Vec2d, ...]:
+        """Both ends of a segment (m)."""
+        return (self.shape.a, self.shape.b) if isinstance(self.shape, pymunk.Segment) else ()
 
     def belt(self, normal: Vec2d) -> float:
         """Return the speed (m/s) of the surface along (n_y, -n_x) where a disk touches it.

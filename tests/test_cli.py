@@ -515,7 +515,7 @@ def test_check_says_what_will_happen():
     assert "warning" not in text
     text = call("check", "stream").stdout
     assert "  engine        pymunk: particles meet each other, " in text
-    assert "  tunnelling    none at any speed: steps end at contacts\n" in text
+    assert "  tunnelling    none at any speed: blows have their own instants\n" in text
     assert re.search(
         r"^  slop          overlaps up to \S+ .m are left alone, \S+ % of the r", text, re.M
     )

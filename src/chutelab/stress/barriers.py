@@ -163,7 +163,7 @@ def no_one_through_another(e: Evidence) -> Verdict | None:
         share = -(start * along).sum(axis=1) / np.where(way > 0.0, way, 1.0) ** 2
         nearest = np.hypot(*(start + np.clip(share, 0.0, 1.0)[:, None] * along).T)
         for k in np.flatnonzero((way < r) & (nearest < r)).tolist():
-            passed.add((int(i[k]), int(j[k])))
+            passed.add((min(i[k], j[k]), max(i[k], j[k])))
             where = where or f"pairs: {i[k]} and {j[k]} at t = {now:.6g} s"
     return Verdict(len(passed), 0.0, where or "pairs")
 

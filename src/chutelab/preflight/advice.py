@@ -84,7 +84,9 @@ def _waiting(scene: Scene, machine: Machine, tried: Recording) -> Iterator[Advic
     late = releases["t"] - machine.releases.t[releases["particle"]]
     waited = late > 0.5 * scene.run.dt
     if waited.any():
-        slower = _down(scene.stream.rate * tried.count / (tried.count + scene.stream.rate * late.max()))
+        # Each waits for all that waited before it.
+        period = 1.0 / scene.stream.rate + late.max() / max(1, tried.count - 1)
+        slower = _down((1.0 - MARGIN) / period)
         yield Advice(
             f"of {tried.count} particles tried, {np.count_nonzero(waited)} wait for a free place to"
             f" be released, up to {late.max():.3g} s",

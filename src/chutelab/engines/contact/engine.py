@@ -62,7 +62,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Recording:
     place = origin(machine)
     module = borrow()
     try:
-        job = _Job(module, moved(machine, -place[0], -place[1]))
+        job = Job(module, moved(machine, -place[0], -place[1]))
         stalled = job.run(progress)
         recording = job.recording(machine, place, perf_counter() - begin)
     finally:
@@ -74,7 +74,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Recording:
     return recording
 
 
-class _Job:
+class Job:
     """One run: fills the module's memory, drains what it writes, makes room where it is full."""
 
     def __init__(self, module: Module, machine: Machine) -> None:

@@ -26,6 +26,10 @@ extern World W;
 #define FEW 10
 #define SLOW 20.0
 #define TOO_MANY 200
+/* Impacts in a step from which on a disk counts as jammed: all it touches is solved at once. */
+#define JAM 40
+/* Of the speed; a slower approach grazes, and rounding may well have made it. */
+#define GRAZE 1e-6
 /* Impacts of a disk in a step that no collapse needs: something is wrong, the run stops. */
 #define STALL 20000
 /* Blows that one impact may pass on at its instant, per lasting contact; the rest are foreseen. */
@@ -97,11 +101,13 @@ void expect(int i, double due, int partner);
 int next_disk(void);
 void shock(int i, int j, double t);
 void hold(Disk *d, int k);
+double soft_approach(const Disk *d, double radius);
 void lie_down(int i);
 void was_moved(int i, double t);
 
 /* solver.c */
 int find_contacts(double h, int *woke);
+void sweep_contacts(Contact *list, int count, int sweeps, double accurate);
 void solve_contacts(void);
 void close_step(double h);
 void take_back(int i);

@@ -51,15 +51,22 @@ void expect(int i, double due, int partner) {
 /* The disk whose event is next in this step, or -1. */
 int next_disk(void) { return W.heap_count ? W.heap[0] : -1; }
 
+/* Approach that is no blow: of a disk by itself only what grazes; in a crowd what goes by less than
+   a tenth of TOUCH in a step, as long as gravity would do the same. */
+double soft_approach(const Disk *d, double radius) {
+    if (W.interact) return MIN(W.skip * radius, W.g * W.step);
+    return GRAZE * sqrt(d->vx * d->vx + d->vy * d->vy);
+}
+
 /* Approach up to which a contact is left to the next step, m/s. */
 static double left_over(const Disk *d, int impacts, int surface, double radius) {
     if (surface >= 0)
         for (int n = 0; n < d->held_count; n++)
             /* What lies on a surface comes back to it at the end of each step, so fast. */
             if (d->held[n] == surface) return 1.000001 * W.g * W.step;
-    double base = W.base * radius;
-    if (impacts <= MANY) return MIN(W.skip * radius, W.g * W.step);
-    return MIN(base * pow(GROW, impacts - MANY), base * (MOST_SKIP / SKIP));
+    double skip = W.skip * radius;
+    if (impacts <= MANY) return soft_approach(d, radius);
+    return MIN(skip * pow(GROW, impacts - MANY), skip * (MOST_SKIP / SKIP));
 }
 
 static void foresee_pair(int i, int j, double *due, int *partner) {
@@ -161,7 +168,7 @@ static void give(Contact *c, double normal) {
     double *J = c->impulse, u[3], v[3], entries[3], given[3], most = c->friction * normal;
     relative(c, 0, u);
     J[0] = normal;
-    J[1] = MIN(MAX(-c->mass[1] * u[1], -most), most);
+    J[1] = MIN(MAX(-c->mass[1] * (u[1] + c->drift), -most), most);
     most = c->arm * normal;
     J[2] = MIN(MAX(-c->mass[2] * u[2], -most), most);
     push(c, J);
@@ -178,8 +185,50 @@ static void support(int i, int k, double t) {
     Contact c;
     describe(&c, i, -1 - k);
     hold(d, k);
-    double press = press_on(d, W.surfaces + k, c.nx, c.ny);
-    if (press > 0) give(&c, 0.5 * press * d->mass * (W.step_end - t));
+    double press = press_on(d, W.surfaces + k, c.nx, c.ny), left = W.step_end - t, u[3];
+    if (press <= 0) return;
+    relative(&c, 0, u);
+    c.drift = 0.5 * left * (W.gx * c.ny - W.gy * c.nx);
+    give(&c, 0.5 * press * d->mass * left);
+    /* Friction that need not slow it can hold it from now on. */
+    if (fabs(u[1]) <= 1e-12 * W.g * W.dt && fabs(c.impulse[1]) < c.friction * c.impulse[0]) {
+        d->slips = 0;
+        event_here(STICK, i, c.owner);
+    }
+}
+
+/* Bring a disk to rest that rattles without end where surfaces meet, as far as they let it: what
+   touches is solved at once, without restitution. */
+static void jam(int i) {
+    Disk *d = W.disks + i;
+    Contact list[MAX_HELD];
+    int count = 0;
+    d->ux = d->vx;
+    d->uy = d->vy;
+    d->uspin = d->spin;
+    for (int k = 0; k < W.surface_count && count < MAX_HELD; k++) {
+        Contact *c = list + count;
+        if (!is_near(W.surfaces + k, d)) continue;
+        describe(c, i, -1 - k);
+        if (c->gap > TOUCH * d->radius) continue;
+        c->impulse[0] = c->impulse[1] = c->impulse[2] = c->need = c->drift = 0;
+        hold(d, k);
+        count++;
+    }
+    for (int n = 0; n < count; n++) {
+        /* No approach afterwards; separating is allowed. */
+        double u[3];
+        relative(list + n, 0, u);
+        list[n].need = -u[0];
+    }
+    sweep_contacts(list, count, W.sweeps, 0);
+    for (int n = 0; n < count; n++) {
+        double u[3], v[3], entries[3], given[3];
+        relative(list + n, 1, u);
+        relative(list + n, 0, v);
+        share_out(list + n, u, v, 0, entries, given);
+        book(d->entries, 0, list[n].owner, entries);
+    }
 }
 
 /* Resolve the impact of disk i with disk j, or with surface k as j = -1 - k, by Newton's restitution
@@ -194,6 +243,7 @@ static void strike(int i, int j, double t) {
     Contact c;
     double u[3];
     describe(&c, i, j);
+    c.drift = 0;
     was_moved(i, t);
     if (c.two) was_moved(j, t);
     relative(&c, 0, u);
@@ -207,7 +257,8 @@ static void strike(int i, int j, double t) {
         back = 0;
     }
     double before[3] = {a->vx, a->vy, a->spin};
-    give(&c, c.mass[0] * (back - u[0]));
+    if (j < 0 && impacts >= JAM && c.rest < 1) jam(i);
+    else give(&c, c.mass[0] * (back - u[0]));
     a->since = t;
     if (c.two) b->since = t;
     W.impact_count++;

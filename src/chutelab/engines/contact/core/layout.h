@@ -60,6 +60,7 @@ typedef struct {
     int island;
     int held_count;
     int held[MAX_HELD];         /* surfaces it lies on */
+    int ride_met;               /* surface where a ride ends, or -1 */
     int on;                     /* surface it lasts on by itself, or -1 */
     int slips;                  /* whether it slips there */
     int landed;                 /* has met the landing surface */
@@ -79,6 +80,7 @@ typedef struct {
     double past[6];       /* the state before `held` */
     double load[3];       /* normal impulse per time of the last three steps, newest first */
     double load_t[3];
+    double end_of_face;   /* s; when it left the end of a face */
     int bent, open;       /* bend is known; `held` is no knot yet */
     int lasted;           /* steps of this contact, 0 in flight */
     int pad;
@@ -117,7 +119,7 @@ typedef struct {
     int two;                /* whether j is a free disk, which feels the impulse too */
     int owner;              /* of the ledger entries */
     int next;               /* of the contacts of disk i in the step before */
-    int pad;
+    int leaves;             /* it parts in this step */
 } Contact;
 
 typedef struct { double t, x, y, vx, vy, spin, entries[3]; int disk, pad; } Knot;       /* [out] */
@@ -177,8 +179,7 @@ typedef struct {
     double t, now, step, step_end, cell;
     double g;            /* m/s2; size of gravity */
     double soft;         /* m/s; twice what gravity does in a step: supported disks meet softly */
-    double skip;         /* of SKIP, 0 where each blow counts: a disk by itself */
-    double base;         /* m/s over radii; SKIP in a step */
+    double skip;         /* 1/s; SKIP in a step: radii that it may go */
 } World;
 
 #endif

@@ -25,43 +25,46 @@ static void ride_at(const Disk *d, double t, double *place) {
     place[3] = phi > 0 ? -d->ride_speed * s : 0;
 }
 
-/* When a ride ends: where cos phi = v^2 / (g rho), or where another surface is met. */
-static double ride_end(const Disk *d, double from) {
-    double v = d->ride_speed, rho = d->ride_rho, c = W.g > 0 ? v * v / (W.g * rho) : 1;
-    if (v <= 0) return INFINITY;
-    double end = from + (MAX(-d->ride_x, 0) + rho * acos(MIN(c, 1))) / v, t = from, safe = from;
-    while (t < end) {
-        double least = INFINITY, place[4], nx, ny;
-        Disk at = *d;
-        at.ride_from = from;
-        ride_at(&at, t, place);
-        for (int k = 0; k < W.surface_count; k++)
-            if (W.surfaces[k].owner != W.ride_owner)
-                least = MIN(least, gap_to(W.surfaces + k, place[0], place[1], d->radius, &nx, &ny));
-        if (least < 0) {
-            if (t == from) return from;
-            /* Between the last free place and this one; to the last bit. */
-            double mid = 0.5 * (safe + t);
-            if (mid <= safe || mid >= t) return safe;
-            end = t;
-            t = mid;
-            continue;
-        }
-        safe = t;
-        if (end - t <= 1e-3 * d->radius / v && least > 2e-3 * d->radius) return end;
-        t = MIN(t + MAX(least, 1e-3 * d->radius) / v, end);
-        if (t >= end && safe < end) {
-            ride_at(&at, end, place);
-            least = INFINITY;
-            for (int k = 0; k < W.surface_count; k++)
-                if (W.surfaces[k].owner != W.ride_owner)
-                    least = MIN(least, gap_to(W.surfaces + k, place[0], place[1], d->radius, &nx, &ny));
-            if (least >= 0) return end;
-            t = 0.5 * (safe + end);
-            if (t <= safe || t >= end) return safe;
+/* Gap of a rider at t to the nearest surface that is not its own, and that surface. */
+static double ride_gap(const Disk *d, double t, int *which) {
+    double place[4], nx, ny, least = INFINITY;
+    ride_at(d, t, place);
+    for (int k = 0; k < W.surface_count; k++) {
+        if (W.surfaces[k].owner == W.ride_owner) continue;
+        double gap = gap_to(W.surfaces + k, place[0], place[1], d->radius, &nx, &ny);
+        if (gap < least) {
+            least = gap;
+            *which = k;
         }
     }
-    return end;
+    return least;
+}
+
+/* Set when a ride ends: where cos phi = v^2 / (g rho), or where another surface is met. The gap
+   there shrinks by no more than the way, so the way may be looked at in strides of the gap. */
+static void plan_ride(Disk *d, double from) {
+    double v = d->ride_speed, rho = d->ride_rho, c = W.g > 0 ? v * v / (W.g * rho) : 1, t = from;
+    int which = -1;
+    d->ride_from = from;
+    d->ride_met = -1;
+    d->ride_to = INFINITY;
+    if (v <= 0) return;
+    d->ride_to = from + (MAX(-d->ride_x, 0) + rho * acos(MIN(c, 1))) / v;
+    for (double safe = from; t < d->ride_to;) {
+        double gap = ride_gap(d, t, &which);
+        if (gap <= 0) {
+            /* Bisect to the last place that is free. */
+            for (double mid = 0.5 * (safe + t); mid > safe && mid < t; mid = 0.5 * (safe + t)) {
+                if (ride_gap(d, mid, &which) <= 0) t = mid;
+                else safe = mid;
+            }
+            d->ride_to = safe;
+            d->ride_met = which;
+            return;
+        }
+        safe = t;
+        t += MAX(gap, 1e-3 * d->radius) / v;
+    }
 }
 
 /* Put a rider on a parabola that agrees with its ride now and at the end of the step. */
@@ -119,7 +122,6 @@ static void take_off(int i) {
     d->uy = d->vy;
     d->uspin = d->spin;
     W.tracks[i].lasted = 0;
-    lie_down(i);
 }
 
 /* Release a disk at t if its place is free; its event is then the end of a ride, or an impact. */
@@ -133,14 +135,14 @@ static int release(int i, double t) {
     d->on = -1;
     d->changes++;
     d->mode = RIDING;
-    if (d->ride_rho > 0) {
-        d->ride_from = t;
-        d->ride_to = ride_end(d, t);
-    }
+    if (d->ride_rho > 0) plan_ride(d, t);
     event_here(RELEASE, i, -1);
     knot_now(i);
     if (d->ride_rho > 0) ride_on(d, t, MAX(W.step_end, t));
-    else take_off(i);
+    else {
+        take_off(i);
+        lie_down(i);
+    }
     return 1;
 }
 
@@ -149,6 +151,8 @@ static void separate(int i) {
     write_ride(i, d->ride_to);
     event_here(SEPARATION, i, W.ride_owner);
     take_off(i);
+    enter_again(i, MAX(W.step_end, d->t));
+    if (d->ride_met >= 0) shock(i, -1 - d->ride_met, d->t);
 }
 
 /* ------------------------------------------------------------------------------------------- ends */
@@ -258,16 +262,16 @@ static void look_ahead(int i) {
    what was too small, and nothing has happened yet. */
 static int begin_step(void) {
     int woke;
-    double next = set_gates(W.t), h = W.dt;
+    double next = set_gates(W.t), h = W.dt, stride = 0;
     if (W.g > 0)
         for (int i = W.low; i < W.high; i++) h = MIN(h, sqrt(8 * HOP * W.disks[i].radius / W.g));
     W.step = h;
     W.soft = 2 * W.g * h;
-    W.base = SKIP / h;
-    W.skip = W.interact ? W.base : 0;
+    W.skip = SKIP / h;
     W.step_end = MIN(W.t + h, next);
     if (!W.interact && W.disks[W.low].mode == FREE && !W.disks[W.low].supports)
-        W.step_end = W.t + free_span(W.disks + W.low, h);
+        stride = free_span(W.disks + W.low, h);
+    if (stride > 0) W.step_end = W.t + stride;
     /* At the very end a step is solved for what lasts, and not gone through. */
     if (W.t < W.end_time) W.step_end = MIN(W.step_end, W.end_time);
     else W.step_end = W.t + h;
@@ -291,6 +295,13 @@ static int begin_step(void) {
         }
         if (!list_near(W.step_end)) return FULL_NEAR;
         if (!find_contacts(h, &woke)) return FULL_CONTACTS;
+        if (stride > W.step && W.contact_count) {
+            /* It does not fly: what it touches is solved for a step of usual length. */
+            stride = 0;
+            W.step_end = MIN(W.t + W.step, W.step_end);
+            h = W.step_end - W.t;
+            woke = 1;
+        }
     } while (woke);
     if (W.contact_count) solve_contacts();
     close_step(h);
@@ -324,10 +335,7 @@ static int go_through(void) {
         }
         if (d->mode == WAITING) {
             if (release(i, t)) enter_again(i, W.step_end);
-        } else {
-            separate(i);
-            enter_again(i, W.step_end);
-        }
+        } else separate(i);
         foresee(i);
     }
     return DONE;
@@ -422,7 +430,7 @@ static int begin_alone(void) {
                 finish(i, BY_SETTLING);
             } else W.t = W.end_time;
         } else {
-            W.t = d->ride_to;
+            W.t = W.step_end = d->ride_to;
             separate(i);
         }
     }

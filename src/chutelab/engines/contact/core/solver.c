@@ -12,6 +12,8 @@
    since parting does work. */
 #define SLOP 1e-3
 #define PART 0.1
+/* Gap, in radii, up to which what was pressed still touches: what sweeps leave open. */
+#define LEAVE 1e-4
 /* m/s; below it the contacts of a crowd count as calm: `settled` in the contract. */
 #define CALM 1e-3
 /* Of sqrt(g r): below it an island may fall asleep; 0.5 mm/s for r = 4 mm. */
@@ -27,25 +29,61 @@ static double gap_later(const Contact *c, double h) {
     return sqrt(x * x + y * y) - a->radius - b->radius;
 }
 
+/* Time until the foot of a disk on a face passes its end, INFINITY where there is none. */
+static double time_on_face(const Contact *c) {
+    const Disk *d = W.disks + c->i;
+    const Surface *s = W.surfaces + (-1 - c->j);
+    if (s->shape != SEGMENT) return INFINITY;
+    double along = (d->x - s->x) * s->tx + (d->y - s->y) * s->ty, run = d->vx * s->tx + d->vy * s->ty;
+    if (along < 0 || along > s->length || run == 0) return INFINITY;
+    return (run > 0 ? s->length - along : along) / fabs(run);
+}
+
 /* Add a contact if it touches and hardly approaches; `least` is the smaller radius. */
 static int add(int i, int j, double least, double bound, double h) {
     if (W.contact_count >= W.contact_room) return 0;
     Contact *c = W.contacts + W.contact_count;
+    const Disk *d = W.disks + i;
     double u[3];
     describe(c, i, j);
     if (c->gap > TOUCH * least) return 1;
     relative(c, 0, u);
-    if (-u[0] > bound) return 1;
+    if (-u[0] > bound || u[0] > W.soft) return 1;
     double aim = MIN(c->gap, 0);
     if (c->gap < -SLOP * least) aim = -SLOP * least + (1 - PART) * (c->gap + SLOP * least);
     c->need = (aim - gap_later(c, h)) / h;
     c->drift = j < 0 ? 0.5 * h * (W.gx * c->ny - W.gy * c->nx) : 0;
     c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
-    for (int k = W.disks[i].before; k >= 0; k = W.earlier[k].next)
+    for (int k = d->before; k >= 0; k = W.earlier[k].next)
         if (W.earlier[k].j == j)
             for (int n = 0; n < 3; n++) c->impulse[n] = W.earlier[k].impulse[n];
+    int pressed = c->impulse[0] > 0;
+    for (int n = 0; n < d->held_count; n++) pressed |= d->held[n] == -1 - j;
+    /* What was pressed came down from its last hop: it may leave along the surface, not into it. */
+    c->leaves = pressed && c->gap <= LEAVE * least && c->need < -u[0];
+    if (c->leaves) c->need = -u[0];
     W.contact_count++;
     return 1;
+}
+
+/* A disk that leaves all surfaces in this step, over the end of a face, is carried until then: it
+   gets what gravity takes from it up to there. */
+static void carry_to_end(int i, int first, double h) {
+    Contact *last = 0;
+    double until = h;
+    for (int n = first; n < W.contact_count; n++) {
+        Contact *c = W.contacts + n;
+        if (!c->leaves && c->need > -W.soft) return;
+        double t = time_on_face(c);
+        if (c->leaves && t < until) {
+            last = c;
+            until = t;
+        }
+    }
+    if (!last) return;
+    double press = press_on(W.disks + i, W.surfaces + (-1 - last->j), last->nx, last->ny);
+    if (press > 0) last->need += press * until;
+    W.tracks[i].end_of_face = W.t + until;
 }
 
 /* List the contacts of the step, waking sleepers that are touched; 0 if there is no room. */
@@ -63,32 +101,30 @@ int find_contacts(double h, int *woke) {
             *woke = 1;
         }
         if (a->mode != FREE) { int k = i; i = j; j = k; }
-        if (!add(i, j, least, soft ? W.soft : MIN(W.skip * least, W.g * h), h)) return 0;
+        if (!add(i, j, least, soft ? W.soft : soft_approach(a, least), h)) return 0;
     }
     if (*woke) return 1;
     for (int i = W.low; i < W.high; i++) {
         Disk *d = W.disks + i;
         if (d->mode != FREE) continue;
-        for (int k = 0; k < W.surface_count; k++) {
-            if (!is_near(W.surfaces + k, d)) continue;
-            double bound = d->supports ? W.soft : MIN(W.skip * d->radius, W.g * h);
-            if (!add(i, -1 - k, d->radius, bound, h)) return 0;
-        }
+        int first = W.contact_count;
+        double bound = d->supports ? W.soft : soft_approach(d, d->radius);
+        for (int k = 0; k < W.surface_count; k++)
+            if (is_near(W.surfaces + k, d) && !add(i, -1 - k, d->radius, bound, h)) return 0;
+        if (W.contact_count > first) carry_to_end(i, first, h);
     }
     return 1;
 }
 
-void solve_contacts(void) {
-    int count = W.contact_count;
-    for (int n = 0; n < count; n++) push(W.contacts + n, W.contacts[n].impulse);
-    for (int sweep = 0; sweep < W.sweeps; sweep++) {
+/* Sweep over contacts until no relative velocity changes by more than `accurate`. */
+void sweep_contacts(Contact *list, int count, int sweeps, double accurate) {
+    for (int sweep = 0; sweep < sweeps; sweep++) {
         double worst = 0;
         for (int m = 0; m < count; m++) {
             /* To and fro, so that what one end of a pile does reaches the other in one sweep. */
-            Contact *c = W.contacts + (sweep % 2 == 0 ? m : count - 1 - m);
+            Contact *c = list + (sweep % 2 == 0 ? m : count - 1 - m);
             const Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
-            double *J = c->impulse, K[3], most, v[3];
-            double x = a->vx - a->ux, y = a->vy - a->uy;
+            double *J = c->impulse, K[3], most, v[3], x = a->vx - a->ux, y = a->vy - a->uy;
             if (c->two) {
                 x -= b->vx - b->ux;
                 y -= b->vy - b->uy;
@@ -108,8 +144,13 @@ void solve_contacts(void) {
             if (c->mass[2] > 0) worst = MAX(worst, fabs(change[2]) / c->mass[2] * a->radius);
         }
         W.sweep_count++;
-        if (worst <= W.accurate) break;
+        if (worst <= accurate) break;
     }
+}
+
+void solve_contacts(void) {
+    for (int n = 0; n < W.contact_count; n++) push(W.contacts + n, W.contacts[n].impulse);
+    sweep_contacts(W.contacts, W.contact_count, W.sweeps, W.accurate);
     W.solve_count++;
 }
 
@@ -137,7 +178,7 @@ static void note_grip(Disk *d, const Contact *c, const double *u, const double *
         /* Friction slows the slip evenly; it is used up so long after the last mid-step. */
         double s = fabs(u[1] - c->drift), rate = most / (c->mass[1] * h);
         double t = d->t - 0.5 * h + (rate > 0 ? s / rate : 0);
-        t = MIN(MAX(MAX(t, d->since), W.tracks[i].knot[0]), d->t + h);
+        t = MIN(MAX(t, d->since), d->t + h);
         double place[2] = {d->x + (t - d->t) * 0.5 * (d->ux + d->vx), d->y + (t - d->t) * 0.5 * (d->uy + d->vy)};
         double after[3] = {d->vx + 0.5 * W.gx * h, d->vy + 0.5 * W.gy * h, d->spin};
         write_event(STICK, i, -1, c->owner, t, place, after, after, 0, 0);
@@ -154,6 +195,37 @@ static int lies(const Disk *d, const Contact *c) {
     if (bending(s, d->x, d->y, d->radius) != 0 && (d->vx != 0 || c->other[1] != 0)) return 0;
     if (c->arm > 0 && d->spin != c->other[2]) return 0;
     return d->inertia == 0 || c->drift == 0;
+}
+
+/* End the track of a disk that came to rest on one surface, when its slip was used up: `d->since`.
+
+   From the velocity after the impulses to that in the middle of the step it is a hop, which is left
+   out: an impulse of its own. At that velocity it has gone since, and what gravity did then the
+   drive paid. */
+static void settle(int i, const Contact *last, double h) {
+    Disk *d = W.disks + i;
+    Contact hop = *last;
+    double u[3], v[3], entries[3], given[3], jx = 0.5 * h * d->mass * W.gx, jy = 0.5 * h * d->mass * W.gy;
+    hop.impulse[0] = jx * hop.nx + jy * hop.ny;
+    hop.impulse[1] = jx * hop.ny - jy * hop.nx;
+    hop.impulse[2] = 0;
+    for (int n = 0; n < 3; n++) d->entries[n] += d->gain[n];
+    relative(&hop, 0, u);
+    d->vx += jx / d->mass;
+    d->vy += jy / d->mass;
+    relative(&hop, 0, v);
+    share_out(&hop, u, v, 0, entries, given);
+    double back = d->t - d->since;
+    entries[0] += d->mass * (W.gx * d->vx + W.gy * d->vy) * back;
+    book(d->entries, 0, hop.owner, entries);
+    d->x -= d->vx * back;
+    d->y -= d->vy * back;
+    d->t = d->since;
+    if (W.tracks[i].open) knot_asleep(i);
+    W.tracks[i].lasted = 0;
+    knot_now(i);
+    event_here(SETTLE, i, hop.owner);
+    finish(i, BY_SETTLING);
 }
 
 /* After the solve: entries, supports, timers, tracks. */
@@ -220,6 +292,7 @@ void close_step(double h) {
                 if (d->on >= 0 && track->lasted >= (W.interact ? 10 : 3)) {
                     double t = track->load_t[1], fall = track->load[2] - track->load[1];
                     if (fall > 0) t += track->load[1] / fall * (t - track->load_t[2]);
+                    if (track->end_of_face >= track->held[0]) t = track->end_of_face;
                     t = MIN(MAX(t, track->load_t[1]), d->t);
                     const double *from = t < track->held[0] ? track->past : track->held;
                     double s = t - from[0], span = d->t - from[0];
@@ -248,26 +321,20 @@ void close_step(double h) {
             double u[3], v[3];
             relative(only, 1, u);
             relative(only, 0, v);
-            int gripped = !d->slips && d->on == only->owner;
             note_grip(d, only, u, v, h);
-            track_lasting(i);
-            for (int n = 0; n < 3; n++) d->entries[n] += d->gain[n];
-            d->changes++;
-            if (!W.interact && W.until == UNTIL_SETTLED && gripped && !d->slips && lies(d, only))
-                reason = BY_SETTLING;
-            else if (!W.interact && W.until == UNTIL_LANDED && d->landed)
-                reason = BY_LANDING;
+            if (!W.interact && W.until == UNTIL_SETTLED && !d->slips && lies(d, only)) settle(i, only, h);
+            else if (!W.interact && W.until == UNTIL_LANDED && d->landed) reason = BY_LANDING;
         } else {
-            track_lasting(i);
-            for (int n = 0; n < 3; n++) d->entries[n] += d->gain[n];
-            d->changes++;
             d->slips = 1;
             d->on = -1;
-            if (!W.interact && W.until == UNTIL_SETTLED) {
-                const double *s = track->held;
-                if (fabs(s[3]) + fabs(s[4]) + fabs(s[5]) * d->radius < 1e-9 && d->calm > 2 * h)
-                    reason = BY_SETTLING;
-            }
+        }
+        d->changes++;
+        if (d->mode == GONE) continue;
+        track_lasting(i);
+        for (int n = 0; n < 3; n++) d->entries[n] += d->gain[n];
+        if (owners > 1 && !W.interact && W.until == UNTIL_SETTLED && d->calm > 2 * h) {
+            const double *s = track->held;
+            if (fabs(s[3]) + fabs(s[4]) + fabs(s[5]) * d->radius < 1e-9) reason = BY_SETTLING;
         }
         if (reason >= 0) {
             take_back(i);
@@ -299,29 +366,18 @@ void take_back(int i) {
     }
 }
 
-/* End the track of a disk in lasting contact in the state halfway through this step's impulses.
-
-   One that settles ended when its slip was used up: it has ridden along at the same velocity since,
-   and the belt has done no more than gravity took. */
+/* End the track of a disk in lasting contact in the state halfway through this step's impulses. */
 void end_in_contact(int i, int reason) {
     Disk *d = W.disks + i;
     Track *track = W.tracks + i;
-    double *s = track->held;
-    double then = d->t;
-    if (reason == BY_SETTLING) then = MIN(MAX(d->since, track->knot[0]), then);
-    double back = d->t - then, work = d->mass * (W.gx * s[3] + W.gy * s[4]) * back;
-    d->x = s[1] - s[3] * back;
-    d->y = s[2] - s[4] * back;
+    const double *s = track->held;
+    d->x = s[1];
+    d->y = s[2];
     d->vx = s[3];
     d->vy = s[4];
     d->spin = s[5];
-    d->t = then;
-    if (back > 0 && d->on >= 0) {
-        d->entries[0] += work;
-        W.books[3 * d->on] += work;
-    }
-    if (track->lasted > 1 || then > track->knot[0]) knot_now(i);
+    if (d->t > track->knot[0]) knot_now(i);
     track->lasted = 0;
-    if (reason == BY_SETTLING) event_here(SETTLE, i, d->on);
+    if (reason == BY_SETTLING) event_here(SETTLE, i, W.surfaces[d->held[0]].owner);
     finish(i, reason);
 }

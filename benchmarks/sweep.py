@@ -1,6 +1,6 @@
 """Throughput of `sweep` beside a plain loop over `simulate`: angle × speed × ε, one particle each.
 
-    OMP_NUM_THREADS=1 python tests/benchmarks/sweep.py [VARIANTS]
+    OMP_NUM_THREADS=1 python benchmarks/sweep.py [VARIANTS]
 
 Both validate each variant, run it and read its row off the recording. Times are of the processor,
 on one core. The file is written on top, and timed by itself.

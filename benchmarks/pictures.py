@@ -1,6 +1,6 @@
 """Time and size of the lesson picture.
 
-    python tests/benchmarks/pictures.py
+    python benchmarks/pictures.py
 
 First 120 frames of 800 x 450 pixels with 60 particles, beside Matplotlib's FuncAnimation and its
 PillowWriter drawing the same picture; then `lesson.gif` of each shipped scene with one particle.

@@ -1,6 +1,6 @@
 """Run time, error and memory of particles that do not meet each other, beside SciPy's DOP853.
 
-    python tests/benchmarks/independent.py [--repeats N] [COUNT ...]
+    python benchmarks/independent.py [--repeats N] [COUNT ...]
 
 COUNT is 1, 1000 and 100000 by default; 1000000 takes some seconds and 1.5 GB. Times run from the
 validated scene to the recording. DOP853 does the same transfer of one particle, flight to the

@@ -1,0 +1,288 @@
+"""The references against closed forms, and against the exact engine where that has an answer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import cos, exp, hypot, pi, sin, sqrt
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from chutelab import exact, scene, simulate
+from chutelab.machine import build
+from chutelab.recording import Kind
+from drawn import draw, only_blows
+from references import (
+    Impact,
+    first_impacts,
+    henderson,
+    inside_surfaces,
+    likeness,
+    maxwell_boltzmann,
+    overlaps,
+    round_the_pulley,
+    slide,
+    virial,
+    wall_pressure,
+)
+
+G = 9.81
+
+
+# First impacts
+
+
+def own_impacts(recording, particle):
+    events = recording.select(Kind.IMPACT, Kind.LANDING)
+    return events[events["particle"] == particle]
+
+
+def test_lone_disks_meet_what_they_meet_in_the_exact_engine():
+    compared = 0
+    for seed in range(150):
+        built = build(draw(seed, points=False))
+        if built.gravity == 0.0:
+            continue  # it may graze the belt on its way back
+        carried = built.releases.carried[0]
+        try:
+            recording = exact.run(built)
+        except exact.CornerError:
+            continue
+        if not only_blows(recording, 2.0 * built.dt):
+            continue
+        met, left = own_impacts(recording, 0), recording.select(Kind.SEPARATION)
+        if carried and len(met) and met["t"][0] <= left["t"][0]:
+            continue  # something is in the way of the ride
+        end = float(recording.track(0)["t"][-1])
+        found = first_impacts(built, end + 1e-9)
+        assert [recording.surfaces[s] for s in met["surface"]] == [i.partner for i in found.of[0]]
+        np.testing.assert_allclose([i.t for i in found.of[0]], met["t"], rtol=1e-12, atol=1e-13)
+        compared += len(met)
+    assert compared > 50, compared
+
+
+def test_likeness_counts_what_is_alike_and_names_what_is_not():
+    built = build(scene.load("stream-independent", ["stream.count=40", "plate.friction=0.3"]))
+    recording = exact.run(built)
+    found = first_impacts(built, 3.0)
+    both = likeness(found, recording)
+    # Each strikes the plate and lands, and there the run ends.
+    assert (both.alike, both.unlike, both.unknown) == (80, [], 0)
+    assert both.time < 1e-12
+    assert both.approach < 1e-12
+    late = found.of[3][1]._replace(t=found.of[3][1].t + 1e-9)
+    found.of[3][1] = late
+    found.of[5].insert(1, Impact(found.of[5][0].t + 0.01, "plate", 1.0))
+    (mine, its), (missed, _) = (one[1:] for one in likeness(found, recording).unlike)
+    assert mine == late
+    assert its.t == pytest.approx(late.t - 1e-9, abs=1e-12)
+    assert missed.partner == "plate"
+
+
+def box(count, seed, *, side=1.0, radius=0.02, friction=0.0, spin=False):
+    """Disks at rest in a square lattice, with random velocities, in an elastic box."""
+    corners = [[0.0, 0.0], [side, 0.0], [side, side], [0.0, side], [0.0, 0.0]]
+    built = build(
+        scene.from_dict(
+            {
+                "gravity": 0.0,
+                "particle": {"radius": radius, "spin": spin},
+                "surface": [
+                    {"name": "box", "points": corners, "restitution": 1.0, "friction": 0.0}
+                ],
+                "stream": {
+                    "count": 2, "at": [0.5, 0.5], "velocity": [0.0, 0.0], "restitution": 1.0,
+                    "friction": friction, "interact": True, "bed_height": 0.4, "rate": 1e-3,
+                },
+                "run": {"until": 1.0, "max_time": 1.0, "dt": 1e-6},
+            }
+        )
+    )  # fmt: skip
+    rng = np.random.default_rng(seed)
+    rows = int(np.ceil(sqrt(count)))
+    places = (np.indices((rows, rows)).reshape(2, -1).T[:count] + 0.5) * side / rows
+    releases = replace(
+        built.releases,
+        t=np.zeros(count),
+        position=places,
+        velocity=rng.normal(size=(count, 2)),
+        carried=np.zeros(count, dtype=bool),
+    )
+    return replace(built, releases=releases)
+
+
+def test_a_pair_meets_when_and_as_fast_as_written_here():
+    # Two falling disks: g cancels. d = (0.3, 0.04) apart, u = 2 m/s towards each other.
+    built = box(2, 0)
+    releases = replace(
+        built.releases,
+        position=np.array([[0.3, 0.5], [0.6, 0.54]]),
+        velocity=np.array([[1.0, 0.0], [-1.0, 0.0]]),
+    )
+    found = first_impacts(replace(built, releases=releases, gravity=1.0), 0.3).of
+    normal = sqrt(0.04**2 - 0.04**2)  # 0.04 m off the centre line: they only touch
+    assert normal == 0.0
+    assert [one.partner for one in found[0]] != [1]
+    releases = replace(releases, position=np.array([[0.3, 0.5], [0.6, 0.52]]))
+    found = first_impacts(replace(built, releases=releases, gravity=1.0), 0.3).of
+    reach = sqrt(0.04**2 - 0.02**2)
+    assert found[0][0].t == pytest.approx((0.3 - reach) / 2.0, rel=1e-14)
+    assert found[0][0].approach == pytest.approx(2.0 * reach / 0.04, rel=1e-14)
+    assert (found[0][0].partner, found[1][0].partner) == (1, 0)
+
+
+def test_a_gas_presses_on_its_walls_as_the_virial_theorem_says():
+    # d/dt Σ m x·v = 2 K + Σ σ J (pairs) - (walls) ½ a J, with x from the middle and a = side - 2 r.
+    count, side, r, end = 64, 1.0, 0.02, 8.0
+    built = box(count, 1)
+    found = first_impacts(built, end).of
+    mass = built.particle.mass
+    kinetic = 0.5 * mass * (built.releases.velocity**2).sum()
+    every = [one for own in found for one in own]
+    pairs = mass * np.array([one.approach for one in every if one.partner != "box"]) / 2.0
+    walls = 2.0 * mass * np.array([one.approach for one in every if one.partner == "box"])
+    assert len(pairs) > 3000
+    inside = (2.0 * kinetic * end + 2.0 * r * pairs.sum()) / (2.0 * kinetic * end)
+    assert virial(pairs, diameter=2.0 * r, time=end, kinetic=kinetic) == pytest.approx(inside)
+    outside = 0.5 * (side - 2.0 * r) * walls.sum() / (2.0 * kinetic * end)
+    # Of N disks all over the box Σ m x·v spreads by m √(N <x²> <v²>/2), <x²> = side²/6; at both
+    # ends of the time.
+    spread = mass * sqrt(2.0 * count * side**2 / 6.0 * kinetic / (mass * count))
+    assert abs(inside - outside) < 4.0 * spread / (2.0 * kinetic * end) < 0.02
+    pressure = wall_pressure(walls, perimeter=4.0 * side, time=end)
+    assert pressure == pytest.approx(walls.sum() / (4.0 * side * end), rel=1e-15)
+
+
+# Lasting contacts
+
+
+@pytest.mark.parametrize("friction", [0.15, 0.5, 2.0])
+@pytest.mark.parametrize("turning", [0.0, 2.0])
+def test_round_the_pulley_as_the_exact_engine_and_the_slip_law_say(friction, turning):
+    belt, wheel, r, length = 2.0, 0.5, 0.004, 0.5
+    ride = wheel + r
+    found = round_the_pulley(
+        belt=belt, ride=ride, friction=friction, turning=turning, way=-length, speed=0.8
+    )
+    u0 = belt**2 / (G * ride)
+    if turning == 0.0 and friction > 0.15:
+        # It has the belt's speed before it comes to the pulley.
+        # u' = 2 (sin φ - µ (cos φ - u)); u = A cos φ - B sin φ + C exp(2 µ φ), from the onset on.
+        onset = brentq(lambda f: sin(f) - friction * (cos(f) - u0), 0.0, 1.5, xtol=1e-15)
+        a, b = (
+            (4.0 * friction**2 - 2.0) / (1.0 + 4.0 * friction**2),
+            6.0 * friction / (1.0 + 4.0 * friction**2),
+        )
+        c = (u0 - a * cos(onset) + b * sin(onset)) * exp(-2.0 * friction * onset)
+        leaves = brentq(
+            lambda f: a * cos(f) - b * sin(f) + c * exp(2.0 * friction * f) - cos(f),
+            onset + 1e-6, 1.5, xtol=1e-15,
+        )  # fmt: skip
+        assert [what for _, what in found.phases] == ["slip", "grip", "grip", "slip"]
+        assert found.angle == pytest.approx(leaves, abs=1e-9)
+    document = {
+        "particle": {"radius": r, "spin": turning > 0.0},
+        "incoming": {"speed": belt, "pulley_radius": wheel, "friction": friction},
+        "stream": {"at": [-length, ride], "velocity": [0.8, 0.0]},
+        "run": {"until": 3.0},
+    }
+    recording = simulate(scene.from_dict(document), engine="exact")
+    left = recording.select(Kind.SEPARATION)[0]
+    assert found.t == pytest.approx(left["t"], rel=1e-9)
+    assert found.angle == pytest.approx(np.arctan2(*left["position"]), abs=1e-9)
+    assert found.speed == pytest.approx(hypot(*left["velocity_after"]), rel=1e-9)
+    assert found.rim == pytest.approx(r * left["omega_after"], abs=1e-9)
+    times = np.linspace(0.0, found.t, 200)
+    way = found.state(times)[0]
+    place = np.where(
+        way < 0.0,
+        [way, np.full_like(way, ride)],
+        [ride * np.sin(way / ride), ride * np.cos(way / ride)],
+    )
+    np.testing.assert_allclose(recording.at(times)[0][:-1, 0], place.T[:-1], atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"speed": 0.5, "belt": 2.0, "friction": 0.3},
+        {"speed": 0.5, "belt": 2.0, "friction": 0.3, "turning": 2.0},
+        {"speed": 1.0, "slope": 0.3, "friction": 0.2},
+        {"speed": 1.0, "slope": 0.3, "friction": 0.2, "turning": 2.0},
+        {"speed": 0.5, "slope": 0.6, "friction": 0.1, "belt": 1.5, "turning": 2.0},
+        {"speed": 0.0, "slope": 0.3, "friction": 0.5, "belt": -1.0},
+    ],
+)
+def test_slide_as_the_exact_engine_says(options):
+    r, slope = 0.02, options.get("slope", 0.0)
+    along, normal = np.array([cos(slope), -sin(slope)]), np.array([sin(slope), cos(slope)])
+    surface = {
+        "name": "ramp", "from": (-20.0 * along).tolist(), "to": (20.0 * along).tolist(),
+        "friction": options["friction"], "speed": options.get("belt", 0.0), "restitution": 0.0,
+    }  # fmt: skip
+    document = {
+        "particle": {"radius": r, "spin": options.get("turning", 0.0) > 0.0},
+        "surface": [surface],
+        "stream": {"at": (r * normal).tolist(), "velocity": (options["speed"] * along).tolist()},
+        "run": {"until": 2.0},
+    }
+    recording = simulate(scene.from_dict(document), engine="exact")
+    times = np.linspace(0.0, 1.99, 50)
+    way, speed, _ = slide(times, **options)
+    place, velocity = recording.at(times)
+    np.testing.assert_allclose(place[:, 0], r * normal + way[:, None] * along, atol=1e-12)
+    np.testing.assert_allclose(velocity[:, 0], speed[:, None] * along, atol=1e-12)
+    assert r * recording.track(0)[-1]["omega"] == pytest.approx(slide(2.0, **options)[2], abs=1e-12)
+
+
+# Gas
+
+
+def test_henderson_has_the_virial_coefficients_of_hard_disks():
+    # Z = 1 + 2 η + (16/3 - 4 √3/π) η² + ..., the first two exact, the third 3.12802.
+    h = 1e-3
+    assert (henderson(h) - henderson(-h)) / (2.0 * h) == pytest.approx(2.0, rel=1e-5)
+    third = (henderson(h) - 2.0 + henderson(-h)) / (2.0 * h**2)
+    assert third == pytest.approx(16.0 / 3.0 - 4.0 * sqrt(3.0) / pi, rel=1e-3)
+
+
+def test_maxwell_boltzmann_tells_normal_components_from_others():
+    rng = np.random.default_rng(3)
+    assert maxwell_boltzmann(rng.normal(0.0, 2.5, (2000, 2))) > 0.01
+    assert maxwell_boltzmann(rng.uniform(-1.0, 1.0, (2000, 2))) < 1e-6
+
+
+# Overlaps
+
+
+def held(positions, surface):
+    """A recording of disks of radius 1 cm that lie where told, gravity 0."""
+    count = len(positions)
+    built = build(
+        scene.from_dict(
+            {
+                "gravity": 0.0,
+                "particle": {"radius": 0.01},
+                "surface": [surface],
+                "stream": {"count": count, "at": [0.0, 1.0], "velocity": [0.0, 0.0]},
+                "run": {"until": 1.0},
+            }
+        )
+    )
+    releases = replace(built.releases, t=np.zeros(count), position=np.array(positions))
+    built = replace(built, releases=releases)
+    return exact.run(built), built
+
+
+def test_overlaps_are_those_of_what_touches_in_radii():
+    far = {"name": "floor", "from": [-1.0, 0.0], "to": [1.0, 0.0]}
+    recording, built = held(
+        [[0.0, 0.5], [0.019, 0.5], [0.3, 0.5], [0.3, 0.5198], [0.6, 0.5], [0.7, 0.009]], far
+    )
+    depth = overlaps(recording, [0.0, 0.5])
+    assert depth.worst == pytest.approx(0.1, rel=1e-12)
+    assert depth.count == 4
+    assert depth.percentile_99 == pytest.approx(0.1, rel=1e-12)
+    depth = inside_surfaces(recording, built, [0.0])
+    assert (depth.worst, depth.count) == (pytest.approx(0.1, rel=1e-12), 1)

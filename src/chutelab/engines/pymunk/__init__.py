@@ -9,6 +9,7 @@ outside.
 
 from __future__ import annotations
 
+from functools import partial
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -40,9 +41,9 @@ def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Re
             gravity=machine.gravity, steps=steps, seconds=perf_counter() - begin, origin=place,
         )  # fmt: skip
 
-    def report(share: float) -> None:
+    def report(done: int, share: float) -> None:
         if progress is not None:
-            progress(share)
+            progress((done + share) / len(groups))
 
     everybody = range(machine.count)
     groups = [everybody] if machine.interact else [range(i, i + 1) for i in everybody]
@@ -56,10 +57,10 @@ def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Re
             else:
                 part = Shared(machine, World(machine), recorder, group)
             try:
-                part.run(lambda share, n=n: report((n + share) / len(groups)))
+                part.run(partial(report, n))
             finally:
                 steps += part.steps
-        report(1.0)
+        report(len(groups), 0.0)
     except StalledError as stalled:
         stalled.recording = finished()
         x, y = stalled.position

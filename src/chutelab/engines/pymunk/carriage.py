@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 from pymunk import Vec2d
 
 if TYPE_CHECKING:
-    from chutelab.engines.pymunk.world import World
+    from chutelab.engines.pymunk.world import Track, World
     from chutelab.machine import Machine
-    from chutelab.recorder import Recorder
 
 ARC = 0.025
 """rad between knots round the pulley: ρ Δφ⁴/384, the curve's error, is 1e-9 of the radius."""
@@ -29,7 +28,7 @@ class Carriage:
     def __init__(self, machine: Machine, world: World, particle: int) -> None:
         assert machine.pulley is not None
         start = machine.releases
-        self.particle, self.surface = particle, machine.pulley.surface
+        self.surface = machine.pulley.surface
         self.weight = machine.particle.mass * machine.gravity
         self.t = float(start.t[particle])
         self.x, self.rho = start.position[particle].tolist()
@@ -66,11 +65,13 @@ class Carriage:
         pieces = ceil(span * self.speed / self.rho / ARC)
         return [top, *(top + span * n / pieces for n in range(1, pieces)), self.until]
 
-    def book(self, recorder: Recorder, t: float) -> None:
-        """Book what the belt has paid since the last time: it lets the particle down."""
-        height = self.state(t)[0].y
-        recorder.book(self.particle, self.surface, self.weight * (height - self.height))
-        self.height = height
+    def write(self, track: Track, end: float) -> None:
+        """Write the knots until a time (s), with what the belt pays: it lets the particle down."""
+        for t in (*(t for t in self.times() if t < end), end):
+            x, v = self.state(t)
+            track.pay(self.surface, self.weight * (x.y - self.height), 0.0, 0.0)
+            self.height = x.y
+            track.knot(t, x, v, 0.0)
 
     def _free(self, world: World, radius: float, path: float) -> float:
         """Return how much of a path (m) is free of surfaces other than the own belt."""

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 from math import ceil, inf, sqrt
 from operator import itemgetter
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+import pymunk
 from pymunk import Vec2d
 
 from chutelab.engines.pymunk.carriage import Carriage
@@ -134,7 +135,7 @@ class Lone:
 
     # What Chipmunk asks and tells
 
-    def _before(self, arbiter: object, _space: object, _data: object) -> None:
+    def _before(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
         face = self.world.by_shape[arbiter.shapes[1]]
         normal = -arbiter.normal
         restitution = self.law(face, normal)
@@ -145,7 +146,7 @@ class Lone:
         if face.tangent is not None and face.speed != 0.0:
             arbiter.surface_velocity = face.belt(normal) * Vec2d(normal.y, -normal.x)
 
-    def _after(self, arbiter: object, _space: object, _data: object) -> None:
+    def _after(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
         face = self.world.by_shape[arbiter.shapes[1]]
         self.contacts.append(Contact(face, -arbiter.normal, arbiter.total_impulse))
 
@@ -239,8 +240,9 @@ class Lone:
         """Return when (s from now) the parabola meets a surface, inf if not within `span`.
 
         All surfaces are convex: along a straight line the distance from one is a convex function,
-        so from where gap and rate of change are known it stays above gap + rate τ - g τ²/2. Stepping
-        from root to root of that bound never passes a contact, and converges like Newton's method.
+        so from where gap and rate of change are known it stays above gap + rate τ - g τ²/2.
+        Stepping from root to root of that bound never passes a contact, and converges like Newton's
+        method.
         A surface that the flight has just left along its tangent gives no bound; it is looked at
         after times that grow by half.
         """
@@ -474,16 +476,12 @@ class Lone:
             self._end("settled")
             return
         ride = Carriage(self.machine, self.world, self.particle)
-        for t in ride.times():
-            self.t, (self.x, self.v) = t, ride.state(t)
-            ride.book(self.recorder, t)
-            self.track.knot(t, self.x, self.v, 0.0)
+        ride.write(self.track, ride.until)
+        self.t, (self.x, self.v) = ride.until, ride.state(ride.until)
         if self.t >= self.machine.end_time:
             self._end("time")
         else:
-            self.track.event(
-                Kind.SEPARATION, self.t, self.x, (self.v, 0.0), surface=belt.surface
-            )
+            self.track.event(Kind.SEPARATION, self.t, self.x, (self.v, 0.0), surface=belt.surface)
 
     # The end
 

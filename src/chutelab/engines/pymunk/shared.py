@@ -8,15 +8,14 @@ flight is exact, and gravity's work is.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import ceil, inf, sqrt
+from math import sqrt
 from typing import TYPE_CHECKING, Any
 
 import pymunk
 from pymunk import Vec2d
 
 from chutelab.engines.pymunk.carriage import Carriage
-from chutelab.engines.pymunk.world import PARTICLE, SURFACE, Contact, Face, Track, World
-from chutelab.recorder import StalledError
+from chutelab.engines.pymunk.world import PARTICLE, SURFACE, Contact, Track, World
 from chutelab.recording import REASONS, Kind
 
 if TYPE_CHECKING:
@@ -37,6 +36,10 @@ PUSH = 0.2
 
 FASTER, DEEPEST = 2**10, 1.0
 """Steps into which `dt` is divided at most; overlap in radii at which a disk has passed through."""
+
+STAY, HOPS = 5, 10
+"""Steps in contact that make it a lasting one; steps off the surface that end it: a ride round the
+pulley hops, and ends with its last impulse."""
 
 CALM, STILL = 0.1, 1e-3
 """s and m/s: who slips and moves less for that long has settled."""
@@ -60,6 +63,9 @@ class Disk:
     loose: bool = False
     landed: bool = False
     calm: float = 0.0
+    on: int = -1
+    stays: int = 0
+    left: tuple[float, Vec2d, tuple[Vec2d, float]] | None = None
 
     @property
     def state(self) -> tuple[Vec2d, float]:
@@ -234,6 +240,11 @@ class Shared:
         tangent = Vec2d(normal.y, -normal.x)
         slip = disk.v.dot(tangent) + self.r * disk.omega - face.belt(normal)
         disk.fastest = max(disk.fastest, abs(slip), abs(disk.v.dot(normal)))
+        if impulse.dot(normal) > 0.0:
+            if disk.on != face.surface:
+                self._part(disk)
+            disk.on, disk.stays = face.surface, disk.stays + 1
+            disk.left = self.t, disk.x, disk.state
         lands = face.surface == self.machine.landing
         disk.loose |= face.speed != 0.0 and not lands
         approach = -before[1].dot(normal)
@@ -262,10 +273,9 @@ class Shared:
         closing, slip = (u - a).dot(normal), (u - a).dot(tangent) + self.r * (w + b)
         lost = -impulse.dot(normal) * closing, -impulse.dot(tangent) * slip
         for disk, mean, sign in ((one, u, -1.0), (other, a, 1.0)):
-            self.recorder.book(disk.number, -1, 0.0, 0.5 * lost[0], 0.5 * lost[1])
+            disk.track.pay(-1, 0.0, 0.5 * lost[0], 0.5 * lost[1])
             if disk.ride is not None:
-                held = sign * impulse.dot(mean)
-                self.recorder.book(disk.number, disk.ride.surface, held)
+                disk.track.pay(disk.ride.surface, sign * impulse.dot(mean), 0.0, 0.0)
         relative = one.v - other.v
         slips = relative.dot(tangent) + self.r * (one.omega + other.omega)
         for disk in (one, other):
@@ -289,6 +299,8 @@ class Shared:
                 continue
             if disk.meets:
                 disk.track.sample(self.t, disk.x, disk.v, disk.omega)
+            if disk.left is not None and self.t - disk.left[0] > HOPS * self.h:
+                self._part(disk)
             still = disk.meets and not disk.loose and disk.fastest <= STILL
             disk.calm = disk.calm + self.h if still else 0.0
             if disk.landed and self.machine.until == "landed":
@@ -297,27 +309,31 @@ class Shared:
                 disk.track.knot(self.t, disk.x, disk.v, disk.omega)
                 disk.track.event(Kind.EXIT, self.t, disk.x, disk.state)
                 self._end(disk, "exit")
-        if self.machine.until == "settled" and not self.waiting:
-            if all(disk.calm >= CALM for disk in self.live.values()):
-                for disk in list(self.live.values()):
-                    disk.track.event(Kind.SETTLE, self.t, disk.x, disk.state)
-                    self._end(disk, "settled")
+        calm = not self.waiting and all(disk.calm >= CALM for disk in self.live.values())
+        if calm and self.machine.until == "settled":
+            for disk in list(self.live.values()):
+                disk.track.event(Kind.SETTLE, self.t, disk.x, disk.state, surface=disk.on)
+                self._end(disk, "settled")
+
+    def _part(self, disk: Disk) -> None:
+        """End a contact; one that lasted with an event where the surface pushed last."""
+        if disk.left is not None and disk.stays >= STAY:
+            t, x, state = disk.left
+            disk.track.event(Kind.SEPARATION, t, x, state, surface=disk.on)
+        disk.on, disk.stays, disk.left = -1, 0, None
 
     def _carried(self, disk: Disk) -> None:
         """Let a carried particle go when its time comes, else note where it is."""
         ride = disk.ride
         assert ride is not None
-        ride.book(self.recorder, min(self.t, ride.until))
         if self.t < ride.until:
-            disk.track.sample(self.t, disk.x, disk.v, 0.0)
             return
+        ride.write(disk.track, ride.until)
         x, v = ride.state(ride.until)
-        disk.track.knot(ride.until, x, v, 0.0)
-        if ride.until >= self.machine.end_time:
-            return
         disk.track.event(Kind.SEPARATION, ride.until, x, (v, 0.0), surface=ride.surface)
         late = self.t - ride.until
-        disk.ride, disk.x, disk.v = None, x + late * (v + 0.5 * late * self.pull), v + late * self.pull
+        disk.ride, disk.v = None, v + late * self.pull
+        disk.x = x + 0.5 * late * (v + disk.v)
         self.world.space.remove(disk.body, disk.circle)
         del self.live[disk.circle]
         old = disk.circle
@@ -338,5 +354,8 @@ class Shared:
     def _stop(self) -> None:
         """End what is left."""
         for disk in list(self.live.values()):
-            disk.track.knot(self.t, disk.x, disk.v, disk.omega)
+            if disk.ride is not None:
+                disk.ride.write(disk.track, self.t)
+            else:
+                disk.track.knot(self.t, disk.x, disk.v, disk.omega)
             self._end(disk, "time")

@@ -35,7 +35,7 @@ DIGITS = 16.0 * float(np.finfo(float).eps)
 ROUGH = 1e-5
 """Share of the radius by which a track between two knots of a lasting contact may be off."""
 
-SAMPLES = 16
+SAMPLES = 4
 """States between two knots that are held against the curve through the knots."""
 
 
@@ -133,6 +133,7 @@ class World:
         self, shape: pymunk.Shape, surface: int, tangent: Vec2d | None, speed: float,
         restitution: float, friction: float,
     ) -> None:  # fmt: skip
+        assert shape.body is not None
         shape.collision_type = SURFACE
         self.space.add(shape.body, shape)
         self.faces.append(Face(shape, surface, tangent, speed, restitution, min(friction, GRIP)))
@@ -185,7 +186,14 @@ class Track:
         spin = 0.5 * self.radius * (before[1] + after[1])
         slip = 0.5 * (before[0] + after[0]).dot(t) + spin - belt
         push, rub = impulse.dot(n), impulse.dot(t)
-        self.recorder.book(self.particle, face.surface, rub * belt, -push * normal, -rub * slip)
+        self.pay(face.surface, rub * belt, -push * normal, -rub * slip)
+
+    def pay(self, surface: int, belt: float, restitution: float, friction: float) -> None:
+        """Book entries (J) on the particle and on a surface."""
+        for row in (self.entries, self.recorder.by_surface[surface]):
+            row[0] += belt
+            row[1] += restitution
+            row[2] += friction
 
     def event(
         self, kind: Kind, t: float, x: Vec2d, after: tuple[Vec2d, float],

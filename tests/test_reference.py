@@ -1,4 +1,4 @@
-"""The reference: one particle as an ODE, against closed forms written out here and against exact."""
+"""The reference: one particle as an ODE, against closed forms written out here, and exact."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 ANSWERS: Final = {
     "theory": ("closed form, NumPy", "nothing, not even the machine"),
-    "exact": ("the next event, solved", "mechanics, which also places the belt under the plate"),
+    "exact": ("the next event, solved", "mechanics, which place the belt too"),
     "contact": ("impacts, contact dynamics; C", "the machine's arrays"),
     "pymunk": ("Chipmunk's solver, stepped", "the machine's arrays"),
     "dop853": ("SciPy's ODE solver, events", "the machine's arrays"),

@@ -27,8 +27,8 @@ contract."""
 ZOOMS = 12
 """Times that the place of a crossing is narrowed down to a `PIECES`-th: to rounding."""
 
-PLACES = 400_000
-"""Places, all particles and instants together, at which pairs of particles are looked at."""
+INSTANTS, PLACES = 1000, 200_000
+"""Times at which pairs of particles are looked at, and places, all particles together, at most."""
 
 COLLISIONS = 300
 """Collisions, and releases, at which that is done besides, at most."""
@@ -164,16 +164,18 @@ def no_one_through_another(e: Evidence) -> Verdict | None:
         share = -(start * along).sum(axis=1) / np.where(way > 0.0, way, 1.0) ** 2
         nearest = np.hypot(*(start + np.clip(share, 0.0, 1.0)[:, None] * along).T)
         for k in np.flatnonzero((way < r) & (nearest < r)).tolist():
-            passed.add((min(i[k], j[k]), max(i[k], j[k])))
-            where = where or f"pairs: {i[k]} and {j[k]} at t = {now:.6g} s"
+            a, b = sorted((int(i[k]), int(j[k])))
+            passed.add((a, b))
+            where = where or f"pairs: {a} and {b} at t = {now:.6g} s"
     return Verdict(len(passed), 0.0, where or "pairs")
 
 
 def _instants(e: Evidence) -> Floats:
-    """Return times at which pairs are looked at, as many as `PLACES` allows, s."""
+    """Return times at which pairs are looked at, s: every step, or as many as are allowed."""
     t = e.recording.knots["t"]
     step = e.dt or np.ptp(t)
-    count = min(PLACES // max(1, e.recording.count), int(np.ptp(t) / step) + 1)
+    most = min(INSTANTS, PLACES // max(1, e.recording.count))
+    count = min(most, int(np.ptp(t) / step) + 1)
     return np.linspace(t.min(), t.max(), max(2, count))
 
 

@@ -254,6 +254,8 @@ class _Run:
         slip = float(v @ along) + self.r * self.state[OMEGA] - belt
         need = -pull / (1.0 + self.lever)
         sign = 0
+        if abs(slip) > SLIP and thing.friction == inf:
+            raise UnableError("a belt that grips drives it into something")
         if abs(slip) > SLIP:
             sign = 1 if slip > 0.0 else -1
         else:

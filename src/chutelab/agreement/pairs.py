@@ -148,7 +148,7 @@ def _growth(scene: Scene, name: str, found: Recording) -> float:
 def _lasts(scene: Scene, found: Recording) -> bool:
     """Tell whether anything but gravity acts between blows, apart from the ride by adhesion."""
     track = found.track(0)
-    if scene.incoming is not None and scene.incoming.friction == "adhesion":
+    if build(scene).releases.carried[0]:
         left = found.select(Kind.SEPARATION, surface="incoming")
         track = track[track["t"] >= (left["t"][0] if len(left) else inf)]
     time, velocity = np.diff(track["t"]), np.diff(track["velocity"], axis=0)

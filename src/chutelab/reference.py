@@ -440,7 +440,7 @@ class _Run:
         aside: set[int] = set()
         if on is not None:
             lies = self.things[on.index]
-            aside = {on.index, *(j for j, _, _ in getattr(lies, "joined", ()))}
+            aside = {on.index}
             aside |= {
                 k for k, thing in enumerate(self.things)
                 if (isinstance(thing, _Circle) and on.index in [j for j, _, _ in thing.joined])

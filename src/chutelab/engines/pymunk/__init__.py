@@ -4,7 +4,9 @@ Nothing here is shared with the other engines but the machine and the recorder: 
 outside.
 
 - `world`: the machine as a `pymunk.Space`; tracks and books.
+- `carriage`: the adhesion ride, in closed form.
 - `lone`: one particle whose steps end at its contacts.
+- `shared`: particles in one Space, in steps that are all alike.
 """
 
 from __future__ import annotations
@@ -27,7 +29,29 @@ if TYPE_CHECKING:
 
 
 def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Recording:
-    """Run a machine in Pymunk."""
+    """Run a machine in Pymunk.
+
+    Parameters
+    ----------
+    machine : Machine
+        From `chutelab.machine.build`; the radius must be more than 0.
+    progress : callable, optional
+        Called with the share of the run that is done.
+
+    Returns
+    -------
+    Recording
+        With `align`, a lone particle's blows to rounding error and its lasting contacts of order 2
+        in the step, which is no longer than `dt` and half a radius' way. Particles that meet, and
+        steps that are all alike, of order 1.
+
+    Raises
+    ------
+    ValueError
+        If the particle has no radius.
+    StalledError
+        If a lone particle goes on without getting on; it has the recording so far.
+    """
     if machine.particle.radius <= 0.0:
         raise ValueError("particle.radius = 0: pymunk needs disks with a radius above 0 m")
     begin, steps = perf_counter(), 0

@@ -42,8 +42,8 @@ one less than the second."""
 STRIDE = 0.5
 """Share of the radius that a lasting contact moves on in a step, at most: it meets every end."""
 
-STILL = 1e-9
-"""Share of 1 m/s plus the speed; a step that changes the velocity by less changes nothing."""
+STILL = 1e-6
+"""Share of a free fall's gain; a step that changes the velocity by less changes nothing."""
 
 SLACK = 1e-9
 """Share of the friction limit below which a contact is held to grip."""
@@ -59,6 +59,9 @@ WINDOW = 10_000
 
 TICK = 1e-12
 """s; mean time between blows of a particle that does not get on."""
+
+LOW = 2.0
+"""Hairs; bounces lower than this cannot be told from lying on the surface."""
 
 TURNS = 200
 """Blows at one instant, one surface after the other, before all are solved together."""
@@ -234,6 +237,8 @@ class Lone:
                 if v != 0.0:
                     out = min(out, max(((high if v > 0.0 else low) - x) / v, 0.0))
         rest = self.machine.end_time - self.t
+        if self.machine.until == "time":
+            return rest, "time"
         return (out, "exit") if out < rest else (rest, "time")
 
     def _meets(self, face: Face, span: float, leaving: bool) -> float:
@@ -335,7 +340,8 @@ class Lone:
             return 0.0
         if weight > 0.0:
             hop = 2.0 * e * approach / weight
-            if hop < self.dt * max(LATE * (1.0 - e), HOP):
+            height = 0.5 * (e * approach) ** 2 / weight
+            if hop < self.dt * max(LATE * (1.0 - e), HOP) or height < LOW * self.world.hair:
                 return 0.0
         return e
 
@@ -384,7 +390,7 @@ class Lone:
         if self.slipping and not end.slips:
             h = _longest(lambda span: trial(span).slips, h, floor, upper=True)
             end = trial(h)
-        if self.machine.until == "settled" and self._lies(end):
+        if self.machine.until == "settled" and self._lies(end, h):
             self._settle(end)
         else:
             self._accept(end, h)
@@ -409,7 +415,7 @@ class Lone:
 
         contacts = self._step(middle - h * self.v, self.v, h, self.pull, law)
         if self.v.dot(normal) > SEAM * self.v.length:
-            turn = self.body.velocity.get_length_sqrd() / self.v.get_length_sqrd()
+            turn = self.body.velocity.dot(self.body.velocity) / self.v.dot(self.v)
             contacts = self._step(middle - h * self.v, self.v, h, self.pull, law)
         v, omega = self.body.velocity, self.body.angular_velocity
         x = middle + 0.5 * h * v
@@ -439,9 +445,9 @@ class Lone:
         if self.t >= self.machine.end_time:
             self._end("time")
 
-    def _lies(self, end: Ridden) -> bool:
+    def _lies(self, end: Ridden, h: float) -> bool:
         """Tell whether a step without slip changed nothing, on a surface to settle on."""
-        still = STILL * (1.0 + end.v.length)
+        still = STILL * self.g * h
         return (
             bool(end.pushed)
             and not end.slips

@@ -8,7 +8,7 @@ flight is exact, and gravity's work is.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import sqrt
+from math import inf, sqrt
 from typing import TYPE_CHECKING, Any
 
 import pymunk
@@ -34,12 +34,12 @@ SLOP = 1e-3
 PUSH = 0.2
 """Share of an overlap beyond it that Chipmunk takes back in a step."""
 
-FASTER, DEEPEST = 2**10, 1.0
-"""Steps into which `dt` is divided at most; overlap in radii at which a disk has passed through."""
+FASTER = 2**10
+"""Steps into which `dt` is divided at most."""
 
-STAY, HOPS = 5, 10
-"""Steps in contact that make it a lasting one; steps off the surface that end it: a ride round the
-pulley hops, and ends with its last impulse."""
+STAY = 5
+"""Soft contacts in a row with one surface that make a lasting one. It ends with the last of them:
+a ride round the pulley hops, and more so near its end."""
 
 CALM, STILL = 0.1, 1e-3
 """s and m/s: who slips and moves less for that long has settled."""
@@ -94,7 +94,8 @@ class Shared:
         self.pull = Vec2d(0.0, -self.g)
         self.t = float(machine.releases.t[self.waiting[0]])
         self.h, self.steps = machine.dt, 0
-        self.box = machine.exit_box
+        everywhere = (-inf, inf, -inf, inf)
+        self.box = everywhere if machine.until == "time" else machine.exit_box
         space = world.space
         space.gravity, space.collision_slop = self.pull, SLOP * self.r + world.hair
         # Who was in contact in this step, with impulses: with a surface, with another.
@@ -240,14 +241,16 @@ class Shared:
         tangent = Vec2d(normal.y, -normal.x)
         slip = disk.v.dot(tangent) + self.r * disk.omega - face.belt(normal)
         disk.fastest = max(disk.fastest, abs(slip), abs(disk.v.dot(normal)))
-        if impulse.dot(normal) > 0.0:
+        approach = -before[1].dot(normal)
+        if impulse.dot(normal) > 0.0 and approach <= 2.0 * self.g * self.h:
             if disk.on != face.surface:
                 self._part(disk)
             disk.on, disk.stays = face.surface, disk.stays + 1
             disk.left = self.t, disk.x, disk.state
         lands = face.surface == self.machine.landing
         disk.loose |= face.speed != 0.0 and not lands
-        approach = -before[1].dot(normal)
+        if approach > 2.0 * self.g * self.h and disk.on != face.surface:
+            self._part(disk)
         if lands and not disk.landed and impulse.dot(normal) > 0.0:
             disk.landed, kind = True, Kind.LANDING
         elif first and approach > self.g * self.h:
@@ -299,8 +302,6 @@ class Shared:
                 continue
             if disk.meets:
                 disk.track.sample(self.t, disk.x, disk.v, disk.omega)
-            if disk.left is not None and self.t - disk.left[0] > HOPS * self.h:
-                self._part(disk)
             still = disk.meets and not disk.loose and disk.fastest <= STILL
             disk.calm = disk.calm + self.h if still else 0.0
             if disk.landed and self.machine.until == "landed":

@@ -25,7 +25,7 @@ ITERATIONS = 60
 GRIP = 1e9
 """Friction coefficient that stands for inf, which Chipmunk would multiply with an impulse of 0."""
 
-HAIR = 1e-10
+HAIR = 2e-11
 """Share of the radius by which a disk in the Space is larger than the particle, so that Chipmunk
 sees a contact where centre and surface are one radius apart. Levers are off by as much."""
 

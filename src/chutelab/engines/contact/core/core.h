@@ -76,6 +76,7 @@ int place_is_free(int i, double x, double y, double t);
 
 /* record.c */
 void knot_now(int i);
+void knot_after(int i);
 void knot_before(int i, double t, double vx, double vy, double spin);
 void flush_track(int i);
 void track_lasting(int i);
@@ -102,6 +103,7 @@ int next_disk(void);
 void shock(int i, int j, double t);
 void hold(Disk *d, int k);
 double soft_approach(const Disk *d, double radius);
+double left_over(const Disk *d, int impacts, int surface, double radius);
 void lie_down(int i);
 void was_moved(int i, double t);
 

@@ -290,15 +290,17 @@ static void strike(int i, int j, double t) {
     double back = -c.rest * u[0];
     if (j >= 0 && -u[0] < W.soft && (a->supports || b->supports || !c.two)) back = 0;
     if (c.rest < 1 && ((impacts >= FEW && -u[0] < SLOW * W.g * W.dt) || impacts >= TOO_MANY)) back = 0;
-    int rests = 0;
-    if (j < 0 && back <= press_on(a, W.surfaces + (-1 - j), c.nx, c.ny) * W.step) {
-        rests = 1;
+    double press = j < 0 ? press_on(a, W.surfaces + (-1 - j), c.nx, c.ny) : 0, later = 0;
+    int rests = j < 0 && back <= press * W.step;
+    if (rests) {
+        /* The bounces that are left out, infinitely many, would have taken so long. */
+        if (back > 0 && c.rest < 1) later = 2 * back / (press * (1 - c.rest));
         back = 0;
     }
     double before[3] = {a->vx, a->vy, a->spin};
     if (j < 0 && impacts >= JAM && c.rest < 1) jam(i);
     else give(&c, c.mass[0] * (back - u[0]));
-    a->since = t;
+    a->since = t + later;
     if (c.two) b->since = t;
     W.impact_count++;
     int landing = j < 0 && c.owner == W.landing && !a->landed, kind = COLLISION;

@@ -58,16 +58,15 @@ double soft_approach(const Disk *d, double radius) {
     return GRAZE * sqrt(d->vx * d->vx + d->vy * d->vy);
 }
 
-/* Approach up to which a contact is left to the next step, m/s. */
+/* Approach up to which a contact is left to the next step, m/s. What lies on a surface comes back to
+   it at the end of each step, as fast as gravity makes it in one. */
 double left_over(const Disk *d, int impacts, int surface, double radius) {
-    if (surface >= 0)
-        for (int n = 0; n < d->held_count; n++)
-            /* What lies on a surface comes back to it at the end of each step, so fast. */
-            if (d->held[n] == surface) return 1.000001 * W.g * W.step;
-    double skip = W.skip * radius;
-    if (impacts <= MANY) return soft_approach(d, radius);
-    double most = skip * (MOST_SKIP / SKIP) * MAX(1, impacts / CROWDED);
-    return MIN(skip * pow(GROW, MIN(impacts - MANY, 1000)), most);
+    double skip = W.skip * radius, least = soft_approach(d, radius);
+    for (int n = 0; n < d->held_count; n++)
+        if (d->held[n] == surface) least = MAX(least, 1.000001 * W.g * W.step);
+    if (impacts <= MANY) return least;
+    double most = skip * (MOST_SKIP / SKIP) * (surface < 0 ? MAX(1, impacts / CROWDED) : 1);
+    return MAX(least, MIN(skip * pow(GROW, MIN(impacts - MANY, 1000)), most));
 }
 
 static void foresee_pair(int i, int j, double *due, int *partner) {
@@ -298,7 +297,7 @@ static void strike(int i, int j, double t) {
         back = 0;
     }
     double before[3] = {a->vx, a->vy, a->spin};
-    if (j < 0 && impacts >= JAM && c.rest < 1) jam(i);
+    if (j < 0 && impacts >= (c.rest < 1 ? JAM : CROWDED)) jam(i);
     else give(&c, c.mass[0] * (back - u[0]));
     a->since = t + later;
     if (c.two) b->since = t;

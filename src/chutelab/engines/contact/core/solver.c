@@ -175,7 +175,7 @@ static double sweep(Contact *list, int count, int sweeps, double accurate, doubl
         W.sweep_count++;
         if (n == 0) first = worst;
         if (worst <= accurate) return worst;
-        if (!(worst <= DIVERGES * (first + W.soft))) return INFINITY;
+        if (!(worst <= DIVERGES * (first + W.soft + W.skip * W.disks[list->i].radius))) return INFINITY;
     }
     return worst;
 }

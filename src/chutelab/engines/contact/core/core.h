@@ -79,7 +79,7 @@ void knot_now(int i);
 void knot_before(int i, double t, double vx, double vy, double spin);
 void flush_track(int i);
 void track_lasting(int i);
-void knot_asleep(int i);
+void knot_held(int i);
 void finish(int i, int reason);
 void write_event(int kind, int i, int other, int owner, double t, const double *place,
                  const double *before, const double *after, double normal, double tangent);

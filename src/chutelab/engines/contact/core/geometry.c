@@ -112,27 +112,36 @@ static double meet_round(double x, double y, double vx, double vy, double reach,
 /* The same for a plane: its gap, the gap's rate and its acceleration. */
 static double meet_face(double gap, double rate, double pull, double span, double *approach) {
     *approach = 0;
-    if (gap <= 0) {
+    if (gap <= 0 && rate <= 0) {
         *approach = -rate;
         return 0;
     }
-    double root = rate * rate - 2 * pull * gap;
+    if (rate > 0 && pull >= 0) return INFINITY;
+    double root = rate * rate - 2 * pull * MAX(gap, 0);
     if (root < 0) return INFINITY;
     root = sqrt(root);
-    if (root - rate <= 0 || 2 * gap > span * (root - rate)) return INFINITY;
+    /* The form without cancellation: going away it comes back, else it comes. */
+    double h = rate > 0 ? (rate + root) / -pull : 2 * gap / (root - rate);
+    if (!(h <= span)) return INFINITY;
     *approach = root;
-    return 2 * gap / (root - rate);
+    return h;
 }
 
+/* An end is met where the foot of the disk is beyond it; before, the face is in the way. */
 static double meet_ends(const Surface *s, const Disk *d, double span, double *approach) {
     double first = INFINITY;
     for (int e = 0; e < 4; e += 2) {
         double speed, x = d->x - s->end[e], y = d->y - s->end[e + 1];
         double h = meet_round(x, y, d->vx, d->vy, d->radius, 1, span, &speed);
-        if (h < first) {
-            first = h;
-            *approach = speed;
-        }
+        if (h >= first) continue;
+        x += (d->vx + 0.5 * W.gx * h) * h;
+        y += (d->vy + 0.5 * W.gy * h) * h;
+        if (s->shape == SEGMENT) {
+            double along = x * s->tx + y * s->ty;
+            if (e == 0 ? along > 0 : along < 0) continue;
+        } else if (in_angle(s, x + s->end[e] - s->x, y + s->end[e + 1] - s->y)) continue;
+        first = h;
+        *approach = speed;
     }
     return first;
 }
@@ -205,8 +214,7 @@ double free_span(const Disk *d, double least) {
             double off = dy * s->tx - dx * s->ty, side = off >= 0 ? 1 : -1, speed;
             double rate = side * (d->vy * s->tx - d->vx * s->ty);
             double pull = side * (W.gy * s->tx - W.gx * s->ty);
-            double h = meet_face(MAX(side * off - r, 0), rate, pull, INFINITY, &speed);
-            if (side * off - r <= 0) h = 0;
+            double h = meet_face(side * off - r, rate, pull, INFINITY, &speed);
             if (h < INFINITY) span = MIN(span, h + 0.5 * least);
         } else {
             rounds[count][0] = dx; rounds[count][1] = dy; rounds[count++][2] = s->radius;

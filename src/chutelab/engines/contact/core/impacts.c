@@ -157,10 +157,6 @@ void was_moved(int i, double t) {
     }
 }
 
-/* Let a lone flight end where a contact begins that lasts: its steps begin there. */
-static void cut_stride(double t, double length) {
-    if (W.high - W.low == 1 && W.step_end > t + length) W.step_end = t + length;
-}
 
 /* Give a contact a normal impulse, with the friction that it allows, and book what it does. */
 static void give(Contact *c, double normal) {
@@ -178,15 +174,15 @@ static void give(Contact *c, double normal) {
     if (given[0] != 0) book(a->entries, 0, W.ride_owner, given);
 }
 
-/* Let a disk lie on a surface from t on: half of what gravity will take from it within the step it
-   gets now, and hops to the end, where the next step begins. */
+/* Let a disk lie on a surface from t on. The step of a disk by itself ends here; in a crowd half of
+   what gravity will take from it within the step it gets now, and hops to the end. */
 static void support(int i, int k, double t) {
     Disk *d = W.disks + i;
     Contact c;
     describe(&c, i, -1 - k);
     hold(d, k);
     double press = press_on(d, W.surfaces + k, c.nx, c.ny), left = W.step_end - t, u[3];
-    if (press <= 0) return;
+    if (press <= 0 || !W.interact) return;
     relative(&c, 0, u);
     c.drift = 0.5 * left * (W.gx * c.ny - W.gy * c.nx);
     give(&c, 0.5 * press * d->mass * left);
@@ -231,6 +227,48 @@ static void jam(int i) {
     }
 }
 
+/* Bring a disk by itself that lasts on a surface from its hop to the smooth path, before it is struck
+   in the middle of a step: else the hop's velocity, of first order in the step, would go on.
+
+   On the smooth path the velocity changes evenly from the last mid-step to the next; the difference is
+   an impulse of the surface, and the height of the hop goes to what its impulses lost. */
+static void end_hop(int i, double t) {
+    Disk *d = W.disks + i;
+    Track *track = W.tracks + i;
+    if (W.interact || !track->lasted || track->held[0] != W.t) return;
+    const Contact *last = 0;
+    for (int link = d->links; link >= 0; link = W.links[link])
+        if (W.contacts[link / 2].impulse[0] > 0) last = W.contacts + link / 2;
+    if (!last) return;
+    Contact c = *last;
+    double h = t - W.t, half = 0.5 * W.length, u[3], v[3], entries[3], given[3], to[3];
+    /* A contact that lasted already has its state at the step's beginning in `held`; a new one has
+       that before the impulses. Half a step later both have the velocity without the hop. */
+    const double *from = track->lasted > 1 ? track->held + 3 : &d->ux;
+    for (int n = 0; n < 3; n++) {
+        double mid = track->after[n] + (n == 0 ? half * W.gx : n == 1 ? half * W.gy : 0);
+        to[n] = from[n] + (mid - from[n]) * (half > 0 ? h / half : 0);
+    }
+    relative(&c, 0, u);
+    double x = track->held[1] + 0.5 * (from[0] + to[0]) * h;
+    double y = track->held[2] + 0.5 * (from[1] + to[1]) * h;
+    double jx = d->mass * (to[0] - d->vx), jy = d->mass * (to[1] - d->vy);
+    c.impulse[0] = jx * c.nx + jy * c.ny;
+    c.impulse[1] = jx * c.ny - jy * c.nx;
+    c.impulse[2] = d->inertia * (to[2] - d->spin) - d->radius * c.impulse[1];
+    double fall = d->mass * (W.gx * (x - d->x) + W.gy * (y - d->y));
+    d->x = x;
+    d->y = y;
+    d->vx = to[0];
+    d->vy = to[1];
+    d->spin = to[2];
+    relative(&c, 0, v);
+    share_out(&c, u, v, 0, entries, given);
+    entries[1] += fall;
+    book(d->entries, 0, c.owner, entries);
+    knot_held(i);
+}
+
 /* Resolve the impact of disk i with disk j, or with surface k as j = -1 - k, by Newton's restitution
    and Coulomb's friction. */
 static void strike(int i, int j, double t) {
@@ -239,6 +277,7 @@ static void strike(int i, int j, double t) {
     if (j >= 0 && b->mode == ASLEEP) wake(j, t);
     advance(a, t);
     if (j >= 0) advance(b, t);
+    else end_hop(i, t);
     int impacts = j >= 0 ? MAX(a->impacts, b->impacts) : a->impacts;
     Contact c;
     double u[3];
@@ -272,10 +311,7 @@ static void strike(int i, int j, double t) {
         a->on = c.owner;
         a->slips = 1;
     }
-    if (rests && !(a->landed && W.until == UNTIL_LANDED)) {
-        cut_stride(t, W.step);
-        support(i, -1 - j, t);
-    }
+    if (rests) support(i, -1 - j, t);
 }
 
 /* Whether a lasting contact of the step is struck now as well. */
@@ -335,7 +371,8 @@ void shock(int i, int j, double t) {
         knot_now(W.moved[k]);
         if (d->landed && W.until == UNTIL_LANDED) finish(W.moved[k], BY_LANDING);
     }
-    cut_stride(t, W.disks[i].held_count ? W.step : 0);
+    /* A disk by itself begins a new step after each impact. */
+    if (!W.interact) W.step_end = t;
     for (int k = 0; k < W.moved_count; k++) {
         int m = W.moved[k];
         if (W.disks[m].mode == FREE) {
@@ -356,7 +393,6 @@ void lie_down(int i) {
         if (press <= 0 || fabs(d->vx * nx + d->vy * ny) > press * W.dt) continue;
         d->on = s->owner;
         d->slips = 1;
-        if (W.step_end > d->t) support(i, k, d->t);
-        else hold(d, k);
+        support(i, k, d->t);
     }
 }

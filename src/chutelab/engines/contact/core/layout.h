@@ -177,6 +177,7 @@ typedef struct {
     int low, high;       /* disks that this part of the run is about */
     int phase, cell_count, heap_count, moved_count, wide_count, stamp;
     double t, now, step, step_end, cell;
+    double length, length_before; /* s; of this step and of the one before */
     double g;            /* m/s2; size of gravity */
     double soft;         /* m/s; twice what gravity does in a step: supported disks meet softly */
     double skip;         /* 1/s; SKIP in a step: radii that it may go */

@@ -157,29 +157,23 @@ static void separate(int i) {
 
 /* ------------------------------------------------------------------------------------------- ends */
 
-static int is_outside(double x, double y) {
-    return x < W.exit_box[0] || y < W.exit_box[1] || x > W.exit_box[2] || y > W.exit_box[3];
-}
-
-/* End the track of a disk that leaves the scene in this step, where it does. */
+/* End the track of a disk that leaves the scene in this step, where it does: outwards over an edge. */
 static void leave(int i, double end) {
-    Disk *d = W.disks + i, there = *d;
-    double first = end, box[4];
-    advance(&there, end);
-    if (!is_outside(there.x, there.y)) return;
-    for (int n = 0; n < 4; n++) box[n] = W.exit_box[n];
+    Disk *d = W.disks + i;
+    double first = INFINITY, h = end - d->t;
     for (int n = 0; n < 4; n++) {
-        int side = n < 2 ? -1 : 1, y = n % 2;
-        double gap = side * (box[n] - (y ? d->y : d->x)), rate = side * (y ? d->vy : d->vx);
-        double pull = side * (y ? W.gy : W.gx);
-        if (!(fabs(box[n]) < INFINITY) || gap - (rate + 0.5 * pull * (end - d->t)) * (end - d->t) > 0)
-            continue;
-        double root = sqrt(MAX(rate * rate + 2 * pull * gap, 0));
-        double t = gap <= 0 ? 0 : rate + root > 0 ? 2 * gap / (rate + root) : end - d->t;
-        first = MIN(first, d->t + t);
+        int y = n % 2;
+        double side = n < 2 ? -1 : 1, pull = side * (y ? W.gy : W.gx);
+        double gap = side * (W.exit_box[n] - (y ? d->y : d->x)), rate = side * (y ? d->vy : d->vx);
+        if (!(fabs(W.exit_box[n]) < INFINITY) || gap - (rate + 0.5 * pull * h) * h >= 0) continue;
+        double t = 0, root = sqrt(MAX(rate * rate + 2 * pull * gap, 0));
+        if (gap > 0) t = 2 * gap / (rate + root);
+        else if (rate < 0) t = pull > 0 ? -rate / pull : INFINITY;
+        first = MIN(first, t);
     }
+    if (first > h) return;
     flush_track(i);
-    advance(d, MIN(first, end));
+    advance(d, MIN(d->t + first, end));
     knot_now(i);
     event_here(EXIT, i, -1);
     finish(i, BY_EXIT);
@@ -276,6 +270,7 @@ static int begin_step(void) {
     if (W.t < W.end_time) W.step_end = MIN(W.step_end, W.end_time);
     else W.step_end = W.t + h;
     W.now = W.t;
+    W.length_before = W.length;
     h = W.step_end - W.t;
     do {
         for (int i = W.low; i < W.high; i++) {
@@ -303,6 +298,7 @@ static int begin_step(void) {
             woke = 1;
         }
     } while (woke);
+    W.length = h;
     if (W.contact_count) solve_contacts();
     close_step(h);
     return DONE;
@@ -355,6 +351,7 @@ static void end_step(void) {
             d->t = W.step_end;
         }
     }
+    W.length = W.step_end - W.t;
     W.t = W.step_end;
     W.step_count++;
     Contact *c = W.contacts;

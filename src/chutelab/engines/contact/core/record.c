@@ -91,7 +91,7 @@ void track_lasting(int i) {
 }
 
 /* Write the latest state in lasting contact, which sleep ends. */
-void knot_asleep(int i) {
+void knot_held(int i) {
     Track *track = W.tracks + i;
     double state[6];
     memcpy(state, track->held, sizeof state);

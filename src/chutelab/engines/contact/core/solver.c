@@ -14,6 +14,8 @@
 #define PART 0.1
 /* Gap, in radii, up to which what was pressed still touches: what sweeps leave open. */
 #define LEAVE 1e-4
+/* Times the first change: sweeps whose changes grow so far never end. */
+#define DIVERGES 1e3
 /* m/s; below it the contacts of a crowd count as calm: `settled` in the contract. */
 #define CALM 1e-3
 /* Of sqrt(g r): below it an island may fall asleep; 0.5 mm/s for r = 4 mm. */
@@ -73,8 +75,10 @@ static void carry_to_end(int i, int first, double h) {
     double until = h;
     for (int n = first; n < W.contact_count; n++) {
         Contact *c = W.contacts + n;
-        if (!c->leaves && c->need > -W.soft) return;
-        double t = time_on_face(c);
+        double t = time_on_face(c), u[3];
+        relative(c, 0, u);
+        /* Another surface carries it on. */
+        if (!c->leaves && u[0] + c->need > 0) return;
         if (c->leaves && t < until) {
             last = c;
             until = t;
@@ -116,13 +120,15 @@ int find_contacts(double h, int *woke) {
     return 1;
 }
 
-/* Sweep over contacts until no relative velocity changes by more than `accurate`. */
-void sweep_contacts(Contact *list, int count, int sweeps, double accurate) {
-    for (int sweep = 0; sweep < sweeps; sweep++) {
-        double worst = 0;
+/* Sweep over contacts until no relative velocity changes by more than `accurate`; return by how much
+   one changed in the last sweep, or INFINITY if the sweeps diverge. */
+static double sweep(Contact *list, int count, int sweeps, double accurate, double share) {
+    double first = 0, worst = 0;
+    for (int n = 0; n < sweeps; n++) {
+        worst = 0;
         for (int m = 0; m < count; m++) {
             /* To and fro, so that what one end of a pile does reaches the other in one sweep. */
-            Contact *c = list + (sweep % 2 == 0 ? m : count - 1 - m);
+            Contact *c = list + (n % 2 == 0 ? m : count - 1 - m);
             const Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
             double *J = c->impulse, K[3], most, v[3], x = a->vx - a->ux, y = a->vy - a->uy;
             if (c->two) {
@@ -131,9 +137,9 @@ void sweep_contacts(Contact *list, int count, int sweeps, double accurate) {
             }
             relative(c, 0, v);
             K[0] = MAX(J[0] - c->mass[0] * (x * c->nx + y * c->ny - c->need), 0);
-            most = c->friction * K[0];
+            most = share * c->friction * K[0];
             K[1] = MIN(MAX(J[1] - c->mass[1] * (v[1] + c->drift), -most), most);
-            most = c->arm * K[0];
+            most = share * c->arm * K[0];
             K[2] = MIN(MAX(J[2] - c->mass[2] * v[2], -most), most);
             double change[3] = {K[0] - J[0], K[1] - J[1], K[2] - J[2]};
             if (change[0] == 0 && change[1] == 0 && change[2] == 0) continue;
@@ -144,7 +150,32 @@ void sweep_contacts(Contact *list, int count, int sweeps, double accurate) {
             if (c->mass[2] > 0) worst = MAX(worst, fabs(change[2]) / c->mass[2] * a->radius);
         }
         W.sweep_count++;
-        if (worst <= accurate) break;
+        if (n == 0) first = worst;
+        if (worst <= accurate) return worst;
+        if (!(worst <= DIVERGES * (first + W.soft))) return INFINITY;
+    }
+    return worst;
+}
+
+/* Solve contacts by sweeps. Where belts drive a disk into a wedge that locks itself, rigid bodies
+   with all of the friction have no solution: the friction is lowered until they have one. */
+void sweep_contacts(Contact *list, int count, int sweeps, double accurate) {
+    double share = 1, enough = W.interact ? 1e300 : MAX(accurate, 1e-9);
+    while (!(sweep(list, count, sweeps, accurate, share) <= enough) && share > 0) {
+        share = share > 1e-3 ? 0.5 * share : 0;
+        for (int n = 0; n < count; n++) {
+            Contact *c = list + n;
+            Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
+            a->vx = a->ux;
+            a->vy = a->uy;
+            a->spin = a->uspin;
+            if (c->two) {
+                b->vx = b->ux;
+                b->vy = b->uy;
+                b->spin = b->uspin;
+            }
+            c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
+        }
     }
 }
 
@@ -158,13 +189,15 @@ void solve_contacts(void) {
 static void note_grip(Disk *d, const Contact *c, const double *u, const double *v, double h) {
     int i = c->i;
     double most = c->friction * c->impulse[0], slip = v[1] + c->drift;
+    /* The impulses stand for the second half of the last step, if it lasted, and the first of this. */
+    double past = W.tracks[c->i].lasted ? 0.5 * W.length_before : 0, span = past + 0.5 * h;
     int grips = fabs(c->impulse[1]) < most * (1 - 1e-12) || (most == 0 && slip == 0 && c->drift == 0);
     Track *track = W.tracks + i;
     for (int n = 2; n > 0; n--) {
         track->load[n] = track->load[n - 1];
         track->load_t[n] = track->load_t[n - 1];
     }
-    track->load[0] = c->impulse[0] / h;
+    track->load[0] = c->impulse[0] / span;
     track->load_t[0] = d->t;
     if (d->on != c->owner) {
         /* It came to lie there without an impact that was told. */
@@ -176,8 +209,8 @@ static void note_grip(Disk *d, const Contact *c, const double *u, const double *
     }
     if (grips && d->slips) {
         /* Friction slows the slip evenly; it is used up so long after the last mid-step. */
-        double s = fabs(u[1] - c->drift), rate = most / (c->mass[1] * h);
-        double t = d->t - 0.5 * h + (rate > 0 ? s / rate : 0);
+        double s = fabs(u[1] - c->drift * 2 * past / h), rate = most / (c->mass[1] * span);
+        double t = d->t - past + (rate > 0 ? s / rate : 0);
         t = MIN(MAX(t, d->since), d->t + h);
         double place[2] = {d->x + (t - d->t) * 0.5 * (d->ux + d->vx), d->y + (t - d->t) * 0.5 * (d->uy + d->vy)};
         double after[3] = {d->vx + 0.5 * W.gx * h, d->vy + 0.5 * W.gy * h, d->spin};
@@ -221,7 +254,7 @@ static void settle(int i, const Contact *last, double h) {
     d->x -= d->vx * back;
     d->y -= d->vy * back;
     d->t = d->since;
-    if (W.tracks[i].open) knot_asleep(i);
+    if (W.tracks[i].open) knot_held(i);
     W.tracks[i].lasted = 0;
     knot_now(i);
     event_here(SETTLE, i, hop.owner);
@@ -235,7 +268,7 @@ void close_step(double h) {
         Disk *d = W.disks + i;
         d->links = d->before = -1;
         d->held_count = d->supports = 0;
-        if (h > 0.01 * W.dt) d->impacts = 0;
+        if (W.length_before > 0.01 * W.dt) d->impacts = 0;
         for (int n = 0; n < 3; n++) d->gain[n] = d->ahead[n] = 0;
         if (d->mode == FREE) {
             d->calm += h;

@@ -32,7 +32,7 @@ FILES = [
 # The contract of section 4, copied by hand.
 KEYS = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
-    "impact", "landing", "ended", "ledger", "theory", "theory_as_printed", "error",
+    "impact", "landing", "ended", "rolling", "ledger", "theory", "theory_as_printed", "error",
     "accuracy",
 ]  # fmt: skip
 THEORY = [
@@ -201,6 +201,15 @@ def test_settings_change_the_run():
 
 
 # run: an accuracy that is asked for
+
+
+def test_a_run_says_that_a_disk_rolls_instead_of_being_carried():
+    settings = ("--set", "particle.spin=true", "--set", "outgoing.length=8")
+    text = " ".join(call("run", "belt-landing", *settings).stdout.split())
+    # m v_b (v_b - v_x)/3 and m v_b (v_b - v_x), with 8 g, 2 m/s and -1 m/s
+    assert "1 disk rolls on the outgoing belt: nothing slips, and nothing is carried along." in text
+    assert "The belt has paid 0.016 J, loads that are carried take 0.048 J" in text
+    assert "rolls" not in call("run", "belt-landing").stdout
 
 
 def test_an_accuracy_is_reported_in_text_json_and_file():

@@ -659,7 +659,7 @@ def test_the_worksheets_commands_run(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     text = (LESSON / "README.md").read_text(encoding="utf-8")
     commands = re.findall(r"^chutelab (.*)$", text, re.MULTILINE)
-    assert len(commands) == 7
+    assert len(commands) == 9
     said = []
     for command in commands:
         result = CliRunner().invoke(main, shlex.split(command))
@@ -669,7 +669,10 @@ def test_the_worksheets_commands_run(monkeypatch, tmp_path):
     assert "47.25" in said[1]
     assert "0.0063185" in said[2]
     assert "0.016" in said[3]
-    assert "share of plate.restitution   68" in said[5]
+    # m v_b (v_b - v_x), with a belt of 1 m/s under the plate of 60°; without slip where v_x = 1 m/s
+    assert "least                  60  -0.0048407" in said[4]
+    assert "least         47.25" in said[5]
+    assert "share of plate.restitution   68" in said[7]
 
 
 def test_the_worksheets_numbers_hold():

@@ -17,7 +17,7 @@ from chutelab.summary import summary
 
 TOP = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
-    "impact", "landing", "ended", "ledger", "theory", "theory_as_printed", "error",
+    "impact", "landing", "ended", "rolling", "ledger", "theory", "theory_as_printed", "error",
     "accuracy",
 ]  # fmt: skip
 BEFORE = ["t", "x", "y", "vx", "vy"]
@@ -162,3 +162,40 @@ def test_the_printed_equation_has_the_sine_and_cosine_the_wrong_way_round():
 )
 def test_it_is_printed_for_a_frictionless_upright_plate_only(name, override):
     assert printed(run(name, override))["theory_as_printed"] is None
+
+
+ROLLING = ("particle.spin=true", "run.until=settled", "outgoing.length=8")
+
+
+@pytest.mark.parametrize(
+    ("friction", "belt"), [(0.0, 2.0), (0.3, 2.0), (0.0, 0.5), (0.3, -2.0), (0.0, -1.5)]
+)
+def test_a_disk_that_rolls_on_the_belt_is_said_not_to_be_carried(friction, belt):
+    """No slip from v_x = -1 m/s on: v_x + w/3, w = v_b - v_x - s; paid m v_b w/3, a load m v_b
+    (v_b - v_x). At a frictionless plate the rim speed s stays 0; else J_t = m/3 of the slip
+    2.92 m/s, at most µ m (1 + ε) v_n = 0.9 m, gives s = r J_t r / (m r²/2), along the belt."""
+    overrides = (*ROLLING, f"plate.friction={friction}", f"outgoing.speed={belt}")
+    found = printed(run("perpendicular", *overrides))
+    fall = 9.81 * 0.298
+    impulse = min(fall / 3.0, friction * 1.5 * 2.0)
+    rim = 2.0 * impulse
+    slip = belt + 1.0 - rim
+    assert found["rolling"] == {
+        "particles": 1,
+        "belt_work": pytest.approx(0.008 * belt * slip / 3.0, rel=1e-12),
+        "belt_work_carried": pytest.approx(0.008 * belt * (belt + 1.0), rel=1e-12),
+    }
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        ("run.until=settled", "outgoing.length=8"),  # does not turn: carried in the end
+        (*ROLLING, "outgoing.speed=-1"),  # arrives as fast as the belt runs
+        ("particle.spin=true",),  # only landed
+        # Slips so long that it is off the end before.
+        (*ROLLING, "outgoing.friction=0.02", "outgoing.start=-1"),
+    ],
+)
+def test_nothing_rolls_where_all_are_carried_or_nothing_settled(overrides):
+    assert printed(run("perpendicular", *overrides))["rolling"] is None

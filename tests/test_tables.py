@@ -70,6 +70,9 @@ def test_table_3_is_refuted_not_fitted() -> None:
     text = " ".join(found.notes)
     assert "17,675 N mm" in text
     assert "11.7 m/s" in text
+    # m g h, from the plate to the support at 4 m/s
+    assert f"fall {(93.56914 - 34.84660) / (0.26 * G):.1f} m from the plate" in text
+    assert "fall 23.0 m" in text
     assert math.sqrt(2 * 17.67536 / 0.26) == pytest.approx(11.66, abs=0.005)
 
 

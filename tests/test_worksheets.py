@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import shutil
-from math import acos, atan, cos, degrees, hypot, log, pi, radians, sin, sqrt
+from math import acos, atan, cos, degrees, erfc, hypot, log, pi, radians, sin, sqrt, tan
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,8 +17,10 @@ from chutelab.ledger import ledger
 from chutelab.lessons import find, scene_of, shipped
 from chutelab.recording import Kind
 from chutelab.stepper.solids import HALF_THICKNESS
+from chutelab.theory import transfer
 
 G = 9.81
+PHYSICS = Path(__file__).parent.parent / "docs" / "physics.md"
 
 
 def chutelab(*arguments):
@@ -25,7 +28,9 @@ def chutelab(*arguments):
 
 
 def worksheet(number):
-    return find(number).worksheet.read_text(encoding="utf-8")
+    """Text of a lesson's worksheet, or of docs/physics.md."""
+    path = PHYSICS if number == "physics" else find(number).worksheet
+    return path.read_text(encoding="utf-8")
 
 
 def commands(text):
@@ -171,12 +176,12 @@ def matching(r, d1=0.1, v=2.0):
     return low
 
 
-def leaving_at(vx):
+def leaving_at(vx, r=0.004, d1=0.1, v=2.0):
     """Angle, degrees, of the plate that the particle leaves with this forward velocity."""
-    low, high = 20.0, 60.0
+    low, high = 10.0, matching(r, d1, v) - 1e-3
     for _ in range(60):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if plate(middle)[1] < vx else (low, middle)
+        low, high = (middle, high) if plate(middle, r, d1, v)[1] < vx else (low, middle)
     return low
 
 
@@ -191,6 +196,75 @@ def fixed(dt):
     return compare(recording).max, ledger(recording).relative_residual
 
 
+def reaches(r):
+    """Distances d1, m, from which on a plate of 20° sends forward, and one of 40° is missed."""
+    ends = []
+    for after in (lambda d1: plate(20, r, d1)[1] > 0.0, lambda d1: matching(r, d1) < 40.0):
+        low, high = 0.1, 0.35
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if after(middle) else (middle, high)
+        ends.append(low)
+    return ends
+
+
+def rise(e, printed=False):
+    """Energy (14), mJ, of a point at 2 m/s, R = 0.1 m, with ε on the plate, either form of (9)."""
+    down = G * 0.3
+    phi2 = atan(2.0 / down)
+    a, b = (sin(phi2), cos(phi2)) if printed else (cos(phi2), sin(phi2))
+    vx = hypot(2.0, down) * hypot(a, e * b) * sin(atan(e * tan(phi2)))
+    return 500.0 * 0.008 * (vx**2 + 4.0)
+
+
+def ease(k, mu=0.5):
+    """Separation, degrees, of a body with I = k m r² on the pulley of `slip`: rolls, then slips.
+
+    Rolling, u = u0 + 2/(1 + k) (1 - cos φ), with the grip k/(1 + k) sin φ <= µ (cos φ - u).
+    """
+    phi, u, step, slips = 0.0, U0, 1e-5, False
+
+    def rate(phi, u):
+        if slips:
+            return 2.0 * sin(phi) - 2.0 * mu * (cos(phi) - u)
+        return 2.0 / (1.0 + k) * sin(phi)
+
+    while u < cos(phi):
+        slips = slips or k / (1.0 + k) * sin(phi) > mu * (cos(phi) - u)
+        u += step * rate(phi + 0.5 * step, u + 0.5 * step * rate(phi, u))
+        phi += step
+    return degrees(phi)
+
+
+def drag(r, m):
+    """Drag of a sphere in `perpendicular`, c_w = 0.47, 1.2 kg/m³, in steps of 10 µs (midpoint).
+
+    Share of the weight at the landing (without drag), mm farther forward, mJ less for the belt.
+    """
+    per = 0.5 * 0.47 * 1.2 * pi * r**2 / m
+
+    def fly(x, y, vx, vy, per, done):
+        h = 1e-5
+        while not done(x, y):
+            last = x, y, vx, vy
+            k = per * hypot(vx, vy)
+            mx, my = vx - 0.5 * h * k * vx, vy - 0.5 * h * (G + k * vy)
+            k = per * hypot(mx, my)
+            x, y = x + h * mx, y + h * my
+            vx, vy = vx - h * k * mx, vy - h * (G + k * my)
+        return last, (x, y, vx, vy)
+
+    def lands(per):
+        (x0, *_), (x, y, vx, vy) = fly(0.0, 0.0, 2.0, 0.0, per, lambda x, y: x >= 0.596)
+        y += (0.596 - x) / (x - x0) * (vy * 1e-5)
+        bottom = y - 0.5
+        (x0, y0, *_), (x, y, vx, vy) = fly(0.596, y, -0.5 * vx, vy, per, lambda x, y: y <= bottom)
+        return x + (bottom - y) / (y0 - y) * (x0 - x), vx
+
+    (x0, v0), (x1, v1) = lands(0.0), lands(per)
+    return per * (1.0 + DOWN**2) / G, 1e3 * (x1 - x0), 1e3 * 0.008 * 2.0 * (v1 - v0)
+
+
 def belt(vb, vx=-1.0, m=0.008):
     return 1e3 * m * vb * (vb - vx), 500.0 * m * (vb - vx) ** 2
 
@@ -198,6 +272,14 @@ def belt(vb, vx=-1.0, m=0.008):
 FALL = sqrt(2.0 * 0.8 / G)
 DOWN = sqrt(G**2 * 0.298**2 + 2.0 * G * 0.5)
 U0 = 4.0 / (G * 0.504)
+GRAIN, STONE, SAND = (
+    drag(r, m)
+    for r, m in (
+        (0.004, 0.008),
+        ((0.006 / pi / 2650.0) ** (1.0 / 3.0), 0.008),
+        (0.0005, 2650.0 * 4.0 / 3.0 * pi * 0.0005**3),
+    )
+)
 B1, B2, B3 = bounce(0.05), bounce(0.1), bounce(0.2)
 
 STATED = {
@@ -254,6 +336,15 @@ STATED = {
         "in J: {38.7} mJ": belt(2.0, plate(20)[1])[0],
         "38.7 mJ, {22.2} mJ": belt(2.0, plate(40)[1])[0],
         "and {6.3} mJ": belt(2.0, plate(60)[1])[0],
+        "forward saves {16} mJ": belt(2.0, 0.0)[0] - belt(2.0, 1.0)[0],
+        "makes it {-4.8} mJ": belt(1.0, plate(60)[1])[0],
+        "(v_b - v_x)²: {23.3} mJ": belt(2.0, plate(20)[1])[1],
+        "23.3 mJ, {7.7} mJ": belt(2.0, plate(40)[1])[1],
+        "7.7 mJ and {0.6} mJ": belt(2.0, plate(60)[1])[1],
+        "there, with {0.29} m/s": plate(20, 0.0, v=1.0)[1],
+        "20 mm, with {0.07} m/s": plate(20, 0.02, v=1.0)[1],
+        "It turns at {17.9}°": leaving_at(0.0, 0.02, v=1.0),
+        "the point at {14.2}°": leaving_at(0.0, 0.0, v=1.0),
         "on, where d1 (m) is the way from the axis to the pivot: {63.9}°": degrees(
             atan(4.0 / (2.0 * G * 0.1))
         ),
@@ -298,6 +389,8 @@ STATED = {
         "(v_b - v_x) = {9.6} W": 0.008 * 200.0 * 2.0 * 3.0,
         "or {9.6} J": 200.0 * 1e-3 * belt(2.0)[0],
         "v_y = {2.92} m/s": G * 0.298,
+        "pushes with {0.35} % of": 100.0 * GRAIN[0],
+        "with a third of it on sand of {1} mm": 3.0 * SAND[0],
     },
     8: {
         "at {4.28} m/s onto": DOWN,
@@ -309,11 +402,90 @@ STATED = {
         "and {47.25}°": leaving_at(1.0),
         "wins, {6.3} mJ": belt(2.0, plate(60)[1])[0],
         "as much, {32.0} mJ": belt(2.0, 0.0)[0],
+        "makes it {-4.8} mJ": belt(1.0, plate(60)[1])[0],
+        "it is zero at {47.25}°": leaving_at(1.0),
+        "and {1.5} mJ at 60°": belt(1.0, plate(60)[1])[1],
+        "one plate in {3} stands": 1.0 / erfc(sqrt(0.5)),
         "It is least, {16} mJ": 500.0 * 0.008 * 4.0,
     },
+    "physics": {
+        "up to {1} m/s. A faster": sqrt(G * 0.1),
+        "20° sends a point back at {0.40} m/s": -plate(20, 0.0)[1],
+        "at 40° forward at {0.65} m/s": plate(40, 0.0)[1],
+        "at 60° forward at {1.71} m/s": plate(60, 0.0)[1],
+        "| adhesion | {36.00}°": angle(2.0, 0.504),
+        "does not turn | {22.91}°": degrees(slipping(0.5, U0)[0]),
+        "22.91° | {2.134} m/s": sqrt(G * 0.504 * cos(slipping(0.5, U0)[0])),
+        "free disk | {22.05}°": ease(0.5),
+        "22.05° | {2.141} m/s": sqrt(G * 0.504 * cos(radians(ease(0.5)))),
+        "µ = 0 | {20.55}°": degrees(acos((2.0 + U0) / 3.0)),
+        "20.55° | {2.152} m/s": sqrt(G * 0.504 * (2.0 + U0) / 3.0),
+        "0.137 m | {0.1369} m": B1[3][2],
+        "0.1369 m | {0.1464} m": B1[2][2],
+        "| 20° | -0.40 m/s | {16.6} mJ": 4.0 * (plate(20, 0.0)[1] ** 2 + 4.0),
+        "| 40° | +0.65 m/s | {17.7} mJ": 4.0 * (plate(40, 0.0)[1] ** 2 + 4.0),
+        "| 60° | +1.71 m/s | {27.7} mJ": 4.0 * (plate(60, 0.0)[1] ** 2 + 4.0),
+        "16.6 mJ | {38.4} mJ": belt(2.0, plate(20, 0.0)[1])[0],
+        "38.4 mJ | {23.1} mJ": belt(2.0, plate(20, 0.0)[1])[1],
+        "17.7 mJ | {21.6} mJ": belt(2.0, plate(40, 0.0)[1])[0],
+        "21.6 mJ | {7.3} mJ": belt(2.0, plate(40, 0.0)[1])[1],
+        "27.7 mJ | {4.7} mJ": belt(2.0, plate(60, 0.0)[1])[0],
+        "4.7 mJ | {0.3} mJ": belt(2.0, plate(60, 0.0)[1])[1],
+        "on `perpendicular` {34.3} of 48": 1e3 * 0.008 * 2.0 * 0.5 * DOWN,
+        "falls {0.31} m": 0.5 * G * 0.25**2,
+        "| 0.1 m | 20° | 1 m/s | +{0.29} m/s": plate(20, 0.0, 0.1, 1.0)[1],
+        "| 0.1 m | 20° | 1 m/s | +0.29 m/s | +{0.07} m/s": plate(20, 0.02, 0.1, 1.0)[1],
+        "| 0.1 m | 20° | 2 m/s | {-0.40} m/s": plate(20, 0.0, 0.1)[1],
+        "| 0.1 m | 20° | 2 m/s | -0.40 m/s | {-0.47} m/s": plate(20, 0.02, 0.1)[1],
+        "| 0.1 m | 40° | 2 m/s | +{0.65} m/s": plate(40, 0.0, 0.1)[1],
+        "| 0.1 m | 40° | 2 m/s | +0.65 m/s | +{0.46} m/s": plate(40, 0.02, 0.1)[1],
+        "| 0.5 m | 20° | 2 m/s | +{1.13} m/s": plate(20, 0.0, 0.5)[1],
+        "| 0.5 m | 20° | 2 m/s | +1.13 m/s | +{0.95} m/s": plate(20, 0.02, 0.5)[1],
+        "back up to {17.9}° only": leaving_at(0.0, 0.02, v=1.0),
+        "the point up to {14.2}°": leaving_at(0.0, 0.0, v=1.0),
+        "plate at {0.269} to": reaches(0.02)[0],
+        "0.269 to {0.286} m": reaches(0.02)[1],
+        "({0.241} to": reaches(0.0)[0],
+        "0.241 to {0.243} m": reaches(0.0)[1],
+        "speed of {11.7} m/s": sqrt(2.0 * 17.67536 / 0.26),
+        "have had to fall {6.7} m": (2.0 * 17.67536 / 0.26 - 4.0) / (2.0 * G),
+        "to fall {12.8} m to the plate": (2.0 * 34.84660 / 0.26 - 16.0) / (2.0 * G),
+        "another {23.0} m": (93.56914 - 34.84660) / (0.26 * G),
+        "lands with {77.4} mJ": 500.0 * 0.008 * (1.0 + DOWN**2),
+        "rides on with {16} mJ": 500.0 * 0.008 * 4.0,
+        "a change of {-61.4} mJ": 500.0 * 0.008 * (4.0 - 1.0 - DOWN**2),
+        "-61.4 mJ; {73.4} mJ": 500.0 * 0.008 * DOWN**2,
+        "from {16} mJ at ε = 0": rise(0.0),
+        "to {32} mJ at ε = 1": rise(1.0, printed=True),
+        "with d2: {3.94},": sqrt(1.0 + (G * 0.3) ** 2 + 2.0 * G * 0.3),
+        "3.94, {4.41} and": sqrt(1.0 + (G * 0.3) ** 2 + 2.0 * G * 0.5),
+        "and {4.84} m/s": sqrt(1.0 + (G * 0.3) ** 2 + 2.0 * G * 0.7),
+        "x2 = {0.711} m in Table 1": 1.0 - 0.5 * sin(acos(4.0 / (G * 0.5))),
+        "`perpendicular` {0.35} % of the weight": 100.0 * GRAIN[0],
+        "it lands {0.2} mm farther": GRAIN[1],
+        "costs the belt {0.04} of": GRAIN[2],
+        "leave at {22.05}°": ease(0.5),
+        "22.05° or {21.92}°": ease(0.4),
+        "it would be after {15} s": 2.0 / (2.0 / 3.0 * 0.02 * G),
+        "(2/3) c g, {0.13} m/s²": 2.0 / 3.0 * 0.02 * G,
+        "5 cm up leaves at {42.6}°": angle(2.0, 0.554),
+        "one body, at {25.4}°": angle(2.0 * 0.554 / 0.5, 0.554),
+        "leave at {34.7}°": angle(2.0 * 0.504 / 0.5, 0.504),
+        "instead of {36.0}°": angle(2.0, 0.504),
+        "sphere ({29.8} g/cm³": 8.0 / (4.0 / 3.0 * pi * 0.4**3),
+        "8 g has r = {9} mm": 1e3 * (0.006 / pi / 2650.0) ** (1.0 / 3.0),
+        "stone drag is {1.8} %": 100.0 * STONE[0],
+        "and it lands {0.9} mm": STONE[1],
+        "in diameter has {31} %": 100.0 * SAND[0],
+        "31 % and {16} mm": SAND[1],
+        "pays {48} or": belt(2.0)[0],
+        "48 or {16} mJ": belt(2.0)[0] / 3.0,
+        "g dt²/8, {1.2} µm": 1e6 * G * 1e-6 / 8.0,
+        "2 g dt, {2} cm/s": 100.0 * 2.0 * G * 1e-3,
+    },
 }
-"""What the worksheets state, by lesson: words around a {number}, and what it has to be, from
-formulas written here."""
+"""What the worksheets, by lesson, and docs/physics.md state: words around a {number}, and what it
+has to be, from formulas written here."""
 
 GIVEN = {
     1: {"0.2", "0.4", "0.8", "1.62", "9.81"},
@@ -374,6 +546,42 @@ def test_the_plate_of_lesson_4_is_missed_from_69_degrees_on():
     assert "pulley" in str(
         chutelab("run", find(4).folder / "any-angle.toml", "--set", "plate.angle_deg=0").stdout
     )
+
+
+def test_equation_14_rises_with_epsilon_all_the_way_in_either_form():
+    for printed in (False, True):
+        energies = [rise(0.05 * n, printed) for n in range(21)]
+        assert all(np.diff(energies) > 0.0)
+        form = "as-printed" if printed else "corrected"
+        found = transfer(
+            speed=2.0, pulley_radius=0.1, distance=0.5, restitution=0.05 * np.arange(21),
+            rebound=form,
+        )  # fmt: skip
+        assert 1e3 * found.dEk == pytest.approx(energies, rel=1e-12)
+
+
+def test_the_papers_ball_of_lesson_4_goes_forward_in_the_engine_too():
+    def after(radius, angle):
+        settings = [f"particle.radius={radius}", f"plate.angle_deg={angle}", "incoming.speed=1"]
+        recording = simulate(load("inclined-20", settings), engine="exact")
+        return recording.select(Kind.IMPACT, surface="plate")["velocity_after"][0, 0]
+
+    assert after(0.0, 20.0) == pytest.approx(plate(20, 0.0, v=1.0)[1], rel=1e-12)
+    assert after(0.02, 20.0) == pytest.approx(plate(20, 0.02, v=1.0)[1], rel=1e-12)
+    assert after(0.02, 17.8) < 0.0 < after(0.02, 17.9)
+    assert after(0.0, 14.2) < 0.0 < after(0.0, 14.3)
+
+
+def test_belts_pay_less_the_faster_particles_land_as_lessons_4_and_9_say():
+    def paid(angle, speed):
+        settings = [f"outgoing.speed={speed}", "outgoing.length=20", "run.until=settled"]
+        recording = simulate(load(f"inclined-{angle}", settings), engine="exact")
+        entries = ledger(recording).by_surface["outgoing"]
+        return 1e3 * entries["belt_work"], 1e3 * entries["friction_loss"]
+
+    for speed in (1.0, 2.0):
+        for angle in (20, 40, 60):
+            assert paid(angle, speed) == pytest.approx(belt(speed, plate(angle)[1]), rel=1e-10)
 
 
 def test_the_slip_of_lesson_5_lasts_as_long_as_it_says():

@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 FORMAT = 1
 """Version of the object; keys are only ever added to a version."""
 
+CARRIED = 1e-3
+"""m/s from the belt's speed, up to which a particle rides with it: the slip that counts as none."""
+
 ANGLES = ("phi1", "phi2", "phi2r")
 THEORY = (
     "phi1", "t2", "x2", "y2", "v2", "phi2", "phi2r", "v2r", "t3", "x3", "y3", "v3x", "v3y", "v3",
@@ -35,7 +38,8 @@ def summary(recording: Recording, accuracy: Accuracy | None = None) -> dict[str,
     """Return a recording's numbers as plain lists and floats, None for what did not happen.
 
     Lists have one entry a particle. Lengths, times and energies are in SI units, angles in degrees
-    under names that end in ``_deg``. ``accuracy`` is None unless one was asked for.
+    under names that end in ``_deg``. ``accuracy`` is None unless one was asked for, ``rolling``
+    unless disks settled on the outgoing belt without being carried by it (see `rolling`).
     """
     scene = scene_of(recording)
     compared = compare(recording)
@@ -54,6 +58,7 @@ def summary(recording: Recording, accuracy: Accuracy | None = None) -> dict[str,
         "impact": _first(recording, impacts, after=True),
         "landing": _first(recording, landings, after=True),
         "ended": _ended(recording),
+        "rolling": rolling(recording),
         "ledger": asdict(ledger(recording)),
         "theory": _theory(predict(scene)),
         "theory_as_printed": _as_printed(scene),
@@ -91,6 +96,32 @@ def _ended(recording: Recording) -> dict[str, list[Any]]:
     for particle, end in zip(np.flatnonzero(released).tolist(), last["t"].tolist(), strict=True):
         t[particle] = end
     return {"t": t, "reason": [REASONS[reason] for reason in recording.ended.tolist()]}
+
+
+def rolling(recording: Recording) -> dict[str, Any] | None:
+    """Return what settled on the outgoing belt without being carried, None if nothing did.
+
+    A free disk stops slipping when its contact point runs with the belt. Its centre, v_x, may then
+    be far from the belt's speed v_b: it rolls, and the belt pays no more. Belt work so far and
+    m v_b (v_b - v_x) together are what loads that are carried take.
+
+    Returns
+    -------
+    dict or None
+        ``particles``, how many; ``belt_work``, what the outgoing belt has paid for all particles,
+        and ``belt_work_carried``, what it would have paid if these were carried, J.
+    """
+    belt = scene_of(recording).outgoing
+    if belt is None or belt.speed is None or recording.particle.inertia == 0.0:
+        return None
+    settled = recording.select(Kind.SETTLE, surface="outgoing")
+    missing = belt.speed - settled["velocity_after"][:, 0]
+    missing = missing[np.abs(missing) > CARRIED]
+    if not len(missing):
+        return None
+    paid = ledger(recording).by_surface["outgoing"]["belt_work"]
+    due = recording.particle.mass * belt.speed * float(missing.sum())
+    return {"particles": len(missing), "belt_work": paid, "belt_work_carried": paid + due}
 
 
 def _theory(prediction: Transfer) -> dict[str, Any]:

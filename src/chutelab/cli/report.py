@@ -16,6 +16,7 @@ from chutelab.compare import compare
 from chutelab.ledger import ledger
 from chutelab.recording import REASONS, Kind
 from chutelab.sheet import Sheet, number, wrapped
+from chutelab.summary import rolling
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -40,6 +41,8 @@ def report(recording: Recording, accuracy: Accuracy | None = None) -> list[Rende
         parts.append(drawn(way))
     books = ledger(recording).sheet()
     parts += [drawn(books), Text("\n" + "\n".join(books.notes))]
+    if (left := rolling(recording)) is not None:
+        parts.append(Text("\n" + "\n".join(wrapped(_rolling(**left)))))
     return parts if accuracy is None else [*parts, _reached(accuracy)]
 
 
@@ -98,6 +101,16 @@ def _head(recording: Recording) -> Text:
     )
     head.append(f"\nended: {endings}", style="not bold")
     return head
+
+
+def _rolling(particles: int, belt_work: float, belt_work_carried: float) -> str:
+    """Say that free disks roll on the outgoing belt, and what carrying them would have cost."""
+    disks = "1 disk rolls" if particles == 1 else f"{particles} disks roll"
+    return (
+        f"{disks} on the outgoing belt: nothing slips, and nothing is carried along. The belt has"
+        f" paid {number(belt_work)} J, loads that are carried take {number(belt_work_carried)} J (a"
+        " disk that arrives without turning takes a third of a carried load's work)."
+    )
 
 
 def _reached(accuracy: Accuracy) -> Text:

@@ -42,8 +42,9 @@ def _complete_column(
     "uncertain",
     metavar="KEY=VALUE±SPREAD",
     multiple=True,
-    help="Instead of --vary: what is not exactly known, such as plate.restitution=0.5±0.05. Says"
-    " how far that makes landing and belt work uncertain, and which key matters most.",
+    help="Instead of --vary: what is not exactly known, such as plate.restitution=0.5±0.05, where"
+    " 0.05 is the standard deviation (with :uniform at the end the half-width). Says how far that"
+    " makes landing and belt work uncertain, and which key matters most.",
 )
 @click.option(
     "--sample",

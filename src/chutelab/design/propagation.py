@@ -131,8 +131,9 @@ class Uncertainty(Shown):
 
     def _notes(self) -> list[str]:
         said = [
+            "Each ± is a standard deviation, of a uniform input the half-width.",
             "Shares are first-order Sobol indices, the part of the variance that an input explains"
-            " alone, with their 95 % intervals."
+            " alone, with their 95 % intervals.",
         ]
         said += [
             f"{100.0 * one.cut:.2g} % of {one.key} = {one.mean:g} ± {one.spread:g} lies outside"

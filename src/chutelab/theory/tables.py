@@ -234,6 +234,8 @@ def _energies(rebound: Rebound) -> Table:
     joule = float(first.printed) / 1000.0
     fast = (2.0 * joule / BALL_MASS) ** 0.5
     fall = (fast**2 - 2.0**2) / (2.0 * 9.81)
+    plate, support = (float(cell.printed) / 1000.0 for cell in rows[1].cells)
+    after = (support - plate) / (BALL_MASS * 9.81)
     return Table(
         3,
         "Table 3: kinetic energy at the plate and at the outgoing support, N mm",
@@ -244,7 +246,9 @@ def _energies(rebound: Rebound) -> Table:
             f"Not reproducible. {float(first.printed):,.0f} N mm is {joule:.2f} J; a ball of"
             f" {BALL_MASS} kg has that at {fast:.1f} m/s, yet it leaves a belt of 2 m/s and would"
             f" have to fall {fall:.1f} m to get there. Over {PLATE_AHEAD} m to the plate it falls"
-            f" {0.5 * 9.81 * (PLATE_AHEAD / 2.0) ** 2:.2f} m and has {first.computed:,.0f} N mm.",
+            f" {0.5 * 9.81 * (PLATE_AHEAD / 2.0) ** 2:.2f} m and has {first.computed:,.0f} N mm."
+            f" At 4 m/s it would have to fall {after:.1f} m from the plate to the outgoing support,"
+            " even if the plate took nothing.",
             "No factor repairs it: printed over computed is "
             + ", ".join(
                 f"{float(cell.printed) / cell.computed:.1f}" for row in rows for cell in row.cells

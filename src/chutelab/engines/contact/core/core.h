@@ -76,6 +76,7 @@ int place_is_free(int i, double x, double y, double t);
 
 /* record.c */
 void knot_now(int i);
+void knot_after(int i);
 void knot_before(int i, double t, double vx, double vy, double spin);
 void flush_track(int i);
 void track_lasting(int i);

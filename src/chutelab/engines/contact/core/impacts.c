@@ -368,7 +368,7 @@ void shock(int i, int j, double t) {
     for (int k = 0; k < W.moved_count; k++) {
         Disk *d = W.disks + W.moved[k];
         d->changes++;
-        knot_now(W.moved[k]);
+        knot_after(W.moved[k]);
         if (d->landed && W.until == UNTIL_LANDED) finish(W.moved[k], BY_LANDING);
     }
     /* A disk by itself begins a new step after each impact. */

@@ -83,7 +83,8 @@ typedef struct {
     double end_of_face;   /* s; when it left the end of a face */
     int bent, open;       /* bend is known; `held` is no knot yet */
     int lasted;           /* steps of this contact, 0 in flight */
-    int pad;
+    int blow, drained;    /* where the knot after a blow is, if it is the last, and when that was */
+    int again;            /* the next knot after a blow goes there too */
 } Track;
 
 typedef struct {
@@ -171,6 +172,7 @@ typedef struct {
     /* [out] */
     int knot_count, event_count, contact_count, near_count, earlier_count;
     int impact_count, step_count, solve_count, sweep_count;
+    int drained;         /* [in] how often the host has taken the knots */
     int done;            /* disks ended, a measure of progress */
     int stalled;         /* which disk */
     /* within the step */

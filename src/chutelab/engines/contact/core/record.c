@@ -9,6 +9,7 @@ static void write_knot(int i, const double *state, const double *entries) {
     memcpy(&k->t, state, 6 * sizeof(double));
     memcpy(k->entries, entries, sizeof k->entries);
     k->disk = i;
+    track->blow = -1;
     memcpy(track->knot, state, sizeof track->knot);
     track->bent = track->open = 0;
 }
@@ -20,12 +21,32 @@ void knot_now(int i) {
     write_knot(i, state, d->entries);
 }
 
-/* Write the state in which a path ends, unless it is the last knot anyhow. */
+/* Write the state in which a path ends, unless it is the last knot anyhow. In a crowd a rattling
+   disk has many impacts within a thousandth of a radius: of these the first and the last are told. */
 void knot_before(int i, double t, double vx, double vy, double spin) {
     Disk *d = W.disks + i;
+    Track *track = W.tracks + i;
     double state[6] = {t, d->x, d->y, vx, vy, spin};
     flush_track(i);
-    if (memcmp(state, W.tracks[i].knot, sizeof state)) write_knot(i, state, d->entries);
+    if (!memcmp(state, track->knot, sizeof state)) return;
+    if (W.interact && track->blow >= 0 && track->drained == W.drained && t - track->knot[0] < W.step
+        && fabs(d->x - track->knot[1]) + fabs(d->y - track->knot[2]) < W.smooth_x) {
+        track->again = 1;
+        return;
+    }
+    write_knot(i, state, d->entries);
+}
+
+/* Write the state after a blow, over that of the blow before if `knot_before` said so. */
+void knot_after(int i) {
+    Track *track = W.tracks + i;
+    int end = W.knot_count, blow = track->again ? track->blow : end;
+    W.knot_count = blow;
+    knot_now(i);
+    if (track->again) W.knot_count = end;
+    track->again = 0;
+    track->blow = blow;
+    track->drained = W.drained;
 }
 
 /* End the smooth part of a track: the state halfway through the last impulses, and that after. */
@@ -43,8 +64,10 @@ void flush_track(int i) {
 static int foretold(const Track *track, const double *state, double radius) {
     double h = state[0] - track->knot[0];
     for (int n = 0; n < 3; n++) {
-        double v = track->knot[3 + n], a = track->bend[n], lever = n < 2 ? 1 : radius;
-        if (fabs(v + a * h - state[3 + n]) * lever > W.smooth_v) return 0;
+        double v = track->knot[3 + n], a = track->bend[n], off = fabs(v + a * h - state[3 + n]);
+        if (off * (n < 2 ? 1 : radius) > W.smooth_v) return 0;
+        /* A cubic whose end velocity is off by so much bulges by a seventh of off h. */
+        if (n < 2 && 0.15 * off * h > W.smooth_x) return 0;
         if (n < 2 && fabs(track->knot[1 + n] + (v + 0.5 * a * h) * h - state[1 + n]) > W.smooth_x)
             return 0;
     }

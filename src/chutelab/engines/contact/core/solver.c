@@ -14,6 +14,10 @@
 #define PART 0.1
 /* Gap, in radii, up to which what was pressed still touches: what sweeps leave open. */
 #define LEAVE 1e-4
+/* Friction from which on it is lowered where sweeps diverge: 76 degrees. */
+#define ROUGH 4.0
+/* Of momentum. */
+#define NOISE 1e-11
 /* Times the first change: sweeps whose changes grow so far never end. */
 #define DIVERGES 1e3
 /* m/s; below it the contacts of a crowd count as calm: `settled` in the contract. */
@@ -61,9 +65,15 @@ static int add(int i, int j, double least, double bound, double h) {
             for (int n = 0; n < 3; n++) c->impulse[n] = W.earlier[k].impulse[n];
     int pressed = c->impulse[0] > 0;
     for (int n = 0; n < d->held_count; n++) pressed |= d->held[n] == -1 - j;
-    /* What was pressed came down from its last hop: it may leave along the surface, not into it. */
-    c->leaves = pressed && c->gap <= LEAVE * least && c->need < -u[0];
-    if (c->leaves) c->need = -u[0];
+    /* What was pressed came down from its last hop: it may leave along the surface, not into it, and
+       above the face while that lasts. */
+    double floor = -u[0], until = j < 0 ? time_on_face(c) : INFINITY;
+    if (until < h) {
+        double press = press_on(d, W.surfaces + (-1 - j), c->nx, c->ny);
+        floor += 0.5 * until * MAX(press, 0);
+    }
+    c->leaves = pressed && c->gap <= LEAVE * least && c->need < floor;
+    if (c->leaves) c->need = floor;
     W.contact_count++;
     return 1;
 }
@@ -72,21 +82,21 @@ static int add(int i, int j, double least, double bound, double h) {
    gets what gravity takes from it up to there. */
 static void carry_to_end(int i, int first, double h) {
     Contact *last = 0;
-    double until = h;
+    double until = 0;
     for (int n = first; n < W.contact_count; n++) {
         Contact *c = W.contacts + n;
         double t = time_on_face(c), u[3];
         relative(c, 0, u);
         /* Another surface carries it on. */
         if (!c->leaves && u[0] + c->need > 0) return;
-        if (c->leaves && t < until) {
+        if (c->leaves && t < h && t >= until) {
             last = c;
             until = t;
         }
     }
     if (!last) return;
     double press = press_on(W.disks + i, W.surfaces + (-1 - last->j), last->nx, last->ny);
-    if (press > 0) last->need += press * until;
+    if (press > 0) last->need += 0.5 * press * until;
     W.tracks[i].end_of_face = W.t + until;
 }
 
@@ -137,7 +147,7 @@ static double sweep(Contact *list, int count, int sweeps, double accurate, doubl
             }
             relative(c, 0, v);
             K[0] = MAX(J[0] - c->mass[0] * (x * c->nx + y * c->ny - c->need), 0);
-            most = share * c->friction * K[0];
+            most = (share < 1 ? share * MIN(c->friction, ROUGH) : c->friction) * K[0];
             K[1] = MIN(MAX(J[1] - c->mass[1] * (v[1] + c->drift), -most), most);
             most = share * c->arm * K[0];
             K[2] = MIN(MAX(J[2] - c->mass[2] * v[2], -most), most);
@@ -182,6 +192,15 @@ void sweep_contacts(Contact *list, int count, int sweeps, double accurate) {
 void solve_contacts(void) {
     for (int n = 0; n < W.contact_count; n++) push(W.contacts + n, W.contacts[n].impulse);
     sweep_contacts(W.contacts, W.contact_count, W.sweeps, W.accurate);
+    for (int n = 0; n < W.contact_count; n++) {
+        /* Rounding presses nobody; with endless friction even that would pull. */
+        Contact *c = W.contacts + n;
+        const Disk *a = W.disks + c->i;
+        if (c->impulse[0] >= NOISE * c->mass[0] * (fabs(a->vx) + fabs(a->vy))) continue;
+        for (int k = 0; k < 3; k++) c->impulse[k] = -c->impulse[k];
+        push(c, c->impulse);
+        c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
+    }
     W.solve_count++;
 }
 
@@ -365,9 +384,11 @@ void close_step(double h) {
         if (d->mode == GONE) continue;
         track_lasting(i);
         for (int n = 0; n < 3; n++) d->entries[n] += d->gain[n];
-        if (owners > 1 && !W.interact && W.until == UNTIL_SETTLED && d->calm > 2 * h) {
-            const double *s = track->held;
-            if (fabs(s[3]) + fabs(s[4]) + fabs(s[5]) * d->radius < 1e-9) reason = BY_SETTLING;
+        /* Held in a corner, whatever runs along it. */
+        if (owners > 1 && !W.interact && W.until == UNTIL_SETTLED && track->lasted > 3) {
+            const double *s = track->held + 3, *p = track->past + 3;
+            double most = MAX(fabs(s[0]) + fabs(s[1]), fabs(p[0]) + fabs(p[1]));
+            if (most + fabs(s[2]) * d->radius < 1e-9) reason = BY_SETTLING;
         }
         if (reason >= 0) {
             take_back(i);

@@ -1,0 +1,516 @@
+"""One particle whose steps end at its contacts (``align = true``).
+
+Flight is stepped with the velocity half a step ahead, which makes Chipmunk's integrator exact. When
+a flight ends is asked of Chipmunk's own distance queries along its parabola; what the contact does,
+of `Space.step`. A lasting contact is stepped by the midpoint rule: the contact is solved half-way
+through the step, with the velocities at its ends.
+"""
+
+from __future__ import annotations
+
+from math import ceil, inf, sqrt
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import pymunk
+from pymunk import Vec2d
+
+from chutelab.engines.pymunk.carriage import Carriage
+from chutelab.engines.pymunk.world import Contact, Face, Track, World
+from chutelab.recorder import StalledError
+from chutelab.recording import REASONS, Kind
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from chutelab.machine import Machine
+    from chutelab.recorder import Recorder
+
+INSTANT = 1e-30
+"""s; the step that resolves a blow: nothing moves in it."""
+
+TINY = 1e-12
+"""Share of 1 m/s plus the particle's speed; an approach this slow is a touch, no blow."""
+
+SEAM = 1e-6
+"""The same in a lasting contact, where a surface goes on in the next one."""
+
+LATE, HOP = 1e-3, 1e-6
+"""Shares of a step: bounces are over when all that are left take less than the first, or the next
+one less than the second."""
+
+STRIDE = 0.5
+"""Share of the radius that a lasting contact moves on in a step, at most: it meets every end."""
+
+STILL = 1e-6
+"""Share of a free fall's gain; a step that changes the velocity by less changes nothing."""
+
+SLACK = 1e-9
+"""Share of the friction limit below which a contact is held to grip."""
+
+FIRST = 1e-3
+"""Share of a step after which a surface just left is looked at again."""
+
+SHORT = 1e-5
+"""Share of a step; a contact that lasts less has ended."""
+
+WINDOW = 10_000
+"""Blows after which it is asked whether the particle gets on; queries on one flight, at most."""
+
+TICK = 1e-12
+"""s; mean time between blows of a particle that does not get on."""
+
+LOW = 2.0
+"""Hairs; bounces lower than this cannot be told from lying on the surface."""
+
+TURNS = 200
+"""Blows at one instant, one surface after the other, before all are solved together."""
+
+
+class Ridden(NamedTuple):
+    """End of a trial step in a lasting contact."""
+
+    x: Vec2d
+    v: Vec2d
+    omega: float
+    contacts: list[Contact]
+    middle: Vec2d
+
+    @property
+    def pushed(self) -> list[Contact]:
+        """Contacts at which a surface pushed."""
+        return [c for c in self.contacts if c.impulse.dot(c.normal) > 0.0]
+
+    @property
+    def slips(self) -> bool:
+        """Whether friction was used up at a contact."""
+        return any(
+            abs(c.impulse.cross(c.normal))
+            >= c.face.friction * c.impulse.dot(c.normal) * (1.0 - SLACK)
+            for c in self.pushed
+        )
+
+
+class Lone:
+    """Runs one particle from its release to its end."""
+
+    def __init__(self, machine: Machine, world: World, recorder: Recorder, particle: int) -> None:
+        self.machine, self.world = machine, world
+        self.track = Track(machine, recorder, particle)
+        self.recorder, self.particle = recorder, particle
+        p, start = machine.particle, machine.releases
+        self.r, self.g, self.dt = p.radius, machine.gravity, machine.dt
+        self.pull = Vec2d(0.0, -self.g)
+        self.t = float(start.t[particle])
+        self.x = Vec2d(*start.position[particle].tolist())
+        self.v = Vec2d(*start.velocity[particle].tolist())
+        self.omega = 0.0
+        self.body, self.circle = world.disk()
+        world.space.add(self.body, self.circle)
+        world.space.on_collision(1, 2, pre_solve=self._before, post_solve=self._after)
+        self.law: Callable[[Face, Vec2d], float | None] = _ignore
+        self.contacts: list[Contact] = []
+        self.on = -1
+        self.slipping: bool | None = None
+        self.ended = False
+        self.steps, self.last = 0, 0.0
+        self.landed = False
+        self.blows, self.since = 0, self.t
+        self.turns = self.t, 0
+
+    def run(self, _report: Callable[[float], None]) -> None:
+        """Run to the end."""
+        if self.t >= self.machine.end_time:
+            return
+        self.track.knot(self.t, self.x, self.v, self.omega)
+        self.track.event(Kind.RELEASE, self.t, self.x, (self.v, self.omega))
+        if self.machine.releases.carried[self.particle]:
+            self._carry()
+            if not (self.ended or self._approached(self._touching())):
+                self._fly(self._touching())
+        while not self.ended:
+            touching = self._touching()
+            if self._approached(touching):
+                self._blow(touching)
+            elif not self._ride(touching):
+                self._fly(touching)
+        self.world.space.remove(self.body, self.circle)
+
+    # What Chipmunk asks and tells
+
+    def _before(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
+        face = self.world.by_shape[arbiter.shapes[1]]
+        normal = -arbiter.normal
+        restitution = self.law(face, normal)
+        arbiter.process_collision = restitution is not None
+        if restitution is None:
+            return
+        arbiter.restitution, arbiter.friction = restitution, face.friction
+        if face.tangent is not None and face.speed != 0.0:
+            arbiter.surface_velocity = face.belt(normal) * Vec2d(normal.y, -normal.x)
+
+    def _after(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
+        face = self.world.by_shape[arbiter.shapes[1]]
+        self.contacts.append(Contact(face, -arbiter.normal, arbiter.total_impulse))
+
+    def _step(
+        self, x: Vec2d, v: Vec2d, h: float, pull: Vec2d, law: Callable[[Face, Vec2d], float | None]
+    ) -> list[Contact]:
+        """Let Chipmunk step by h (s); return the contacts that it solved."""
+        body, space = self.body, self.world.space
+        if h != self.last:
+            # Chipmunk keeps impulses for the next step, but right ones only if it is as long.
+            space.remove(self.circle)
+            space.add(self.circle)
+            self.last = h
+        body.position, body.velocity, body.angular_velocity = x, v, self.omega
+        self.law, space.gravity, self.contacts = law, pull, []
+        space.step(h)
+        self.steps += 1
+        return self.contacts
+
+    # Distances
+
+    def _gap(self, face: Face, x: Vec2d) -> tuple[float, Vec2d]:
+        """Return gap (m) between disk and surface, and the normal, as Chipmunk has them."""
+        found = face.shape.point_query(x)
+        return found.distance - self.r, found.gradient
+
+    def _on_end(self, face: Face, x: Vec2d) -> bool:
+        """Tell whether the nearest point of a segment is one of its ends."""
+        if face.tangent is None:
+            return False
+        point = face.shape.point_query(x).point
+        return min((point - end).length for end in face.ends) <= self.world.hair
+
+    def _touching(self) -> dict[Face, Vec2d]:
+        """Return the surfaces in touch and their normals."""
+        found = ((face, *self._gap(face, self.x)) for face in self.world.faces)
+        return {face: normal for face, gap, normal in found if gap <= 0.5 * self.world.hair}
+
+    def _approached(self, touching: dict[Face, Vec2d]) -> bool:
+        """Tell whether the particle moves into a surface in touch."""
+        slow = (TINY if self.on < 0 else SEAM) * (1.0 + self.v.length)
+        return any(self.v.dot(normal) < -slow for normal in touching.values())
+
+    # Flight
+
+    def _fly(self, touching: dict[Face, Vec2d]) -> None:
+        """Fly to the next contact, the exit or the end."""
+        self._part()
+        span, reason = self._way_out()
+        for face in self.world.faces:
+            found = self._meets(face, span, face in touching)
+            if found < span:
+                span, reason = found, ""
+        self._soar(span)
+        self.track.knot(self.t, self.x, self.v, self.omega)
+        if reason == "exit":
+            self.track.event(Kind.EXIT, self.t, self.x, (self.v, self.omega))
+        if reason:
+            self._end(reason)
+
+    def _soar(self, span: float) -> None:
+        """Step freely for a time (s), by `dt` at most."""
+        count = ceil(span / self.dt)
+        x, v = self.x, self.v + 0.5 * self.dt * self.pull
+        for n in range(count):
+            h = self.dt if n < count - 1 else span - (count - 1) * self.dt
+            if n == count - 1:
+                v += 0.5 * (h - self.dt) * self.pull
+            self._step(x, v, h, self.pull, _ignore)
+            x, v = self.body.position, self.body.velocity
+        self.t += span
+        self.x, self.v = x, self.v + span * self.pull
+
+    def _way_out(self) -> tuple[float, str]:
+        """Return the time left (s) until the exit box or the end of the run, and which it is."""
+        left, right, bottom, top = self.machine.exit_box
+        out = inf
+        if self.g > 0.0:
+            rise = self.v.y / self.g
+            out = rise + sqrt(max(rise * rise + 2.0 * (self.x.y - bottom) / self.g, 0.0))
+        else:
+            for x, v, low, high in (
+                (self.x.x, self.v.x, left, right), (self.x.y, self.v.y, bottom, top)
+            ):  # fmt: skip
+                if v != 0.0:
+                    out = min(out, max(((high if v > 0.0 else low) - x) / v, 0.0))
+        rest = self.machine.end_time - self.t
+        if self.machine.until == "time":
+            return rest, "time"
+        return (out, "exit") if out < rest else (rest, "time")
+
+    def _meets(self, face: Face, span: float, leaving: bool) -> float:
+        """Return when (s from now) the parabola meets a surface, inf if not within `span`.
+
+        All surfaces are convex: along a straight line the distance from one is a convex function,
+        so from where gap and rate of change are known it stays above gap + rate τ - g τ²/2.
+        Stepping from root to root of that bound never passes a contact, and converges like Newton's
+        method.
+        A surface that the flight has just left along its tangent gives no bound; it is looked at
+        after times that grow by half.
+        """
+        t = last = 0.0
+        x0, v0, g, hair = self.x, self.v, self.g, self.world.hair
+        for _ in range(WINDOW):
+            v = v0 + t * self.pull
+            gap, normal = self._gap(face, x0 + (0.5 * t) * (v0 + v))
+            rate = v.dot(normal)
+            slow = TINY * (1.0 + v.length)
+            if leaving:
+                if gap < -hair and t > 0.0:
+                    return self._pierced(face, last, t)
+                leaving = gap <= hair or rate > 0.0
+            elif gap <= self.world.rounding:
+                if rate < -slow:
+                    return t
+                leaving = True
+            ahead = max(gap, 0.0)
+            root = sqrt(rate * rate + 2.0 * g * ahead)
+            if rate <= 0.0:
+                tau = 2.0 * ahead / (root - rate) if root > rate else inf
+            else:
+                tau = (rate + root) / g if g > 0.0 else inf
+            if leaving:
+                tau = max(tau, min(0.5 * t + FIRST * self.dt, self.r / (v.length + g * self.dt)))
+            if t + tau == t:
+                return t
+            last, t = t, t + tau
+            if t >= span:
+                return inf
+        raise self._stalled("it slides past a surface without touching it; lower run.max_time")
+
+    def _pierced(self, face: Face, low: float, high: float) -> float:
+        """Return when, between two times, a flight enters a surface."""
+        while (middle := 0.5 * (low + high)) not in (low, high):
+            x = self.x + middle * (self.v + 0.5 * middle * self.pull)
+            low, high = (
+                (low, middle) if self._gap(face, x)[0] < -0.5 * self.world.hair else (middle, high)
+            )
+        return low
+
+    # Blows
+
+    def _blow(self, touching: dict[Face, Vec2d]) -> None:
+        """Let Chipmunk resolve the blow from the surface that the particle moves into fastest."""
+        before = self.v, self.omega
+        struck = min(touching, key=lambda face: self.v.dot(touching[face]))
+        gap, normal = self._gap(struck, self.x)
+        self.x -= gap * normal
+        if self.turns[0] != self.t:
+            self.turns = self.t, 0
+        self.turns = self.t, self.turns[1] + 1
+
+        def law(face: Face, normal: Vec2d) -> float | None:
+            together = self.turns[1] > TURNS
+            return self._restitution(face, normal) if together or face is struck else None
+
+        contacts = self._step(self.x, self.v, INSTANT, Vec2d(0, 0), law)
+        after = self.body.velocity, self.body.angular_velocity
+        self.v, self.omega = after
+        landed = False
+        for contact in contacts:
+            if contact.impulse.dot(contact.normal) <= 0.0:
+                continue
+            self.track.book(contact, before, after)
+            lands = contact.face.surface == self.machine.landing and not self.landed
+            self.landed |= lands
+            landed |= lands
+            kind = Kind.LANDING if lands else Kind.IMPACT
+            self.track.event(kind, self.t, self.x, after, before, contact)
+            self.recorder.contacts += 1
+        self.track.knot(self.t, self.x, self.v, self.omega)
+        if landed and self.machine.until == "landed":
+            self._end("landed")
+        self.blows += 1
+        if self.blows % WINDOW == 0:
+            if self.t - self.since < WINDOW * TICK:
+                raise self._stalled(
+                    f"{WINDOW} blows in no time: it is driven to and fro in a narrow place; move"
+                    " the surfaces there apart, or lower their restitution"
+                )
+            self.since = self.t
+
+    def _restitution(self, face: Face, normal: Vec2d) -> float:
+        """Return ε, or 0 where the bounces that would follow are over within a step."""
+        approach, weight = -self.v.dot(normal), -self.pull.dot(normal)
+        e = face.restitution
+        if approach <= TINY * (1.0 + self.v.length):
+            return 0.0
+        if weight > 0.0:
+            hop = 2.0 * e * approach / weight
+            height = 0.5 * (e * approach) ** 2 / weight
+            if hop < self.dt * max(LATE * (1.0 - e), HOP) or height < LOW * self.world.hair:
+                return 0.0
+        return e
+
+    # Lasting contact
+
+    def _ride(self, touching: dict[Face, Vec2d]) -> bool:
+        """Step on in contact; False if no surface pushes."""
+        slow = SEAM * (1.0 + self.v.length)
+        if all(self.v.dot(normal) > slow for normal in touching.values()):
+            return False
+        h = min(self.dt, self.machine.end_time - self.t)
+        speed = self.v.length + self.g * self.dt
+        h = min(h, STRIDE * self.r / speed) if speed > 0.0 else h
+
+        rims = {face for face in touching if self._on_end(face, self.x)}
+
+        def trial(span: float) -> Ridden:
+            return self._ridden(span, touching)
+
+        def holds(span: float) -> bool:
+            end = trial(span)
+            return bool(end.pushed) and not any(
+                self._on_end(c.face, end.middle) for c in end.pushed if c.face not in rims
+            )
+
+        def clear(end: Ridden) -> bool:
+            pushed = {c.face for c in end.pushed}
+            return all(
+                self._gap(face, end.x)[0] >= -0.25 * self.world.hair
+                for face in self.world.faces
+                if face not in pushed
+            )
+
+        # What half of a step twice as long finds goes for the end of this one.
+        floor = SHORT * h
+        if not holds(2.0 * h):
+            if not holds(floor):
+                return False
+            h = 0.5 * _longest(holds, 2.0 * h, floor)
+            if h <= floor:
+                return False
+        end = trial(h)
+        if not clear(end):
+            h = _longest(lambda span: clear(trial(span)), h, 0.0)
+            end = trial(h)
+        if self.slipping and not end.slips:
+            h = _longest(lambda span: trial(span).slips, h, floor, upper=True)
+            end = trial(h)
+        if self.machine.until == "settled" and self._lies(end, h):
+            self._settle(end)
+        else:
+            self._accept(end, h)
+        return True
+
+    def _ridden(self, h: float, touching: dict[Face, Vec2d]) -> Ridden:
+        """Return where a step in contact leads, without taking it.
+
+        The contact is solved half-way. There ε turns round the normal velocity that a curved
+        surface gives the particle: v_n goes out as -v_n (v1/v0)², which keeps it on the circle, and
+        gives the normal impulse of the speed half-way. On a face v_n is 0.
+        """
+        middle = self.x + 0.5 * h * self.v
+        gap, normal = min((self._gap(face, middle) for face in touching), key=itemgetter(0))
+        middle -= gap * normal
+        turn = 1.0
+
+        def law(face: Face, normal: Vec2d) -> float | None:
+            if face not in touching:
+                return None
+            return turn if self.v.dot(normal) > 0.0 else 0.0
+
+        contacts = self._step(middle - h * self.v, self.v, h, self.pull, law)
+        if self.v.dot(normal) > SEAM * self.v.length:
+            turn = self.body.velocity.dot(self.body.velocity) / self.v.dot(self.v)
+            contacts = self._step(middle - h * self.v, self.v, h, self.pull, law)
+        v, omega = self.body.velocity, self.body.angular_velocity
+        x = middle + 0.5 * h * v
+        pushed = [c.face for c in contacts if c.impulse.dot(c.normal) > 0.0]
+        for face in pushed:
+            gap, normal = self._gap(face, x)
+            x -= gap * normal
+            if len(pushed) == 1:
+                v -= v.dot(normal) * normal
+        return Ridden(x, v, omega, contacts, middle)
+
+    def _accept(self, end: Ridden, h: float) -> None:
+        """Take a step that was tried."""
+        before = self.v, self.omega
+        self.x, self.v, self.omega = end.x, end.v, end.omega
+        after = self.v, self.omega
+        self.t += h
+        pushed = end.pushed
+        for contact in pushed:
+            self.track.book(contact, before, after)
+        slips, on = end.slips, pushed[0].face.surface if pushed else self.on
+        if self.on >= 0 and slips != self.slipping and self.slipping is not None:
+            kind = Kind.SLIP if slips else Kind.STICK
+            self.track.event(kind, self.t, self.x, after, surface=on)
+        self.on, self.slipping = on, slips
+        self.track.sample(self.t, self.x, self.v, self.omega)
+        if self.t >= self.machine.end_time:
+            self._end("time")
+
+    def _lies(self, end: Ridden, h: float) -> bool:
+        """Tell whether a step without slip changed nothing, on a surface to settle on."""
+        still = STILL * self.g * h
+        return (
+            bool(end.pushed)
+            and not end.slips
+            and (end.v - self.v).length <= still
+            and self.r * abs(end.omega - self.omega) <= still
+            and all(
+                c.face.speed == 0.0 or c.face.surface == self.machine.landing for c in end.pushed
+            )
+        )
+
+    def _settle(self, end: Ridden) -> None:
+        surface = end.pushed[0].face.surface
+        if self.slipping:
+            self.track.event(Kind.STICK, self.t, self.x, (self.v, self.omega), surface=surface)
+        self.track.knot(self.t, self.x, self.v, self.omega)
+        self.track.event(Kind.SETTLE, self.t, self.x, (self.v, self.omega), surface=surface)
+        self._end("settled")
+
+    def _part(self) -> None:
+        """Write that a lasting contact has ended."""
+        if self.on >= 0:
+            self.track.knot(self.t, self.x, self.v, self.omega)
+            self.track.event(Kind.SEPARATION, self.t, self.x, (self.v, self.omega), surface=self.on)
+        self.on, self.slipping = -1, None
+
+    def _carry(self) -> None:
+        """Ride by adhesion, see `Carriage`."""
+        belt = self.machine.pulley
+        assert belt is not None
+        if self.v.x == 0.0 and self.machine.until == "settled":
+            self.track.event(Kind.SETTLE, self.t, self.x, (self.v, 0.0), surface=belt.surface)
+            self._end("settled")
+            return
+        ride = Carriage(self.machine, self.world, self.particle)
+        ride.write(self.track, ride.until)
+        self.t, (self.x, self.v) = ride.until, ride.state(ride.until)
+        if self.t >= self.machine.end_time:
+            self._end("time")
+        else:
+            self.track.event(Kind.SEPARATION, self.t, self.x, (self.v, 0.0), surface=belt.surface)
+
+    # The end
+
+    def _end(self, reason: str) -> None:
+        self.ended = True
+        self.track.finish(REASONS.index(reason))
+
+    def _stalled(self, reason: str) -> StalledError:
+        self._end("time")
+        return StalledError(self.particle, self.t, (self.x.x, self.x.y), reason)
+
+
+def _ignore(_face: Face, _normal: Vec2d) -> None:
+    """Let nothing collide: when a flight ends is known before it is stepped."""
+
+
+def _longest(
+    test: Callable[[float], bool], high: float, low: float, *, upper: bool = False
+) -> float:
+    """Return the time (s) up to which a test that fails at `high` is passed, to a bit.
+
+    With `upper` the first one that fails it.
+    """
+    while low < (middle := 0.5 * (low + high)) < high and high - low > 1e-15 * high:
+        low, high = (middle, high) if test(middle) else (low, middle)
+    return high if upper else low

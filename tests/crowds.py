@@ -179,12 +179,16 @@ class _Draw:
 
     def _transfer(self):
         pair, radius = self.pair(), self.uniform(5.0, 100.0)
+        adhesion = self.one_of(True, False)
+        # Layers that are carried round the pulley run into each other: there is one, if it is slow.
+        slow = self.v**2 < self.g * self.r * (radius + 22.0)
         return {
+            **({"released": {"bed_height": 0.0}} if adhesion and slow else {}),
             "incoming": {
                 "speed": self.v,
                 "pulley_radius": self.r * radius,
                 "length": self.r * self.uniform(10.0, 100.0),
-                "friction": self.one_of("adhesion", pair["friction"]),
+                "friction": "adhesion" if adhesion else pair["friction"],
                 "restitution": pair["restitution"],
             },
             "plate": {

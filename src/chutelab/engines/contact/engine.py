@@ -144,7 +144,7 @@ class Job:
             ("gy", -machine.gravity), ("g", machine.gravity), ("dt", machine.dt),
             ("end_time", machine.end_time), ("exit_box", (left, bottom, right, top)),
             ("smooth_x", (1e-5 if alone else 1e-4) * r), ("smooth_v", 1e-4 if alone else 1e-3),
-            ("accurate", 1e-15 if alone else 1e-4),
+            ("accurate", 1e-15 if alone else 3e-4),
         ):  # fmt: skip
             world[name] = value
 

@@ -59,7 +59,7 @@ double soft_approach(const Disk *d, double radius) {
 }
 
 /* Approach up to which a contact is left to the next step, m/s. */
-static double left_over(const Disk *d, int impacts, int surface, double radius) {
+double left_over(const Disk *d, int impacts, int surface, double radius) {
     if (surface >= 0)
         for (int n = 0; n < d->held_count; n++)
             /* What lies on a surface comes back to it at the end of each step, so fast. */

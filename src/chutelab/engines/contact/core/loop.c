@@ -262,13 +262,16 @@ static int begin_step(void) {
     W.step = h;
     W.soft = 2 * W.g * h;
     W.skip = SKIP / h;
-    W.step_end = MIN(W.t + h, next);
+    /* Steps end where a surface comes or goes, and at the end of the run; none is a short rest: two
+       shorter ones share what is left. At the very end a step is solved for what lasts, and not gone
+       through. */
+    double stop = W.t < W.end_time ? MIN(next, W.end_time) : W.t + h;
+    if (stop - W.t < (1 + 1e-9) * h) h = stop - W.t;
+    else if (stop - W.t < 2 * h) h = 0.5 * (stop - W.t);
+    W.step_end = stop - W.t <= h ? stop : W.t + h;
     if (!W.interact && W.disks[W.low].mode == FREE && !W.disks[W.low].supports)
-        stride = free_span(W.disks + W.low, h);
-    if (stride > 0) W.step_end = W.t + stride;
-    /* At the very end a step is solved for what lasts, and not gone through. */
-    if (W.t < W.end_time) W.step_end = MIN(W.step_end, W.end_time);
-    else W.step_end = W.t + h;
+        stride = MIN(free_span(W.disks + W.low, h), stop - W.t);
+    if (stride > h) W.step_end = W.t + stride < stop ? W.t + stride : stop;
     W.now = W.t;
     W.length_before = W.length;
     h = W.step_end - W.t;

@@ -9,9 +9,10 @@
 #include "core.h"
 
 /* Overlap that is left alone, in radii; of what is beyond, a tenth is parted in each step: gently,
-   since parting does work. */
+   since parting does work. Of an overlap as deep as DEEP more, up to all. */
 #define SLOP 1e-3
 #define PART 0.1
+#define DEEP 0.05
 /* Gap, in radii, up to which what was pressed still touches: what sweeps leave open. */
 #define LEAVE 1e-4
 /* Friction from which on it is lowered where sweeps diverge: 76 degrees. */
@@ -56,7 +57,10 @@ static int add(int i, int j, double least, double bound, double h) {
     relative(c, 0, u);
     if (-u[0] > bound || u[0] > W.soft) return 1;
     double aim = MIN(c->gap, 0);
-    if (c->gap < -SLOP * least) aim = -SLOP * least + (1 - PART) * (c->gap + SLOP * least);
+    if (c->gap < -SLOP * least) {
+        double part = MIN(MAX(PART, -c->gap / (DEEP * least)), 1);
+        aim = -SLOP * least + (1 - part) * (c->gap + SLOP * least);
+    }
     c->need = (aim - gap_later(c, h)) / h;
     c->drift = j < 0 ? 0.5 * h * (W.gx * c->ny - W.gy * c->nx) : 0;
     c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
@@ -109,20 +113,24 @@ int find_contacts(double h, int *woke) {
         Disk *a = W.disks + i, *b = W.disks + j;
         double least = MIN(a->radius, b->radius), reach = a->radius + b->radius + TOUCH * least;
         if (square(a->x - b->x) + square(a->y - b->y) > reach * reach) continue;
-        int soft = a->supports || b->supports || a->mode != FREE || b->mode != FREE;
+        /* What the step before left over is taken up here. */
+        double bound = left_over(a, MAX(a->impacts, b->impacts), -1, least);
+        if (a->supports || b->supports || a->mode != FREE || b->mode != FREE)
+            bound = MAX(bound, MAX(W.soft, W.skip * least));
         if (a->mode == ASLEEP || b->mode == ASLEEP) {
             wake(a->mode == ASLEEP ? i : j, W.t);
             *woke = 1;
         }
         if (a->mode != FREE) { int k = i; i = j; j = k; }
-        if (!add(i, j, least, soft ? W.soft : soft_approach(a, least), h)) return 0;
+        if (!add(i, j, least, bound, h)) return 0;
     }
     if (*woke) return 1;
     for (int i = W.low; i < W.high; i++) {
         Disk *d = W.disks + i;
         if (d->mode != FREE) continue;
         int first = W.contact_count;
-        double bound = d->supports ? W.soft : soft_approach(d, d->radius);
+        double bound = left_over(d, d->impacts, -1, d->radius);
+        if (d->supports) bound = MAX(bound, W.interact ? MAX(W.soft, W.skip * d->radius) : W.soft);
         for (int k = 0; k < W.surface_count; k++)
             if (is_near(W.surfaces + k, d) && !add(i, -1 - k, d->radius, bound, h)) return 0;
         if (W.contact_count > first) carry_to_end(i, first, h);

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import atan2, cos, degrees, sin, sqrt
+from math import atan2, cos, degrees, hypot, sin, sqrt
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from chutelab import scene
 from chutelab.engines.contact import run
@@ -55,7 +56,7 @@ def check_first_impacts(machine, least):
 
 @pytest.mark.parametrize(("seed", "rate", "spin"), [(0, 100, True), (1, 50, False)])
 def test_first_impacts_as_brute_force_says(seed, rate, spin):
-    check_first_impacts(dilute(seed, rate, spin, 60), 150)
+    check_first_impacts(dilute(seed, rate, spin, 60), 80)
 
 
 @pytest.mark.slow
@@ -166,41 +167,46 @@ STEPS = (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4)
 WITHIN = 1e-4
 """m; of positions at dt = 1e-3 s."""
 
+PHASES = (1.0, 0.91, 0.83, 0.69)
+"""Shares of each step that are run as well: errors depend on where in a step a phase begins."""
 
-def order_of(steps, errors):
-    return float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
 
-
-@pytest.mark.parametrize(("friction", "turning", "speed"), PULLEYS)
-def test_round_the_pulley_in_second_order(friction, turning, speed):
-    belt, wheel, r, length = 2.0, 0.5, 0.004, 0.5
-    ride = wheel + r
-    found = round_the_pulley(
-        belt=belt, ride=ride, friction=friction, turning=turning, way=-length, speed=speed
-    )
+def ride(friction, turning, speed, found, dt):
+    """Return errors of position (m) and of the time of separation (s), and how often it is told."""
+    wheel, r, length = 0.5, 0.02, 0.5
     times = np.linspace(0.0, 0.999 * found.t, 300)
     way = found.state(times)[0]
     place = np.where(
         way < 0.0,
-        [way, np.full_like(way, ride)],
-        [ride * np.sin(way / ride), ride * np.cos(way / ride)],
+        [way, np.full_like(way, wheel + r)],
+        [(wheel + r) * np.sin(way / (wheel + r)), (wheel + r) * np.cos(way / (wheel + r))],
     ).T
-    errors, leaves = [], []
+    document = {
+        "particle": {"radius": r, "spin": turning > 0.0},
+        "incoming": {"speed": 2.0, "pulley_radius": wheel, "friction": friction},
+        "stream": {"at": [-length, wheel + r], "velocity": [speed, 0.0]},
+        "run": {"until": found.t + 0.05, "max_time": 3.0, "dt": dt},
+    }
+    recording = run(build(scene.from_dict(document)))
+    left = recording.select(Kind.SEPARATION)
+    error = np.abs(recording.at(times)[0][:, 0] - place).max()
+    return error, abs(left["t"][-1] - found.t), len(left)
+
+
+@pytest.mark.parametrize(("friction", "turning", "speed"), PULLEYS)
+def test_round_the_pulley_in_second_order(friction, turning, speed):
+    # Errors of place stay below 60 dt² (m, s), of the time it leaves below 100 dt²/s.
+    found = round_the_pulley(
+        belt=2.0, ride=0.52, friction=friction, turning=turning, way=-0.5, speed=speed
+    )
     for dt in STEPS:
-        document = {
-            "particle": {"radius": r, "spin": turning > 0.0},
-            "incoming": {"speed": belt, "pulley_radius": wheel, "friction": friction},
-            "stream": {"at": [-length, ride], "velocity": [speed, 0.0]},
-            "run": {"until": found.t + 0.05, "max_time": 3.0, "dt": dt},
-        }
-        recording = run(build(scene.from_dict(document)))
-        errors.append(np.abs(recording.at(times)[0][:, 0] - place).max())
-        left = recording.select(Kind.SEPARATION)[0]
-        leaves.append(abs(left["t"] - found.t))
-    assert errors[2] < WITHIN, errors
-    assert order_of(STEPS, errors) == pytest.approx(2.0, abs=0.3), errors
-    assert leaves[2] < 2e-3, leaves
-    assert leaves[-1] < 5e-4, leaves
+        runs = [ride(friction, turning, speed, found, share * dt) for share in PHASES]
+        place, time, told = map(max, zip(*runs, strict=True))
+        assert place < 60.0 * dt**2, (dt, place)
+        assert time < 100.0 * dt**2, (dt, time)
+        assert told == 1, dt
+        if dt == 1e-3:
+            assert place < WITHIN
 
 
 SLIDES = [
@@ -213,32 +219,33 @@ SLIDES = [
 ]
 
 
-@pytest.mark.parametrize("options", SLIDES)
-def test_slides_and_rolls_as_the_closed_form_says(options):
-    # Where acceleration is constant a step is exact: errors come from the step in which it grips.
+def sliding(options, dt):
+    """Return the error of position, m."""
     r, slope = 0.02, options.get("slope", 0.0)
     along, normal = np.array([cos(slope), -sin(slope)]), np.array([sin(slope), cos(slope)])
     surface = {
         "name": "ramp", "from": (-20.0 * along).tolist(), "to": (20.0 * along).tolist(),
         "friction": options["friction"], "speed": options.get("belt", 0.0), "restitution": 0.0,
     }  # fmt: skip
+    machine = scene_of(
+        particle={"radius": r, "spin": options.get("turning", 0.0) > 0.0},
+        surface=[surface],
+        stream={"at": (r * normal).tolist(), "velocity": (options["speed"] * along).tolist()},
+        run={"until": 2.0, "dt": dt},
+    )
     times = np.linspace(0.0, 1.99, 200)
     way, _, _ = slide(times, **options)
-    expected = r * normal + way[:, None] * along
-    errors = []
+    place = run(machine).at(times)[0][:, 0]
+    return np.abs(place - (r * normal + way[:, None] * along)).max()
+
+
+@pytest.mark.parametrize("options", SLIDES)
+def test_slides_and_rolls_as_the_closed_form_says(options):
+    # Where acceleration is constant a step is exact: errors, below dt² (m, s), come from the step in
+    # which the slip ends.
     for dt in STEPS:
-        machine = scene_of(
-            particle={"radius": r, "spin": options.get("turning", 0.0) > 0.0},
-            surface=[surface],
-            stream={
-                "at": (r * normal).tolist(), "velocity": (options["speed"] * along).tolist()
-            },
-            run={"until": 2.0, "dt": dt},
-        )  # fmt: skip
-        errors.append(np.abs(run(machine).at(times)[0][:, 0] - expected).max())
-    assert errors[2] < WITHIN, errors
-    # What is exact to 1e-9 has no order.
-    assert max(errors) < 1e-9 or order_of(STEPS, errors) > 1.7, errors
+        error = max(sliding(options, share * dt) for share in PHASES)
+        assert error < dt**2, (dt, error)
 
 
 # A heap
@@ -372,14 +379,14 @@ def feeder(count=60):
     return scene_of(
         surface=[{"name": "tray", "points": [[-0.1, 0.3], [-0.1, 0.0], [0.1, 0.0], [0.1, 0.3]],
                   "restitution": 0.3, "friction": 0.5}],
-        stream={"count": count, "rate": 1e4, "at": [0.0, 0.5], "velocity": [0.0, -0.5],
+        stream={"count": count, "rate": 1e4, "at": [-0.05, 0.5], "velocity": [0.4, -0.5],
                 "interact": True, "restitution": 0.3},
         run={"until": 3.0},
     )  # fmt: skip
 
 
 def test_whose_place_is_taken_waits_for_it():
-    # One after the other leaves the place free when it fell by 2 r: v t + g t²/2 = 2 r.
+    # One leaves the place free for the next when it is 2 r away: |v t + g t²/2| = 2 r.
     machine = feeder()
     recording = run(machine)
     assert not faults(machine, recording)
@@ -387,7 +394,7 @@ def test_whose_place_is_taken_waits_for_it():
     assert len(started) == machine.count
     late = started["t"] - machine.releases.t[started["particle"]]
     assert (late >= 0.0).all()
-    clear = (-0.5 + sqrt(0.25 + 4.0 * G * 0.01)) / G
+    clear = brentq(lambda t: hypot(0.4 * t, 0.5 * t + 0.5 * G * t * t) - 0.02, 0.0, 1.0)
     gaps = np.diff(np.sort(started["t"]))
     assert gaps.min() >= clear * (1.0 - 1e-9)
     # It looks once a step.
@@ -398,14 +405,14 @@ def test_who_finds_no_place_to_the_end_is_never_released():
     machine = scene_of(
         surface=[{"name": "cup", "points": [[-0.03, 0.08], [-0.03, 0.0], [0.03, 0.0],
                                             [0.03, 0.08]], "restitution": 0.0}],
-        stream={"count": 30, "rate": 1000.0, "at": [0.0, 0.05], "velocity": [0.0, 0.0],
+        stream={"count": 30, "rate": 1000.0, "at": [0.0, 0.07], "velocity": [0.0, 0.0],
                 "interact": True},
         run={"until": 2.0},
     )  # fmt: skip
     recording = run(machine)
     assert not faults(machine, recording)
     started = len(recording.select(Kind.RELEASE))
-    assert 3 < started < 30
+    assert 3 <= started < 12
     assert (np.diff(recording.offsets) > 0).sum() == started
     assert {REASONS[k] for k in recording.ended} == {"time"}
 

@@ -69,7 +69,11 @@ BROKEN = {
     "NaN in point": (FREE.replace("[0, 1]", "[nan, 1]"), ["stream.at[0]"], "a number"),
     "endless title": (f'title = "{BIG}"\n' + IN, ["title"], "at most 200 characters"),
     # unknown words
-    "unknown engine": (IN + '[run]\nengine = "box2d"', ["run.engine"], '"exact" or "pymunk"'),
+    "unknown engine": (
+        IN + '[run]\nengine = "box2d"',
+        ["run.engine"],
+        '"exact", "contact" or "pymunk"',
+    ),
     "unknown ending": (IN + '[run]\nuntil = "end"', ["run.until"], '"settled" or a number'),
     "zero ending": (IN + "[run]\nuntil = 0", ["run.until"], "> 0"),
     "unknown grip": (IN + 'friction = "glue"', ["incoming.friction"], '"adhesion" or a number'),
@@ -131,12 +135,17 @@ BROKEN = {
     "interact and exact": (
         IN + '[stream]\ninteract = true\ncount = 2\n[run]\nengine = "exact"',
         ["run.engine", "stream.interact", "stream.count = 2"],
-        "pymunk",
+        "contact or pymunk",
     ),
     "pymunk and points": (
         IN + '[particle]\nradius = 0\n[run]\nengine = "pymunk"',
         ["run.engine", "particle.radius"],
-        "disks",
+        "pymunk needs disks",
+    ),
+    "contact and points": (
+        IN + '[particle]\nradius = 0\n[run]\nengine = "contact"',
+        ["run.engine", "particle.radius"],
+        "contact needs disks",
     ),
     "interact and points": (
         IN + "[particle]\nradius = 0\n[stream]\ninteract = true",
@@ -228,6 +237,11 @@ BROKEN = {
     "tolerance in words": (expect(tolerance='"little"'), ["expect[0].tolerance"], "0.5 mm"),
     "negative length": (expect(tolerance='"-1 mm"'), ["expect[0].tolerance"], "0.5 mm"),
     "nothing promised": (expect(tolerance='"none"'), ["expect[0].tolerance"], "0.5 mm"),
+    "tolerance for contact": (
+        expect(tolerance_contact='"no"'),
+        ["expect[0].tolerance_contact"],
+        "",
+    ),
     "tolerance for pymunk": (
         expect(tolerance_pymunk='"no"'),
         ["expect[0].tolerance_pymunk"],

@@ -203,8 +203,10 @@ def test_a_ledger_entry_is_measured_by_itself_and_the_residual_by_what_was_turne
 def test_pymunk_may_have_a_tolerance_of_its_own_or_none():
     # One lies r above the belt; 0.1 mm are more than nothing and less than a millimetre.
     own = verify(expecting("x2", 0.5961, 1e-12, more='tolerance_pymunk = "1 mm"'))
-    assert [row.holds for row in own.findings] == [False, True, False]
-    assert [row.engine for row in own.findings] == ["exact", "pymunk", "theory"]
+    assert [row.engine for row in own.findings] == ["exact", "contact", "pymunk", "theory"]
+    assert [row.holds for row in own.findings] == [False, False, True, False]
+    own = verify(expecting("x2", 0.5961, 1e-12, more='tolerance_contact = "1 mm"'))
+    assert [row.holds for row in own.findings] == [False, True, False, False]
     none = verify(expecting("x2", 0.5961, '"1 mm"', more='tolerance_pymunk = "none"'))
     row = only(none, "pymunk")
     assert (row.tolerance, row.holds) == (None, True)
@@ -228,25 +230,29 @@ def test_what_does_not_happen_fails():
 
 def test_the_theory_is_asked_for_its_own_symbols_only():
     assert [row.engine for row in verify(expecting("t2", 0.298, 1e-6)).findings] == [
-        *("exact", "pymunk", "theory")
+        *("exact", "contact", "pymunk", "theory")
     ]
     for quantity, value in (("t2", '"theory"'), ("impact.t", "0.798")):
         engines = [row.engine for row in verify(expecting(quantity, value, 1e-6)).findings]
-        assert engines == ["exact", "pymunk"]
+        assert engines == ["exact", "contact", "pymunk"]
 
 
 @pytest.mark.parametrize(
     ("more", "engines", "skipped"),
     [
-        ("[particle]\nradius = 0\n", ["exact"], {"pymunk": "it has no mass points"}),
+        (
+            "[particle]\nradius = 0\n",
+            ["exact"],
+            dict.fromkeys(("contact", "pymunk"), "it has no mass points"),
+        ),
         (
             "[stream]\ncount = 3\ninteract = true\nrate = 20\n",
-            ["pymunk"],
+            ["contact", "pymunk"],
             {"exact": "particles meet each other"},
         ),
         (
             f"[stream]\ncount = {MOST_ALONE + 1}\n",
-            ["exact"],
+            ["exact", "contact"],
             {"pymunk": f"{MOST_ALONE + 1} particles that do not meet would take it minutes"},
         ),
     ],
@@ -257,11 +263,14 @@ def test_engines_that_are_not_for_a_scene_are_left_out(more, engines, skipped):
     assert found.skipped == skipped
 
 
-def test_a_scene_that_expects_nothing_has_its_three_answers_compared():
+def test_a_scene_that_expects_nothing_has_its_answers_compared():
     found = verify(sc.parse(PERPENDICULAR))
     assert found.findings == ()
     assert [row.pair for row in found.agreements] == [
-        *("exact, theory", "pymunk, exact", "pymunk, exact")
+        "exact, theory",
+        *("dop853, theory", "dop853, exact"),
+        *("contact, theory", "contact, exact"),
+        *("pymunk, theory", "pymunk, exact"),
     ]
     assert found.failures == 0
 
@@ -367,8 +376,10 @@ def test_the_inclined_scenes_are_near_the_mass_points_velocity(angle, expected):
 
 def test_a_wrong_expectation_of_a_shipped_scene_is_noticed():
     found = verify(sc.load("perpendicular", ["expect[0].value=0.6"]))
-    assert [row.engine for row in found.findings if not row.holds] == ["exact", "pymunk", "theory"]
-    assert found.failures == 3
+    assert [row.engine for row in found.findings if not row.holds] == [
+        *("exact", "contact", "pymunk", "theory")
+    ]
+    assert found.failures == 4
 
 
 def test_expectations_travel_with_the_recording_and_change_nothing():

@@ -1,4 +1,4 @@
-"""What gets loaded: text waits for no pictures, the exact engine for no pymunk."""
+"""What gets loaded: text waits for no pictures, the exact engine for no pymunk and no wasmtime."""
 
 import json
 import os
@@ -12,7 +12,7 @@ import chutelab
 
 SOURCES = str(Path(chutelab.__file__).parent.parent)
 PICTURES = {"matplotlib", "imageio", "PIL"}
-EVERYTHING = PICTURES | {"numpy", "pydantic", "pymunk", "scipy", "rich", "click"}
+EVERYTHING = PICTURES | {"numpy", "pydantic", "pymunk", "wasmtime", "scipy", "rich", "click"}
 
 WATCH = """
 import json, sys
@@ -64,6 +64,10 @@ def loaded_by(*arguments, cwd=None):
             {"click", "pydantic", "numpy", "pymunk"},
         ),
         (
+            ["run", "perpendicular", "--json", "--engine", "contact"],
+            {"click", "pydantic", "numpy", "wasmtime"},
+        ),
+        (
             ["run", "perpendicular", "--json", "--out", "out", "--only", "csv,npz,json"],
             {"click", "pydantic", "numpy"},
         ),
@@ -77,7 +81,7 @@ def test_a_command_loads_what_it_needs_and_nothing_else(arguments, needed, tmp_p
 def test_a_picture_loads_no_engine(tmp_path):
     loaded = loaded_by("run", "perpendicular", "-q", "--out", "out", "--only", "png", cwd=tmp_path)
     assert "matplotlib" in loaded
-    assert not loaded & {"pymunk", "scipy", "rich"}
+    assert not loaded & {"pymunk", "wasmtime", "scipy", "rich"}
 
 
 def test_importing_the_package_loads_nothing():

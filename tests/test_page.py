@@ -200,7 +200,7 @@ def test_titles_cannot_break_out():
     ("name", "changes", "varies", "said"),
     [
         ("stream-independent", [], [], "stream.count = 10000: a page shows at most 200 particles"),
-        ("stream", ["stream.count=2"], ["plate.angle_deg=0:12:25"], "25 variants need the pymunk"),
+        ("stream", ["stream.count=2"], ["plate.angle_deg=0:12:25"], "25 variants are stepped"),
         ("inclined-40", [], ["plate.restitution=2,3"], "no variant can be run"),
     ],
 )

@@ -88,7 +88,7 @@ CONTRACT = {
     "expect": (),
 }
 
-EXPECT = {"quantity", "value", "tolerance", "tolerance_pymunk", "source"}
+EXPECT = {"quantity", "value", "tolerance", "tolerance_contact", "tolerance_pymunk", "source"}
 
 
 def test_the_defaults_are_the_contract():
@@ -396,7 +396,7 @@ def test_the_schema_describes_every_key_of_the_contract():
         if isinstance(keys, dict):
             assert set(tables[name]["properties"]) == set(keys)
     assert set(tables["expect"]["properties"]) == EXPECT
-    assert set(tables["expect"]["required"]) == EXPECT - {"tolerance_pymunk"}
+    assert set(tables["expect"]["required"]) == EXPECT - {"tolerance_contact", "tolerance_pymunk"}
     assert set(tables["surface"]["properties"]) == {
         *("name", "from", "to", "points", "restitution", "friction", "speed")
     }
@@ -421,7 +421,12 @@ def test_the_schema_knows_no_null_and_gives_the_ranges():
         "degrees",
     )
     assert (plate["restitution"]["minimum"], plate["restitution"]["maximum"]) == (0, 1)
-    assert schema["$defs"]["Run"]["properties"]["engine"]["enum"] == ["auto", "exact", "pymunk"]
+    assert schema["$defs"]["Run"]["properties"]["engine"]["enum"] == [
+        "auto",
+        "exact",
+        "contact",
+        "pymunk",
+    ]
 
 
 def test_reading_a_scene_imports_nothing_heavy():

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+
 import pytest
 
-from chutelab import exact, machine, scene, stepper
+from chutelab import exact, machine, scene
 from chutelab.recording import REASONS
 from chutelab.simulation import ENGINES, choose, simulate
 
@@ -24,8 +26,8 @@ def same(one, other):
 @pytest.mark.parametrize("name", scene.shipped())
 def test_auto_takes_exact_unless_particles_interact(name):
     built = machine.build(loaded(name))
-    assert choose(built) == choose(built, "auto") == ("pymunk" if name == "stream" else "exact")
-    assert [choose(built, engine) for engine in ENGINES[1:]] == ["exact", "pymunk"]
+    assert choose(built) == choose(built, "auto") == ("contact" if name == "stream" else "exact")
+    assert [choose(built, engine) for engine in ENGINES[1:]] == ["exact", "contact", "pymunk"]
 
 
 def test_one_particle_has_nobody_to_interact_with():
@@ -48,6 +50,7 @@ def test_the_scene_chooses_and_the_caller_overrides():
     [
         ("stream", (), "exact", ("run.engine", "stream.interact")),
         ("perpendicular", ("particle.radius=0",), "pymunk", ("particle.radius", "run.engine")),
+        ("perpendicular", ("particle.radius=0",), "contact", ("particle.radius", "run.engine")),
     ],
 )
 def test_what_an_engine_cannot_do_is_refused_with_file_and_keys(name, overrides, engine, words):
@@ -57,7 +60,7 @@ def test_what_an_engine_cannot_do_is_refused_with_file_and_keys(name, overrides,
         assert word in str(raised.value)
 
 
-def test_a_disk_held_in_a_moving_corner_goes_to_pymunk_unless_exact_was_asked_for():
+def test_a_disk_held_in_a_moving_corner_goes_to_contact_unless_exact_was_asked_for():
     corner = {
         "particle": {"radius": 0.05, "spin": True},
         "surface": [
@@ -67,8 +70,8 @@ def test_a_disk_held_in_a_moving_corner_goes_to_pymunk_unless_exact_was_asked_fo
         "stream": {"at": [0.0, 0.06], "velocity": [0.0, 0.0]},
         "run": {"until": 3.0},
     }
-    assert simulate(scene.from_dict(corner, "mine.toml")).engine == "pymunk"
-    with pytest.raises(scene.SceneError, match=r"mine\.toml: run\.engine.*pymunk"):
+    assert simulate(scene.from_dict(corner, "mine.toml")).engine == "contact"
+    with pytest.raises(scene.SceneError, match=r"mine\.toml: run\.engine.*contact"):
         simulate(scene.from_dict(corner, "mine.toml"), engine="exact")
 
 
@@ -79,6 +82,8 @@ def test_a_disk_held_in_a_moving_corner_goes_to_pymunk_unless_exact_was_asked_fo
         ("belt-landing", ("particle.spin=true",), "exact"),
         ("stream-independent", ("stream.count=300", "stream.seed=5"), "exact"),
         ("perpendicular", (), "pymunk"),
+        ("perpendicular", (), "contact"),
+        ("stream", ("stream.count=5", "run.until=1.0"), "contact"),
         ("stream", ("stream.count=5", "run.until=1.0"), "pymunk"),
     ],
 )
@@ -96,8 +101,9 @@ def test_another_seed_gives_another_run():
     assert one.knots.tobytes() != other.knots.tobytes()
 
 
-@pytest.mark.parametrize(("engine", "run"), [("exact", exact.run), ("pymunk", stepper.run)])
-def test_simulating_is_building_and_running(engine, run):
+@pytest.mark.parametrize("engine", ["exact", "contact", "pymunk"])
+def test_simulating_is_building_and_running(engine):
+    run = exact.run if engine == "exact" else import_module(f"chutelab.engines.{engine}").run
     asked = loaded("perpendicular")
     recording = simulate(asked, engine=engine)
     assert same(recording, run(machine.build(asked)))
@@ -106,7 +112,7 @@ def test_simulating_is_building_and_running(engine, run):
     assert [REASONS[n] for n in recording.ended] == ["landed"]
 
 
-@pytest.mark.parametrize("engine", ["exact", "pymunk"])
+@pytest.mark.parametrize("engine", ["exact", "contact", "pymunk"])
 def test_progress_goes_from_0_to_1(engine):
     shares = []
     simulate(loaded("free-fall"), engine=engine, progress=shares.append)

@@ -20,8 +20,20 @@ import chutelab
 from chutelab import cli, machine, scene, simulate, stress
 from chutelab.cli import main
 from chutelab.recorder import StalledError
+from chutelab.recording import Kind
 from chutelab.stress import demands, harness, laws, symmetric, table, watchdog
-from chutelab.stress.case import Case, Ladder, Twin, merged, scene_of, surface, thrown
+from chutelab.stress.case import (
+    ENGINES,
+    TRANSFER,
+    Case,
+    Ladder,
+    Twin,
+    by_name,
+    merged,
+    scene_of,
+    surface,
+    thrown,
+)
 from chutelab.stress.evidence import Evidence
 
 SOURCES = str(Path(chutelab.__file__).parent.parent)
@@ -48,7 +60,7 @@ def listed(folder):
 def evidence(tables=HOP, engine="exact", dt=None, **changes):
     """A run, with the arrays named in `changes` handed to a function that may spoil them."""
     loaded = scene_of(tables, "test", engine, dt)
-    recording = simulate(loaded, "exact" if engine == "exact" else "pymunk")
+    recording = simulate(loaded, by_name(engine))
     spoilt = {name: getattr(recording, name).copy() for name in changes}
     for name, change in changes.items():
         change(spoilt[name])
@@ -209,7 +221,7 @@ def test_a_perturbed_end_opens_the_ledger(field, amount):
 
 
 def crowd(**changes):
-    return evidence(PAIR, "pymunk", 1e-3, **changes)
+    return evidence(PAIR, "contact", 1e-3, **changes)
 
 
 def test_a_crowd_keeps_the_laws_and_meets():
@@ -248,6 +260,101 @@ def test_two_in_one_place_overlap():
     assert not bad.holds
 
 
+def test_nobody_stays_in_another_for_longer_than_a_step():
+    """Two disks of 2 cm, 4 mm deep in each other from the middle on: 0.2 r, and more than 5 %."""
+
+    def still(knots):
+        knots["velocity"] = 0.0
+        half = len(knots) // 2
+        knots["position"][:half] = knots["position"][half - 1]
+        knots["position"][half:] = knots["position"][half - 1] + [0.036, 0.0]
+
+    good, bad = laws.pressed(crowd()), laws.pressed(crowd(knots=still))
+    assert good.holds
+    assert bad.figure == pytest.approx(0.2, rel=1e-9)
+    assert not bad.holds
+
+
+def test_slow_disks_whose_centres_come_within_a_radius_went_through_each_other():
+    """One at rest, one that passes 15 mm from its centre at 1 m/s: a 20th of the radius a step."""
+
+    def ghosts(knots):
+        half = len(knots) // 2
+        first, second = knots[:half], knots[half:]
+        first["velocity"], second["velocity"] = [0.0, 0.0], [1.0, 0.0]
+        first["position"] = [1.0, 0.0]
+        second["position"][:, 0] = 0.5 + second["t"] - second["t"][0]
+        second["position"][:, 1] = 0.015
+
+    good, bad = (laws.no_one_through_another(e) for e in (crowd(), crowd(knots=ghosts)))
+    assert (good.figure, good.bound) == (0, 0.0)
+    assert bad.figure == 1
+    assert "0 and 1" in bad.detail
+
+
+def test_a_bounce_beside_the_surface_is_off_nothing():
+    """An impact 1 nm above the floor, or one that names another surface."""
+    hits = np.flatnonzero(evidence().recording.events["kind"] == Kind.IMPACT)
+    good, bad = teller(laws.on_something, "events", hits[0], "position", [0.0, 1e-9])
+    assert good.holds
+    assert bad.figure == pytest.approx(1e-9, rel=1e-3)
+    assert not bad.holds
+    assert "off floor" in bad.detail
+    wall = merged(HOP, {"surface": [FLOOR, surface("wall", (2.0, 0.0), (2.0, 1.0))]})
+    hits = np.flatnonzero(evidence(wall).recording.events["kind"] == Kind.IMPACT)
+    other = laws.on_something(evidence(wall, events=adder("surface", hits[0], 1)))
+    assert other.figure > 1.0
+
+
+def test_a_collision_with_one_that_is_elsewhere_is_off_nothing():
+    (hit,) = crowd().recording.select(Kind.COLLISION)
+    row = np.flatnonzero(crowd().recording.events["kind"] == Kind.COLLISION)[0]
+    good = laws.on_something(crowd())
+    away = hit["position"] - crowd().recording.at([hit["t"]])[0][0][hit["other"]]
+    bad = laws.on_something(crowd(events=adder("position", row, 0.2 * away)))
+    assert good.holds
+    # 20 % farther from its partner than two radii of 2 cm.
+    assert bad.figure == pytest.approx(0.2 * 0.04, rel=1e-3)
+    assert not bad.holds
+
+
+def test_one_released_in_another_or_in_a_surface_has_no_room():
+    starts = np.flatnonzero(crowd().recording.events["kind"] == Kind.RELEASE)
+    there = crowd().recording.at([crowd().recording.events["t"][starts[1]]])[0][0][0]
+    here = crowd().recording.events["position"][starts[1]]
+
+    def inside(events):
+        events["position"][starts[1]] += (1.0 - 0.03 / np.hypot(*(there - here))) * (there - here)
+
+    assert laws.released_free(crowd()).holds
+    bad = laws.released_free(crowd(events=inside))
+    assert bad.figure == pytest.approx(0.01, rel=1e-9)
+    assert "particle 1 in 0" in bad.detail
+    good, low = teller(laws.released_free, "events", 0, "position", [0.0, -0.297])
+    assert good.holds
+    assert low.figure == pytest.approx(0.001, rel=1e-9)
+    assert "in floor" in low.detail
+
+
+def test_what_rides_on_a_belt_that_will_throw_it_has_not_settled():
+    """Of the surfaces that move, only the outgoing belt is one to settle on."""
+    lying = merged(HOP, {
+        "surface": [{**FLOOR, "speed": 0.0}],
+        "stream": {"at": [0.0, 0.004], "velocity": [0.1, 0.0], "count": 1},
+        "run": {"until": "settled"},
+    })  # fmt: skip
+    assert laws.settled_to_stay(evidence()) is None
+    e = evidence(lying)
+    assert laws.settled_to_stay(e).holds
+    moving = scene_of(merged(lying, {"surface": [{**FLOOR, "speed": 1.0}]}), "test", "exact", None)
+    bad = laws.settled_to_stay(replace(e, machine=machine.build(moving)))
+    assert bad.figure == 1
+    assert "0 on floor" in bad.detail
+    carried = evidence(merged(TRANSFER, {"run": {"until": "settled"}}))
+    assert carried.machine.segments.speed[-1] != 0.0
+    assert laws.settled_to_stay(carried).holds
+
+
 def test_momentum_on_a_frictionless_floor_holds_along_it_only():
     slides = merged(
         PAIR, {"surface": [{**FLOOR, "friction": 0.0, "points": [[-9.0, -0.5], [9.0, -0.5]]}]}
@@ -257,12 +364,12 @@ def test_momentum_on_a_frictionless_floor_holds_along_it_only():
         return lambda knots: np.add.at(knots["velocity"], -1, direction)
 
     verdicts = [
-        laws.momentum(evidence(slides, "pymunk", 1e-3, knots=pushed(direction)))
+        laws.momentum(evidence(slides, "contact", 1e-3, knots=pushed(direction)))
         for direction in ([0.0, 0.0], [0.0, 0.1], [0.1, 0.0])
     ]
     assert [verdict.holds for verdict in verdicts] == [True, True, False]
     rough = merged(slides, {"surface": [{**slides["surface"][0], "friction": 0.1}]})
-    assert laws.momentum(evidence(rough, "pymunk", 1e-3)) is None
+    assert laws.momentum(evidence(rough, "contact", 1e-3)) is None
 
 
 # Demands of single cases
@@ -337,7 +444,7 @@ def test_a_run_is_judged_by_every_law_that_applies():
     names = [result.law for result in found]
     assert names == [
         "finite numbers", "time goes forward", "nobody lost", "lasts to the end",
-        "no one through", "no one inside",
+        "no one through", "no one inside", "bounces off something", "released into room",
         "energy never rises", "ledger closes", "ends as it must",
     ]  # fmt: skip
     assert all(result.holds for result in found)
@@ -352,10 +459,12 @@ def test_steps_and_engines_are_all_run(monkeypatch):
         return simulate(loaded, "exact")
 
     monkeypatch.setattr(harness, "simulate", note)
-    case = Case("hop", "test", HOP, engines=("exact", "pymunk", "fixed"), steps=(0.01, 0.02))
+    case = Case("hop", "test", HOP, engines=ENGINES, steps=(0.01, 0.02))
     list(harness.results([case]))
     assert asked == [
         ("exact", "exact", 1e-3, True),
+        ("contact", "contact", 0.01, True),
+        ("contact", "contact", 0.02, True),
         ("pymunk", "pymunk", 0.01, True),
         ("pymunk", "pymunk", 0.02, True),
         ("pymunk", "pymunk", 0.01, False),

@@ -515,6 +515,7 @@ def rows_for_a_picture():
             if case == "interacting"
             else Record(case, "exact", median=5e-4, error=0.0),
             *rows_of("plain", lambda dt: (3.0 * dt, 2e-5 / dt), (1e-3, 1e-4, 1e-5), case),
+            *rows_of("contact", lambda dt: (1e-8 * dt, 4e-4), (1e-2, 1e-3), case),
             *rows_of("aligned", lambda dt: (1e-9 * dt, 2e-3), (1e-2, 1e-3), case),
             *rows_of("fixed", lambda dt: (dt, 2e-4 / dt), (1e-3, 1e-4), case),
             *(
@@ -538,7 +539,7 @@ def test_the_picture_shows_every_method_slope_and_failure(tmp_path):
         assert ax.get_title(loc="left") == case.title
         assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
         lines = {line.get_gid(): line for line in ax.lines}
-        assert set(lines) >= {"plain", "aligned", "fixed"}
+        assert set(lines) >= {"plain", "contact", "aligned", "fixed"}
         slopes = {t.get_gid(): t.get_text() for t in ax.texts}
         assert slopes["slope plain"] == "−1.0"
         assert slopes["slope fixed"] == "−1.0"
@@ -610,17 +611,17 @@ def test_scaling_is_drawn_with_its_exponents(tmp_path):
     ]
     sizes += [
         Size("interacting", m, n, 9 * n, 1.0, 3, 1e-5 * n**1.25, 900 * n)
-        for m in ("aligned", "fixed")
+        for m in ("contact", "fixed")
         for n in (10, 100, 1000)
     ]
-    sizes.append(Size("interacting", "aligned", 3000, failed="StalledError: particle 7"))
+    sizes.append(Size("interacting", "contact", 3000, failed="StalledError: particle 7"))
     figure = draw_scaling(sizes, ABOUT, path=tmp_path / "s.png")
     labels = [[t.get_text() for t in ax.get_legend().get_texts()] for ax in figure.axes]
     assert labels == [
         ["exact, ∝ N$^{1.00}$"],
         ["exact, ∝ N$^{1.00}$"],
-        ["pymunk, fixed step, ∝ N$^{1.25}$", "pymunk, aligned, ∝ N$^{1.25}$"],
-        ["pymunk, fixed step, ∝ N$^{1.00}$", "pymunk, aligned, ∝ N$^{1.00}$"],
+        ["pymunk, fixed step, ∝ N$^{1.25}$", "contact, ∝ N$^{1.25}$"],
+        ["pymunk, fixed step, ∝ N$^{1.00}$", "contact, ∝ N$^{1.00}$"],
     ]
     assert (tmp_path / "s.png").exists()
 
@@ -687,17 +688,17 @@ def test_bench_scaling(tmp_path, monkeypatch):
     assert "400" in said
     assert sorted(file.name for file in tmp_path.iterdir()) == ["scaling.png", "scaling.tsv"]
     sizes, _ = from_tsv((tmp_path / "scaling.tsv").read_text(encoding="utf-8"), Size)
-    assert [one.events for one in sizes] == [4, 40, 400]
+    assert [one.events for one in sizes] == 2 * [4, 40, 400]  # exact, contact
 
 
 @pytest.mark.parametrize(
     ("arguments", "allowed"),
     [
         (["transfers"], "'transfer', 'bounce', 'belt', 'independent', 'interacting', 'process'"),
-        (["--method", "box2d"], "'exact', 'aligned', 'fixed', 'plain', 'dop853'"),
+        (["--method", "box2d"], "'exact', 'contact', 'aligned', 'fixed', 'plain', 'dop853'"),
         (["--repeats", "0"], "1<=x<=1000"),
         (["--scaling", "transfer"], "independent and interacting"),
-        (["--scaling", "--method", "plain"], "exact, aligned, fixed"),
+        (["--scaling", "--method", "plain"], "exact, contact, fixed"),
         (["--out", ""], "the name of a folder is empty"),
     ],
 )

@@ -14,7 +14,7 @@ True
   to build, the paper's figures.
 
 Each is imported when it is first asked for, so that text output never waits for matplotlib, nor the
-exact engine for pymunk.
+exact engine for pymunk or wasmtime.
 """
 
 from __future__ import annotations

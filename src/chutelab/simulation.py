@@ -18,17 +18,17 @@ if TYPE_CHECKING:
 
     Progress = Callable[[float], None]
 
-ENGINES = ("auto", "exact", "pymunk")
+ENGINES = ("auto", "exact", "contact", "pymunk")
 
 
 def choose(machine: Machine, engine: str | None = None) -> str:
-    """Return the engine that will run: exact whenever particles do not interact.
+    """Return the engine that runs first: exact, unless particles interact or another is asked for.
 
     Parameters
     ----------
     machine : Machine
         The scene, resolved.
-    engine : {"auto", "exact", "pymunk"}, optional
+    engine : {"auto", "exact", "contact", "pymunk"}, optional
         Overrides the scene's ``run.engine``.
 
     Raises
@@ -41,7 +41,7 @@ def choose(machine: Machine, engine: str | None = None) -> str:
         raise ValueError(f"engine = {wanted!r}: one of {', '.join(ENGINES)}")
     if wanted != "auto":
         return wanted
-    return "pymunk" if machine.interact else "exact"
+    return "contact" if machine.interact else "exact"
 
 
 def simulate(
@@ -55,9 +55,9 @@ def simulate(
     ----------
     scene : Scene
         From `chutelab.load`.
-    engine : {"auto", "exact", "pymunk"}, optional
+    engine : {"auto", "exact", "contact", "pymunk"}, optional
         Overrides the scene's ``run.engine``. With auto, what the exact engine cannot follow (a
-        spinning disk between a moving surface and another) goes to pymunk.
+        spinning disk between a moving surface and another) goes to contact.
     progress : callable, optional
         Called now and then with the share of the run that is done, 0 to 1.
 
@@ -72,38 +72,28 @@ def simulate(
     SceneError
         If the geometry contradicts itself, or the engine cannot run the scene.
     """
-    begin = perf_counter()
+    began = perf_counter()
     machine = build(scene)
     name = choose(machine, engine)
-    recording = _exact(scene, machine, engine, progress, begin) if name == "exact" else None
-    if recording is None:
-        recording = _stepped(scene, machine, progress)
-        recording = replace(recording, seconds=perf_counter() - begin)
-    return recording
+    if name == "exact":
+        if machine.interact:
+            allowed = "contact or pymunk, because stream.interact = true"
+            raise _refused(scene, "run.engine", "exact", allowed)
+        from chutelab.exact import CornerError, run
 
-
-def _exact(
-    scene: Scene, machine: Machine, engine: str | None, progress: Progress | None, began: float
-) -> Recording | None:
-    """Run the exact engine; None if it meets what it cannot do, and another was not ruled out."""
-    if machine.interact:
-        raise _refused(scene, "run.engine", "exact", "pymunk, because stream.interact = true")
-    from chutelab.exact import CornerError, run
-
-    try:
-        return run(machine, progress, began)
-    except CornerError as error:
-        if "exact" in (engine, scene.run.engine):
-            raise _refused(scene, "run.engine", "exact", str(error)) from error
-        return None
-
-
-def _stepped(scene: Scene, machine: Machine, progress: Progress | None) -> Recording:
+        try:
+            return run(machine, progress, began)
+        except CornerError as error:
+            if "exact" in (engine, scene.run.engine):
+                raise _refused(scene, "run.engine", "exact", str(error)) from error
+            name = "contact"
     if machine.particle.radius == 0.0:
-        raise _refused(scene, "particle.radius", 0.0, 'more than 0 with run.engine = "pymunk"')
-    from chutelab.stepper import run
-
-    return run(machine, progress)
+        raise _refused(scene, "particle.radius", 0.0, f'more than 0 with run.engine = "{name}"')
+    if name == "contact":
+        from chutelab.engines.contact import run as follow
+    else:
+        from chutelab.engines.pymunk import run as follow
+    return replace(follow(machine, progress), seconds=perf_counter() - began)
 
 
 def _refused(scene: Scene, key: str, value: object, allowed: str) -> SceneError:

@@ -1,9 +1,10 @@
 """What a run answers, and how far two runs are apart.
 
 The answers of a run are: place, time and velocity of every particle's separation, of its first
-impact on each surface, of its landing and of its end (where that is not a matter of definition);
-and the entries of the energy ledger. In a chaotic crowd no particle's own way can be computed; its
-answers are the mean landing point, how many land, and the ledger.
+impact on each surface and of its landing, with the impulses of these two; its place at the end
+(where that is not a matter of definition); and the entries of the energy ledger. In a crowd no
+particle's own way can be computed for long; its answers are the mean landing point and the
+ledger.
 """
 
 from __future__ import annotations
@@ -61,6 +62,11 @@ def each(recording: Recording) -> Iterator[Answer]:
                 values = np.full((recording.count, *events[column].shape[1:]), np.nan)
                 values[events["particle"]] = events[column]
                 yield Answer(name, quantity, values)
+            if kind != Kind.SEPARATION:
+                values = np.full((recording.count, 2), np.nan)
+                pushed = [events["normal_impulse"], events["tangential_impulse"]]
+                values[events["particle"]] = np.transpose(pushed) / recording.particle.mass
+                yield Answer(f"impulse per mass of the {where}", "speed", values)
     yield Answer("place of the end", "place", _ends(recording))
     yield Answer("number of particles that end so", "number", recording.ended.astype(np.float64))
     yield from _booked(recording)

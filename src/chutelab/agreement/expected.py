@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from chutelab.scene import Expect, Scene
     from chutelab.theory import Transfer
 
+ENGINES = ("exact", "contact", "pymunk")
+
 MOST_ALONE = 50
 """Particles that do not meet get a pymunk space each; beyond this many it takes minutes."""
 
@@ -40,7 +42,7 @@ class Finding:
     quantity, unit, source : str
         What was looked at, in what unit, and who says what it should be.
     engine : str
-        ``exact``, ``pymunk`` or ``theory``.
+        ``exact``, ``contact``, ``pymunk`` or ``theory``.
     expected, simulated : float
         In `unit`; NaN where the theory, or the run, has none.
     error : float
@@ -98,11 +100,11 @@ def verify(scene: Scene, progress: Callable[[float], None] | None = None) -> Ver
     Raises
     ------
     SceneError
-        If neither engine can run it.
+        If no engine can run it.
     """
     skipped = _skipped(scene) if scene.expect else {}
     recordings: dict[str, Recording] = {}
-    for engine in ("exact", "pymunk"):
+    for engine in ENGINES:
         if scene.expect and engine not in skipped:
             try:
                 recordings[engine] = simulate(scene, engine, progress)
@@ -127,7 +129,7 @@ def _skipped(scene: Scene) -> dict[str, str]:
     if stream.interact and stream.count > 1:
         return {"exact": "particles meet each other"}
     if scene.particle.radius == 0.0:
-        return {"pymunk": "it has no mass points"}
+        return dict.fromkeys(("contact", "pymunk"), "it has no mass points")
     if stream.count > MOST_ALONE:
         return {"pymunk": f"{stream.count} particles that do not meet would take it minutes"}
     return {}

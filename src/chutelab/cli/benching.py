@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from chutelab.workprecision import Record, Size
 
 CASES = ("transfer", "bounce", "belt", "independent", "interacting", "process")
-METHODS = ("exact", "aligned", "fixed", "plain", "dop853")
+METHODS = ("exact", "contact", "aligned", "fixed", "plain", "dop853")
 MANY = ("independent", "interacting")
-STREAMED = ("exact", "aligned", "fixed")
+STREAMED = ("exact", "contact", "fixed")
 """Methods that are measured against the number of particles."""
 
 REPEATS = 9
@@ -77,7 +77,8 @@ def bench(
 
     \b
     exact        the event-driven engine
-    aligned      the pymunk engine, steps ending at impacts
+    contact      the contact engine
+    aligned      the pymunk engine, steps of a lone particle ending at contacts
     fixed        the pymunk engine, all steps alike (run.align = false)
     plain        Pymunk as most people write it: step, read, repeat
     dop853       SciPy's integrator with events (pip install "chutelab[bench]")

@@ -93,8 +93,8 @@ def _steps(steps: Stepping) -> Iterator[str]:
 
     longest = write_size(steps.dt, "s")
     if steps.aligned:
-        yield from _item("steps", f"at most {longest} while particles touch")
-        yield from _item("tunnelling", "none at any speed: steps end at contacts")
+        yield from _item("steps", f"at most {longest} while contacts last")
+        yield from _item("tunnelling", "none at any speed: blows have their own instants")
     else:
         yield from _item("steps", f"all of {longest}")
         room = f"a surface catches it within {write_size(steps.bound, 'm')}"
@@ -108,11 +108,6 @@ def _steps(steps: Stepping) -> Iterator[str]:
                 f" {write_size(steps.way, 'm')} in a step, and {room}:"
                 f" safe below dt = {write_size(steps.longest, 's')}",
             )
-    yield from _item(
-        "slop",
-        f"overlaps up to {write_size(steps.slop, 'm')} are left alone,"
-        f" {100.0 * steps.slop_to_radius:.2g} % of the radius",
-    )
 
 
 def _cost(effort: Effort) -> Iterator[str]:

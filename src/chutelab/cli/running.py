@@ -50,7 +50,7 @@ def _accuracy(_ctx: click.Context, _parameter: click.Parameter, text: str | None
 @click.argument("scene", shell_complete=complete_scene)
 @click.option(
     "--engine",
-    type=click.Choice(["auto", "exact", "pymunk"]),
+    type=click.Choice(["auto", "exact", "contact", "pymunk"]),
     help="Same as --set run.engine=...",
 )
 @click.option("--dt", metavar="S", type=float, help="Same as --set run.dt=S.")

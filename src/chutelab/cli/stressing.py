@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from chutelab.stress import Result
     from chutelab.stress.table import Run
 
-ENGINES = ("exact", "pymunk", "fixed")
+ENGINES = ("exact", "contact", "pymunk", "fixed")
 
-HEAD = " {:<23} {:<6} {:>6} {:>5} {:>7} {:>7}  {}"
+HEAD = " {:<22} {:<7} {:>6} {:>5} {:>7} {:>7}  {}"
 """A line of at most 80 columns."""
 
 

@@ -61,7 +61,7 @@ def _complete_column(
 @click.option("--seed", type=int, default=0, help="Seed of the samples.", show_default=True)
 @click.option(
     "--engine",
-    type=click.Choice(["auto", "exact", "pymunk"]),
+    type=click.Choice(["auto", "exact", "contact", "pymunk"]),
     help="Same as --set run.engine=...",
 )
 @set_option

@@ -1,4 +1,4 @@
-"""``verify``: what scenes are expected to show, and the three answers side by side."""
+"""``verify``: what scenes are expected to show, and all answers side by side."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 OK, FAILED = "ok", "FAILED"
 
 
-@click.command(short_help="Check what scenes promise; compare theory, exact and pymunk.")
+@click.command(short_help="Check what scenes promise; compare independent answers.")
 @click.argument("scenes", metavar="[SCENE]...", nargs=-1, shell_complete=complete_scene)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @click.pass_context
@@ -29,8 +29,8 @@ def verify(ctx: click.Context, scenes: tuple[str, ...], as_json: bool) -> None:
     """Check what each SCENE is expected to show (default: all shipped ones).
 
     Every [[expect]] of a scene is looked at on each engine that can run it, and in the theory.
-    Then theory, exact and pymunk are compared on its particle 0, taken alone. Exit code 1 if an
-    error is larger than its tolerance.
+    Then theory, exact, contact, pymunk and, where SciPy is installed, its DOP853 are compared on
+    its particle 0, taken alone. Exit code 1 if an error is larger than its tolerance.
     """
     from chutelab import agreement
     from chutelab.cli import console
@@ -47,10 +47,15 @@ def verify(ctx: click.Context, scenes: tuple[str, ...], as_json: bool) -> None:
     failures = sum(answer.failures for answer in found.values())
     if as_json:
         answers = [_plain(name, loaded[name], answer) for name, answer in found.items()]
-        console.show_json({"format": 1, "failures": failures, "scenes": answers})
+        shares = {name: shared for name, (_, shared) in agreement.ANSWERS.items()}
+        printed = {"format": 1, "failures": failures, "shares": shares, "scenes": answers}
+        console.show_json(printed)
     else:
         for name, answer in found.items():
             console.show(*_shown(name, loaded[name], answer))
+        click.echo("What the answers have in common:")
+        for one, (how, shared) in agreement.ANSWERS.items():
+            click.echo(f"  {one:<9}{how:<30}{shared}")
         click.echo("Errors and tolerances are relative where they have no unit.")
         click.echo(f"{failures} outside the tolerance" if failures else "all within the tolerance")
     if failures:
@@ -80,8 +85,9 @@ def _plain(name: str, scene: Scene, answer: Verification) -> dict[str, Any]:
             {
                 "pair": row.pair.split(", "),
                 "quantity": row.quantity,
-                "difference": row.difference,
+                "difference": None if row.difference is None else _or_null(row.difference),
                 "tolerance": row.tolerance,
+                "least": row.least,
                 "holds": row.holds,
             }
             for row in answer.agreements
@@ -157,7 +163,9 @@ def _compared(row: Agreement) -> Iterator[Text]:
         for number, line in enumerate(wrapped(pair, WIDTH - 6)):
             yield Text(f"    {'  ' if number else ''}{line}")
         return
-    difference = "-" if row.difference is None else f"{row.difference:.1e}"
-    tolerance = "-" if row.tolerance is None else f"{row.tolerance:.1e}"
-    columns = f"    {pair:<42}{difference:>14}{tolerance:>13}"
+    form = ".1f" if row.least else ".1e"
+    difference = "-" if row.difference is None else f"{row.difference:{form}}"
+    tolerance = "-" if row.tolerance is None else f"{row.tolerance:{form}}"
+    least = ">= " if row.least else ""
+    columns = f"    {pair:<48}{difference:>8}{least + tolerance:>13}"
     yield _judged(columns, row.holds, promised=row.tolerance is not None)

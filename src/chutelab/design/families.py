@@ -39,7 +39,7 @@ def suits(scene: Scene, keys: Sequence[str], quantities: Sequence[Quantity]) -> 
     return (
         scene.stream.count == 1
         and scene.stream.at is None
-        and scene.run.engine != "pymunk"
+        and scene.run.engine not in ("contact", "pymunk")
         and all(is_plain(key) for key in keys)
         and all(_readable(quantity) for quantity in quantities)
     )

@@ -48,7 +48,7 @@ def hold(
     if s.spins and moving.any():
         raise CornerError(
             "a spinning disk is held between two surfaces of which one moves; the exact engine"
-            ' cannot follow that: run it with engine = "pymunk"'
+            ' cannot follow that: run it with engine = "contact"'
         )
     v, mass = s.v.take(who, axis=1), of(s.mass, who)
     kinetic = 0.5 * mass * (dot(v, v) + 0.5 * s.z[who] ** 2)

@@ -1,4 +1,4 @@
-"""`Machine` and its parts: what both engines take, and all they take."""
+"""`Machine` and its parts: what the engines take, and all they take."""
 
 from __future__ import annotations
 
@@ -115,14 +115,14 @@ class Machine:
     end_time : float
         s; no track goes on after it.
     dt : float
-        s; longest step of the pymunk engine.
+        s; step of lasting contacts (contact), longest step (pymunk).
     align : bool
-        Whether its steps end at impacts.
+        Whether the pymunk engine's steps of a lone particle end at contacts.
     interact : bool
         Whether particles meet each other.
     pair_restitution, pair_friction : float
         Of two particles.
-    engine : {"auto", "exact", "pymunk"}
+    engine : {"auto", "exact", "contact", "pymunk"}
         What the scene asks for.
     plate_warnings : tuple of str
         What is to be said of a nominal particle that misses the plate.

@@ -25,7 +25,7 @@ MOST_VARIANTS: Final = 1_000
 """Variants on one page: two sliders of some 30 positions each."""
 
 MOST_STEPPED: Final = 24
-"""Variants on one page of a scene that pymunk steps, because each may take seconds."""
+"""Variants on one page of a scene that is stepped, because each may take seconds."""
 
 MOST_PARTICLES: Final = 200
 """Particles on one page: a phone draws all of them 60 times a second."""
@@ -176,7 +176,7 @@ def _check(found: Sequence[Variant]) -> None:
     )
     if stepped > MOST_STEPPED:
         raise PageError(
-            f"{stepped} variants need the pymunk engine, at most {MOST_STEPPED} are allowed,"
+            f"{stepped} variants are stepped, at most {MOST_STEPPED} are allowed,"
             " because each may take seconds: vary in fewer steps, or add"
             " --set stream.interact=false --set run.engine=exact"
         )

@@ -49,6 +49,7 @@ LOOKS: dict[str, dict[str, Any]] = {
     "dop853": {"color": colours.PURPLE, "marker": "D", "markersize": 6.5},
     "fixed": {"color": colours.ORANGE, "marker": "s", "markersize": 9.0},
     "aligned": {"color": colours.GREEN, "marker": "o", "markersize": 6.5},
+    "contact": {"color": colours.SKY, "marker": "P", "markersize": 8.0},
     "exact": {"color": colours.BLUE, "marker": "*", "markersize": 15.0},
 }
 """Colour and marker of each method: two signs, for readers who tell colours apart

@@ -10,7 +10,7 @@ import numpy as np
 from chutelab import scene as scenes
 from chutelab.machine import build
 from chutelab.preflight.results import Advice
-from chutelab.recording import REASONS
+from chutelab.recording import REASONS, Kind
 from chutelab.scene import SceneError
 
 if TYPE_CHECKING:
@@ -68,11 +68,29 @@ def advice(
         yield from _ending(scene, machine, tried.recording)
     if tried.trouble:
         yield Advice(f"a trial run did not come to an end: {tried.trouble}", LOOK)
-    if steps is not None and not machine.interact and machine.count > 1:
+    if tried.recording is not None:
+        yield from _waiting(scene, machine, tried.recording)
+    if scene.run.engine == "pymunk" and not machine.interact and machine.count > 1:
         yield Advice(
             f"pymunk steps {machine.count} particles one after the other, in about"
             f" {cost.seconds:.2g} s",
             'run.engine = "auto", for the exact engine: all of them at once',
+        )
+
+
+def _waiting(scene: Scene, machine: Machine, tried: Recording) -> Iterator[Advice]:
+    """Yield how many of the trial's particles found their place taken, and how long they waited."""
+    releases = tried.select(Kind.RELEASE)
+    late = releases["t"] - machine.releases.t[releases["particle"]]
+    waited = late > 0.5 * scene.run.dt
+    if waited.any():
+        # Each waits for all that waited before it.
+        period = 1.0 / scene.stream.rate + late.max() / max(1, tried.count - 1)
+        slower = _down((1.0 - MARGIN) / period)
+        yield Advice(
+            f"of {tried.count} particles tried, {np.count_nonzero(waited)} wait for a free place to"
+            f" be released, up to {late.max():.3g} s",
+            f"stream.rate = {slower:g}, or a larger stream.bed_height",
         )
 
 

@@ -26,7 +26,7 @@ TOGETHER = 400.0
 """Particles that cost the exact engine as much again as a round costs by itself."""
 
 BODIES = 50.0
-"""The same for a step of the pymunk engine."""
+"""The same for a step of an engine with steps."""
 
 IN_THE_JET = 2.5
 """Contacts of a particle in a crowd up to its landing, where no trial tells."""
@@ -36,7 +36,7 @@ TO_REST, NEIGHBOURS = 12.0, 10.0
 which half of those that are to be met are there."""
 
 STEP = 3e-4
-"""s for a step of the pymunk engine with a few particles, where no trial tells."""
+"""s for a step with a few particles, where no trial tells: of Chipmunk, the slower engine."""
 
 ROUNDS = 10
 """Rounds of the exact engine for a contact, at most about: a slip round the pulley takes the most;

@@ -50,7 +50,7 @@ def skipped(scene: Scene, machine: Machine, engine: str) -> Iterator[Part]:
         yield Part("collisions", f"of particles with each other: {why}")
     if engine == "exact":
         yield Part("steps", "the next event is solved for, so no flight is stepped")
-    elif machine.align:
-        yield Part("flights", "steps begin and end at contacts, what is between is not stepped")
+    elif engine == "contact" or (machine.align and not machine.interact):
+        yield Part("flights", "only contacts that last are stepped, blows have their own instants")
     if machine.until == "landed":
         yield Part("what follows", 'the first touch of the outgoing belt: run.until = "landed"')

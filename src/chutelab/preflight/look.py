@@ -37,7 +37,7 @@ def preflight(scene: Scene) -> Preflight:
     if recording is not None and recording.engine != engine:
         engine = recording.engine
         why = "a spinning disk between surfaces of which one moves is beyond the exact engine"
-    steps = stepping(machine, tried.lone, recording) if engine == "pymunk" else None
+    steps = None if engine == "exact" else stepping(machine, engine, tried.lone, recording)
     cost = effort(scene, engine, tried)
     return Preflight(
         title=machine.title,

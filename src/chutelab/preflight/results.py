@@ -15,26 +15,22 @@ class Part:
 
 @dataclass(frozen=True)
 class Stepping:
-    """What the finite steps of the pymunk engine mean for a scene.
+    """What finite steps mean for a scene.
 
     Attributes
     ----------
     dt : float
         Longest step, s.
     aligned : bool
-        Whether steps end at impacts; then nothing is passed through at any speed.
+        Whether blows are met at their own instants; then nothing is passed through at any speed.
     speed : float or None
         Highest speed seen in the trial run, m/s; None if there was none.
     way : float or None
         What a particle covers in a step at that speed, m.
     bound : float
-        What it must stay below if steps are not aligned: r and half a surface's thickness, m.
+        What it must stay below if steps are not aligned: the radius, m.
     longest : float or None
         The longest step that would, s.
-    slop : float
-        Overlap that is left alone so that resting contacts persist, m.
-    slop_to_radius : float
-        The same as a share of the radius.
     """
 
     dt: float
@@ -43,8 +39,6 @@ class Stepping:
     way: float | None
     bound: float
     longest: float | None
-    slop: float
-    slop_to_radius: float
 
     @property
     def safe(self) -> bool:

@@ -21,7 +21,7 @@ PATIENCE = 0.12
 """s of trial run at most: the look as a whole is to take less than half a second."""
 
 INDEPENDENT, CROWD, ALONE = 16, 24, 1
-"""Particles of a trial: exact, colliding, and one after the other in pymunk."""
+"""Particles of a trial: not colliding, colliding, and one after the other in pymunk."""
 
 WARMING = 0.05
 """s; a trial shorter than this is run once more, because its first time is mostly warming up."""
@@ -81,7 +81,7 @@ def trial(scene: Scene, engine: str) -> Trial:
         If the engine that the scene asks for cannot run it.
     """
     crowd = is_crowd(scene)
-    most = INDEPENDENT if engine == "exact" else CROWD if crowd else ALONE
+    most = CROWD if crowd else ALONE if engine == "pymunk" else INDEPENDENT
     count = min(scene.stream.count, most)
     landed = crowd and scene.run.until == "settled" and scene.outgoing is not None
     run = {"until": "landed"} if landed else {}

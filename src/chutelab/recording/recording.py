@@ -55,7 +55,7 @@ class Recording(Shown):
         The scene in canonical JSON, as `Scene.model_dump_json` writes it; an engine may give a
         function instead, so that it is written only when somebody asks.
     title, engine : str
-        The scene's title; ``"exact"`` or ``"pymunk"``.
+        The scene's title; ``"exact"``, ``"contact"`` or ``"pymunk"``.
     particle : Particle
         Radius, mass and inertia.
     gravity : float
@@ -75,7 +75,7 @@ class Recording(Shown):
         Ledger entries (J) of each surface, summed over particles. Of a family of machines (see
         `chutelab.exact.run`), and of none else, those of each particle, (N, len(surfaces), 3).
     steps : int
-        Steps (pymunk) or rounds (exact) taken.
+        Rounds (exact) or steps (contact, pymunk) taken.
     contacts : int
         Impacts and collisions resolved.
     seconds : float

@@ -42,9 +42,11 @@ class Expect(Table):
         "What it may be off: a number is relative (0.01 is 1 %; of the value, or of what such "
         'quantities are measured by in the scene if that is more), a string absolute ("0.5 mm")',
     )
+    tolerance_contact: Tolerance | Words | None = described(
+        None, 'The same for the contact engine, or "none"; default: tolerance'
+    )
     tolerance_pymunk: Tolerance | Words | None = described(
-        None,
-        'The same for the pymunk engine, whose steps are finite, or "none"; default: tolerance',
+        None, 'The same for the pymunk engine, or "none"; default: tolerance'
     )
     source: Text = described(
         ..., "Who says so: an equation or a table of the paper, a closed form", max_length=200
@@ -55,9 +57,8 @@ class Expect(Table):
 
         None if nothing is promised.
         """
-        tolerance = self.tolerance
-        if engine == "pymunk" and self.tolerance_pymunk is not None:
-            tolerance = self.tolerance_pymunk
+        own = {"contact": self.tolerance_contact, "pymunk": self.tolerance_pymunk}.get(engine)
+        tolerance = self.tolerance if own is None else own
         if tolerance == UNPROMISED:
             return None
         return read_size(tolerance) if isinstance(tolerance, str) else (tolerance, "%")
@@ -78,7 +79,7 @@ def expectation_conflicts(
     if given.get("value") == THEORY and name not in measures.SYMBOLS:
         text = f"a number; the theory has no {name}, only {', '.join(measures.SYMBOLS)}"
         yield Fault(f"{path}.value", THEORY, text)
-    for key in ("tolerance", "tolerance_pymunk"):
+    for key in ("tolerance", "tolerance_contact", "tolerance_pymunk"):
         tolerance = given.get(key)
         if not isinstance(tolerance, str) or (key != "tolerance" and tolerance == UNPROMISED):
             continue

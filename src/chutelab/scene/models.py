@@ -182,8 +182,8 @@ class Stream(Table):
 class Run(Table):
     """How the scene is simulated, and until when."""
 
-    engine: Literal["auto", "exact", "pymunk"] = described(
-        "auto", '"auto" takes exact where particles do not interact, else pymunk'
+    engine: Literal["auto", "exact", "contact", "pymunk"] = described(
+        "auto", '"auto" takes exact where particles do not interact, else contact'
     )
     until: Literal["landed", "settled"] | Duration = described(
         None,
@@ -194,9 +194,16 @@ class Run(Table):
     max_time: Duration = described(
         30.0, "Bound on every ending, counted from the last release", "s"
     )
-    dt: Number = described(0.001, "Longest step of the pymunk engine", "s", ge=1e-7, le=0.1)
+    dt: Number = described(
+        0.001,
+        "Step of contacts that last (contact engine), longest step (pymunk engine)",
+        "s",
+        ge=1e-7,
+        le=0.1,
+    )
     align: bool = described(
-        True, "Whether steps of the pymunk engine end at impacts, or all last dt (for comparison)"
+        True,
+        "Whether the pymunk engine's steps of a lone particle end at contacts, or all last dt",
     )
 
 

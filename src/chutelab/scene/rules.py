@@ -114,15 +114,15 @@ def _engine(look: Look) -> Iterator[Fault]:
         if look("particle", "spin") is True:
             text = "particle.radius is 0, and a mass point cannot turn"
             yield Fault("particle.spin", True, text)
-        if engine == "pymunk":
-            text = "particle.radius is 0, and pymunk needs disks (> 0)"
+        if engine in ("contact", "pymunk"):
+            text = f"particle.radius is 0, and {engine} needs disks (> 0)"
             yield Fault("run.engine", engine, text)
         if interact:
             text = "particle.radius is 0, and mass points never meet"
             yield Fault("stream.interact", True, text)
     count = look("stream", "count")
     if interact and engine == "exact" and count > 1:
-        text = f"stream.interact with stream.count = {count} needs the pymunk engine"
+        text = f"stream.interact with stream.count = {count} needs contact or pymunk"
         yield Fault("run.engine", engine, text)
 
 

@@ -18,11 +18,14 @@ if TYPE_CHECKING:
     Tables = Mapping[str, Any]
     Map = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
-ENGINES = ("exact", "pymunk", "fixed")
+ENGINES = ("exact", "contact", "pymunk", "fixed")
 """``fixed`` is pymunk with run.align = false: every step lasts dt."""
 
+LONE, CROWD = ("exact", "contact", "pymunk"), ("contact", "pymunk")
+"""Those that follow particles which do not meet, and which do."""
+
 STEPS = (1e-3, 1.0 / 30.0)
-"""s; pymunk's default, and two frames of a game."""
+"""s; the default, and two frames of a game."""
 
 PATIENCE = 20.0
 """s of wall time that one run may take."""
@@ -55,7 +58,7 @@ class Twin:
 
 @dataclass(frozen=True)
 class Ladder:
-    """Runs at steps halved again and again; the error has to fall with them, at first order.
+    """Runs at steps halved again and again; the error has to fall with them.
 
     Attributes
     ----------
@@ -65,20 +68,23 @@ class Ladder:
         What is observed of a recording.
     floor : float
         Error (of the quantity's own unit) that rounding explains: below it halving changes nothing.
+    claimed : float
+        Order of the method.
     """
 
     steps: tuple[float, ...]
     quantity: Callable[[Recording], float]
     floor: float
+    claimed: float = 1.0
 
     @property
     def order(self) -> float:
-        """The least order that may be found: 1, less what chance may do to it.
+        """The least order that may be found: the claimed one, less what chance may do to it.
 
         What happens at the end of a step happens up to a step late, at a coarse step perhaps a
         quarter as late as it might: that is two of the halvings.
         """
-        return 1.0 - 2.0 / (len(self.steps) - 1)
+        return self.claimed - 2.0 / (len(self.steps) - 1)
 
 
 @dataclass(frozen=True)
@@ -120,7 +126,7 @@ class Case:
     name: str
     group: str
     tables: Tables
-    engines: tuple[str, ...] = ("exact", "pymunk")
+    engines: tuple[str, ...] = LONE
     steps: tuple[float, ...] = STEPS
     formula: Callable[[Evidence], Verdict | None] | None = None
     refusals: Mapping[str, str] = field(default_factory=dict)
@@ -138,12 +144,17 @@ class Case:
         return replace(self, **changes)
 
 
+def by_name(engine: str) -> str:
+    """Return what run.engine calls one of `ENGINES`."""
+    return "pymunk" if engine == "fixed" else engine
+
+
 def scene_of(tables: Tables, name: str, engine: str, dt: float | None) -> Scene:
     """Validate a scene for an engine and a step."""
     from chutelab.scene import from_dict
 
     run = {**tables.get("run", {})}
-    run["engine"] = "exact" if engine == "exact" else "pymunk"
+    run["engine"] = by_name(engine)
     if dt is not None:
         run["dt"] = dt
     if engine == "fixed":

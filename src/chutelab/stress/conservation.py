@@ -8,7 +8,7 @@ import numpy as np
 
 from chutelab.ledger import ledger
 from chutelab.stress.barriers import overlap
-from chutelab.stress.evidence import EPS, ROUNDINGS, Verdict
+from chutelab.stress.evidence import EPS, PRESSED, ROUNDINGS, Verdict
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,9 +19,14 @@ A_CONTACT = 2.0
 """eps that one contact may move an energy by: half an ulp for each of two velocity components, a
 height and a sum."""
 
-CROWD = 1e-3
-"""Share of the energy turned over that interacting particles in pymunk may gain or lose: the
-promise of the engine, for the overlaps of a pile are parted with work that nobody books."""
+BOOKED = 1e-9
+"""Share of the energy turned over that the contact engine may misbook in a crowd: its promise."""
+
+LEVERS = 1e-3
+"""The same of Chipmunk, whose impulses act on arms that are shorter by the overlap."""
+
+HAIR = 1e-10
+"""Share of the radius by which the pymunk engine's disks are larger, and so their levers."""
 
 BALANCES = 2000
 """Times at which the energy of a crowd is summed."""
@@ -67,7 +72,10 @@ def _energy_of_crowd(e: Evidence) -> Verdict:
     rise = gain - np.minimum.accumulate(gain)
     at, scale = int(np.argmax(rise)), ledger(e.recording).turned_over
     where = f"of {scale:.3g} J, at t = {times[at]:.6g} s"
-    return Verdict(float(rise[at]) / scale, _energy_bound(e), where)
+    # An overlap that is parted lifts a disk by no more than it may be pressed.
+    m = e.machine
+    lifted = e.recording.count * m.particle.mass * m.gravity * PRESSED * m.particle.radius
+    return Verdict(float(rise[at]) / scale, _energy_bound(e) + lifted / scale, where)
 
 
 def residual(e: Evidence) -> Verdict | None:
@@ -82,21 +90,21 @@ def residual(e: Evidence) -> Verdict | None:
 def _energy_bound(e: Evidence) -> float:
     """Bound what numbers may do to the energy, as a share of the energy in play.
 
-    Contacts round it. In pymunk a lone particle's is moved, besides, where an overlap of a step is
-    parted: each contact by the weight times what `Evidence.late` says of a particle that was at
-    rest, as impulses are booked to the last bit.
+    Contacts round it. In a stepped engine a lone particle's is moved, besides, where an overlap is
+    parted: each contact by the weight times `Evidence.late`, as impulses are booked to the last
+    bit.
     """
     rounding = EPS * (ROUNDINGS + A_CONTACT * e.recording.contacts)
     if e.dt is None:
         return rounding
-    if e.crowd:
-        return CROWD
-    from chutelab.stepper.solids import SLOP
-
-    m = e.machine
-    sunk = SLOP * m.particle.radius + m.gravity * e.dt**2
+    if e.crowd and e.engine == "contact":
+        return BOOKED
+    m, steps = e.machine, EPS * A_CONTACT * e.recording.steps
     touched = max(1, e.recording.contacts)
-    return rounding + touched * m.particle.mass * m.gravity * sunk / e.energy
+    scale = ledger(e.recording).turned_over if e.crowd else e.energy
+    if e.engine != "contact":
+        steps += LEVERS if e.crowd else touched * HAIR
+    return rounding + steps + touched * m.particle.mass * m.gravity * e.late / scale
 
 
 def momentum(e: Evidence) -> Verdict | None:

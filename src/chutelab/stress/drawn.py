@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from chutelab.stress.case import Case, surface, thrown
+from chutelab.stress.case import LONE, Case, surface, thrown
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,7 +15,7 @@ QUICK, MANY = 20, 500
 """Machines in the quick set, and in all."""
 
 RESOLVED = 1e-3
-"""m; smaller disks than this are left to the exact engine here: `extremes` has them for both."""
+"""m; smaller disks than this are left to the exact engine here: `extremes` has them for all."""
 
 SHORTEST = 0.05
 """m; shortest segment drawn."""
@@ -72,7 +72,7 @@ def cases() -> tuple[Case, ...]:
                 f"drawn-{seed}",
                 "drawn at random",
                 tables,
-                engines=("exact", "pymunk") if resolved else ("exact",),
+                engines=LONE if resolved else ("exact",),
                 steps=(1e-3,),
                 # A spinning disk held between a moving surface and another.
                 may_refuse={"exact": "run.engine"},

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from chutelab.stress.case import TRANSFER, Case, merged, surface, thrown
+from chutelab.stress.case import CROWD, TRANSFER, Case, merged, surface, thrown
 from chutelab.stress.evidence import Verdict
 
 if TYPE_CHECKING:
     from chutelab.stress.evidence import Evidence
 
-LONE = 1e-8
-"""Relative error that a lone particle may have in pymunk when steps end at its contacts."""
+ALIGNED = 1e-8
+"""Relative error that a lone particle may have where only its lasting contacts are stepped."""
 
 THIN = 0.002
 """m; thickness of the plate at which particles are shot."""
@@ -23,7 +23,7 @@ def place_error(e: Evidence, x: float, y: float) -> Verdict:
     """Distance of particle 0 from where a formula has it at the end, m."""
     found = e.recording.track(0)["position"][-1]
     apart = float(np.hypot(*(found - [x, y])))
-    return Verdict(apart, e.rounding + (LONE * e.length if e.stepped else 0.0), "m")
+    return Verdict(apart, e.rounding + (ALIGNED * e.length if e.stepped else 0.0), "m")
 
 
 SHOT_UNTIL, SHOT_SPEED, SHOT_RADIUS = 0.01, 200.0, 0.004
@@ -63,7 +63,7 @@ def _fast() -> list[Case]:
         Case("plate-200-inclined", group, _inclined(), steps=(1e-3, 1 / 60, 1 / 30)),
         Case("plate-200-machine", group, machine, ends=("landed", "exit")),
         Case("plate-200-small", group, merged(_SHOT, {"particle": {"radius": 1e-4}})),
-        Case("plate-200-volley", group, volley, engines=("pymunk",)),
+        Case("plate-200-volley", group, volley, engines=CROWD),
     ]
 
 
@@ -96,7 +96,9 @@ def _radii() -> list[Case]:
     return [
         *out,
         Case("radius-1", group, big, ends=("landed",)),
-        Case("radius-0", group, point, refusals={"pymunk": "run.engine"}, ends=("landed",)),
+        Case(
+            "radius-0", group, point, refusals=dict.fromkeys(CROWD, "run.engine"), ends=("landed",)
+        ),
     ]
 
 
@@ -107,7 +109,7 @@ def _masses() -> list[Case]:
         lone = merged(TRANSFER, {"particle": {"mass": mass}})
         pair = merged(swarm(20), {"particle": {"mass": mass}})
         out.append(Case(f"mass-{mass:g}", group, lone, ends=("landed",)))
-        out.append(Case(f"mass-{mass:g}-swarm", group, pair, engines=("pymunk",)))
+        out.append(Case(f"mass-{mass:g}-swarm", group, pair, engines=CROWD))
     return out
 
 
@@ -146,7 +148,7 @@ def _materials() -> list[Case]:
         name, group = f"restitution-{restitution:g}", "restitution"
         out.append(Case(f"{name}-drop", group, drop))
         out.append(Case(f"{name}-box", group, box, inside=(-0.5, 0.5, -0.5, 0.5)))
-        out.append(Case(f"{name}-swarm", group, crowd, engines=("pymunk",)))
+        out.append(Case(f"{name}-swarm", group, crowd, engines=CROWD))
     for friction in (0.0, 1e6):
         for spin in (False, True):
             materials = {"friction": friction, "restitution": 0.5}
@@ -158,7 +160,7 @@ def _materials() -> list[Case]:
             turning = "-spin" if spin else ""
             out.append(Case(f"friction-{friction:g}{turning}", "friction", machine))
         crowd = merged(swarm(20), {"stream": {"friction": friction}})
-        out.append(Case(f"friction-{friction:g}-swarm", "friction", crowd, engines=("pymunk",)))
+        out.append(Case(f"friction-{friction:g}-swarm", "friction", crowd, engines=CROWD))
     return out
 
 
@@ -172,7 +174,7 @@ def _belts() -> list[Case]:
         def carried(e: Evidence, speed: float = speed) -> Verdict:
             # It settles where it no longer slips: at the speed of the belt.
             found = float(e.recording.track(0)["velocity"][-1, 0])
-            bound = e.rounding + (LONE * max(1.0, abs(speed)) if e.stepped else 0.0)
+            bound = e.rounding + (ALIGNED * max(1.0, abs(speed)) if e.stepped else 0.0)
             return Verdict(abs(found - speed), bound, "m/s")
 
         for spin in (False, True):
@@ -195,8 +197,8 @@ def _weightless() -> list[Case]:
     machine = merged(TRANSFER, {"gravity": 0.0, "run": {"until": 3.0}})
     return [
         Case("weightless", group, machine),
-        Case("weightless-swarm", group, swarm(40), engines=("pymunk",)),
-        Case("weightless-swarm-still", group, swarm(40, spin=False), engines=("pymunk",)),
+        Case("weightless-swarm", group, swarm(40), engines=CROWD),
+        Case("weightless-swarm-still", group, swarm(40, spin=False), engines=CROWD),
     ]
 
 

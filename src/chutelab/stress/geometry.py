@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chutelab.recording import Kind
-from chutelab.stress.case import TRANSFER, Case, merged, surface, thrown
+from chutelab.stress.case import CROWD, LONE, TRANSFER, Case, merged, surface, thrown
 from chutelab.stress.evidence import EPS, ROUNDINGS, Verdict
 from chutelab.stress.extremes import place_error
 
@@ -46,7 +46,7 @@ def _grazing() -> list[Case]:
         machine = merged(TRANSFER, {"plate": plate_})
         out.append(Case(f"graze-machine-{name}", group, machine))
     level = merged(TRANSFER, {"plate": {"angle_deg": 80.0}, "outgoing": {"drop_from": "impact"}})
-    never = {"exact": "outgoing.drop_from", "pymunk": "outgoing.drop_from"}
+    never = dict.fromkeys(LONE, "outgoing.drop_from")
     out.append(Case("graze-missed", group, level, refusals=never))
     return out
 
@@ -130,7 +130,7 @@ def _contact() -> list[Case]:
                 **thrown((0.0, y), velocity),
                 "run": {"until": 1.0},
             }
-            refusals = {} if y == r else {"exact": "stream.at", "pymunk": "stream.at"}
+            refusals = {} if y == r else dict.fromkeys(LONE, "stream.at")
             out.append(Case(f"contact-{name}-{way}", group, tables, refusals=refusals))
     nook = {
         "particle": {"radius": r},
@@ -145,12 +145,12 @@ def _contact() -> list[Case]:
         "run": {"until": 1.0},
     }
     tight = merged(crowded, {"stream": {"bed_height": 0.04 + 4e-9, "count": 2, "seed": 3}})
-    refused = {"pymunk": "stream.bed_height"}
     return [
         *out,
         Case("contact-corner", group, nook),
-        Case("contact-crowd", group, crowded, engines=("pymunk",), refusals=refused),
-        Case("contact-crowd-tight", group, tight, engines=("pymunk",)),
+        # All at one place and time: they wait for each other.
+        Case("contact-crowd", group, crowded, engines=CROWD),
+        Case("contact-crowd-tight", group, tight, engines=CROWD),
     ]
 
 

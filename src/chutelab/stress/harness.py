@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from chutelab.machine import build
 from chutelab.scene import SceneError
 from chutelab.simulation import simulate
-from chutelab.stress.case import ENGINES, scene_of
+from chutelab.stress.case import ENGINES, by_name, scene_of
 from chutelab.stress.demands import demands, order, symmetric
 from chutelab.stress.evidence import Evidence, Verdict
 from chutelab.stress.laws import LAWS
@@ -124,7 +124,7 @@ class _Run:
                 reference, errors = ladder.quantity(exact), []
                 for dt in ladder.steps:
                     scene = scene_of(case.tables, case.name, self.engine, dt)
-                    found = ladder.quantity(simulate(scene, "pymunk", progress))
+                    found = ladder.quantity(simulate(scene, by_name(self.engine), progress))
                     errors.append(abs(found - reference))
         except Exception as error:
             return self.raised(error, "")
@@ -133,8 +133,7 @@ class _Run:
     def evidence(self, tables: Tables) -> Evidence:
         with bounded(self.case.patience) as progress:
             scene = scene_of(tables, self.case.name, self.engine, self.dt)
-            name = "exact" if self.engine == "exact" else "pymunk"
-            recording = simulate(scene, name, progress)
+            recording = simulate(scene, by_name(self.engine), progress)
         return Evidence(build(scene), recording, self.engine, self.dt)
 
     def judged(self, law: str, verdict: Verdict) -> Result:

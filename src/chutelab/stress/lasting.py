@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chutelab.scene import load, to_dict
-from chutelab.stress.case import TRANSFER, Case, Twin, merged, surface, thrown
+from chutelab.stress.case import CROWD, TRANSFER, Case, Twin, merged, surface, thrown
 from chutelab.stress.conservation import A_CONTACT
 from chutelab.stress.evidence import EPS, ROUNDINGS, Verdict
 from chutelab.stress.extremes import place_error
@@ -85,7 +85,7 @@ def _late() -> list[Case]:
     pair = merged(late, {"stream": {"interact": True}})
     return [
         Case("late-1e6", group, TRANSFER, twin=twin),
-        Case("late-1e6-interacting", group, pair, engines=("pymunk",)),
+        Case("late-1e6-interacting", group, pair, engines=CROWD),
     ]
 
 
@@ -118,7 +118,7 @@ def _piles() -> list[Case]:
         "pile-60",
         group,
         _pile(60, 0.4, 0.02, 2.5),
-        engines=("pymunk",),
+        engines=CROWD,
         at_rest=True,
         steps=(1e-3, 1.0 / 120.0),
         inside=(-0.2, 0.2, 0.0, 4.0),
@@ -148,7 +148,7 @@ def _coarse() -> list[Case]:
         *(Case(f"coarse-{name}", group, tables, steps=steps) for name, tables in shipped.items()),
         *(
             Case(
-                f"coarse-{name}", group, tables, engines=("pymunk",), steps=steps,
+                f"coarse-{name}", group, tables, engines=CROWD, steps=steps,
                 full=name == "stream-whole", patience=120.0,
             )
             for name, tables in streams.items()

@@ -1,7 +1,8 @@
 """The laws that every run must keep, one function each.
 
 A law takes `Evidence` and answers with a `Verdict`, or with None where it says nothing. Bounds are
-argued, not fitted: for the exact engine rounding, for pymunk also what can happen within a step.
+argued, not fitted: for the exact engine rounding, for the others also what can happen within a
+step.
 """
 
 from __future__ import annotations
@@ -12,7 +13,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from chutelab.ledger import ledger
-from chutelab.stress.barriers import depth, no_one_through, overlap
+from chutelab.stress.barriers import (
+    depth,
+    no_one_through,
+    no_one_through_another,
+    on_something,
+    overlap,
+    pressed,
+    released_free,
+    settled_to_stay,
+)
 from chutelab.stress.conservation import energy, momentum, residual, spin
 from chutelab.stress.evidence import EPS, ROUNDINGS, Verdict
 
@@ -71,7 +81,12 @@ LAWS: dict[str, Law] = {
     "lasts to the end": lasting,
     "no one through": no_one_through,
     "no one inside": depth,
+    "bounces off something": on_something,
+    "released into room": released_free,
+    "settled to stay": settled_to_stay,
     "no overlap": overlap,
+    "pressed for a step": pressed,
+    "no one through another": no_one_through_another,
     "energy never rises": energy,
     "ledger closes": residual,
     "momentum": momentum,

@@ -116,7 +116,7 @@ def _ladders() -> list[Case]:
     hops = {"surface": [floor], **thrown((0.0, 0.1), (1.0, 0.0)), "run": {"until": 0.4}}
     whole = merged(TRANSFER, {"incoming": {"length": 0.1}, "plate": {"angle_deg": 20.0}})
     carried = merged(whole, {"run": {"until": 0.8}})
-    # Pymunk's own arithmetic leaves some 1e-10 m where it resolves a contact.
+    # Chipmunk's arithmetic leaves some 1e-10 m where it resolves a contact.
     floor_of = 1e-9
     out = []
     for name, tables, quantity in (
@@ -127,14 +127,12 @@ def _ladders() -> list[Case]:
         ("belt", carried, _end_at),
         ("transfer", whole, _landed_at),
     ):
-        for engine in ("pymunk", "fixed"):
+        for engine in ("contact", "pymunk", "fixed"):
             # Impacts alone are exact at any step; what touches is stepped no coarser than this.
-            steps = COARSE if engine == "pymunk" and name in {"bounce", "transfer"} else FINE
-            if name == "pulley" and engine == "fixed":
-                # Known to converge only slowly: a grip that slips hops.
-                continue
-            ladder = Ladder(steps, quantity, floor_of)
-            suffix = "" if engine == "pymunk" else "-fixed"
+            blows = engine != "fixed" and name in {"bounce", "transfer"}
+            claimed = 2.0 if engine == "contact" else 1.0
+            ladder = Ladder(COARSE if blows else FINE, quantity, floor_of, claimed)
+            suffix = "" if engine == "pymunk" else f"-{engine}"
             out.append(
                 Case(
                     f"order-{name}{suffix}",

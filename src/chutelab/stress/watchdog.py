@@ -45,8 +45,9 @@ def bounded(seconds: float) -> Iterator[Callable[[float], None]]:
         yield report
         return
     before = signal.signal(signal.SIGALRM, ring)
-    # Later than the callback's own time, which tells more about where the engine was.
-    signal.setitimer(signal.ITIMER_REAL, 1.1 * seconds + 0.1)
+    # Later than the callback's own time, which tells more about where the engine was; and again,
+    # because what is raised in a callback from C is lost.
+    signal.setitimer(signal.ITIMER_REAL, 1.1 * seconds + 0.1, 0.1)
     try:
         yield report
     finally:

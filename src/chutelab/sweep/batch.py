@@ -125,7 +125,7 @@ class Batch:
 def _fits(scene: Scene, paths: tuple[str, ...], engine: str | None) -> bool:
     """Tell whether a scene and the like of it go through the exact engine, one particle each."""
     wanted = scene.run.engine if engine is None else engine
-    if wanted == "pymunk" or scene.stream.count > 1:
+    if wanted in ("contact", "pymunk") or scene.stream.count > 1:
         return False
     # Whether such a release lies on the belt is a matter of the last digits.
     at_risk = {"particle.radius", "incoming.pulley_radius", "incoming.length"}

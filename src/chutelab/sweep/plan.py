@@ -100,7 +100,7 @@ def planned(
         What to vary: texts as ``--vary`` takes them, or values (with `sample`, two ends) by key.
     sample, design, seed : int, str, int
         How many samples to draw, how ("lhs" or "sobol"), and the seed; without `sample` a grid.
-    engine : {"auto", "exact", "pymunk"}, optional
+    engine : {"auto", "exact", "contact", "pymunk"}, optional
         Overrides the scene's ``run.engine``.
 
     Raises

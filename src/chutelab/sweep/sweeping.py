@@ -30,7 +30,7 @@ EXACT: Final = 16
 """The same of variants that go one by one, a millisecond each."""
 
 STEPPED: Final = 1
-"""The same of variants that pymunk steps: each may take seconds."""
+"""The same of variants that are stepped: each may take seconds."""
 
 
 AHEAD: Final = 64
@@ -65,7 +65,7 @@ def sweep(
         Draw so many samples from the ranges instead; needs SciPy.
     design, seed : {"lhs", "sobol"}, int
         Latin hypercube or Sobol points, and the seed.
-    engine : {"auto", "exact", "pymunk"}, optional
+    engine : {"auto", "exact", "contact", "pymunk"}, optional
         Overrides the scene's ``run.engine``.
     jobs : int
         Processes to spread the work over; 0 is one for each processor.
@@ -181,7 +181,7 @@ def _size(plan: Plan) -> int:
     stream, run = plan.document.get("stream", {}), plan.document.get("run", {})
     one = stream.get("count", 1) == 1 and "stream.count" not in plan.keys
     wanted = plan.engine or run.get("engine", "auto")
-    if wanted == "pymunk" or (stream.get("interact", False) and not one):
+    if wanted in ("contact", "pymunk") or (stream.get("interact", False) and not one):
         return STEPPED
     plain = all(is_plain(quantity.path) for quantity in plan.quantities)
     return TOGETHER if one and plain else EXACT

@@ -6,7 +6,7 @@
 `crowd`          the error of particles that meet each other, where there is no closed form
 `methods`        who solves it, with which parameter, and who cannot
 `plain`          plain Pymunk as most people write it (the one module here to import pymunk)
-`ode`            SciPy's DOP853 with events (needs the extra ``bench``)
+`ode`            SciPy's DOP853 with events, by hand (needs the extra ``bench``)
 `measure`        clocks, memory, and one `Record` for each case, method and parameter
 `process`        the whole process, imports and all
 `scaling`        time and memory against the number of particles

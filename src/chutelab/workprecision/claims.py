@@ -18,7 +18,13 @@ EQUAL_ERROR = 1e-4
 """The error at which methods are compared: a tenth of a millimetre in a metre."""
 
 USUAL_STEP = 1e-3
-"""s; the step of plain Pymunk with which the exact engine is compared, whatever its error."""
+"""s; the step of plain Pymunk with which exact and contact are compared, whatever its error."""
+
+PAIRS = (
+    ("exact", "plain"), ("contact", "plain"), ("aligned", "plain"),
+    ("exact", "dop853"), ("contact", "dop853"),
+)  # fmt: skip
+"""Which methods are compared."""
 
 RIGID = 0.01
 """Overlap in radii at which methods are compared on a crowd."""
@@ -53,9 +59,10 @@ def claims(records: Sequence[Record]) -> list[Claim]:
             found += _whole_process(records)
             continue
         error = RIGID if case == "interacting" else EQUAL_ERROR
-        for fast, slow in (("exact", "plain"), ("aligned", "plain"), ("exact", "dop853")):
+        for fast, slow in PAIRS:
             found += _at_equal_error(records, case, fast, slow, error)
-        found += _at_the_usual_step(records, case)
+        for method in ("exact", "contact"):
+            found += _at_the_usual_step(records, case, method)
     return found
 
 
@@ -90,21 +97,24 @@ def _at_equal_error(
         )
 
 
-def _at_the_usual_step(records: Sequence[Record], case: str) -> Iterator[Claim]:
-    stepped = [
-        one
-        for one in records
-        if (one.case, one.method, one.value) == (case, "plain", USUAL_STEP) and one.median
-    ]
-    exact = points(records, case, "exact")
-    if not stepped or not exact or stepped[0].median is None or stepped[0].error is None:
+def _at_the_usual_step(records: Sequence[Record], case: str, method: str) -> Iterator[Claim]:
+    def usual(name: str) -> Record | None:
+        """Return a method's run with that step, or its only one."""
+        for one in records:
+            if (one.case, one.method) == (case, name) and one.value in (None, USUAL_STEP):
+                return one
+        return None
+
+    mine, plain = usual(method), usual("plain")
+    if mine is None or plain is None or not mine.median or not plain.median:
         return
-    error, time = exact[0]
-    ratio = stepped[0].median / time
+    if mine.error is None or plain.error is None:
+        return
+    ratio = plain.median / mine.median
     yield Claim(
         case,
-        f"exact, with an error of {error:.0e}, is {_faster(ratio)} plain Pymunk at dt ="
-        f" {USUAL_STEP:g} s, with one of {stepped[0].error:.0e}",
+        f"{method}, with an error of {mine.error:.0e}, is {_faster(ratio)} plain Pymunk at dt ="
+        f" {USUAL_STEP:g} s, with one of {plain.error:.0e}",
         ratio,
     )
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from chutelab.versions import version_of
 
-PACKAGES = ("chutelab", "numpy", "pymunk", "scipy")
+PACKAGES = ("chutelab", "numpy", "pymunk", "wasmtime", "scipy")
 
 
 def environment() -> dict[str, str]:

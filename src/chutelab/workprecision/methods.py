@@ -72,10 +72,10 @@ class Method:
 
     def prepare(self, scene: Scene, value: float | None) -> Scene:
         """Return the scene with the parameter written into it where the engines look for it."""
-        if self.name not in ("aligned", "fixed"):
+        if self.name not in ("contact", "aligned", "fixed"):
             return scene
         tables = to_dict(scene)
-        run = {**tables.get("run", {}), "dt": value, "align": self.name == "aligned"}
+        run = {**tables.get("run", {}), "dt": value, "align": self.name != "fixed"}
         return from_dict({**tables, "run": run}, scene.source)
 
     def run(self, case: str, scene: Scene, value: float | None) -> Recording | Answer | Floats:
@@ -95,13 +95,17 @@ class Method:
             return found
         from chutelab.simulation import simulate
 
-        return simulate(scene, engine="exact" if self.name == "exact" else "pymunk")
+        return simulate(scene, engine=ENGINES.get(self.name, self.name))
 
+
+ENGINES = {"aligned": "pymunk", "fixed": "pymunk"}
+"""Engine of the methods that are not called as theirs is."""
 
 MANY = ("independent", "interacting")
 
 UNABLE = {
     ("exact", "interacting"): "no contacts between particles",
+    ("aligned", "interacting"): "only a lone particle's steps end at contacts",
     ("dop853", "interacting"): "half a million pairs to watch",
 }
 """Reasons why a method cannot do a case."""
@@ -113,11 +117,15 @@ METHODS = {
     for method in (
         Method("exact", "exact", "", "chutelab.exact", (), (), ()),
         Method(
-            "aligned", "pymunk, aligned", "dt", "chutelab.stepper",
+            "contact", "contact", "dt", "chutelab.engines.contact",
             (1.0 / 60.0, 3e-3, 1e-3, 3e-4, 1e-4), (1.0 / 60.0, 1e-3), (1e-3, 1e-2, 3e-3, 3e-4),
         ),
         Method(
-            "fixed", "pymunk, fixed step", "dt", "chutelab.stepper",
+            "aligned", "pymunk, aligned", "dt", "chutelab.engines.pymunk",
+            (1.0 / 60.0, 3e-3, 1e-3, 3e-4, 1e-4), (1.0 / 60.0, 1e-3), (1e-3, 1e-2, 3e-3, 3e-4),
+        ),
+        Method(
+            "fixed", "pymunk, fixed step", "dt", "chutelab.engines.pymunk",
             _STEPS[:5], (1e-2, 1e-3), (1e-3, 1e-2, 3e-3),
         ),
         Method(

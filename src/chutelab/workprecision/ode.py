@@ -1,7 +1,8 @@
 """SciPy's DOP853 with events: what a careful scientist writes instead of an engine.
 
 The flights are integrated by `scipy.integrate.solve_ivp`, each until its event; what happens at the
-event is put in by hand. One particle at a time: events of many are solved one after the other.
+event is put in by hand. One particle at a time: events of many are solved one after the other. It
+knows these cases only, and so is fast; `chutelab.reference` follows any machine.
 """
 
 from __future__ import annotations

@@ -6,8 +6,8 @@ a surface velocity, on which particles ride. The particle has left the pulley wh
 top, met the plate when it moves back, and landed when it is at or under the belt's level, each
 noticed after the step in which it happens; the landing velocity is the one before that step.
 
-In four things it is better than what most people write, or it would be no contest: segments are as
-thick as those of the product's own engine, and lie behind the faces, not across them; elasticities
+In four things it is better than what most people write, or it would be no contest: segments are
+4 mm thick, so that little tunnels, and lie behind the faces, not across them; elasticities
 and frictions are set so that Pymunk's products are the scene's pair values; `collision_slop` is 1 %
 of the radius, for its default of 0.1, meant for pixels, lets a disk of 4 mm sink through a belt;
 and where particles do not interact, those that have landed leave the Space.

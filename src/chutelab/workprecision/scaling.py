@@ -26,7 +26,7 @@ COUNTS = {
 QUICK = {"independent": 10_000, "interacting": 100}
 """The most of them in a quick run."""
 
-RUNS = {"independent": ("exact",), "interacting": ("aligned", "fixed")}
+RUNS = {"independent": ("exact", "contact"), "interacting": ("contact", "fixed")}
 """Methods, by case."""
 
 STEP = 1e-3

@@ -232,7 +232,6 @@ class Job:
             if count:
                 kept.append(self.module.array(f"{what}s", dtype(what.title()), count).copy())
                 self.module.world[f"{what}_count"] = 0
-        self.module.world["drained"] += 1
         return counts
 
     def recording(self, machine: Machine, place: tuple[float, float], seconds: float) -> Recording:

@@ -78,6 +78,7 @@ int place_is_free(int i, double x, double y, double t);
 void knot_now(int i);
 void knot_after(int i);
 void knot_before(int i, double t, double vx, double vy, double spin);
+void knot_before_blow(int i);
 void flush_track(int i);
 void track_lasting(int i);
 void knot_held(int i);
@@ -105,7 +106,7 @@ void hold(Disk *d, int k);
 double soft_approach(const Disk *d, double radius);
 double left_over(const Disk *d, int impacts, int surface, double radius);
 void lie_down(int i);
-void was_moved(int i, double t);
+void was_moved(int i);
 
 /* solver.c */
 int find_contacts(double h, int *woke);

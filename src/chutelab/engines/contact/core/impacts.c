@@ -145,15 +145,15 @@ void hold(Disk *d, int k) {
     d->supports++;
 }
 
-/* Note that a disk gets an impulse at t; what it was before becomes a knot. */
-void was_moved(int i, double t) {
+/* Note that a disk gets an impulse now; what it was before becomes a knot. */
+void was_moved(int i) {
     Disk *d = W.disks + i;
     d->impacts++;
     d->calm = d->rest = 0;
     if (d->moved != W.stamp) {
         d->moved = W.stamp;
         W.moved[W.moved_count++] = i;
-        knot_before(i, t, d->vx, d->vy, d->spin);
+        knot_before_blow(i);
     }
 }
 
@@ -283,22 +283,24 @@ static void strike(int i, int j, double t) {
     double u[3];
     describe(&c, i, j);
     c.drift = 0;
-    was_moved(i, t);
-    if (c.two) was_moved(j, t);
+    was_moved(i);
+    if (c.two) was_moved(j);
     relative(&c, 0, u);
     if (u[0] >= 0) return;
     double back = -c.rest * u[0];
     if (j >= 0 && -u[0] < W.soft && (a->supports || b->supports || !c.two)) back = 0;
     if (c.rest < 1 && ((impacts >= FEW && -u[0] < SLOW * W.g * W.dt) || impacts >= TOO_MANY)) back = 0;
-    int rests = 0;
-    if (j < 0 && back <= press_on(a, W.surfaces + (-1 - j), c.nx, c.ny) * W.step) {
-        rests = 1;
+    double press = j < 0 ? press_on(a, W.surfaces + (-1 - j), c.nx, c.ny) : 0, later = 0;
+    int rests = j < 0 && back <= press * W.step;
+    if (rests) {
+        /* The bounces that are left out, infinitely many, would have taken so long. */
+        if (back > 0 && c.rest < 1) later = 2 * back / (press * (1 - c.rest));
         back = 0;
     }
     double before[3] = {a->vx, a->vy, a->spin};
     if (j < 0 && impacts >= JAM && c.rest < 1) jam(i);
     else give(&c, c.mass[0] * (back - u[0]));
-    a->since = t;
+    a->since = t + later;
     if (c.two) b->since = t;
     W.impact_count++;
     int landing = j < 0 && c.owner == W.landing && !a->landed, kind = COLLISION;

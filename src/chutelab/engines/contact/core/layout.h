@@ -72,6 +72,7 @@ typedef struct {
 /* The track of a disk between the knots that are written. */
 typedef struct {
     double knot[6];       /* last knot written: t, x, y, vx, vy, spin */
+    double blow_entries[3]; /* of a knot that is held back */
     double bend[3];       /* acceleration foretold from it on, of x, y and spin */
     double held[6];       /* latest state in lasting contact, halfway through its impulses */
     double held_entries[3];
@@ -83,8 +84,7 @@ typedef struct {
     double end_of_face;   /* s; when it left the end of a face */
     int bent, open;       /* bend is known; `held` is no knot yet */
     int lasted;           /* steps of this contact, 0 in flight */
-    int blow, drained;    /* where the knot after a blow is, if it is the last, and when that was */
-    int again;            /* the next knot after a blow goes there too */
+    int held_back;        /* `knot` is one after a blow and not written yet */
 } Track;
 
 typedef struct {
@@ -172,7 +172,6 @@ typedef struct {
     /* [out] */
     int knot_count, event_count, contact_count, near_count, earlier_count;
     int impact_count, step_count, solve_count, sweep_count;
-    int drained;         /* [in] how often the host has taken the knots */
     int done;            /* disks ended, a measure of progress */
     int stalled;         /* which disk */
     /* within the step */

@@ -3,13 +3,24 @@
 #include <string.h>
 #include "core.h"
 
-static void write_knot(int i, const double *state, const double *entries) {
+static void emit(int i, const double *state, const double *entries) {
     Knot *k = W.knots + W.knot_count++;
-    Track *track = W.tracks + i;
     memcpy(&k->t, state, 6 * sizeof(double));
     memcpy(k->entries, entries, sizeof k->entries);
     k->disk = i;
-    track->blow = -1;
+}
+
+/* Write the knot after a blow that was held back, if there is one. */
+static void let_go(int i) {
+    Track *track = W.tracks + i;
+    if (track->held_back) emit(i, track->knot, track->blow_entries);
+    track->held_back = 0;
+}
+
+static void write_knot(int i, const double *state, const double *entries) {
+    Track *track = W.tracks + i;
+    let_go(i);
+    emit(i, state, entries);
     memcpy(track->knot, state, sizeof track->knot);
     track->bent = track->open = 0;
 }
@@ -21,32 +32,38 @@ void knot_now(int i) {
     write_knot(i, state, d->entries);
 }
 
-/* Write the state in which a path ends, unless it is the last knot anyhow. In a crowd a rattling
-   disk has many impacts within a thousandth of a radius: of these the first and the last are told. */
+/* Write the state in which a path ends, unless it is the last knot anyhow. */
 void knot_before(int i, double t, double vx, double vy, double spin) {
     Disk *d = W.disks + i;
-    Track *track = W.tracks + i;
     double state[6] = {t, d->x, d->y, vx, vy, spin};
     flush_track(i);
-    if (!memcmp(state, track->knot, sizeof state)) return;
-    if (W.interact && track->blow >= 0 && track->drained == W.drained && t - track->knot[0] < W.step
-        && fabs(d->x - track->knot[1]) + fabs(d->y - track->knot[2]) < W.smooth_x) {
-        track->again = 1;
-        return;
-    }
-    write_knot(i, state, d->entries);
+    if (memcmp(state, W.tracks[i].knot, sizeof state)) write_knot(i, state, d->entries);
 }
 
-/* Write the state after a blow, over that of the blow before if `knot_before` said so. */
-void knot_after(int i) {
+/* The same before a blow. In a crowd a rattling disk has many of them within a thousandth of a
+   radius: of these the state before the first and that after the last are told. */
+void knot_before_blow(int i) {
+    const Disk *d = W.disks + i;
     Track *track = W.tracks + i;
-    int end = W.knot_count, blow = track->again ? track->blow : end;
-    W.knot_count = blow;
-    knot_now(i);
-    if (track->again) W.knot_count = end;
-    track->again = 0;
-    track->blow = blow;
-    track->drained = W.drained;
+    if (track->held_back && d->t - track->knot[0] < W.step
+        && fabs(d->x - track->knot[1]) + fabs(d->y - track->knot[2]) < W.smooth_x)
+        track->held_back = 0;
+    else knot_before(i, d->t, d->vx, d->vy, d->spin);
+}
+
+/* Note the state after a blow; in a crowd it is held back, since that of the next may replace it. */
+void knot_after(int i) {
+    const Disk *d = W.disks + i;
+    Track *track = W.tracks + i;
+    double state[6] = {d->t, d->x, d->y, d->vx, d->vy, d->spin};
+    if (!W.interact) {
+        knot_now(i);
+        return;
+    }
+    memcpy(track->knot, state, sizeof state);
+    memcpy(track->blow_entries, d->entries, sizeof track->blow_entries);
+    track->bent = track->open = 0;
+    track->held_back = 1;
 }
 
 /* End the smooth part of a track: the state halfway through the last impulses, and that after. */
@@ -125,6 +142,7 @@ void knot_held(int i) {
 /* End a track at its last knot. */
 void finish(int i, int reason) {
     Disk *d = W.disks + i;
+    let_go(i);
     d->mode = GONE;
     d->reason = reason;
     d->due = INFINITY;

@@ -33,7 +33,7 @@ void wake(int i, double t) {
         d->calm = d->rest = 0;
         d->changes++;
         if (h <= 0) continue;
-        was_moved(n, t);
+        was_moved(n);
         double x = -0.5 * W.gx * left, y = -0.5 * W.gy * left;
         double entries[3] = {0, -d->mass * (x * (d->vx + 0.5 * x) + y * (d->vy + 0.5 * y)), 0};
         book(d->entries, 0, W.owner_count, entries);

@@ -236,9 +236,10 @@ static void note_grip(Disk *d, const Contact *c, const double *u, const double *
     }
     if (grips && d->slips) {
         /* Friction slows the slip evenly; it is used up so long after the last mid-step. */
-        double s = fabs(u[1] - c->drift * 2 * past / h), rate = most / (c->mass[1] * span);
-        double t = d->t - past + (rate > 0 ? s / rate : 0);
-        t = MIN(MAX(t, d->since), d->t + h);
+        double s = u[1] - c->drift * 2 * past / h, pull = 2 * c->drift / h;
+        double rate = most / (c->mass[1] * span) - (s > 0 ? pull : -pull);
+        double t = d->t - past + (rate > 0 ? fabs(s) / rate : 0);
+        t = MAX(t, d->since);
         double place[2] = {d->x + (t - d->t) * 0.5 * (d->ux + d->vx), d->y + (t - d->t) * 0.5 * (d->uy + d->vy)};
         double after[3] = {d->vx + 0.5 * W.gx * h, d->vy + 0.5 * W.gy * h, d->spin};
         write_event(STICK, i, -1, c->owner, t, place, after, after, 0, 0);
@@ -382,7 +383,8 @@ void close_step(double h) {
             relative(only, 1, u);
             relative(only, 0, v);
             note_grip(d, only, u, v, h);
-            if (!W.interact && W.until == UNTIL_SETTLED && !d->slips && lies(d, only)) settle(i, only, h);
+            if (!W.interact && W.until == UNTIL_SETTLED && !d->slips && d->since <= d->t + h && lies(d, only))
+                settle(i, only, h);
             else if (!W.interact && W.until == UNTIL_LANDED && d->landed) reason = BY_LANDING;
         } else {
             d->slips = 1;

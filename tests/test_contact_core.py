@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 from dataclasses import replace
-from math import acos, asin, cos, hypot, inf, pi, sin, sqrt
+from importlib.resources import files
+from math import acos, cos, hypot, inf, pi, sin, sqrt
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
+from chutelab.engines.contact.module import Status, dtype
+from chutelab.machine import build
 from chutelab.recording import REASONS, Kind
+from chutelab.scene import load
 from cores import Core, face, modes, scene_of
 
 G = 9.81
@@ -461,3 +468,54 @@ def test_pushed_by_a_belt_all_its_work_is_on_its_account():
     assert work == pytest.approx(0.1 * speed**2, rel=1e-9)
     assert heat == pytest.approx(0.05 * speed**2, rel=1e-9)
     assert bounce == pytest.approx(0.0, abs=1e-12)
+
+
+# The same bits elsewhere
+
+
+def memory_of(module):
+    """Return all bytes of a module's memory, from 0 on."""
+    return module._bytes.tobytes()
+
+
+def all_bytes(core):
+    """Run in slices of 64 steps, as the other host does, and return knots, events and ledger."""
+    drained, status = {"knot": [], "event": []}, None
+    while True:
+        before, status = status, core.module.run(64)
+        for what, kept in drained.items():
+            count = int(core.world[f"{what}_count"][0])
+            kept.append(core.module.array(f"{what}s", dtype(what.title()), count).tobytes())
+            core.world[f"{what}_count"] = 0
+        if "drained" in core.world.dtype.names:
+            core.world["drained"] += 1
+        if status is Status.DONE:
+            break
+        assert status in (Status.PAUSED, Status.FULL_KNOTS, Status.FULL_EVENTS)
+        assert status is Status.PAUSED or status is not before
+    books = core.module.array("books", np.dtype("<f8"), 3 * (core.job.owners + 1)).tobytes()
+    return b"".join(drained["knot"] + drained["event"]) + books
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="node is not installed")
+@pytest.mark.parametrize("crowded", [False, True])
+def test_in_node_it_does_the_same_to_the_bit(tmp_path, crowded):
+    if crowded:
+        machine = build(load("stream", ["stream.count=60", "particle.spin=true"]))
+    else:
+        machine = build(load("perpendicular", ["incoming.friction=0.5", 'run.until="settled"']))
+    core = Core(machine)
+    if crowded:
+        for what in core.job.rooms:
+            core.job.room(what, 8)
+    # All of the memory: the core's own data are as `_initialize` left them in both.
+    (tmp_path / "memory").write_bytes(memory_of(core.module))
+    here = files("chutelab.engines.contact") / "core"
+    script = Path(__file__).with_name("contact_in_node.mjs")
+    command = ["node", str(script), str(here / "core.wasm"), str(here / "layout.json")]
+    subprocess.run(
+        [*command, str(tmp_path / "memory"), str(tmp_path / "out")], check=True, timeout=60
+    )
+    mine, its = all_bytes(core), (tmp_path / "out").read_bytes()
+    assert len(mine) == len(its) > 1000
+    assert mine == its

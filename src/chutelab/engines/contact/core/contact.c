@@ -81,12 +81,13 @@ void push(const Contact *c, const double *J) {
 }
 
 /* Ledger entries of a contact's impulses, which changed its relative velocities from u to v: an
-   impulse J does the work J (u + v) / 2, its second half alone J (u + 3 v) / 8. `given` is the work
-   of the belt that carries the partner, if that is a rider. */
-void share_out(const Contact *c, const double *u, const double *v, double half, double *entries,
+   impulse J does the work J (u + v) / 2. Of what is left when the share f of it has been given, it
+   is (1 - f) J (u (1 - f) + v (1 + f)) / 2. `given` is the work of the belt that carries the
+   partner, if that is a rider. */
+void share_out(const Contact *c, const double *u, const double *v, double f, double *entries,
                double *given) {
     const double *J = c->impulse;
-    double first = half ? 0.125 : 0.5, then = half ? 0.375 : 0.5, all = half ? 0.5 : 1;
+    double first = 0.5 * (1 - f) * (1 - f), then = 0.5 * (1 - f * f), all = 1 - f;
     entries[0] = c->j < 0 ? all * (J[1] * c->other[1] + J[2] * c->other[2]) : 0;
     entries[1] = -J[0] * (first * u[0] + then * v[0]);
     entries[2] = -J[1] * (first * u[1] + then * v[1]) - J[2] * (first * u[2] + then * v[2]);

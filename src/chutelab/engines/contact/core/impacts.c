@@ -66,7 +66,8 @@ double left_over(const Disk *d, int impacts, int surface, double radius) {
             if (d->held[n] == surface) return 1.000001 * W.g * W.step;
     double skip = W.skip * radius;
     if (impacts <= MANY) return soft_approach(d, radius);
-    return MIN(skip * pow(GROW, impacts - MANY), skip * (MOST_SKIP / SKIP));
+    double most = skip * (MOST_SKIP / SKIP) * MAX(1, impacts / CROWDED);
+    return MIN(skip * pow(GROW, MIN(impacts - MANY, 1000)), most);
 }
 
 static void foresee_pair(int i, int j, double *due, int *partner) {
@@ -87,7 +88,7 @@ static void foresee_surfaces(int i, double *due, int *partner) {
     const Disk *d = W.disks + i;
     for (int k = 0; k < W.surface_count; k++) {
         double approach;
-        if (!is_near(W.surfaces + k, d)) continue;
+        if (W.surfaces[k].there != THERE || !is_near(W.surfaces + k, d)) continue;
         double t = d->t + meet_surface(W.surfaces + k, d, W.step_end - d->t, &approach);
         if (t < *due && t < W.step_end && approach > left_over(d, d->impacts, k, d->radius)) {
             *due = MAX(t, W.now);
@@ -204,7 +205,7 @@ static void jam(int i) {
     d->uspin = d->spin;
     for (int k = 0; k < W.surface_count && count < MAX_HELD; k++) {
         Contact *c = list + count;
-        if (!is_near(W.surfaces + k, d)) continue;
+        if (W.surfaces[k].there != THERE || !is_near(W.surfaces + k, d)) continue;
         describe(c, i, -1 - k);
         if (c->gap > TOUCH * d->radius) continue;
         c->impulse[0] = c->impulse[1] = c->impulse[2] = c->need = c->drift = 0;
@@ -242,9 +243,8 @@ static void end_hop(int i, double t) {
     if (!last) return;
     Contact c = *last;
     double h = t - W.t, half = 0.5 * W.length, u[3], v[3], entries[3], given[3], to[3];
-    /* A contact that lasted already has its state at the step's beginning in `held`; a new one has
-       that before the impulses. Half a step later both have the velocity without the hop. */
-    const double *from = track->lasted > 1 ? track->held + 3 : &d->ux;
+    /* `held` is the smooth state at the step's beginning; half a step later it is that without hop. */
+    const double *from = track->held + 3;
     for (int n = 0; n < 3; n++) {
         double mid = track->after[n] + (n == 0 ? half * W.gx : n == 1 ? half * W.gy : 0);
         to[n] = from[n] + (mid - from[n]) * (half > 0 ? h / half : 0);
@@ -390,7 +390,7 @@ void lie_down(int i) {
     for (int k = 0; k < W.surface_count; k++) {
         const Surface *s = W.surfaces + k;
         double nx, ny;
-        if (!s->there || gap_to(s, d->x, d->y, d->radius, &nx, &ny) > 1e-9 * d->radius) continue;
+        if (s->there != THERE || gap_to(s, d->x, d->y, d->radius, &nx, &ny) > 1e-9 * d->radius) continue;
         double press = press_on(d, s, nx, ny);
         if (press <= 0 || fabs(d->vx * nx + d->vy * ny) > press * W.dt) continue;
         d->on = s->owner;

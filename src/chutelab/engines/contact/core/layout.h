@@ -21,6 +21,9 @@ enum Kind { RELEASE, SEPARATION, SLIP, IMPACT, LANDING, COLLISION, STICK, SETTLE
 
 enum Shape { SEGMENT, CIRCLE, ARC };
 
+/* Whether a surface is there. */
+enum There { ABSENT, THERE, LEAVING };
+
 /* When a run ends: `run.until`. */
 enum Until { UNTIL_LANDED, UNTIL_SETTLED, UNTIL_TIME };
 
@@ -99,7 +102,7 @@ typedef struct {
     int shape;
     int material;           /* [in] column of the table of pairs, behind the kinds of disks */
     int owner;              /* [in] number of the surface it is part of */
-    int there;              /* whether it is there in this step */
+    int there;              /* whether it is there in this step; LEAVING: until just now */
     double box[4];          /* m; left, bottom, right, top */
 } Surface;
 
@@ -179,6 +182,7 @@ typedef struct {
     int phase, cell_count, heap_count, moved_count, wide_count, stamp;
     double t, now, step, step_end, cell;
     double length, length_before; /* s; of this step and of the one before */
+    double before;       /* share of this step's impulses that belongs to the one before */
     double g;            /* m/s2; size of gravity */
     double soft;         /* m/s; twice what gravity does in a step: supported disks meet softly */
     double skip;         /* 1/s; SKIP in a step: radii that it may go */

@@ -98,15 +98,16 @@ static void foretell(Track *track, const double *from, const double *to) {
 
 /* Note the state of a disk in lasting contact, after the impulses of a step.
 
-   In contact a disk hops from step to step; its smooth track goes through the states halfway through
-   the impulses of each step. There its velocity is the mean of those before and after, and its
-   entries are short of what the second half does. One is written where constant acceleration from
+   In contact a disk hops from step to step; its smooth track goes through the states partway through
+   the impulses of each step, halfway if steps are equal. There its velocity has no part of the hop,
+   and its entries are short of what the rest of the impulses does. One is written where constant acceleration from
    the last knot on no longer foretells the next. */
 void track_lasting(int i) {
     Disk *d = W.disks + i;
     Track *track = W.tracks + i;
-    double state[6] = {d->t, d->x, d->y, 0.5 * (d->ux + d->vx), 0.5 * (d->uy + d->vy),
-                       0.5 * (d->uspin + d->spin)};
+    double f = W.before;
+    double state[6] = {d->t, d->x, d->y, d->ux + f * (d->vx - d->ux), d->uy + f * (d->vy - d->uy),
+                       d->uspin + f * (d->spin - d->uspin)};
     double entries[3];
     for (int n = 0; n < 3; n++) entries[n] = d->entries[n] + d->gain[n] - d->ahead[n];
     if (!track->lasted) {

@@ -32,7 +32,10 @@ void wake(int i, double t) {
         d->mode = FREE;
         d->calm = d->rest = 0;
         d->changes++;
-        if (h <= 0) continue;
+        if (h <= 0) {
+            knot_before(n, t, d->vx, d->vy, d->spin);
+            continue;
+        }
         was_moved(n);
         double x = -0.5 * W.gx * left, y = -0.5 * W.gy * left;
         double entries[3] = {0, -d->mass * (x * (d->vx + 0.5 * x) + y * (d->vy + 0.5 * y)), 0};

@@ -76,6 +76,10 @@ static int add(int i, int j, double least, double bound, double h) {
         double press = press_on(d, W.surfaces + (-1 - j), c->nx, c->ny);
         floor += 0.5 * until * MAX(press, 0);
     }
+    if (j < 0 && W.surfaces[-1 - j].there == LEAVING) {
+        if (!pressed) return 1;
+        c->need = -INFINITY;
+    }
     c->leaves = pressed && c->gap <= LEAVE * least && c->need < floor;
     if (c->leaves) c->need = floor;
     W.contact_count++;
@@ -114,7 +118,8 @@ int find_contacts(double h, int *woke) {
         double least = MIN(a->radius, b->radius), reach = a->radius + b->radius + TOUCH * least;
         if (square(a->x - b->x) + square(a->y - b->y) > reach * reach) continue;
         /* What the step before left over is taken up here. */
-        double bound = left_over(a, MAX(a->impacts, b->impacts), -1, least);
+        int impacts = MAX(a->impacts, b->impacts);
+        double bound = impacts > CROWDED ? INFINITY : left_over(a, impacts, -1, least);
         if (a->supports || b->supports || a->mode != FREE || b->mode != FREE)
             bound = MAX(bound, MAX(W.soft, W.skip * least));
         if (a->mode == ASLEEP || b->mode == ASLEEP) {
@@ -129,7 +134,7 @@ int find_contacts(double h, int *woke) {
         Disk *d = W.disks + i;
         if (d->mode != FREE) continue;
         int first = W.contact_count;
-        double bound = left_over(d, d->impacts, -1, d->radius);
+        double bound = d->impacts > CROWDED ? INFINITY : left_over(d, d->impacts, -1, d->radius);
         if (d->supports) bound = MAX(bound, W.interact ? MAX(W.soft, W.skip * d->radius) : W.soft);
         for (int k = 0; k < W.surface_count; k++)
             if (is_near(W.surfaces + k, d) && !add(i, -1 - k, d->radius, bound, h)) return 0;
@@ -291,11 +296,15 @@ static void settle(int i, const Contact *last, double h) {
 
 /* After the solve: entries, supports, timers, tracks. */
 void close_step(double h) {
+    /* The share of the impulses that belongs to the step before; of a new contact, none. */
+    W.before = W.length_before > 0 ? W.length_before / (W.length_before + h) : 0.5;
+    if (!W.interact && !W.tracks[W.low].lasted) W.before = 0;
     double calm_bound = CALM;
     for (int i = W.low; i < W.high; i++) {
         Disk *d = W.disks + i;
         d->links = d->before = -1;
-        d->held_count = d->supports = 0;
+        d->supports = 0;
+        if (d->mode == FREE) d->held_count = 0;
         if (W.length_before > 0.01 * W.dt) d->impacts = 0;
         for (int n = 0; n < 3; n++) d->gain[n] = d->ahead[n] = 0;
         if (d->mode == FREE) {
@@ -321,7 +330,7 @@ void close_step(double h) {
         share_out(c, u, v, 0, entries, given);
         book(a->gain, c->two ? b->gain : 0, c->owner, entries);
         if (given[0] != 0) book(a->gain, 0, W.ride_owner, given);
-        share_out(c, u, v, 1, entries, given);
+        share_out(c, u, v, W.before, entries, given);
         for (int k = 0; k < 3; k++) {
             a->ahead[k] += (c->two ? 0.5 : 1) * entries[k] + given[k];
             if (c->two) b->ahead[k] += 0.5 * entries[k];
@@ -416,7 +425,7 @@ void take_back(int i) {
         if (c->impulse[0] == 0) continue;
         relative(c, 1, u);
         relative(c, 0, v);
-        share_out(c, u, v, 1, entries, given);
+        share_out(c, u, v, W.before, entries, given);
         for (int n = 0; n < 3; n++) {
             double back = (c->two ? 0.5 : 1) * entries[n];
             if (c->i != i && !c->two) back = 0;

@@ -12,7 +12,7 @@
    since parting does work. Of an overlap as deep as DEEP more, up to all. */
 #define SLOP 1e-3
 #define PART 0.1
-#define DEEP 0.05
+#define DEEP 0.03
 /* Gap, in radii, up to which what was pressed still touches: what sweeps leave open. */
 #define LEAVE 1e-4
 /* Friction from which on it is lowered where sweeps diverge: 76 degrees. */

@@ -292,12 +292,18 @@ def _depths(machine, recording):
                     since, worst = look, 0.0
                 worst = max(worst, depth)
                 runs[who] = since, look, worst
-                name = " and ".join(map(str, who)) if isinstance(who[1], int) else f"{who[0]} in {who[1]}"
+                name = (
+                    " and ".join(map(str, who))
+                    if isinstance(who[1], int)
+                    else f"{who[0]} in {who[1]}"
+                )
                 lasts = (look - since) * apart / h
                 if depth > INSIDE:
                     found[who] = f"through: {name} by {depth:.2g} r at {t:.6g} s"
                 elif lasts > 1.25 and not found.get(who, "").startswith("through"):
-                    found[who] = f"pressed: {name} by {worst:.2g} r for {lasts:.3g} steps at {t:.6g} s"
+                    found[who] = (
+                        f"pressed: {name} by {worst:.2g} r for {lasts:.3g} steps at {t:.6g} s"
+                    )
     return list(found.values())
 
 
@@ -329,7 +335,7 @@ def _in_surfaces(machine, x):
 
 
 def _crossings(machine, recording):
-    """Tell whose centre goes through a face: by the cubic between two knots, at nine places each."""
+    """Tell whose centre goes through a face, by the cubic between two knots, at nine places."""
     knots, s = recording.knots, machine.segments
     whose = np.repeat(np.arange(recording.count), np.diff(recording.offsets))
     rows = np.flatnonzero((whose[1:] == whose[:-1]) & (np.diff(knots["t"]) > 0.0))

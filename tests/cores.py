@@ -48,7 +48,7 @@ class Core:
         self.job = engine.Job(self.module, machine)
         for name, size in (rooms or {}).items():
             self.job.rooms[name] = size
-            self.module.world[f"{name}_room"] = size
+            setattr(self.module.world, f"{name}_room", size)
 
     def _array(self, name, struct, count):
         return self.module.array(name, module.dtype(struct), count)
@@ -73,8 +73,8 @@ class Core:
     def kinds(self, table):
         """Set the table of pairs, (kinds, kinds + surfaces): (restitution, friction, rolling)."""
         count = len(table)
-        self.module.place("pairs", module.dtype("Pair"), count * len(table[0]))
-        self.world["kind_count"] = count
+        self.module.place(("pairs", module.dtype("Pair"), count * len(table[0])))
+        self.world.kind_count = count
         pairs = self._array("pairs", "Pair", count * len(table[0]))
         for place, values in enumerate(value for row in table for value in row):
             pairs[place] = values
@@ -93,8 +93,8 @@ class Core:
 
     def tilt(self, angle):
         """Turn gravity counter-clockwise by an angle (rad)."""
-        g = float(self.world["g"][0])
-        self.world["gx"], self.world["gy"] = g * np.sin(angle), -g * np.cos(angle)
+        g = self.world.g
+        self.world.gx, self.world.gy = g * np.sin(angle), -g * np.cos(angle)
 
     def run(self):
         """Run to the end and return the recording; a stall is an error."""
@@ -117,11 +117,11 @@ class Core:
                 return False
             assert status is not module.Status.STALLED
             if status.name in full:
-                self.job.room(full[status.name], 2)
+                self.job.enlarge(full[status.name])
             else:
                 what = "knot" if status is module.Status.FULL_KNOTS else "event"
                 if drained[what] < self.job.rooms[what] // 2:
-                    self.job.room(what, 2)
+                    self.job.enlarge(what)
 
 
 def modes(core):

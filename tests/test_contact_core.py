@@ -161,7 +161,7 @@ def test_a_tilted_world_is_a_turned_scene(crowded):
         machine = crowd_scene(surface=[box], run={"until": 0.6})
         core = Core(thrown(machine, place @ matrix.T, velocity @ matrix.T))
         core.tilt(tilt)
-        core.world["exit_box"] = -inf, -inf, inf, inf
+        core.world.exit_box[:] = -inf, -inf, inf, inf
         found.append(core.run())
     # Rounding may move a knot of what lasts: a track leaves out 1e-4 of the radius there.
     times, close = np.linspace(0.0, 0.599, 200), 2e-6 if crowded else 1e-12
@@ -185,7 +185,7 @@ def pendulum(angle, dt, *, end=1.2):
     place = (radius - r) * np.array([sin(angle), -cos(angle)])
     core = Core(thrown(machine, place, [0.0, 0.0]))
     core.arc(0, (0.0, 0.0), radius, -0.5 * pi, 0.5 * pi)
-    core.world["exit_box"] = -9.0, -9.0, 9.0, 9.0
+    core.world.exit_box[:] = -9.0, -9.0, 9.0, 9.0
     return core
 
 
@@ -234,7 +234,7 @@ def test_a_ball_leaves_the_outside_of_an_arc_where_its_load_ends(dt):
                        run={"until": 0.8, "dt": dt})  # fmt: skip
     core = Core(thrown(machine, [0.0, radius + r], [speed, 0.0]))
     core.arc(0, (0.0, 0.0), radius, 0.5 * pi, 0.5 * pi)
-    core.world["exit_box"] = -9.0, -9.0, 9.0, 9.0
+    core.world.exit_box[:] = -9.0, -9.0, 9.0, 9.0
     left = core.run().select(Kind.SEPARATION)[0]
     rho = radius + r
     u0 = speed**2 / (G * rho)
@@ -257,7 +257,7 @@ def test_a_ball_meets_an_arc_when_the_parabola_does(inside):
     place, velocity = ((0.1, 0.0), (1.3, 0.4)) if inside else ((-0.9, 0.3), (1.5, 1.0))
     core = Core(thrown(machine, place, velocity))
     core.arc(0, (0.0, 0.0), radius, -0.5 if inside else 2.6, 0.9)
-    core.world["exit_box"] = -9.0, -9.0, 9.0, 9.0
+    core.world.exit_box[:] = -9.0, -9.0, 9.0, 9.0
     event = core.run().select(Kind.IMPACT)[0]
     x, v, g = np.array(place), np.array(velocity), np.array([0.0, -G])
     reach = radius - r if inside else radius + r
@@ -400,15 +400,15 @@ def test_a_heap_falls_asleep_and_costs_nothing_until_it_is_hit():
     )
     core = Core(replace(machine, releases=late))
     asleep_at = None
-    while float(core.world["t"][0]) < 1.99:
+    while core.world.t < 1.99:
         core.step()
         if asleep_at is None and modes(core)["ASLEEP"] == 12:
-            asleep_at = int(core.world["step_count"][0]), int(core.world["solve_count"][0])
+            asleep_at = core.world.step_count, core.world.solve_count
     assert asleep_at is not None
     assert modes(core) == {"WAITING": 1, "RIDING": 0, "FREE": 0, "ASLEEP": 12, "GONE": 0}
     # From then on until the late one comes no step was taken and nothing solved.
-    assert int(core.world["solve_count"][0]) == asleep_at[1]
-    assert int(core.world["step_count"][0]) <= asleep_at[0] + 2
+    assert core.world.solve_count == asleep_at[1]
+    assert core.world.step_count <= asleep_at[0] + 2
     lay = core.disks["x"].copy(), core.disks["y"].copy()
     woke = 0
     while not core.step():
@@ -484,11 +484,9 @@ def all_bytes(core):
     while True:
         before, status = status, core.module.run(64)
         for what, kept in drained.items():
-            count = int(core.world[f"{what}_count"][0])
+            count = getattr(core.world, f"{what}_count")
             kept.append(core.module.array(f"{what}s", dtype(what.title()), count).tobytes())
-            core.world[f"{what}_count"] = 0
-        if "drained" in core.world.dtype.names:
-            core.world["drained"] += 1
+            setattr(core.world, f"{what}_count", 0)
         if status is Status.DONE:
             break
         assert status in (Status.PAUSED, Status.FULL_KNOTS, Status.FULL_EVENTS)
@@ -507,7 +505,7 @@ def test_in_node_it_does_the_same_to_the_bit(tmp_path, crowded):
     core = Core(machine)
     if crowded:
         for what in core.job.rooms:
-            core.job.room(what, 8)
+            core.job.enlarge(what)
     # All of the memory: the core's own data are as `_initialize` left them in both.
     (tmp_path / "memory").write_bytes(memory_of(core.module))
     here = files("chutelab.engines.contact") / "core"

@@ -6,9 +6,8 @@
 void describe(Contact *c, int i, int j) {
     const Disk *a = W.disks + i;
     const Pair *pair;
-    double r = a->radius, mass = 1 / a->mass, turn = a->inertia > 0 ? 1 / a->inertia : 0, rb = 0;
-    double reach = r, spin_mass = turn;
-    mass = 1 / a->mass;
+    double r = a->radius, mass = a->inv_mass, turn = a->inv_inertia, rb = 0, reach = r;
+    double spin_mass = turn;
     c->i = i;
     c->j = j;
     c->two = 0;
@@ -36,10 +35,9 @@ void describe(Contact *c, int i, int j) {
         c->other[1] = b->vx * c->ny - b->vy * c->nx;
         c->other[2] = 0;
         if (c->two) {
-            double turn_b = b->inertia > 0 ? 1 / b->inertia : 0;
-            mass += 1 / b->mass;
-            c->mass[1] += 1 / b->mass + rb * rb * turn_b;
-            spin_mass += turn_b;
+            mass += b->inv_mass;
+            c->mass[1] += b->inv_mass + rb * rb * b->inv_inertia;
+            spin_mass += b->inv_inertia;
         }
     }
     c->mass[0] = 1 / mass;
@@ -69,14 +67,14 @@ void relative(const Contact *c, int earlier, double *out) {
 void push(const Contact *c, const double *J) {
     Disk *a = W.disks + c->i;
     double x = J[0] * c->nx + J[1] * c->ny, y = J[0] * c->ny - J[1] * c->nx;
-    a->vx += x / a->mass;
-    a->vy += y / a->mass;
-    if (a->inertia > 0) a->spin += (a->radius * J[1] + J[2]) / a->inertia;
+    a->vx += x * a->inv_mass;
+    a->vy += y * a->inv_mass;
+    a->spin += (a->radius * J[1] + J[2]) * a->inv_inertia;
     if (c->two) {
         Disk *b = W.disks + c->j;
-        b->vx -= x / b->mass;
-        b->vy -= y / b->mass;
-        if (b->inertia > 0) b->spin += (b->radius * J[1] - J[2]) / b->inertia;
+        b->vx -= x * b->inv_mass;
+        b->vy -= y * b->inv_mass;
+        b->spin += (b->radius * J[1] - J[2]) * b->inv_inertia;
     }
 }
 

@@ -29,7 +29,7 @@ extern World W;
 /* Impacts in a step from which on a disk counts as jammed: all it touches is solved at once. */
 #define JAM 40
 /* ... and from which on the step ends, so that the whole crowd round it is solved at once. */
-#define CROWDED 300
+#define CROWDED 50
 /* Of the speed; a slower approach grazes, and rounding may well have made it. */
 #define GRAZE 1e-6
 /* Impacts of a disk in a step that no collapse needs: something is wrong, the run stops. */

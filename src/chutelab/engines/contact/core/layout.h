@@ -36,6 +36,7 @@ typedef struct {
     double ux, uy, uspin;       /* velocity before the step's impulses; of a sleeper, its own */
     double radius, mass;        /* [in] radius > 0 */
     double inertia;             /* [in] kg m2; 0: it does not turn */
+    double inv_mass, inv_inertia; /* 1/kg, 1/(kg m2); 0 for one that does not turn */
     double release;             /* [in] s; it waits from then on until its place is free */
     double ride_x;              /* [in] m along the belt where a ride by adhesion begins, <= 0 ... */
     double ride_rho;            /* [in] ... and its distance from the axis of the pulley; 0: no ride */

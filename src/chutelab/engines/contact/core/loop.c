@@ -408,6 +408,8 @@ static int begin_part(void) {
         d->left = d->bottom = INFINITY;
         d->right = d->top = -INFINITY;
         d->before = d->links = -1;
+        d->inv_mass = 1 / d->mass;
+        d->inv_inertia = d->inertia > 0 ? 1 / d->inertia : 0;
         d->heap_place = -1;
         d->on = -1;
         W.t = MIN(W.t, d->release);

@@ -12,11 +12,13 @@
    since parting does work. Of an overlap as deep as DEEP more, up to all. */
 #define SLOP 1e-3
 #define PART 0.1
-#define DEEP 0.05
+#define DEEP 0.03
 /* Gap, in radii, up to which what was pressed still touches: what sweeps leave open. */
 #define LEAVE 1e-4
 /* Friction from which on it is lowered where sweeps diverge: 76 degrees. */
 #define ROUGH 4.0
+/* Steps that a contact in a crowd lasts at least if its end is told as a separation. */
+#define LASTS 10
 /* Of momentum. */
 #define NOISE 1e-11
 /* Times the first change: sweeps whose changes grow so far never end. */
@@ -51,9 +53,13 @@ static int add(int i, int j, double least, double bound, double h) {
     if (W.contact_count >= W.contact_room) return 0;
     Contact *c = W.contacts + W.contact_count;
     const Disk *d = W.disks + i;
-    double u[3];
+    double u[3], later;
     describe(c, i, j);
-    if (c->gap > TOUCH * least) return 1;
+    /* The next face or pulley that a disk by itself slides on to may be further off. */
+    int far = c->gap > TOUCH * least;
+    if (far && (W.interact || j >= 0 || !d->supports)) return 1;
+    later = gap_later(c, h);
+    if (far && later > 0) return 1;
     relative(c, 0, u);
     if (-u[0] > bound || u[0] > W.soft) return 1;
     double aim = MIN(c->gap, 0);
@@ -61,7 +67,7 @@ static int add(int i, int j, double least, double bound, double h) {
         double part = MIN(MAX(PART, -c->gap / (DEEP * least)), 1);
         aim = -SLOP * least + (1 - part) * (c->gap + SLOP * least);
     }
-    c->need = (aim - gap_later(c, h)) / h;
+    c->need = (aim - later) / h;
     c->drift = j < 0 ? 0.5 * h * (W.gx * c->ny - W.gy * c->nx) : 0;
     c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
     for (int k = d->before; k >= 0; k = W.earlier[k].next)
@@ -89,22 +95,28 @@ static int add(int i, int j, double least, double bound, double h) {
 /* A disk that leaves all surfaces in this step, over the end of a face, is carried until then: it
    gets what gravity takes from it up to there. */
 static void carry_to_end(int i, int first, double h) {
+    const Disk *d = W.disks + i;
     Contact *last = 0;
-    double until = 0;
+    double until = 0, nx, ny;
     for (int n = first; n < W.contact_count; n++) {
         Contact *c = W.contacts + n;
-        double t = time_on_face(c), u[3];
-        relative(c, 0, u);
-        /* Another surface carries it on. */
-        if (!c->leaves && u[0] + c->need > 0) return;
-        if (c->leaves && t < h && t >= until) {
+        double t = c->leaves ? time_on_face(c) : INFINITY;
+        if (t < h && t >= until) {
             last = c;
             until = t;
         }
     }
     if (!last) return;
-    double press = press_on(W.disks + i, W.surfaces + (-1 - last->j), last->nx, last->ny);
-    if (press > 0) last->need += 0.5 * press * until;
+    /* Without a hop it would fall from the end on; whatever it would fall into carries it on. */
+    double u[3], fall = 0.5 * square(h - until);
+    relative(last, 0, u);
+    double x = d->x + (d->vx - u[0] * last->nx) * h + fall * W.gx;
+    double y = d->y + (d->vy - u[0] * last->ny) * h + fall * W.gy;
+    for (int k = 0; k < W.surface_count; k++)
+        if (is_near(W.surfaces + k, d) && gap_to(W.surfaces + k, x, y, d->radius, &nx, &ny) < 0)
+            return;
+    double press = press_on(d, W.surfaces + (-1 - last->j), last->nx, last->ny);
+    last->need += 0.5 * MAX(press, 0) * until;
     W.tracks[i].end_of_face = W.t + until;
 }
 
@@ -359,7 +371,7 @@ void close_step(double h) {
             if (track->lasted) {
                 /* The load fell to nothing between the last steps: where its line through two full
                    ones crosses zero the contact ended. */
-                if (d->on >= 0 && track->lasted >= (W.interact ? 10 : 3)) {
+                if (d->on >= 0 && track->lasted >= (W.interact ? LASTS : 3)) {
                     double t = track->load_t[1], fall = track->load[2] - track->load[1];
                     if (fall > 0) t += track->load[1] / fall * (t - track->load_t[2]);
                     if (track->end_of_face >= track->held[0]) t = track->end_of_face;
@@ -396,8 +408,15 @@ void close_step(double h) {
                 settle(i, only, h);
             else if (!W.interact && W.until == UNTIL_LANDED && d->landed) reason = BY_LANDING;
         } else {
+            /* On several; of a surface it lies on, if any, it may still part. */
+            int ground = -1;
+            for (int link = d->links; link >= 0; link = W.links[link]) {
+                const Contact *c = W.contacts + link / 2;
+                if (c->impulse[0] > 0 && c->j < 0) ground = c->owner;
+            }
+            if (ground < 0 && d->on >= 0 && track->lasted >= LASTS) event_here(SEPARATION, i, d->on);
             d->slips = 1;
-            d->on = -1;
+            d->on = ground;
         }
         d->changes++;
         if (d->mode == GONE) continue;

@@ -182,8 +182,8 @@ class _Draw:
         adhesion = self.one_of(True, False)
         # Layers that are carried round the pulley run into each other: there is one, if it is slow.
         slow = self.v**2 < self.g * self.r * (radius + 22.0)
-        return {
-            **({"released": {"bed_height": 0.0}} if adhesion and slow else {}),
+        bed = {"released": {"bed_height": 0.0}} if adhesion and slow else {}
+        tables = {
             "incoming": {
                 "speed": self.v,
                 "pulley_radius": self.r * radius,
@@ -207,6 +207,12 @@ class _Draw:
                 **self.pair(),
             },
         }
+        # Nothing pushes back who is carried: a jam that reaches up to the pulley would be crushed.
+        out = tables["outgoing"]
+        takes_away = self.g > 0.0 and out["speed"] > 0.3 * self.v and out["friction"] > 0.0
+        if not takes_away:
+            tables["incoming"]["friction"] = pair["friction"]
+        return {**bed, **tables}
 
 
 # Laws

@@ -517,3 +517,7 @@ def test_in_node_it_does_the_same_to_the_bit(tmp_path, crowded):
     mine, its = all_bytes(core), (tmp_path / "out").read_bytes()
     assert len(mine) == len(its) > 1000
     assert mine == its
+
+
+def test_the_host_knows_the_statuses_of_the_core():
+    assert {status.name: status.value for status in module.Status} == module.constants("Status")

@@ -85,7 +85,7 @@ class Job:
         count = self.surface_count = len(machine.segments.length) + (machine.pulley is not None)
         self.owners = len(machine.surfaces)
         self.rooms = {
-            "knot": max(64, 24 * n) + 80,
+            "knot": (100 if machine.releases.carried.any() else 30) * n + 200,
             "event": 40 * n + 1200,
             "contact": 6 * n + 16,
             "near": 16 * n + 16 if machine.interact else 1,
@@ -93,40 +93,39 @@ class Job:
         integer, real = np.dtype("<i4"), np.dtype("<f8")
         buckets = 1 << (4 * n + 16).bit_length() if machine.interact else 1
         cells = 12 * n + 64 if machine.interact else 1
-        for name, kind, size in (
+        module.place(
             ("disks", dtype("Disk"), n), ("tracks", dtype("Track"), n),
             ("surfaces", dtype("Surface"), count), ("pairs", dtype("Pair"), 1 + count),
             ("books", real, 3 * (self.owners + 1)), ("cells", dtype("Cell"), cells),
             ("heads", integer, buckets), ("heap", integer, n), ("queue", integer, n + 1),
             ("moved", integer, n), ("found", integer, 2 * n),
-        ):  # fmt: skip
-            module.place(name, kind, size)
-        self.room("contact")
-        self.room("near")
-        self.room("knot")
-        self.room("event")
+            *(arrays for what in self.rooms for arrays in self.arrays(what)),
+        )  # fmt: skip
+        for what, size in self.rooms.items():
+            setattr(module.world, f"{what}_room", size)
         self.settings(buckets, cells)
         self.fill()
 
-    def room(self, what: str, more: int = 1) -> None:
-        """Make room for `more` times as much of something as before; what was there is lost."""
-        self.rooms[what] *= more
-        size, place = self.rooms[what], self.module.place
+    def arrays(self, what: str) -> tuple[tuple[str, np.dtype[Any], int], ...]:
+        """Return the arrays whose size `rooms` tells."""
+        size, integer = self.rooms[what], np.dtype("<i4")
+        if what == "near":
+            return (("near", integer, 2 * size),)
+        if what != "contact":
+            return ((f"{what}s", dtype(what.title()), size),)
+        kind = dtype("Contact")
+        return (("contacts", kind, size), ("earlier", kind, size), ("links", integer, 2 * size))
+
+    def enlarge(self, what: str) -> None:
+        """Make twice as much room; contacts of the step before are kept, all else has been taken."""
+        world, kept = self.module.world, None
         if what == "contact":
-            place("contacts", dtype("Contact"), size)
-            old = int(self.module.world["earlier"][0])
-            kept = int(self.module.world["earlier_count"][0])
-            if kept:
-                before = self.module.array("earlier", dtype("Contact"), kept).copy()
-            place("earlier", dtype("Contact"), size)
-            if old and kept:
-                self.module.array("earlier", dtype("Contact"), kept)[:] = before
-            place("links", np.dtype("<i4"), 2 * size)
-        elif what == "near":
-            place("near", np.dtype("<i4"), 2 * size)
-        else:
-            place(f"{what}s", dtype(what.title()), size)
-        self.module.world[f"{what}_room"] = size
+            kept = self.module.array("earlier", dtype("Contact"), world.earlier_count).copy()
+        self.rooms[what] *= 2
+        self.module.place(*self.arrays(what))
+        setattr(self.module.world, f"{what}_room", self.rooms[what])
+        if kept is not None:
+            self.module.array("earlier", dtype("Contact"), len(kept))[:] = kept
 
     def settings(self, buckets: int, cells: int) -> None:
         machine, world = self.machine, self.module.world
@@ -142,11 +141,12 @@ class Job:
             ("landing", machine.landing), ("ride_owner", 0),
             ("sweeps", SWEEPS_ALONE if alone else SWEEPS), ("sleeps", not alone),
             ("gy", -machine.gravity), ("g", machine.gravity), ("dt", machine.dt),
-            ("end_time", machine.end_time), ("exit_box", (left, bottom, right, top)),
+            ("end_time", machine.end_time),
             ("smooth_x", (1e-5 if alone else 1e-4) * r), ("smooth_v", 1e-4 if alone else 1e-3),
             ("accurate", 1e-15 if alone else 3e-4),
         ):  # fmt: skip
-            world[name] = value
+            setattr(world, name, value)
+        world.exit_box[:] = left, bottom, right, top
 
     def fill(self) -> None:
         """Fill in disks, surfaces and pairs."""
@@ -200,17 +200,17 @@ class Job:
                     progress(1.0)
                 return None
             if status is Status.STALLED:
-                i = int(module.world["stalled"][0])
+                i = module.world.stalled
                 disk = module.array("disks", dtype("Disk"), self.machine.count)[i]
-                return i, float(module.world["now"][0]), (float(disk["x"]), float(disk["y"]))
+                return i, module.world.now, (float(disk["x"]), float(disk["y"]))
             if status is Status.FULL_NEAR:
-                self.room("near", 2)
+                self.enlarge("near")
             elif status is Status.FULL_CONTACTS:
-                self.room("contact", 2)
+                self.enlarge("contact")
             elif status in (Status.FULL_KNOTS, Status.FULL_EVENTS):
                 what = "knot" if status is Status.FULL_KNOTS else "event"
                 if drained[what] < self.rooms[what] // 2:
-                    self.room(what, 2)
+                    self.enlarge(what)
             elif status is Status.PAUSED and perf_counter() - begin < SLICE:
                 steps *= 2
             if progress is not None:
@@ -218,21 +218,20 @@ class Job:
 
     def share(self) -> float:
         world, n = self.module.world, self.machine.count
-        ended = int(world["done"][0]) / n
+        ended = world.done / n
         if not self.machine.interact:
             return ended
-        passed = float(world["t"][0]) / self.machine.end_time if self.machine.end_time > 0 else 1.0
+        passed = world.t / self.machine.end_time if self.machine.end_time > 0 else 1.0
         return min(1.0, max(ended, passed))
 
     def drain(self) -> dict[str, int]:
         """Take what was written; return how much it was."""
         counts = {}
         for what, kept in (("knot", self.knots), ("event", self.events)):
-            counts[what] = count = int(self.module.world[f"{what}_count"][0])
+            counts[what] = count = getattr(self.module.world, f"{what}_count")
             if count:
                 kept.append(self.module.array(f"{what}s", dtype(what.title()), count).copy())
-                self.module.world[f"{what}_count"] = 0
-        self.module.world["drained"] += 1
+                setattr(self.module.world, f"{what}_count", 0)
         return counts
 
     def recording(self, machine: Machine, place: tuple[float, float], seconds: float) -> Recording:
@@ -257,9 +256,9 @@ class Job:
         recorder.ended[:] = disks["reason"]
         books = module.array("books", np.dtype("<f8"), 3 * (self.owners + 1))
         recorder.by_surface[:] = books.reshape(-1, 3)
-        recorder.contacts = int(world["impact_count"][0])
+        recorder.contacts = world.impact_count
         return recorder.finish(
             scene=machine.text, title=machine.title, engine="contact", particle=machine.particle,
-            gravity=machine.gravity, steps=int(world["step_count"][0]), seconds=seconds,
+            gravity=machine.gravity, steps=world.step_count, seconds=seconds,
             origin=place,
         )  # fmt: skip

@@ -6,9 +6,8 @@
 void describe(Contact *c, int i, int j) {
     const Disk *a = W.disks + i;
     const Pair *pair;
-    double r = a->radius, mass = 1 / a->mass, turn = a->inertia > 0 ? 1 / a->inertia : 0, rb = 0;
-    double reach = r, spin_mass = turn;
-    mass = 1 / a->mass;
+    double r = a->radius, mass = a->inv_mass, turn = a->inv_inertia, rb = 0, reach = r;
+    double spin_mass = turn;
     c->i = i;
     c->j = j;
     c->two = 0;
@@ -36,10 +35,9 @@ void describe(Contact *c, int i, int j) {
         c->other[1] = b->vx * c->ny - b->vy * c->nx;
         c->other[2] = 0;
         if (c->two) {
-            double turn_b = b->inertia > 0 ? 1 / b->inertia : 0;
-            mass += 1 / b->mass;
-            c->mass[1] += 1 / b->mass + rb * rb * turn_b;
-            spin_mass += turn_b;
+            mass += b->inv_mass;
+            c->mass[1] += b->inv_mass + rb * rb * b->inv_inertia;
+            spin_mass += b->inv_inertia;
         }
     }
     c->mass[0] = 1 / mass;
@@ -69,24 +67,25 @@ void relative(const Contact *c, int earlier, double *out) {
 void push(const Contact *c, const double *J) {
     Disk *a = W.disks + c->i;
     double x = J[0] * c->nx + J[1] * c->ny, y = J[0] * c->ny - J[1] * c->nx;
-    a->vx += x / a->mass;
-    a->vy += y / a->mass;
-    if (a->inertia > 0) a->spin += (a->radius * J[1] + J[2]) / a->inertia;
+    a->vx += x * a->inv_mass;
+    a->vy += y * a->inv_mass;
+    a->spin += (a->radius * J[1] + J[2]) * a->inv_inertia;
     if (c->two) {
         Disk *b = W.disks + c->j;
-        b->vx -= x / b->mass;
-        b->vy -= y / b->mass;
-        if (b->inertia > 0) b->spin += (b->radius * J[1] - J[2]) / b->inertia;
+        b->vx -= x * b->inv_mass;
+        b->vy -= y * b->inv_mass;
+        b->spin += (b->radius * J[1] - J[2]) * b->inv_inertia;
     }
 }
 
 /* Ledger entries of a contact's impulses, which changed its relative velocities from u to v: an
-   impulse J does the work J (u + v) / 2, its second half alone J (u + 3 v) / 8. `given` is the work
-   of the belt that carries the partner, if that is a rider. */
-void share_out(const Contact *c, const double *u, const double *v, double half, double *entries,
+   impulse J does the work J (u + v) / 2. Of what is left when the share f of it has been given, it
+   is (1 - f) J (u (1 - f) + v (1 + f)) / 2. `given` is the work of the belt that carries the
+   partner, if that is a rider. */
+void share_out(const Contact *c, const double *u, const double *v, double f, double *entries,
                double *given) {
     const double *J = c->impulse;
-    double first = half ? 0.125 : 0.5, then = half ? 0.375 : 0.5, all = half ? 0.5 : 1;
+    double first = 0.5 * (1 - f) * (1 - f), then = 0.5 * (1 - f * f), all = 1 - f;
     entries[0] = c->j < 0 ? all * (J[1] * c->other[1] + J[2] * c->other[2]) : 0;
     entries[1] = -J[0] * (first * u[0] + then * v[0]);
     entries[2] = -J[1] * (first * u[1] + then * v[1]) - J[2] * (first * u[2] + then * v[2]);

@@ -28,6 +28,8 @@ extern World W;
 #define TOO_MANY 200
 /* Impacts in a step from which on a disk counts as jammed: all it touches is solved at once. */
 #define JAM 40
+/* ... and from which on the step ends, so that the whole crowd round it is solved at once. */
+#define CROWDED 50
 /* Of the speed; a slower approach grazes, and rounding may well have made it. */
 #define GRAZE 1e-6
 /* Impacts of a disk in a step that no collapse needs: something is wrong, the run stops. */
@@ -92,7 +94,7 @@ void book(double *first, double *second, int owner, const double *entries);
 void describe(Contact *c, int i, int j);
 void relative(const Contact *c, int earlier, double *out);
 void push(const Contact *c, const double *impulse);
-void share_out(const Contact *c, const double *u, const double *v, double half, double *entries,
+void share_out(const Contact *c, const double *u, const double *v, double f, double *entries,
                double *given);
 double press_on(const Disk *d, const Surface *s, double nx, double ny);
 

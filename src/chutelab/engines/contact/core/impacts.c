@@ -58,15 +58,15 @@ double soft_approach(const Disk *d, double radius) {
     return GRAZE * sqrt(d->vx * d->vx + d->vy * d->vy);
 }
 
-/* Approach up to which a contact is left to the next step, m/s. */
+/* Approach up to which a contact is left to the next step, m/s. What lies on a surface comes back to
+   it at the end of each step, as fast as gravity makes it in one. */
 double left_over(const Disk *d, int impacts, int surface, double radius) {
-    if (surface >= 0)
-        for (int n = 0; n < d->held_count; n++)
-            /* What lies on a surface comes back to it at the end of each step, so fast. */
-            if (d->held[n] == surface) return 1.000001 * W.g * W.step;
-    double skip = W.skip * radius;
-    if (impacts <= MANY) return soft_approach(d, radius);
-    return MIN(skip * pow(GROW, impacts - MANY), skip * (MOST_SKIP / SKIP));
+    double skip = W.skip * radius, least = soft_approach(d, radius);
+    for (int n = 0; n < d->held_count; n++)
+        if (d->held[n] == surface) least = MAX(least, 1.000001 * W.g * W.step);
+    if (impacts <= MANY) return least;
+    double most = skip * (MOST_SKIP / SKIP) * (surface < 0 ? MAX(1, impacts / CROWDED) : 1);
+    return MAX(least, MIN(skip * pow(GROW, MIN(impacts - MANY, 1000)), most));
 }
 
 static void foresee_pair(int i, int j, double *due, int *partner) {
@@ -87,7 +87,7 @@ static void foresee_surfaces(int i, double *due, int *partner) {
     const Disk *d = W.disks + i;
     for (int k = 0; k < W.surface_count; k++) {
         double approach;
-        if (!is_near(W.surfaces + k, d)) continue;
+        if (W.surfaces[k].there != THERE || !is_near(W.surfaces + k, d)) continue;
         double t = d->t + meet_surface(W.surfaces + k, d, W.step_end - d->t, &approach);
         if (t < *due && t < W.step_end && approach > left_over(d, d->impacts, k, d->radius)) {
             *due = MAX(t, W.now);
@@ -204,7 +204,7 @@ static void jam(int i) {
     d->uspin = d->spin;
     for (int k = 0; k < W.surface_count && count < MAX_HELD; k++) {
         Contact *c = list + count;
-        if (!is_near(W.surfaces + k, d)) continue;
+        if (W.surfaces[k].there != THERE || !is_near(W.surfaces + k, d)) continue;
         describe(c, i, -1 - k);
         if (c->gap > TOUCH * d->radius) continue;
         c->impulse[0] = c->impulse[1] = c->impulse[2] = c->need = c->drift = 0;
@@ -242,9 +242,8 @@ static void end_hop(int i, double t) {
     if (!last) return;
     Contact c = *last;
     double h = t - W.t, half = 0.5 * W.length, u[3], v[3], entries[3], given[3], to[3];
-    /* A contact that lasted already has its state at the step's beginning in `held`; a new one has
-       that before the impulses. Half a step later both have the velocity without the hop. */
-    const double *from = track->lasted > 1 ? track->held + 3 : &d->ux;
+    /* `held` is the smooth state at the step's beginning; half a step later it is that without hop. */
+    const double *from = track->held + 3;
     for (int n = 0; n < 3; n++) {
         double mid = track->after[n] + (n == 0 ? half * W.gx : n == 1 ? half * W.gy : 0);
         to[n] = from[n] + (mid - from[n]) * (half > 0 ? h / half : 0);
@@ -290,15 +289,17 @@ static void strike(int i, int j, double t) {
     double back = -c.rest * u[0];
     if (j >= 0 && -u[0] < W.soft && (a->supports || b->supports || !c.two)) back = 0;
     if (c.rest < 1 && ((impacts >= FEW && -u[0] < SLOW * W.g * W.dt) || impacts >= TOO_MANY)) back = 0;
-    int rests = 0;
-    if (j < 0 && back <= press_on(a, W.surfaces + (-1 - j), c.nx, c.ny) * W.step) {
-        rests = 1;
+    double press = j < 0 ? press_on(a, W.surfaces + (-1 - j), c.nx, c.ny) : 0, later = 0;
+    int rests = j < 0 && back <= press * W.step;
+    if (rests) {
+        /* The bounces that are left out, infinitely many, would have taken so long. */
+        if (back > 0 && c.rest < 1) later = 2 * back / (press * (1 - c.rest));
         back = 0;
     }
     double before[3] = {a->vx, a->vy, a->spin};
-    if (j < 0 && impacts >= JAM && c.rest < 1) jam(i);
+    if (j < 0 && impacts >= (c.rest < 1 ? JAM : CROWDED)) jam(i);
     else give(&c, c.mass[0] * (back - u[0]));
-    a->since = t;
+    a->since = t + later;
     if (c.two) b->since = t;
     W.impact_count++;
     int landing = j < 0 && c.owner == W.landing && !a->landed, kind = COLLISION;
@@ -388,7 +389,7 @@ void lie_down(int i) {
     for (int k = 0; k < W.surface_count; k++) {
         const Surface *s = W.surfaces + k;
         double nx, ny;
-        if (!s->there || gap_to(s, d->x, d->y, d->radius, &nx, &ny) > 1e-9 * d->radius) continue;
+        if (s->there != THERE || gap_to(s, d->x, d->y, d->radius, &nx, &ny) > 1e-9 * d->radius) continue;
         double press = press_on(d, s, nx, ny);
         if (press <= 0 || fabs(d->vx * nx + d->vy * ny) > press * W.dt) continue;
         d->on = s->owner;

@@ -21,6 +21,9 @@ enum Kind { RELEASE, SEPARATION, SLIP, IMPACT, LANDING, COLLISION, STICK, SETTLE
 
 enum Shape { SEGMENT, CIRCLE, ARC };
 
+/* Whether a surface is there. */
+enum There { ABSENT, THERE, LEAVING };
+
 /* When a run ends: `run.until`. */
 enum Until { UNTIL_LANDED, UNTIL_SETTLED, UNTIL_TIME };
 
@@ -33,6 +36,7 @@ typedef struct {
     double ux, uy, uspin;       /* velocity before the step's impulses; of a sleeper, its own */
     double radius, mass;        /* [in] radius > 0 */
     double inertia;             /* [in] kg m2; 0: it does not turn */
+    double inv_mass, inv_inertia; /* 1/kg, 1/(kg m2); 0 for one that does not turn */
     double release;             /* [in] s; it waits from then on until its place is free */
     double ride_x;              /* [in] m along the belt where a ride by adhesion begins, <= 0 ... */
     double ride_rho;            /* [in] ... and its distance from the axis of the pulley; 0: no ride */
@@ -72,6 +76,7 @@ typedef struct {
 /* The track of a disk between the knots that are written. */
 typedef struct {
     double knot[6];       /* last knot written: t, x, y, vx, vy, spin */
+    double blow_entries[3]; /* of a knot that is held back */
     double bend[3];       /* acceleration foretold from it on, of x, y and spin */
     double held[6];       /* latest state in lasting contact, halfway through its impulses */
     double held_entries[3];
@@ -83,8 +88,7 @@ typedef struct {
     double end_of_face;   /* s; when it left the end of a face */
     int bent, open;       /* bend is known; `held` is no knot yet */
     int lasted;           /* steps of this contact, 0 in flight */
-    int blow, drained;    /* where the knot after a blow is, if it is the last, and when that was */
-    int again;            /* the next knot after a blow goes there too */
+    int held_back;        /* `knot` is one after a blow and not written yet */
 } Track;
 
 typedef struct {
@@ -99,7 +103,7 @@ typedef struct {
     int shape;
     int material;           /* [in] column of the table of pairs, behind the kinds of disks */
     int owner;              /* [in] number of the surface it is part of */
-    int there;              /* whether it is there in this step */
+    int there;              /* whether it is there in this step; LEAVING: until just now */
     double box[4];          /* m; left, bottom, right, top */
 } Surface;
 
@@ -172,7 +176,6 @@ typedef struct {
     /* [out] */
     int knot_count, event_count, contact_count, near_count, earlier_count;
     int impact_count, step_count, solve_count, sweep_count;
-    int drained;         /* [in] how often the host has taken the knots */
     int done;            /* disks ended, a measure of progress */
     int stalled;         /* which disk */
     /* within the step */
@@ -180,6 +183,7 @@ typedef struct {
     int phase, cell_count, heap_count, moved_count, wide_count, stamp;
     double t, now, step, step_end, cell;
     double length, length_before; /* s; of this step and of the one before */
+    double before;       /* share of this step's impulses that belongs to the one before */
     double g;            /* m/s2; size of gravity */
     double soft;         /* m/s; twice what gravity does in a step: supported disks meet softly */
     double skip;         /* 1/s; SKIP in a step: radii that it may go */

@@ -225,7 +225,7 @@ static double set_gates(double t) {
     double next = INFINITY;
     for (int k = 0; k < W.surface_count; k++) {
         Surface *s = W.surfaces + k;
-        int there = t >= s->opens && t < s->closes;
+        int there = t < s->opens || t > s->closes ? ABSENT : t < s->closes ? THERE : LEAVING;
         if (there != s->there && W.step_count > 0)
             for (int i = W.low; i < W.high; i++)
                 if (W.disks[i].mode == ASLEEP) wake(i, W.t);
@@ -329,6 +329,10 @@ static int go_through(void) {
         }
         W.now = t;
         if (j != ALARM) {
+            if (W.interact && d->impacts > CROWDED && t > W.t) {
+                W.step_end = t;
+                return DONE;
+            }
             shock(i, j, t);
             continue;
         }
@@ -404,6 +408,8 @@ static int begin_part(void) {
         d->left = d->bottom = INFINITY;
         d->right = d->top = -INFINITY;
         d->before = d->links = -1;
+        d->inv_mass = 1 / d->mass;
+        d->inv_inertia = d->inertia > 0 ? 1 / d->inertia : 0;
         d->heap_place = -1;
         d->on = -1;
         W.t = MIN(W.t, d->release);

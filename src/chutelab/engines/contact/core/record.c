@@ -3,13 +3,24 @@
 #include <string.h>
 #include "core.h"
 
-static void write_knot(int i, const double *state, const double *entries) {
+static void emit(int i, const double *state, const double *entries) {
     Knot *k = W.knots + W.knot_count++;
-    Track *track = W.tracks + i;
     memcpy(&k->t, state, 6 * sizeof(double));
     memcpy(k->entries, entries, sizeof k->entries);
     k->disk = i;
-    track->blow = -1;
+}
+
+/* Write the knot after a blow that was held back, if there is one. */
+static void let_go(int i) {
+    Track *track = W.tracks + i;
+    if (track->held_back) emit(i, track->knot, track->blow_entries);
+    track->held_back = 0;
+}
+
+static void write_knot(int i, const double *state, const double *entries) {
+    Track *track = W.tracks + i;
+    let_go(i);
+    emit(i, state, entries);
     memcpy(track->knot, state, sizeof track->knot);
     track->bent = track->open = 0;
 }
@@ -34,22 +45,25 @@ void knot_before(int i, double t, double vx, double vy, double spin) {
 void knot_before_blow(int i) {
     const Disk *d = W.disks + i;
     Track *track = W.tracks + i;
-    track->again = W.interact && !track->lasted && track->blow >= 0 && track->drained == W.drained
-        && d->t - track->knot[0] < W.step
-        && fabs(d->x - track->knot[1]) + fabs(d->y - track->knot[2]) < W.smooth_x;
-    if (!track->again) knot_before(i, d->t, d->vx, d->vy, d->spin);
+    if (track->held_back && d->t - track->knot[0] < W.step
+        && fabs(d->x - track->knot[1]) + fabs(d->y - track->knot[2]) < W.smooth_x)
+        track->held_back = 0;
+    else knot_before(i, d->t, d->vx, d->vy, d->spin);
 }
 
-/* Write the state after a blow, over that of the blow before if `knot_before_blow` said so. */
+/* Note the state after a blow; in a crowd it is held back, since that of the next may replace it. */
 void knot_after(int i) {
+    const Disk *d = W.disks + i;
     Track *track = W.tracks + i;
-    int end = W.knot_count, blow = track->again ? track->blow : end;
-    W.knot_count = blow;
-    knot_now(i);
-    if (track->again) W.knot_count = end;
-    track->again = 0;
-    track->blow = blow;
-    track->drained = W.drained;
+    double state[6] = {d->t, d->x, d->y, d->vx, d->vy, d->spin};
+    if (!W.interact) {
+        knot_now(i);
+        return;
+    }
+    memcpy(track->knot, state, sizeof state);
+    memcpy(track->blow_entries, d->entries, sizeof track->blow_entries);
+    track->bent = track->open = 0;
+    track->held_back = 1;
 }
 
 /* End the smooth part of a track: the state halfway through the last impulses, and that after. */
@@ -84,15 +98,16 @@ static void foretell(Track *track, const double *from, const double *to) {
 
 /* Note the state of a disk in lasting contact, after the impulses of a step.
 
-   In contact a disk hops from step to step; its smooth track goes through the states halfway through
-   the impulses of each step. There its velocity is the mean of those before and after, and its
-   entries are short of what the second half does. One is written where constant acceleration from
+   In contact a disk hops from step to step; its smooth track goes through the states partway through
+   the impulses of each step, halfway if steps are equal. There its velocity has no part of the hop,
+   and its entries are short of what the rest of the impulses does. One is written where constant acceleration from
    the last knot on no longer foretells the next. */
 void track_lasting(int i) {
     Disk *d = W.disks + i;
     Track *track = W.tracks + i;
-    double state[6] = {d->t, d->x, d->y, 0.5 * (d->ux + d->vx), 0.5 * (d->uy + d->vy),
-                       0.5 * (d->uspin + d->spin)};
+    double f = W.before;
+    double state[6] = {d->t, d->x, d->y, d->ux + f * (d->vx - d->ux), d->uy + f * (d->vy - d->uy),
+                       d->uspin + f * (d->spin - d->uspin)};
     double entries[3];
     for (int n = 0; n < 3; n++) entries[n] = d->entries[n] + d->gain[n] - d->ahead[n];
     if (!track->lasted) {
@@ -128,6 +143,7 @@ void knot_held(int i) {
 /* End a track at its last knot. */
 void finish(int i, int reason) {
     Disk *d = W.disks + i;
+    let_go(i);
     d->mode = GONE;
     d->reason = reason;
     d->due = INFINITY;

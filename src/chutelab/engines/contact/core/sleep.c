@@ -32,7 +32,10 @@ void wake(int i, double t) {
         d->mode = FREE;
         d->calm = d->rest = 0;
         d->changes++;
-        if (h <= 0) continue;
+        if (h <= 0) {
+            knot_before(n, t, d->vx, d->vy, d->spin);
+            continue;
+        }
         was_moved(n);
         double x = -0.5 * W.gx * left, y = -0.5 * W.gy * left;
         double entries[3] = {0, -d->mass * (x * (d->vx + 0.5 * x) + y * (d->vy + 0.5 * y)), 0};
@@ -47,6 +50,8 @@ static int joins(const Contact *c, double *u, int *owner) {
     const Surface *s = W.surfaces + (-1 - c->j);
     double belt = c->other[1], x = belt * c->ny, y = -belt * c->nx;
     if (s->speed != 0 && s->shape != SEGMENT) return 0;
+    /* Nothing has settled that a belt will throw. */
+    if (s->speed != 0 && W.until == UNTIL_SETTLED && c->owner != W.landing) return 0;
     if (fabs(W.gx * x + W.gy * y) > 1e-12 * W.g * fabs(belt)) return 0;
     if (*owner >= 0 && (fabs(u[0] - x) > 1e-12 || fabs(u[1] - y) > 1e-12)) return 0;
     u[0] = x;

@@ -12,11 +12,13 @@
    since parting does work. Of an overlap as deep as DEEP more, up to all. */
 #define SLOP 1e-3
 #define PART 0.1
-#define DEEP 0.05
+#define DEEP 0.03
 /* Gap, in radii, up to which what was pressed still touches: what sweeps leave open. */
 #define LEAVE 1e-4
 /* Friction from which on it is lowered where sweeps diverge: 76 degrees. */
 #define ROUGH 4.0
+/* Steps that a contact in a crowd lasts at least if its end is told as a separation. */
+#define LASTS 10
 /* Of momentum. */
 #define NOISE 1e-11
 /* Times the first change: sweeps whose changes grow so far never end. */
@@ -51,9 +53,13 @@ static int add(int i, int j, double least, double bound, double h) {
     if (W.contact_count >= W.contact_room) return 0;
     Contact *c = W.contacts + W.contact_count;
     const Disk *d = W.disks + i;
-    double u[3];
+    double u[3], later;
     describe(c, i, j);
-    if (c->gap > TOUCH * least) return 1;
+    /* The next face or pulley that a disk by itself slides on to may be further off. */
+    int far = c->gap > TOUCH * least;
+    if (far && (W.interact || j >= 0 || !d->supports)) return 1;
+    later = gap_later(c, h);
+    if (far && later > 0) return 1;
     relative(c, 0, u);
     if (-u[0] > bound || u[0] > W.soft) return 1;
     double aim = MIN(c->gap, 0);
@@ -61,7 +67,7 @@ static int add(int i, int j, double least, double bound, double h) {
         double part = MIN(MAX(PART, -c->gap / (DEEP * least)), 1);
         aim = -SLOP * least + (1 - part) * (c->gap + SLOP * least);
     }
-    c->need = (aim - gap_later(c, h)) / h;
+    c->need = (aim - later) / h;
     c->drift = j < 0 ? 0.5 * h * (W.gx * c->ny - W.gy * c->nx) : 0;
     c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
     for (int k = d->before; k >= 0; k = W.earlier[k].next)
@@ -76,6 +82,10 @@ static int add(int i, int j, double least, double bound, double h) {
         double press = press_on(d, W.surfaces + (-1 - j), c->nx, c->ny);
         floor += 0.5 * until * MAX(press, 0);
     }
+    if (j < 0 && W.surfaces[-1 - j].there == LEAVING) {
+        if (!pressed) return 1;
+        c->need = -INFINITY;
+    }
     c->leaves = pressed && c->gap <= LEAVE * least && c->need < floor;
     if (c->leaves) c->need = floor;
     W.contact_count++;
@@ -85,22 +95,28 @@ static int add(int i, int j, double least, double bound, double h) {
 /* A disk that leaves all surfaces in this step, over the end of a face, is carried until then: it
    gets what gravity takes from it up to there. */
 static void carry_to_end(int i, int first, double h) {
+    const Disk *d = W.disks + i;
     Contact *last = 0;
-    double until = 0;
+    double until = 0, nx, ny;
     for (int n = first; n < W.contact_count; n++) {
         Contact *c = W.contacts + n;
-        double t = time_on_face(c), u[3];
-        relative(c, 0, u);
-        /* Another surface carries it on. */
-        if (!c->leaves && u[0] + c->need > 0) return;
-        if (c->leaves && t < h && t >= until) {
+        double t = c->leaves ? time_on_face(c) : INFINITY;
+        if (t < h && t >= until) {
             last = c;
             until = t;
         }
     }
     if (!last) return;
-    double press = press_on(W.disks + i, W.surfaces + (-1 - last->j), last->nx, last->ny);
-    if (press > 0) last->need += 0.5 * press * until;
+    /* Without a hop it would fall from the end on; whatever it would fall into carries it on. */
+    double u[3], fall = 0.5 * square(h - until);
+    relative(last, 0, u);
+    double x = d->x + (d->vx - u[0] * last->nx) * h + fall * W.gx;
+    double y = d->y + (d->vy - u[0] * last->ny) * h + fall * W.gy;
+    for (int k = 0; k < W.surface_count; k++)
+        if (is_near(W.surfaces + k, d) && gap_to(W.surfaces + k, x, y, d->radius, &nx, &ny) < 0)
+            return;
+    double press = press_on(d, W.surfaces + (-1 - last->j), last->nx, last->ny);
+    last->need += 0.5 * MAX(press, 0) * until;
     W.tracks[i].end_of_face = W.t + until;
 }
 
@@ -114,7 +130,8 @@ int find_contacts(double h, int *woke) {
         double least = MIN(a->radius, b->radius), reach = a->radius + b->radius + TOUCH * least;
         if (square(a->x - b->x) + square(a->y - b->y) > reach * reach) continue;
         /* What the step before left over is taken up here. */
-        double bound = left_over(a, MAX(a->impacts, b->impacts), -1, least);
+        int impacts = MAX(a->impacts, b->impacts);
+        double bound = impacts > CROWDED ? INFINITY : left_over(a, impacts, -1, least);
         if (a->supports || b->supports || a->mode != FREE || b->mode != FREE)
             bound = MAX(bound, MAX(W.soft, W.skip * least));
         if (a->mode == ASLEEP || b->mode == ASLEEP) {
@@ -129,7 +146,7 @@ int find_contacts(double h, int *woke) {
         Disk *d = W.disks + i;
         if (d->mode != FREE) continue;
         int first = W.contact_count;
-        double bound = left_over(d, d->impacts, -1, d->radius);
+        double bound = d->impacts > CROWDED ? INFINITY : left_over(d, d->impacts, -1, d->radius);
         if (d->supports) bound = MAX(bound, W.interact ? MAX(W.soft, W.skip * d->radius) : W.soft);
         for (int k = 0; k < W.surface_count; k++)
             if (is_near(W.surfaces + k, d) && !add(i, -1 - k, d->radius, bound, h)) return 0;
@@ -170,7 +187,7 @@ static double sweep(Contact *list, int count, int sweeps, double accurate, doubl
         W.sweep_count++;
         if (n == 0) first = worst;
         if (worst <= accurate) return worst;
-        if (!(worst <= DIVERGES * (first + W.soft))) return INFINITY;
+        if (!(worst <= DIVERGES * (first + W.soft + W.skip * W.disks[list->i].radius))) return INFINITY;
     }
     return worst;
 }
@@ -236,9 +253,10 @@ static void note_grip(Disk *d, const Contact *c, const double *u, const double *
     }
     if (grips && d->slips) {
         /* Friction slows the slip evenly; it is used up so long after the last mid-step. */
-        double s = fabs(u[1] - c->drift * 2 * past / h), rate = most / (c->mass[1] * span);
-        double t = d->t - past + (rate > 0 ? s / rate : 0);
-        t = MIN(MAX(t, d->since), d->t + h);
+        double s = u[1] - c->drift * 2 * past / h, pull = 2 * c->drift / h;
+        double rate = most / (c->mass[1] * span) - (s > 0 ? pull : -pull);
+        double t = d->t - past + (rate > 0 ? fabs(s) / rate : 0);
+        t = MAX(t, d->since);
         double place[2] = {d->x + (t - d->t) * 0.5 * (d->ux + d->vx), d->y + (t - d->t) * 0.5 * (d->uy + d->vy)};
         double after[3] = {d->vx + 0.5 * W.gx * h, d->vy + 0.5 * W.gy * h, d->spin};
         write_event(STICK, i, -1, c->owner, t, place, after, after, 0, 0);
@@ -290,11 +308,15 @@ static void settle(int i, const Contact *last, double h) {
 
 /* After the solve: entries, supports, timers, tracks. */
 void close_step(double h) {
+    /* The share of the impulses that belongs to the step before; of a new contact, none. */
+    W.before = W.length_before > 0 ? W.length_before / (W.length_before + h) : 0.5;
+    if (!W.interact && !W.tracks[W.low].lasted) W.before = 0;
     double calm_bound = CALM;
     for (int i = W.low; i < W.high; i++) {
         Disk *d = W.disks + i;
         d->links = d->before = -1;
-        d->held_count = d->supports = 0;
+        d->supports = 0;
+        if (d->mode == FREE) d->held_count = 0;
         if (W.length_before > 0.01 * W.dt) d->impacts = 0;
         for (int n = 0; n < 3; n++) d->gain[n] = d->ahead[n] = 0;
         if (d->mode == FREE) {
@@ -320,7 +342,7 @@ void close_step(double h) {
         share_out(c, u, v, 0, entries, given);
         book(a->gain, c->two ? b->gain : 0, c->owner, entries);
         if (given[0] != 0) book(a->gain, 0, W.ride_owner, given);
-        share_out(c, u, v, 1, entries, given);
+        share_out(c, u, v, W.before, entries, given);
         for (int k = 0; k < 3; k++) {
             a->ahead[k] += (c->two ? 0.5 : 1) * entries[k] + given[k];
             if (c->two) b->ahead[k] += 0.5 * entries[k];
@@ -349,7 +371,7 @@ void close_step(double h) {
             if (track->lasted) {
                 /* The load fell to nothing between the last steps: where its line through two full
                    ones crosses zero the contact ended. */
-                if (d->on >= 0 && track->lasted >= (W.interact ? 10 : 3)) {
+                if (d->on >= 0 && track->lasted >= (W.interact ? LASTS : 3)) {
                     double t = track->load_t[1], fall = track->load[2] - track->load[1];
                     if (fall > 0) t += track->load[1] / fall * (t - track->load_t[2]);
                     if (track->end_of_face >= track->held[0]) t = track->end_of_face;
@@ -382,11 +404,19 @@ void close_step(double h) {
             relative(only, 1, u);
             relative(only, 0, v);
             note_grip(d, only, u, v, h);
-            if (!W.interact && W.until == UNTIL_SETTLED && !d->slips && lies(d, only)) settle(i, only, h);
+            if (!W.interact && W.until == UNTIL_SETTLED && !d->slips && d->since <= d->t + h && lies(d, only))
+                settle(i, only, h);
             else if (!W.interact && W.until == UNTIL_LANDED && d->landed) reason = BY_LANDING;
         } else {
+            /* On several; of a surface it lies on, if any, it may still part. */
+            int ground = -1;
+            for (int link = d->links; link >= 0; link = W.links[link]) {
+                const Contact *c = W.contacts + link / 2;
+                if (c->impulse[0] > 0 && c->j < 0) ground = c->owner;
+            }
+            if (ground < 0 && d->on >= 0 && track->lasted >= LASTS) event_here(SEPARATION, i, d->on);
             d->slips = 1;
-            d->on = -1;
+            d->on = ground;
         }
         d->changes++;
         if (d->mode == GONE) continue;
@@ -414,7 +444,7 @@ void take_back(int i) {
         if (c->impulse[0] == 0) continue;
         relative(c, 1, u);
         relative(c, 0, v);
-        share_out(c, u, v, 1, entries, given);
+        share_out(c, u, v, W.before, entries, given);
         for (int n = 0; n < 3; n++) {
             double back = (c->two ? 0.5 : 1) * entries[n];
             if (c->i != i && !c->two) back = 0;

@@ -1,0 +1,130 @@
+"""A door to the core's arrays, for what no scene file can ask for."""
+
+from __future__ import annotations
+
+from math import cos
+
+import numpy as np
+
+from chutelab.engines.contact import engine, module
+from chutelab.machine import build
+from chutelab.scene import from_dict
+
+SCENE = {
+    "particle": {"radius": 0.01, "mass": 0.1, "spin": True},
+    "stream": {"at": [0.0, 1.0], "velocity": [0.0, 0.0]},
+    "run": {"until": 1.0, "max_time": 100.0},
+}
+
+
+def scene_of(**tables):
+    """Return a machine: `SCENE` with other tables, or with keys of its tables replaced."""
+    document = {name: dict(values) for name, values in SCENE.items()}
+    for name, values in tables.items():
+        if isinstance(values, dict):
+            document.setdefault(name, {}).update(values)
+        else:
+            document[name] = values
+    return build(from_dict(document))
+
+
+def face(name, start, end, **values):
+    return {"name": name, "from": list(start), "to": list(end), **values}
+
+
+class Core:
+    """A run at the level of arrays: change them, then `run` or `step`.
+
+    Parameters
+    ----------
+    machine : Machine
+    rooms : dict, optional
+        Rooms that are smaller than what the engine would make at first.
+    """
+
+    def __init__(self, machine, rooms=None):
+        self.machine = machine
+        self.module = module.Module()
+        self.job = engine.Job(self.module, machine)
+        for name, size in (rooms or {}).items():
+            self.job.rooms[name] = size
+            setattr(self.module.world, f"{name}_room", size)
+
+    def _array(self, name, struct, count):
+        return self.module.array(name, module.dtype(struct), count)
+
+    @property
+    def disks(self):
+        return self._array("disks", "Disk", self.machine.count)
+
+    @property
+    def surfaces(self):
+        return self._array("surfaces", "Surface", self.job.surface_count)
+
+    @property
+    def pairs(self):
+        """Disk against disk, then against each surface, as long as there is one kind of disk."""
+        return self._array("pairs", "Pair", 1 + self.job.surface_count)
+
+    @property
+    def world(self):
+        return self.module.world
+
+    def kinds(self, table):
+        """Set the table of pairs, (kinds, kinds + surfaces): (restitution, friction, rolling)."""
+        count = len(table)
+        self.module.place(("pairs", module.dtype("Pair"), count * len(table[0])))
+        self.world.kind_count = count
+        pairs = self._array("pairs", "Pair", count * len(table[0]))
+        for place, values in enumerate(value for row in table for value in row):
+            pairs[place] = values
+
+    def arc(self, k, center, radius, middle, half, speed=0.0):
+        """Turn surface k into an arc round a centre, `half` (rad) to both sides of a direction."""
+        surface = self.surfaces[k]
+        surface["shape"] = module.constants("Shape")["ARC"]
+        surface["x"], surface["y"] = center
+        surface["tx"], surface["ty"] = np.cos(middle), np.sin(middle)
+        surface["radius"], surface["cos_half"], surface["speed"] = radius, cos(half), speed
+        for n, angle in enumerate((middle - half, middle + half)):
+            end = np.array(center) + radius * np.array([np.cos(angle), np.sin(angle)])
+            surface["end"][2 * n : 2 * n + 2] = end
+        surface["box"] = *(np.array(center) - radius), *(np.array(center) + radius)
+
+    def tilt(self, angle):
+        """Turn gravity counter-clockwise by an angle (rad)."""
+        g = self.world.g
+        self.world.gx, self.world.gy = g * np.sin(angle), -g * np.cos(angle)
+
+    def run(self):
+        """Run to the end and return the recording; a stall is an error."""
+        stalled = self.job.run(None)
+        assert stalled is None, f"stalled: particle, t, place = {stalled}"
+        return self.recording()
+
+    def recording(self):
+        return self.job.recording(self.machine, (0.0, 0.0), 0.0)
+
+    def step(self, steps=1):
+        """Run on for some steps, making room where it is full; True at the end of the run."""
+        full = {"FULL_NEAR": "near", "FULL_CONTACTS": "contact"}
+        while True:
+            status = self.module.run(steps)
+            drained = self.job.drain()
+            if status is module.Status.DONE:
+                return True
+            if status is module.Status.PAUSED:
+                return False
+            assert status is not module.Status.STALLED
+            if status.name in full:
+                self.job.enlarge(full[status.name])
+            else:
+                what = "knot" if status is module.Status.FULL_KNOTS else "event"
+                if drained[what] < self.job.rooms[what] // 2:
+                    self.job.enlarge(what)
+
+
+def modes(core):
+    """Return how many disks are in each mode, by name."""
+    names = module.constants("Mode")
+    return {name: int((core.disks["mode"] == value).sum()) for name, value in names.items()}

@@ -1,0 +1,370 @@
+"""Random crowds of disks, and the laws that each run of one has to obey.
+
+- `crowd`: the machine of a seed: 50 to 500 disks in a box, a funnel, on belts or in a transfer.
+- `faults`: what a recording does that no crowd may do, in words.
+
+Lengths are drawn in radii and speeds in √(G r), so that a scene of 0.1 mm is one of 1 m made small;
+G is gravity, or 1 m/s² if that is less.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import ceil, cos, inf, radians, sin, sqrt
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from chutelab.ledger import ledger
+from chutelab.machine import build
+from chutelab.recording import REASONS, Kind
+from chutelab.scene import SceneError, from_dict
+
+KINDS = ("box", "funnel", "belts", "transfer")
+
+MOST_STEPS = 4000
+"""Steps of `dt` that a crowd is run for, at most."""
+
+
+def crowd(seed, *, count=None):
+    """Return the machine of a seed, and what kind it is; `count` limits the disks."""
+    rng = np.random.default_rng(seed)
+    while True:
+        kind = KINDS[int(rng.integers(len(KINDS)))]
+        try:
+            return kind, _Draw(rng, count).machine(kind)
+        except SceneError:
+            continue  # a release inside a surface, a plate that is missed
+
+
+class _Draw:
+    def __init__(self, rng, count):
+        self.rng = rng
+        self.count = int(np.exp(rng.uniform(np.log(50), np.log(500))))
+        if count is not None:
+            self.count = min(self.count, count)
+        self.r = 10.0 ** self.uniform(-4.0, 0.0)
+        self.g = self.one_of(9.81, 9.81, self.uniform(0.0, 100.0), 10.0 ** self.uniform(-1, 2), 0.0)
+        strength = max(self.g, 1.0)
+        self.v = sqrt(strength * self.r) * 10.0 ** self.uniform(0.0, 1.3)
+        self.tau = sqrt(self.r / strength)
+        drawn = self.one_of(1e-3, 0.05 * self.tau * 10.0 ** self.uniform(-0.5, 0.5))
+        self.dt = min(max(drawn, 0.03 * self.tau, 1e-7), 0.1)
+
+    def uniform(self, low, high):
+        return float(self.rng.uniform(low, high))
+
+    def one_of(self, *values):
+        return values[int(self.rng.integers(len(values)))]
+
+    def pair(self):
+        return {
+            "restitution": self.one_of(0.0, 1.0, self.uniform(0.0, 1.0), self.uniform(0.2, 0.9)),
+            "friction": self.one_of(0.0, self.uniform(0.0, 1.0), self.uniform(0.0, 1.0), 5.0),
+        }
+
+    def surface(self, name, points, speed=0.0):
+        """Return a surface through points that are given in radii."""
+        ends = (self.r * np.array(points)).tolist()
+        return {"name": name, "points": ends, "speed": speed, **self.pair()}
+
+    def belt_speed(self):
+        return self.one_of(-1.0, 1.0) * self.v * self.uniform(0.1, 1.5)
+
+    def machine(self, kind):
+        duration = min(self.tau * self.uniform(60.0, 200.0), MOST_STEPS * self.dt)
+        self.wide = 2.0 * self.uniform(4.0, 1.5 * sqrt(self.count))
+        # So high that all find room, and half as much again.
+        self.high = max(20.0, 6.0 * self.count / self.wide)
+        document = {
+            "gravity": self.g,
+            "particle": {
+                "radius": self.r,
+                "mass": 10.0 ** self.uniform(-3.0, 1.0),
+                "spin": self.one_of(True, False),
+            },
+            "stream": {
+                "count": self.count, "interact": True, "seed": int(self.rng.integers(1000)),
+                "bed_height": self.r * self.one_of(0.0, self.uniform(2.0, 20.0)), **self.pair(),
+            },
+            "run": {
+                "until": self.one_of("settled", duration, duration),
+                "max_time": duration,
+                "dt": self.dt,
+            },
+            **getattr(self, f"_{kind}")(),
+        }  # fmt: skip
+        stream = document["stream"]
+        stream.update(document.pop("released", {}))
+        # From sparse to twice as many as can pass by one after the other.
+        layers = 1.0 + stream["bed_height"] / (2.0 * self.r)
+        stream["rate"] = layers * self.v / (2.0 * self.r) * self.uniform(0.1, 2.0)
+        built = build(from_dict(document))
+        lattice = kind != "transfer" and self.one_of(True, False)
+        return self.lattice(built) if lattice else built
+
+    def lattice(self, built):
+        """All at once, in rows from the release point's height upwards, to and fro at random."""
+        rows = max(1, int((self.wide - 2.5) // 2.1))
+        k = np.arange(self.count)
+        x = 2.1 * (k % rows - 0.5 * (rows - 1))
+        y = 2.1 * (k // rows) + self.base
+        velocity = 0.5 * self.v * self.rng.normal(size=(self.count, 2))
+        return replace(
+            built,
+            releases=replace(
+                built.releases,
+                t=np.zeros(self.count),
+                position=self.r * np.stack([x, y], axis=1),
+                velocity=velocity,
+                carried=np.zeros(self.count, dtype=bool),
+            ),
+            end_time=built.end_time - float(built.releases.t[-1])
+            if built.until != "time"
+            else built.end_time,
+        )
+
+    def pour(self):
+        """Release them where `lattice` begins, mostly downwards."""
+        angle = self.one_of(self.uniform(-np.pi, np.pi), self.uniform(-1.0, 1.0))
+        return {
+            "released": {
+                "at": [0.0, self.base * self.r],
+                "velocity": [self.v * sin(angle), -self.v * cos(angle)],
+            }
+        }
+
+    def _box(self):
+        w, h = 0.5 * self.wide, self.high
+        self.base = 1.5 if self.one_of(True, False) else 0.6 * h
+        walls = [[-w, h], [-w, 0.0], [w, 0.0], [w, h]]
+        closed = self.one_of(True, False)
+        if closed:
+            # A lid so high that a whole lattice finds room below it.
+            top = self.base + 2.2 * self.count / max(1, (self.wide - 2.5) // 2.1) + 4.0
+            walls[0][1] = walls[3][1] = max(h, top)
+            walls.append(walls[0])
+        return {"surface": [self.surface("box", walls)], **self.pour()}
+
+    def _funnel(self):
+        w, gap = 0.5 * self.wide + 4.0, 0.5 * self.uniform(2.2, 12.0)
+        slope = radians(self.uniform(15.0, 75.0))
+        rise = (w - gap) * sin(slope) / cos(slope)
+        low = self.uniform(5.0, 40.0)
+        self.base = low + rise + 2.0
+        top = self.base + 2.2 * self.count / max(1, (self.wide - 2.5) // 2.1) + 6.0
+        sides = [
+            self.surface(f"side{s:+.0f}", [[s * w, top], [s * w, low + rise], [s * gap, low]])
+            for s in (-1.0, 1.0)
+        ]
+        floor = 2.0 * w
+        tray = [[-floor, 10.0], [-floor, 0.0], [floor, 0.0], [floor, 10.0]]
+        if self.one_of(True, False):
+            sides.append(self.surface("tray", tray))
+        else:
+            sides.append(self.surface("belt", tray[1:3], self.belt_speed()))
+        return {"surface": sides, **self.pour()}
+
+    def _belts(self):
+        belts = []
+        for n in range(int(self.rng.integers(2, 6))):
+            length, angle = self.uniform(10.0, 80.0), self.uniform(-0.6, 0.6)
+            x, y = self.uniform(-40.0, 20.0), self.uniform(0.0, 60.0)
+            end = [x + length * cos(angle), y + length * sin(angle)]
+            belts.append(self.surface(f"belt{n}", [[x, y], end], self.belt_speed()))
+        if self.one_of(True, False):
+            belts.append(self.surface("floor", [[-120.0, -5.0], [120.0, -5.0]]))
+        self.base = 110.0
+        return {"surface": belts, **self.pour()}
+
+    def _transfer(self):
+        pair, radius = self.pair(), self.uniform(5.0, 100.0)
+        adhesion = self.one_of(True, False)
+        # Layers that are carried round the pulley run into each other: there is one, if it is slow.
+        slow = self.v**2 < self.g * self.r * (radius + 22.0)
+        return {
+            **({"released": {"bed_height": 0.0}} if adhesion and slow else {}),
+            "incoming": {
+                "speed": self.v,
+                "pulley_radius": self.r * radius,
+                "length": self.r * self.uniform(10.0, 100.0),
+                "friction": "adhesion" if adhesion else pair["friction"],
+                "restitution": pair["restitution"],
+            },
+            "plate": {
+                "distance": self.r * self.uniform(10.0, 150.0),
+                "angle_deg": self.uniform(-40.0, 50.0),
+                "above": self.r * self.uniform(10.0, 80.0),
+                "below": self.r * self.uniform(10.0, 60.0),
+                **self.pair(),
+            },
+            "outgoing": {
+                "speed": self.belt_speed(),
+                "drop": self.r * (2.0 * radius + self.uniform(20.0, 200.0)),
+                "drop_from": "top",
+                "start": -self.r * 200.0,
+                "length": self.r * 600.0,
+                **self.pair(),
+            },
+        }
+
+
+# Laws
+
+DEEP = 0.05
+"""Overlap, in radii, that may last no longer than a step."""
+
+INSIDE = 0.5
+"""Overlap, in radii, that may not be at any time: beyond it a disk is on its way through."""
+
+STRIDE = 0.25
+"""Way, in radii, between two looks; two disks that pass through each other are seen inside."""
+
+LOOKS = 8000
+"""Looks at a run beyond two a step, at most; what flies fast is seen less often then."""
+
+RESIDUAL = 1e-9
+"""Share of the energy turned over that the ledger may miss."""
+
+
+def faults(machine, recording):
+    """Return what a run did that no crowd may do: a list of sentences, empty if all is well."""
+    found = []
+    residual = ledger(recording).relative_residual
+    if not residual <= RESIDUAL:
+        found.append(f"ledger: the residual is {residual:.1e} of the energy turned over")
+    found += _releases(machine, recording)
+    found += _depths(machine, recording)
+    found += _crossings(machine, recording)
+    return found
+
+
+def step_of(machine):
+    """Return the longest step, s; a hop g h²/8 is a thousandth of the radius at most."""
+    if machine.gravity == 0.0:
+        return machine.dt
+    return min(machine.dt, sqrt(8e-3 * machine.particle.radius / machine.gravity))
+
+
+def _releases(machine, recording):
+    """Tell who starts too early, or inside another."""
+    found, r = [], machine.particle.radius
+    for event in recording.select(Kind.RELEASE):
+        i, t = int(event["particle"]), float(event["t"])
+        if t < machine.releases.t[i]:
+            found.append(f"release: {i} starts at {t} s, due at {machine.releases.t[i]}")
+        x = recording.at([t])[0][0]
+        x[i] = event["position"]
+        away = np.hypot(*(np.delete(x, i, axis=0) - x[i]).T)
+        depth = 2.0 - np.nanmin(away, initial=inf) / r
+        # A track may leave out 1e-4 of the radius of what lasts.
+        if depth > 1e-3:
+            found.append(f"release: {i} starts {depth:.2g} r inside another at {t:.6g} s")
+    return found
+
+
+def _free_from(machine, recording):
+    """Return the time from which each disk is not carried by adhesion."""
+    free = np.where(machine.releases.carried, inf, -inf)
+    for event in recording.select(Kind.SEPARATION)[::-1]:
+        if machine.releases.carried[event["particle"]]:
+            free[event["particle"]] = event["t"]
+    return free
+
+
+def _depths(machine, recording):
+    """Tell who is pressed into another or into a surface, and for how long."""
+    r, h = machine.particle.radius, step_of(machine)
+    first, last = recording.ends()
+    begin, end = float(first["t"].min()), float(last["t"].max())
+    fast = np.hypot(*recording.knots["velocity"].T).max(initial=0.0)
+    stride = STRIDE * r / fast if fast > 0.0 else inf
+    apart = min(0.5 * h, max(stride, (end - begin) / LOOKS))
+    times = np.linspace(begin, end, ceil((end - begin) / apart) + 1)
+    free = _free_from(machine, recording)
+    runs, found, look = {}, {}, 0  # of each who is deep: first look of this run, last, worst
+    for some in np.array_split(times, max(1, len(times) // 200)):
+        for t, x in zip(some, recording.at(some)[0], strict=True):
+            look += 1
+            for who, depth in _deep(machine, x, free <= t):
+                since, latest, worst = runs.get(who, (look, look, 0.0))
+                if latest < look - 1:
+                    since, worst = look, 0.0
+                worst = max(worst, depth)
+                runs[who] = since, look, worst
+                name = " and ".join(map(str, who)) if isinstance(who[1], int) else f"{who[0]} in {who[1]}"
+                lasts = (look - since) * apart / h
+                if depth > INSIDE:
+                    found[who] = f"through: {name} by {depth:.2g} r at {t:.6g} s"
+                elif lasts > 1.25 and not found.get(who, "").startswith("through"):
+                    found[who] = f"pressed: {name} by {worst:.2g} r for {lasts:.3g} steps at {t:.6g} s"
+    return list(found.values())
+
+
+def _deep(machine, x, free):
+    """Yield who is deep in whom, and how deep in radii, at places x (N, 2)."""
+    r, here = machine.particle.radius, np.flatnonzero(np.isfinite(x[:, 0]))
+    if not len(here):
+        return
+    pairs = here[cKDTree(x[here]).query_pairs((2.0 - DEEP) * r, output_type="ndarray")]
+    for i, j in pairs.tolist():
+        # Of two that are carried none can give way.
+        if free[i] or free[j]:
+            yield (i, j), 2.0 - np.hypot(*(x[i] - x[j])) / r
+    here = here[free[here]]
+    for name, depth in _in_surfaces(machine, x[here]):
+        for k in np.flatnonzero(depth > DEEP):
+            yield (int(here[k]), name), float(depth[k])
+
+
+def _in_surfaces(machine, x):
+    """Yield the name of each segment or pulley, and how deep disks at x (k, 2) are in it, radii."""
+    r, s = machine.particle.radius, machine.segments
+    for k in range(len(s.length)):
+        d = x - s.start[k]
+        d = d - np.clip(d @ s.tangent[k], 0.0, s.length[k])[:, None] * s.tangent[k]
+        yield f"{machine.surfaces[s.surface[k]]}[{k}]", 1.0 - np.hypot(*d.T) / r
+    if machine.pulley is not None:
+        yield "pulley", (machine.pulley.radius - np.hypot(*x.T)) / r + 1.0
+
+
+def _crossings(machine, recording):
+    """Tell whose centre goes through a face: by the cubic between two knots, at nine places each."""
+    knots, s = recording.knots, machine.segments
+    whose = np.repeat(np.arange(recording.count), np.diff(recording.offsets))
+    rows = np.flatnonzero((whose[1:] == whose[:-1]) & (np.diff(knots["t"]) > 0.0))
+    h = knots["t"][rows + 1] - knots["t"][rows]
+    a, b = knots["position"][rows], knots["position"][rows + 1]
+    u, v = (h[:, None] * knots["velocity"][rows + k] for k in (0, 1))
+
+    def place(of, share):
+        p = share[..., None]
+        return (
+            a[of] + p * (u[of] + p * (3.0 * (b[of] - a[of]) - 2.0 * u[of] - v[of]
+                                      + p * (2.0 * (a[of] - b[of]) + u[of] + v[of])))
+        )  # fmt: skip
+
+    found, shares = [], np.linspace(0.0, 1.0, 9)
+    for k in range(len(s.length)):
+        left = np.array([-s.tangent[k, 1], s.tangent[k, 0]])
+        off = np.stack(
+            [(place(slice(None), np.full(len(rows), p)) - s.start[k]) @ left for p in shares]
+        )
+        piece, of = np.nonzero((off[1:] > 0.0) != (off[:-1] > 0.0))
+        low, high = shares[piece], shares[piece + 1]
+        side = off[piece, of] > 0.0
+        for _ in range(50):
+            mid = 0.5 * (low + high)
+            same = ((place(of, mid) - s.start[k]) @ left > 0.0) == side
+            low, high = np.where(same, mid, low), np.where(same, high, mid)
+        along = (place(of, low) - s.start[k]) @ s.tangent[k]
+        for n in np.flatnonzero((along > 0.0) & (along < s.length[k])):
+            t = knots["t"][rows[of[n]]] + low[n] * h[of[n]]
+            name = machine.surfaces[s.surface[k]]
+            found.append(f"through: {whose[rows[of[n]]]} through {name}[{k}] at {t:.6g} s")
+    return found
+
+
+def ended(recording):
+    """Return how many ended for each reason."""
+    return {REASONS[k]: int(n) for k, n in enumerate(np.bincount(recording.ended)) if n}

@@ -33,7 +33,8 @@ FILES = [
 # The contract of section 4, copied by hand.
 KEYS = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
-    "impact", "landing", "ended", "rolling", "ledger", "theory", "theory_as_printed", "error",
+    "impact", "landing", "ended", "rolling", "waited", "ledger", "theory", "theory_as_printed",
+    "error",
     "accuracy",
 ]  # fmt: skip
 THEORY = [
@@ -211,6 +212,14 @@ def test_a_run_says_that_a_disk_rolls_instead_of_being_carried():
     assert "1 disk rolls on the outgoing belt: nothing slips, and nothing is carried along." in text
     assert "The belt has paid 0.016 J, loads that are carried take 0.048 J" in text
     assert "rolls" not in call("run", "belt-landing").stdout
+
+
+def test_a_run_says_who_waited_for_a_free_place():
+    # One layer, 1 ms apart, 4 ms to get out of the way: 3 ms, then 6 ms late.
+    crowd = [f"--set=stream.{key}" for key in ("count=3", "rate=1000", "bed_height=0")]
+    text = " ".join(call("run", "stream", *crowd).stdout.split())
+    assert "2 particles waited for a free place to be released, 0.006 s at most" in text
+    assert "waited" not in call("run", "stream", "--set", "stream.count=3").stdout
 
 
 def test_an_accuracy_is_reported_in_text_json_and_file():

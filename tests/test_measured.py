@@ -539,7 +539,7 @@ def test_comparing_in_text_imports_neither_pictures_nor_scipy():
         "import sys; from chutelab.cli import main\n"
         "words = ['compare', 'perpendicular', '--data', 'perpendicular-track']\n"
         "main(words, standalone_mode=False)\n"
-        "print({'matplotlib', 'scipy', 'pymunk'} & set(sys.modules), file=sys.stderr)"
+        "print({'matplotlib', 'scipy', 'pymunk', 'wasmtime'} & set(sys.modules), file=sys.stderr)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stderr.strip() == "set()"

@@ -160,7 +160,7 @@ def test_a_stream_has_all_its_particles_and_means():
 def test_particles_that_interact_are_stepped():
     scene = scenes.load("stream", ["stream.count=3"])
     data = data_of(page.html(scene))
-    assert data["engine"] == ["pymunk"]
+    assert data["engine"] == ["contact"]
     assert data["sliders"] == []
 
 

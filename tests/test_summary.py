@@ -17,7 +17,8 @@ from chutelab.summary import summary
 
 TOP = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
-    "impact", "landing", "ended", "rolling", "ledger", "theory", "theory_as_printed", "error",
+    "impact", "landing", "ended", "rolling", "waited", "ledger", "theory", "theory_as_printed",
+    "error",
     "accuracy",
 ]  # fmt: skip
 BEFORE = ["t", "x", "y", "vx", "vy"]
@@ -199,3 +200,42 @@ def test_a_disk_that_rolls_on_the_belt_is_said_not_to_be_carried(friction, belt)
 )
 def test_nothing_rolls_where_all_are_carried_or_nothing_settled(overrides):
     assert printed(run("perpendicular", *overrides))["rolling"] is None
+
+
+FEED = ("stream.count=12", "stream.rate=1000", "stream.bed_height=0", "run.until=0.3")
+
+
+@pytest.mark.parametrize("engine", ["contact", "pymunk"])
+def test_it_says_who_waited_for_a_place_and_how_long(engine):
+    # In one layer on a belt of 2 m/s the place is free again after 2 r / v = 4 ms: particle i is
+    # due at i ms and comes at 4 i ms, 3 i ms late. Engines look once a step of 1 ms.
+    recording = run("stream", *FEED, f"run.engine={engine}")
+    late = 3e-3 * np.arange(1, 12)
+    found = printed(recording)["waited"]
+    assert (found["particles"], found["never"]) == (11, 0)
+    assert late.max() - 1e-9 <= found["longest"] <= late.max() + 11e-3
+    assert found["mean"] == pytest.approx(np.mean(late) * found["longest"] / late.max(), abs=1e-3)
+    # What is released stands clear of the one before it.
+    gaps = np.diff(recording.select(Kind.RELEASE)["t"])
+    assert gaps.min() >= 4e-3 * (1.0 - 1e-9)
+
+
+@pytest.mark.parametrize("engine", ["contact", "pymunk"])
+def test_nobody_waits_where_there_is_room(engine):
+    # 1/220 s at 2 m/s is 9.1 mm; the pymunk engine releases at its steps, which is no waiting.
+    changed = ("stream.rate=220", "incoming.friction=0.5", f"run.engine={engine}")
+    assert printed(run("stream", *FEED, *changed))["waited"] is None
+
+
+def test_who_never_finds_a_place_is_counted_and_who_is_not_due_is_not():
+    # One lies in the place for good; until 0.045 s particles 1 to 4 are due.
+    lying = {
+        "surface": [{"name": "floor", "from": [-1.0, 0.0], "to": [1.0, 0.0]}],
+        "stream": {
+            "count": 10, "rate": 100.0, "at": [0.0, 0.004], "velocity": [0.0, 0.0],
+            "interact": True,
+        },
+        "run": {"until": 0.045},
+    }  # fmt: skip
+    found = printed(simulate(scene.from_dict(lying, "mine.toml")))["waited"]
+    assert found == {"particles": 0, "longest": 0.0, "mean": 0.0, "never": 4}

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from chutelab.stepper.solids import HALF_THICKNESS
 from click.testing import CliRunner
 
 from chutelab import compare, load, simulate
@@ -16,7 +17,6 @@ from chutelab.cli import main
 from chutelab.ledger import ledger
 from chutelab.lessons import find, scene_of, shipped
 from chutelab.recording import Kind
-from chutelab.stepper.solids import HALF_THICKNESS
 from chutelab.theory import transfer
 
 G = 9.81

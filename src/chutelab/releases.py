@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from chutelab.recording import Kind
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from chutelab.many import Value
+    from chutelab.recording import Recording
     from chutelab.scene import Scene
 
 ON_BELT = 1e-9
@@ -77,19 +80,58 @@ def on_belt(scene: Scene) -> bool:
     return y == riding and -scene.incoming.length <= x <= 0.0
 
 
+def schedule(scene: Scene) -> NDArray[np.float64]:
+    """Return when each particle is due, s (N,); of a family each scene has one, at 0 s."""
+    if scene.members is not None:
+        return np.zeros(scene.members)
+    return np.arange(scene.stream.count) / scene.stream.rate
+
+
+@dataclass(frozen=True)
+class Waits:
+    """Particles that were released late because their place was taken.
+
+    Attributes
+    ----------
+    particles : int
+        How many waited and were released.
+    longest, mean : float
+        How long these waited, s; 0 if none did.
+    never : int
+        How many were due, and found no place until the end of the run.
+    """
+
+    particles: int
+    longest: float
+    mean: float
+    never: int
+
+
+def waits(scene: Scene, recording: Recording) -> Waits | None:
+    """Return who waited for its place in a run of a scene; None if nobody did."""
+    due = schedule(scene)[: recording.count]
+    # The pymunk engine releases at the beginning of a step: up to a step late is not waiting.
+    least = (1.0 + 1e-6) * scene.run.dt if recording.engine == "pymunk" else 1e-9
+    released = recording.select(Kind.RELEASE)
+    late = released["t"] - due[released["particle"]]
+    late = late[late > least]
+    missing = np.diff(recording.offsets) == 0
+    end = recording.knots["t"].max(initial=0.0)
+    never = int(np.count_nonzero(due[missing] < end - scene.run.dt))
+    if not len(late) and not never:
+        return None
+    longest, mean = (float(late.max()), float(late.mean())) if len(late) else (0.0, 0.0)
+    return Waits(len(late), longest, mean, never)
+
+
 def draw(scene: Scene) -> Releases:
     """Draw the releases of a scene; the same scene and seed give the same numbers.
 
     Of a family each scene has one particle. Particles that meet start where no other is, as far as
     the bed has room: an engine lets the others wait until their place is free.
     """
-    stream, count = scene.stream, scene.stream.count
-    crowded = stream.interact and count > 1
-    if scene.members is not None:
-        count = scene.members
-        t = np.zeros(count)
-    else:
-        t = np.arange(count) / stream.rate
+    stream, t = scene.stream, schedule(scene)
+    crowded, count = stream.interact and stream.count > 1, len(t)
     position, velocity = np.empty((2, count, 2))
     velocity[:, 0], velocity[:, 1] = release_velocity(scene)
     height: Value = 0.0

@@ -189,7 +189,7 @@ def _words(
     gone = float(recording.track(0)["t"][-1])
     near = 0.25 * float(np.diff(times).min(initial=np.inf))
     flying = in_flight(recording, times, near)
-    still = ~subset(recording, [0]).at(times)[1].any(axis=(1, 2))
+    still: NDArray[np.bool_] = ~np.any(subset(recording, [0]).at(times)[1], axis=(1, 2))
     captions = []
     for t, flies, lies in zip(times, flying.tolist(), np.asarray(still).tolist(), strict=True):
         story = int(np.searchsorted(mine["t"][stories], t, side="right")) - 1

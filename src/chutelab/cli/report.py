@@ -12,9 +12,10 @@ from rich.table import Table
 from rich.text import Text
 
 from chutelab.accuracy.wanted import Wanted
-from chutelab.compare import compare
+from chutelab.compare import compare, scene_of
 from chutelab.ledger import ledger
 from chutelab.recording import REASONS, Kind
+from chutelab.releases import Waits, waits
 from chutelab.sheet import Sheet, number, wrapped
 from chutelab.summary import rolling
 
@@ -41,6 +42,8 @@ def report(recording: Recording, accuracy: Accuracy | None = None) -> list[Rende
         parts.append(drawn(way))
     books = ledger(recording).sheet()
     parts += [drawn(books), Text("\n" + "\n".join(books.notes))]
+    if (late := waits(scene_of(recording), recording)) is not None:
+        parts.append(Text("\n" + "\n".join(wrapped(_waited(late)))))
     if (left := rolling(recording)) is not None:
         parts.append(Text("\n" + "\n".join(wrapped(_rolling(**left)))))
     return parts if accuracy is None else [*parts, _reached(accuracy)]
@@ -101,6 +104,20 @@ def _head(recording: Recording) -> Text:
     )
     head.append(f"\nended: {endings}", style="not bold")
     return head
+
+
+def _waited(late: Waits) -> str:
+    """Say how many found their place taken, and how long."""
+    said = []
+    if late.particles:
+        waited = "1 particle" if late.particles == 1 else f"{late.particles} particles"
+        said.append(
+            f"{waited} waited for a free place to be released, {number(late.longest)} s at most"
+            f" and {number(late.mean)} s on average"
+        )
+    if late.never:
+        said.append(f"{late.never} found no free place until the end")
+    return "; ".join(said) + "."
 
 
 def _rolling(particles: int, belt_work: float, belt_work_carried: float) -> str:

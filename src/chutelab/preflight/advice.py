@@ -10,7 +10,8 @@ import numpy as np
 from chutelab import scene as scenes
 from chutelab.machine import build
 from chutelab.preflight.results import Advice
-from chutelab.recording import REASONS, Kind
+from chutelab.recording import REASONS
+from chutelab.releases import waits
 from chutelab.scene import SceneError
 
 if TYPE_CHECKING:
@@ -69,7 +70,7 @@ def advice(
     if tried.trouble:
         yield Advice(f"a trial run did not come to an end: {tried.trouble}", LOOK)
     if tried.recording is not None:
-        yield from _waiting(scene, machine, tried.recording)
+        yield from _waiting(scene, tried.recording)
     if scene.run.engine == "pymunk" and not machine.interact and machine.count > 1:
         yield Advice(
             f"pymunk steps {machine.count} particles one after the other, in about"
@@ -78,18 +79,16 @@ def advice(
         )
 
 
-def _waiting(scene: Scene, machine: Machine, tried: Recording) -> Iterator[Advice]:
+def _waiting(scene: Scene, tried: Recording) -> Iterator[Advice]:
     """Yield how many of the trial's particles found their place taken, and how long they waited."""
-    releases = tried.select(Kind.RELEASE)
-    late = releases["t"] - machine.releases.t[releases["particle"]]
-    waited = late > 0.5 * scene.run.dt
-    if waited.any():
+    waited = waits(scene, tried)
+    if waited is not None and waited.particles:
         # Each waits for all that waited before it.
-        period = 1.0 / scene.stream.rate + late.max() / max(1, tried.count - 1)
+        period = 1.0 / scene.stream.rate + waited.longest / max(1, tried.count - 1)
         slower = _down((1.0 - MARGIN) / period)
         yield Advice(
-            f"of {tried.count} particles tried, {np.count_nonzero(waited)} wait for a free place to"
-            f" be released, up to {late.max():.3g} s",
+            f"of {tried.count} particles tried, {waited.particles} wait for a free place to"
+            f" be released, up to {waited.longest:.3g} s",
             f"stream.rate = {slower:g}, or a larger stream.bed_height",
         )
 

@@ -1,0 +1,681 @@
+"""The stepped engines, contact and pymunk, by laws written out here: flight, blows, belts, rest."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from importlib import import_module
+from math import cos, hypot, radians, sin, sqrt
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import chutelab
+from chutelab.engines import contact
+from chutelab.engines.contact import engine as host
+from chutelab.ledger import ledger
+from chutelab.machine import build
+from chutelab.recorder import StalledError
+from chutelab.recording import REASONS, Kind, balance
+from chutelab.scene import load, parse
+
+G, R, M = 9.81, 0.004, 0.008
+
+both = pytest.mark.parametrize("engine", ["contact", "pymunk"])
+
+
+def ran(engine, machine, progress=None):
+    return import_module(f"chutelab.engines.{engine}").run(machine, progress)
+
+
+def simulated(engine, text, *overrides):
+    return ran(engine, build(parse(text, overrides=overrides)))
+
+
+def shipped(engine, name, *overrides):
+    return ran(engine, build(load(name, overrides)))
+
+
+def lone(engine, at, velocity, until, *, surface="", spin=False, dt=1e-3, far=0.0):
+    return simulated(
+        engine,
+        f"""
+[particle]
+spin = {str(spin).lower()}
+[stream]
+at = [{at[0] + far}, {at[1] + far}]
+velocity = [{velocity[0]}, {velocity[1]}]
+[run]
+until = {until}
+dt = {dt}
+{surface}
+""",
+    )
+
+
+def floor(*, restitution=0.0, friction=0.0, speed=0.0, height=0.0, ends=(-20.0, 20.0)):
+    return f"""
+[[surface]]
+name = "floor"
+from = [{ends[0]}, {height}]
+to = [{ends[1]}, {height}]
+restitution = {restitution}
+friction = {friction}
+speed = {speed}
+"""
+
+
+def released(places, velocities, times, *, surface="", until=0.2, dt=1e-3, spin=False, **pair):
+    """Machine of particles that meet, each released where and when told."""
+    told = {"gravity": 0.0, "restitution": 0.7, "friction": 0.4, **pair}
+    far = '[[surface]]\nname = "far"\npoints = [[-50.0, -50.0], [50.0, -50.0], [50.0, 50.0]]'
+    machine = build(
+        parse(
+            f"""
+gravity = {told["gravity"]}
+[particle]
+spin = {str(spin).lower()}
+[stream]
+count = {len(times)}
+rate = 1.0
+at = [0.0, 1.0]
+velocity = [1.0, 0.0]
+bed_height = 0.01
+interact = true
+restitution = {told["restitution"]}
+friction = {told["friction"]}
+[run]
+until = {until}
+dt = {dt}
+{surface or far}
+"""
+        )
+    )
+    releases = replace(
+        machine.releases,
+        t=np.array(times, dtype=float),
+        position=np.array(places, dtype=float),
+        velocity=np.array(velocities, dtype=float),
+    )
+    return replace(machine, releases=releases)
+
+
+def pair(velocities, *, offset=0.0, **told):
+    """The second is released at 0.05 s where the first one comes to."""
+    return released([(0.0, 1.0), (0.1, 1.0 + offset)], velocities, (0.0, 0.05), **told)
+
+
+def last(recording, what="position"):
+    return np.array([recording.track(n)[-1][what] for n in range(recording.count)])
+
+
+def same(one, other):
+    arrays = ("knots", "offsets", "ended", "events", "by_surface")
+    return all(getattr(one, a).tobytes() == getattr(other, a).tobytes() for a in arrays)
+
+
+# Flight and blows
+
+
+@both
+@settings(max_examples=40)
+@given(vx=st.floats(-5.0, 5.0), vy=st.floats(-5.0, 5.0), end=st.floats(0.01, 1.0))
+def test_free_flight_is_the_parabola(engine, vx, vy, end):
+    recording = lone(engine, (0.3, 2.0), (vx, vy), end, surface=floor(height=-50.0))
+    knot = recording.track(0)[-1]
+    scale = hypot(0.3, 2.0) + hypot(vx, vy) * end + G * end**2
+    x, y = 0.3 + vx * end, 2.0 + vy * end - 0.5 * G * end**2
+    assert hypot(knot["position"][0] - x, knot["position"][1] - y) <= 1e-12 * scale
+    assert abs(knot["velocity"][1] - (vy - G * end)) <= 1e-12 * scale
+    assert len(recording.track(0)) == 2
+    # The heights round to some last places of m g y, however little energy is turned over.
+    books = ledger(recording)
+    assert abs(books.residual) <= 1e-13 * books.turned_over + 8.0 * np.spacing(M * G * 2.0)
+
+
+@both
+@settings(max_examples=60)
+@given(
+    restitution=st.one_of(st.just(0.0), st.floats(0.05, 1.0)),
+    friction=st.floats(0.0, 1.5),
+    speed=st.floats(-3.0, 3.0),
+    vx=st.floats(-3.0, 3.0),
+    spin=st.booleans(),
+)
+def test_a_bounce_keeps_newtons_and_coulombs_laws(engine, restitution, friction, speed, vx, spin):
+    fall = 0.2
+    belt = floor(restitution=restitution, friction=friction, speed=speed)
+    recording = lone(engine, (0.0, R + fall), (vx, 0.0), 0.25, surface=belt, spin=spin)
+    hit = recording.select(Kind.IMPACT)[0]
+    approach = sqrt(2.0 * G * fall)
+    normal = M * (1.0 + restitution) * approach
+    stop = (M / 3.0 if spin else M) * (vx - speed)
+    tangential = -np.clip(stop, -friction * normal, friction * normal)
+    assert hit["t"] == pytest.approx(approach / G, rel=1e-11)
+    assert hit["position"] == pytest.approx([vx * approach / G, R], abs=1e-11)
+    assert hit["normal_impulse"] == pytest.approx(normal, rel=1e-10)
+    assert hit["tangential_impulse"] == pytest.approx(tangential, abs=1e-10 * normal)
+    after = [vx + tangential / M, restitution * approach]
+    assert hit["velocity_after"] == pytest.approx(after, abs=1e-9)
+    spun = tangential * R / (0.5 * M * R**2) if spin else 0.0
+    assert hit["omega_after"] == pytest.approx(spun, abs=1e-6)
+
+
+@both
+@settings(max_examples=40)
+@given(angle=st.floats(-170.0, 170.0), restitution=st.floats(0.1, 1.0), skew=st.floats(-60.0, 60.0))
+def test_a_surface_is_struck_r_in_front_of_it_whatever_its_direction(
+    engine, angle, restitution, skew
+):
+    # Through the origin, struck from 0.1 m away without gravity.
+    t = np.array([cos(radians(angle)), sin(radians(angle))])
+    n = np.array([-t[1], t[0]])
+    course = -(cos(radians(skew)) * n + sin(radians(skew)) * t)
+    start = -0.1 * course
+    recording = simulated(
+        engine,
+        f"""
+gravity = 0.0
+[stream]
+at = [{start[0]}, {start[1]}]
+velocity = [{course[0]}, {course[1]}]
+[run]
+until = 0.15
+[[surface]]
+name = "wall"
+from = [{-t[0]}, {-t[1]}]
+to = [{t[0]}, {t[1]}]
+restitution = {restitution}
+friction = 0.0
+""",
+    )
+    hit = recording.select(Kind.IMPACT)[0]
+    assert hit["position"] @ n == pytest.approx(R, abs=1e-12)
+    assert hit["velocity_after"] @ n == pytest.approx(restitution * cos(radians(skew)), abs=1e-11)
+    assert hit["velocity_after"] @ t == pytest.approx(course @ t, abs=1e-11)
+
+
+@both
+@pytest.mark.parametrize("dt", [1 / 60, 1e-3])
+@pytest.mark.parametrize("speed", [20.0, 2000.0])
+@pytest.mark.parametrize("lean", [0.0, 40.0, -70.0])
+def test_nothing_is_too_fast_to_be_stopped(engine, dt, speed, lean):
+    # r = 2 mm against a plate 1 m away, whose normal leans by an angle; without gravity.
+    r, a = 0.002, radians(lean)
+    recording = simulated(
+        engine,
+        f"""
+gravity = 0.0
+[particle]
+radius = {r}
+[stream]
+at = [-1.0, 0.0]
+velocity = [{speed}, 0.0]
+[run]
+until = {1.5 / speed}
+dt = {dt}
+[[surface]]
+name = "wall"
+from = [{-sin(a)}, {-cos(a)}]
+to = [{sin(a)}, {cos(a)}]
+restitution = 0.5
+friction = 0.0
+""",
+    )
+    (hit,) = recording.select(Kind.IMPACT)
+    way = 1.0 - r / cos(a)
+    assert hit["t"] == pytest.approx(way / speed, rel=1e-12)
+    assert hit["position"] == pytest.approx([-r / cos(a), 0.0], abs=1e-12)
+    # (1 + ε) of the normal velocity is given back along the normal (-cos a, sin a).
+    given_back = 1.5 * speed * cos(a)
+    after = np.array([speed - given_back * cos(a), given_back * sin(a)])
+    assert hit["velocity_after"] == pytest.approx(after, abs=1e-11 * speed)
+    far = hit["position"] + after * (1.5 - way) / speed
+    assert last(recording)[0] == pytest.approx(far, abs=1e-11)
+
+
+@settings(max_examples=40)
+@given(u=st.floats(0.1, 3.0), v=st.floats(-3.0, 0.0), restitution=st.floats(0.0, 1.0))
+def test_equal_disks_head_on(u, v, restitution):
+    reach = 0.1 - 2.0 * R - 0.05 * u
+    if reach < 1e-3:  # they would meet before the second is there
+        return
+    recording = contact.run(pair([(u, 0.0), (v, 0.0)], restitution=restitution, until=1.5))
+    (hit,) = recording.select(Kind.COLLISION)
+    assert hit["t"] == pytest.approx(0.05 + reach / (u - v), rel=1e-10)
+    first, second = last(recording, "velocity")[:, 0]
+    assert first == pytest.approx(0.5 * ((u + v) - restitution * (u - v)), abs=1e-10)
+    assert second == pytest.approx(0.5 * ((u + v) + restitution * (u - v)), abs=1e-10)
+    lost = 0.25 * M * (1.0 - restitution**2) * (u - v) ** 2
+    books = ledger(recording)
+    assert books.by_surface["particles"]["restitution_loss"] == pytest.approx(lost, abs=1e-12)
+    assert books.relative_residual < 1e-12
+
+
+@settings(max_examples=40)
+@given(offset=st.floats(-1.8 * R, 1.8 * R), friction=st.floats(0.0, 2.0), spin=st.booleans())
+def test_oblique_disks_keep_momentum_and_turn(offset, friction, spin):
+    velocities, restitution = [(1.0, 0.0), (-1.0, 0.0)], 0.7
+    recording = contact.run(pair(velocities, offset=offset, friction=friction, spin=spin))
+    # Line of centres at the touch, from the first to the second.
+    c = np.array([sqrt(4.0 * R**2 - offset**2), offset]) / (2.0 * R)
+    t = np.array([-c[1], c[0]])
+    relative = np.array([2.0, 0.0])
+    push = 0.5 * M * (1.0 + restitution) * (relative @ c)
+    mass = 0.5 * M / 3.0 if spin else 0.5 * M
+    rub = np.clip(mass * (relative @ t), -friction * push, friction * push)
+    first = np.array([1.0, 0.0]) - (push * c + rub * t) / M
+    second = np.array([-1.0, 0.0]) + (push * c + rub * t) / M
+    assert last(recording, "velocity") == pytest.approx(np.array([first, second]), abs=1e-9)
+    spun = -rub * R / (0.5 * M * R**2) if spin else 0.0
+    assert last(recording, "omega") == pytest.approx([spun, spun], abs=1e-6)
+    assert ledger(recording).relative_residual < 1e-12
+
+
+def test_a_blow_goes_through_a_row_within_one_step():
+    # Five at rest in a row, hair by hair; a sixth comes and the blow goes through them all.
+    gap, speed, start = 1e-4, 2.0, 0.1
+    row = [(5.0 + n * (2.0 * R + gap), 3.0) for n in range(5)]
+    places = [*row, (5.0 - 2.0 * R - speed * start, 3.0)]
+    velocities = [*[(0.0, 0.0)] * 5, (speed, 0.0)]
+    recording = contact.run(released(places, velocities, [0.0] * 6, restitution=1.0))
+    hits = recording.select(Kind.COLLISION)
+    assert hits["t"] == pytest.approx(start + np.arange(5) * gap / speed, abs=1e-12)
+    ends = last(recording, "velocity")
+    assert ends[4] == pytest.approx([speed, 0.0], abs=1e-12)
+    assert ends[[0, 1, 2, 3, 5]] == pytest.approx(np.zeros((5, 2)), abs=1e-12)
+
+
+@both
+def test_bounces_come_to_rest_in_the_time_of_the_closed_form(engine):
+    fall, e = 0.1, 0.5
+    recording = lone(engine, (0.0, R + fall), (0.0, 0.0), '"settled"', surface=floor(restitution=e))
+    # Down once, then 2 ε^n times as long for every further bounce; a few steps of rest at the end.
+    total = sqrt(2.0 * fall / G) * (1.0 + 2.0 * e / (1.0 - e))
+    assert recording.track(0)[-1]["t"] == pytest.approx(total, abs=5e-3)
+    assert ledger(recording).restitution_loss == pytest.approx(M * G * fall, rel=2e-5)
+
+
+# Belts and what lies on them
+
+
+@both
+@pytest.mark.parametrize(
+    ("spin", "speed", "work", "heat"),
+    # m v_b (v_b - v_x) and half of it as heat, and a third of both for a free disk.
+    [
+        (False, 2.0, M * 2.0 * 2.0, 0.5 * M * 4.0),
+        (False, -1.0, M * 1.0 * 1.0, 0.5 * M * 1.0),
+        (True, 2.0, M * 2.0 * 2.0 / 3.0, M * 4.0 / 6.0),
+    ],
+)
+def test_a_belt_pays_for_the_speed_it_gives(engine, spin, speed, work, heat):
+    belt = floor(friction=0.3, speed=speed)
+    recording = lone(engine, (0.0, R), (0.0, 0.0), 3.0, surface=belt, spin=spin)
+    books = ledger(recording)
+    assert books.belt_work == pytest.approx(work, rel=1e-10)
+    assert books.friction_loss == pytest.approx(heat, rel=1e-10)
+    end = speed / 3.0 if spin else speed
+    assert last(recording, "velocity")[0, 0] == pytest.approx(end, rel=1e-10)
+    assert books.relative_residual < 1e-10
+
+
+@pytest.mark.parametrize("spin", [False, True])
+def test_accounts_of_surfaces_and_particles_agree_however_a_slide_is_cut(spin):
+    # Around the end of the slip, µ g t = v, and a third of it for a disk that may turn.
+    mu, v = 0.3, 1.0
+    end = v / (mu * G) / (3.0 if spin else 1.0)
+    belt = floor(friction=mu, speed=v)
+    for until in np.linspace(end - 3e-3, end + 3e-3, 25):
+        recording = lone("contact", (0.0, R), (0.0, 0.0), until, surface=belt, spin=spin)
+        entries = recording.track(0)[-1]["entries"]
+        assert recording.by_surface.sum(axis=0) == pytest.approx(entries, abs=1e-15)
+        # Steps: the last one may end within the slip.
+        paid = mu * M * G * v * min(until, end)
+        assert entries[0] == pytest.approx(paid, abs=0.5 * mu * M * G * v * 1e-3)
+
+
+@pytest.mark.parametrize("until", [0.2, 3.0])
+def test_a_slide_leaves_few_knots_and_is_a_parabola_between_them(until):
+    recording = lone("contact", (0.0, R), (9.0, 0.0), until, surface=floor(friction=0.2))
+    assert len(recording.track(0)) < 10
+    times = np.linspace(0.0, until, 50)
+    position, velocity = recording.at(times)
+    assert velocity[:, 0, 0] == pytest.approx(9.0 - 0.2 * G * times, abs=1e-8)
+    assert position[:, 0, 0] == pytest.approx(9.0 * times - 0.1 * G * times**2, abs=1e-8)
+    assert position[:, 0, 1] == pytest.approx(np.full(50, R), abs=1e-5 * R)
+
+
+@both
+@pytest.mark.parametrize("crowded", [False, True])
+def test_off_the_end_of_a_table_it_flies(engine, crowded):
+    # Friction leaves √(v² - 2 µ g L) of its speed at the end of the table; then it falls.
+    table = floor(friction=0.1, ends=(-1.0, 0.3))
+    if crowded:  # with another far away
+        places, velocities = [(0.0, R), (-0.9, R)], [(1.0, 0.0), (0.0, 0.0)]
+        machine = released(places, velocities, (0.0, 0.0), surface=table, until=1.0, gravity=G)
+        recording = ran(engine, machine)
+    else:
+        recording = lone(engine, (0.0, R), (1.0, 0.0), 1.0, surface=table)
+    speed = sqrt(1.0 - 2.0 * 0.1 * G * 0.3)
+    end = recording.track(0)[-1]
+    fall = end["t"] - (1.0 - speed) / (0.1 * G)
+    # A step sees the end of the table: it rubs that much longer at most. Slower than √(g r) it
+    # would roll over the end; v = 0.64 m/s is faster.
+    assert end["velocity"][0] == pytest.approx(speed, abs=0.1 * G * 1e-3)
+    assert end["position"][0] == pytest.approx(0.3 + speed * fall, abs=speed * 1e-3)
+    assert end["position"][1] == pytest.approx(R - 0.5 * G * fall**2, abs=G * fall * 1e-3)
+
+
+@both
+@pytest.mark.parametrize("name", ["low-speed", "perpendicular"])
+def test_the_ride_stays_on_its_circle_and_is_braked_by_the_belt(engine, name):
+    recording = shipped(engine, name)
+    machine = build(load(name))
+    rho, v = machine.pulley.radius + R, machine.pulley.speed
+    cosine = min(1.0, v**2 / (G * rho))
+    (away,) = recording.select(Kind.SEPARATION, surface="incoming")
+    assert away["t"] == pytest.approx((1.0 + rho * np.arccos(cosine)) / v, rel=1e-12)
+    assert away["position"][1] == pytest.approx(rho * cosine, rel=1e-12)
+    books = ledger(recording).by_surface["incoming"]
+    assert books["belt_work"] == pytest.approx(-M * G * rho * (1.0 - cosine), abs=1e-14)
+    times = np.linspace(0.5, away["t"], 500)
+    position, _ = recording.at(times)
+    assert np.abs(np.hypot(*position[:, 0].T) / rho - 1.0).max() < 1e-9
+
+
+@both
+def test_a_ride_ends_where_something_is_in_its_way(engine):
+    recording = simulated(
+        engine,
+        """
+[incoming]
+speed = 1.0
+pulley_radius = 0.1
+[[surface]]
+name = "scraper"
+from = [-0.5, 0.2]
+to = [-0.5, 0.1]
+restitution = 0.5
+[run]
+until = 0.6
+""",
+    )
+    hit = recording.select(Kind.IMPACT, surface="scraper")[0]
+    assert hit["t"] == pytest.approx(0.5 - R, abs=1e-12)
+    assert hit["velocity_after"][0] == pytest.approx(-0.5, abs=1e-9)
+
+
+def in_the_way(place, end):
+    """Machine with one dropped in the way of a carried one."""
+    machine = build(load("stream", ["stream.count=2", "stream.rate=1.0", f"run.max_time={end}"]))
+    releases = replace(
+        machine.releases,
+        t=np.array([0.0, 0.01]),
+        position=np.array([[-1.0, 0.104], place]),
+        velocity=np.array([[2.0, 0.0], [0.0, 0.0]]),
+        carried=np.array([True, False]),
+    )
+    return replace(machine, releases=releases)
+
+
+@both
+def test_a_carried_particle_pushes_and_is_not_pushed(engine):
+    recording = ran(engine, in_the_way([-0.9, 0.115], 1.0))
+    away = recording.first(recording.select(Kind.SEPARATION, surface="incoming"))[0]
+    assert away["t"] == pytest.approx(0.5, rel=1e-12)
+    assert away["velocity_after"] == pytest.approx([2.0, 0.0])
+    assert len(recording.select(Kind.COLLISION)) >= 1
+
+
+def test_what_a_carried_partner_gives_is_booked_when_it_is_given():
+    recording = contact.run(in_the_way([-0.78, 0.16], 0.3))
+    assert len(recording.select(Kind.COLLISION)) >= 1
+    track = recording.track(1)
+    energy = np.sum(recording.energies(track), axis=0)
+    unbooked = energy - energy[0] - balance(track["entries"])
+    # m (g dt)²/8 is what a hop has; the blow, m v²/2, is ten thousand times as much.
+    assert np.abs(unbooked).max() < 2.0 * M * (G * 1e-3) ** 2 / 8.0
+    assert np.ptp(track["entries"][:, 0]) > 1e-3
+
+
+def belts(friction=0.6, restitution=0.0, speed=0.7):
+    """Belts that lean at 20° to either side and draw down what lies between them."""
+    return "".join(
+        f"""
+[[surface]]
+name = "{name}"
+from = [{side * 0.37}, 1.0]
+to = [{side * 0.01}, 0.0]
+friction = {friction}
+restitution = {restitution}
+speed = {speed}
+"""
+        for name, side in (("left", -1.0), ("right", 1.0))
+    )
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.3, 0.8])
+@pytest.mark.parametrize("spin", [True, False])
+@pytest.mark.parametrize("until", [3.0, '"settled"\nmax_time = 3.0'])
+def test_a_disk_that_belts_wedge_rests_where_it_touches_both(until, spin, restitution):
+    # tan 20° < µ: friction holds it against any push. Both belts slip past it: it has not settled.
+    recording = simulated(
+        "contact",
+        f"[particle]\nradius = 0.05\nspin = {str(spin).lower()}\n[stream]\nat = [0.0, 1.2]\n"
+        f"velocity = [0.0, 0.0]\n[run]\nuntil = {until}\n{belts(restitution=restitution)}",
+    )
+    end = recording.track(0)[-1]
+    # From the lower end (-0.01, 0) of a face along (0.36, -1), its normal (1, 0.36): r away.
+    height = (0.05 * hypot(1.0, 0.36) - 0.01) / 0.36
+    assert end["t"] == 3.0
+    assert REASONS[recording.ended[0]] == "time"
+    assert not len(recording.select(Kind.SETTLE))
+    assert end["position"] == pytest.approx([0.0, height], abs=1e-3 * 0.05)
+    assert end["velocity"] == pytest.approx([0.0, 0.0], abs=1e-6)
+    assert end["omega"] == pytest.approx(0.0, abs=1e-6)
+    assert ledger(recording).relative_residual < 1e-10
+
+
+@pytest.mark.parametrize("speed", [0.1, 2.0])
+@pytest.mark.parametrize("degrees", [0.5, 2.0, 8.0])
+def test_a_narrow_wedge_of_belts_is_no_way_through(speed, degrees):
+    # Both faces touch a disk at the origin, and go on below it.
+    r, c, s = 0.02, cos(radians(degrees)), sin(radians(degrees))
+    walls = "".join(
+        f"""
+[[surface]]
+name = "{name}"
+from = [{side * (r * c + s)}, {-r * s + c}]
+to = [{side * (r * c - 0.1 * s)}, {-r * s - 0.1 * c}]
+friction = 0.6
+speed = {speed}
+"""
+        for name, side in (("left", -1.0), ("right", 1.0))
+    )
+    recording = simulated(
+        "contact",
+        f"[particle]\nradius = {r}\n[stream]\nat = [0.0, 0.1]\nvelocity = [0.0, 0.0]\n"
+        f"[run]\nuntil = 1.0\n{walls}",
+    )
+    end = recording.track(0)[-1]
+    assert end["velocity"] == pytest.approx([0.0, 0.0], abs=1e-6)
+    # Half a percent of the radius in each face at most.
+    assert -end["position"][1] * s < 0.005 * r
+    assert end["position"][1] < 1e-3 * r
+
+
+def test_no_belt_wedges_a_disk_that_it_rolls_out_of_a_corner():
+    # The belt under it runs away from the wall: it rests there only as long as it does not grip.
+    corner = """
+[particle]
+radius = 0.05
+[stream]
+at = [0.06, 0.3]
+velocity = [-0.5, 0.0]
+[run]
+until = 1.0
+[[surface]]
+name = "wall"
+from = [0.0, 1.0]
+to = [0.0, -0.1]
+[[surface]]
+name = "belt"
+from = [-0.1, 0.0]
+to = [3.0, 0.0]
+friction = 0.6
+speed = 0.7
+"""
+    end = simulated("contact", corner).track(0)[-1]
+    assert end["velocity"] == pytest.approx([0.7, 0.0], abs=1e-6)
+    assert end["position"][1] == pytest.approx(0.05, abs=1e-3 * 0.05)
+
+
+@both
+def test_a_pile_in_a_box_stays_in_it_and_gains_nothing(engine):
+    recording = simulated(
+        engine,
+        """
+[stream]
+count = 30
+rate = 100.0
+at = [0.0, 0.05]
+velocity = [0.3, 0.0]
+bed_height = 0.1
+interact = true
+[run]
+until = 2.0
+[[surface]]
+name = "box"
+points = [[-0.05, 0.2], [-0.05, 0.0], [0.05, 0.0], [0.05, 0.2]]
+friction = 0.5
+restitution = 0.3
+""",
+    )
+    ends = last(recording)
+    assert np.all(np.abs(ends[:, 0]) < 0.05 - 0.9 * R)
+    assert np.all(ends[:, 1] > 0.9 * R)
+    gaps = np.linalg.norm(ends[:, None] - ends, axis=2)[np.triu_indices(30, 1)]
+    assert gaps.min() > 1.9 * R
+    assert np.abs(last(recording, "velocity")).max() < 1e-2
+    if engine == "contact":
+        assert ledger(recording).relative_residual < 1e-11
+    else:  # what Chipmunk presses apart is energy from nowhere: a few percent
+        assert ledger(recording).relative_residual < 0.05
+
+
+def test_energy_never_rises_where_nothing_is_driven():
+    recording = shipped("contact", "free-fall")
+    for particle in range(recording.count):
+        track = recording.track(particle)
+        energy = np.sum(recording.energies(track), axis=0)
+        # In contact a hop's m (g dt)²/8, twice, is what the halfway velocity may have or not.
+        assert np.diff(energy).max() <= 2.0 * M * (G * 1e-3) ** 2 / 8.0
+        assert energy[-1] < 0.1 * energy[0]
+
+
+# Ends, hosts
+
+
+@both
+def test_what_misses_everything_leaves_a_metre_below(engine):
+    recording = lone(engine, (30.0, 1.0), (0.0, 0.0), '"settled"', surface=floor())
+    (gone,) = recording.select(Kind.EXIT)
+    assert gone["position"][1] == pytest.approx(-1.0, abs=1e-12)
+    assert gone["t"] == pytest.approx(sqrt(2.0 * 2.0 / G), rel=1e-12)
+    assert REASONS[recording.ended[0]] == "exit"
+
+
+@both
+def test_independent_particles_pass_through_each_other(engine):
+    together = shipped(engine, "stream", "stream.interact=false", "stream.count=3", "run.until=0.9")
+    assert not len(together.select(Kind.COLLISION))
+    alone = shipped(engine, "perpendicular", "run.until=0.9")
+    assert together.track(0).tobytes() == alone.track(0).tobytes()
+
+
+@both
+def test_a_machine_far_away_moves_as_one_here(engine):
+    def off_the_edge(far):
+        table = floor(friction=0.3, height=far, ends=(far - 2.0, far + 0.125))
+        return lone(engine, (-0.25, 0.0078125), (1.5, 0.0), 0.5, surface=table, far=far)
+
+    # A power of two, so that it adds without rounding; half a last place of it is 6e-11 m.
+    here, there = off_the_edge(0.0), off_the_edge(2.0**19)
+    times = np.linspace(0.0, 0.5, 100)
+    shifted = there.at(times)[0] - 2.0**19
+    np.testing.assert_allclose(shifted, here.at(times)[0], rtol=0.0, atol=1e-9)
+    assert there.events["kind"].tolist() == here.events["kind"].tolist()
+
+
+@both
+def test_progress_is_rare(engine):
+    shares = []
+    recording = ran(engine, build(load("belt-landing", ["run.until=settled"])), shares.append)
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    assert len(shares) <= 2 + recording.steps / 64 + recording.seconds / 0.05
+
+
+def test_who_stalls_is_named_and_what_was_recorded_is_kept(monkeypatch):
+    # The core's word for it, when it comes back for the third time.
+    statuses = iter([None, None, host.Status.STALLED])
+    really = host.Module.run
+
+    def run(module, _steps):
+        status = really(module, 64)
+        module.world["stalled"] = 1
+        return next(statuses) or status
+
+    monkeypatch.setattr(host.Module, "run", run)
+    with pytest.raises(StalledError) as caught:
+        shipped("contact", "stream", "stream.count=5", "stream.rate=50")
+    stalled, recording = caught.value, caught.value.recording
+    assert stalled.particle == 1
+    assert 0.1 < stalled.t < 0.2
+    # On the belt since 0.02 s: (-1 + 2 (t - 0.02)) m, to a step.
+    assert stalled.position[0] == pytest.approx(-1.0 + 2.0 * (stalled.t - 0.02), abs=3e-3)
+    assert f"particle 1 is stuck at t = {stalled.t:.6g} s" in str(stalled)
+    assert recording.track(1)[-1]["t"] == pytest.approx(stalled.t, abs=1.5e-3)
+    assert len(recording.select(Kind.RELEASE)) == 5
+    assert {REASONS[k] for k in recording.ended} == {"time"}
+    monkeypatch.undo()
+    again = shipped("contact", "stream", "stream.count=5", "stream.rate=50")
+    assert {REASONS[k] for k in again.ended} == {"settled"}
+
+
+def test_an_interrupt_leaves_nothing_behind_for_the_next_run():
+    machine = build(load("stream", ["stream.count=20"]))
+    whole = contact.run(machine)
+
+    def interrupt(_share):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        contact.run(machine, interrupt)
+    assert same(contact.run(machine), whole)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+@both
+def test_ctrl_c_stops_a_long_run_at_once(engine):
+    environment = {**os.environ, "PYTHONPATH": str(Path(chutelab.__file__).parents[1])}
+    words = ["run", "stream", "--set", "stream.count=20000", "--set", "stream.rate=1000"]
+    command = [sys.executable, "-m", "chutelab", *words, "--engine", engine, "--json"]
+    with subprocess.Popen(
+        command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as running:
+        time.sleep(3.0)
+        assert running.poll() is None
+        running.send_signal(signal.SIGINT)
+        out, said = running.communicate(timeout=10.0)
+    assert running.returncode == 130
+    assert out == ""
+    assert said.strip().endswith("Interrupted.")

@@ -14,7 +14,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
-from chutelab.engines.contact.module import Status, dtype
+from chutelab.engines.contact.module import Status, constants, dtype
 from chutelab.machine import build
 from chutelab.recording import REASONS, Kind
 from chutelab.scene import load
@@ -520,4 +520,4 @@ def test_in_node_it_does_the_same_to_the_bit(tmp_path, crowded):
 
 
 def test_the_host_knows_the_statuses_of_the_core():
-    assert {status.name: status.value for status in module.Status} == module.constants("Status")
+    assert {status.name: status.value for status in Status} == constants("Status")

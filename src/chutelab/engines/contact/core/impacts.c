@@ -52,9 +52,9 @@ void expect(int i, double due, int partner) {
 int next_disk(void) { return W.heap_count ? W.heap[0] : -1; }
 
 /* Approach that is no blow: of a disk by itself only what grazes; in a crowd what goes by less than
-   a tenth of TOUCH in a step, as long as gravity would do the same. */
+   a tenth of TOUCH in a step, as long as gravity would do the same; without gravity, rounding. */
 double soft_approach(const Disk *d, double radius) {
-    if (W.interact) return MIN(W.skip * radius, W.g * W.step);
+    if (W.interact) return W.skip * radius * MIN(MAX(W.g * W.step / (W.skip * radius), 1e-9), 1);
     return GRAZE * sqrt(d->vx * d->vx + d->vy * d->vy);
 }
 

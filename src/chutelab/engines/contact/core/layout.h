@@ -68,6 +68,7 @@ typedef struct {
     int on;                     /* surface it lasts on by itself, or -1 */
     int slips;                  /* whether it slips there */
     int landed;                 /* has met the landing surface */
+    int ends;                   /* the reason for which the track ends in this step, or -1 */
     int reason;                 /* [out] why the track ended */
     int waited;                 /* [out] 1 if its place was taken when it was due */
     int wide;                   /* 1 if it is asked by all in this step, see grid.c */

@@ -222,7 +222,8 @@ static void turn_slip(Contact *c) {
     relative(c, 1, u);
     relative(c, 0, v);
     double from = u[1] - pull * past, to = v[1] + c->drift, rate = hold / (c->mass[1] * span);
-    if (c->j >= 0 || fabs(pull) <= rate || from * pull >= 0 || to * from > 0) return;
+    if (c->j >= 0 || fabs(pull) <= rate || from * pull >= 0 || to * from > 1e-12 * from * from)
+        return;
     double slow = pull + (pull > 0 ? rate : -rate), fast = pull - (pull > 0 ? rate : -rate);
     double change[3] = {0, c->mass[1] * (fast * (span + from / slow) - to), 0};
     if (-from / slow > span || fabs(c->impulse[1] + change[1]) > hold) return;
@@ -262,9 +263,7 @@ static void note_grip(Disk *d, const Contact *c, const double *u, const double *
     track->load_t[0] = d->t;
     if (d->on != c->owner) {
         /* It came to lie there without an impact that was told. */
-        int kind = c->owner == W.landing && !d->landed ? LANDING : IMPACT;
-        write_event(kind, i, -1, c->owner, d->t, &d->x, &d->ux, &d->vx, c->impulse[0], c->impulse[1]);
-        d->landed |= kind == LANDING;
+        write_event(IMPACT, i, -1, c->owner, d->t, &d->x, &d->ux, &d->vx, c->impulse[0], c->impulse[1]);
         d->on = c->owner;
         d->slips = 1;
     }
@@ -386,6 +385,13 @@ void close_step(double h) {
         }
         a->supports++;
         if (b) b->supports++;
+        else if (c->owner == W.landing && !a->landed) {
+            write_event(LANDING, c->i, -1, c->owner, a->t, &a->x, &a->ux, &a->vx, c->impulse[0],
+                        c->impulse[1]);
+            a->landed = 1;
+            a->on = c->owner;
+            a->slips = 1;
+        }
         /* Halfway through the impulses the hop is left out. */
         double off = fabs(0.5 * (u[0] + v[0])), slip = fabs(v[1] + c->drift);
         double turn = fabs(v[2]) * a->radius, rest = REST * sqrt(W.g * a->radius);
@@ -402,6 +408,7 @@ void close_step(double h) {
     for (int i = W.low; i < W.high; i++) {
         Disk *d = W.disks + i;
         Track *track = W.tracks + i;
+        d->ends = -1;
         if (d->mode != FREE) continue;
         if (!d->supports) {
             d->calm = d->rest = 0;
@@ -427,7 +434,6 @@ void close_step(double h) {
             note_grip(d, only, u, v, h);
             if (!W.interact && W.until == UNTIL_SETTLED && !d->slips && d->since <= d->t + h && lies(d, only))
                 settle(i, only, h);
-            else if (!W.interact && W.until == UNTIL_LANDED && d->landed) reason = BY_LANDING;
         } else {
             /* On several; of a surface it lies on, if any, it may still part. */
             int ground = -1;
@@ -451,11 +457,14 @@ void close_step(double h) {
             double most = MAX(fabs(s[0]) + fabs(s[1]), fabs(p[0]) + fabs(p[1]));
             if (most + fabs(s[2]) * d->radius < 1e-9) reason = BY_SETTLING;
         }
-        if (reason >= 0) {
-            take_back(i);
-            end_in_contact(i, reason);
-        }
+        if (W.until == UNTIL_LANDED && d->landed) reason = BY_LANDING;
+        d->ends = reason;
     }
+    /* All are asked for what they are ahead before the state of any changes. */
+    for (int i = W.low; i < W.high; i++)
+        if (W.disks[i].mode == FREE && W.disks[i].ends >= 0) take_back(i);
+    for (int i = W.low; i < W.high; i++)
+        if (W.disks[i].mode == FREE && W.disks[i].ends >= 0) end_in_contact(i, W.disks[i].ends);
 }
 
 /* Take back what the second half of this step's impulses did to the ledger by disk i. */

@@ -53,7 +53,7 @@ def dtype(struct: str) -> np.dtype[Any]:
 
 @cache
 def _world() -> type[ctypes.Structure]:
-    """Return `World` as a structure of ctypes: a field is read and set in a tenth of NumPy's time."""
+    """Return `World` as a structure of ctypes, which is read and set ten times as fast."""
     kinds = {"double": ctypes.c_double, "int": ctypes.c_int32, "pointer": ctypes.c_uint32}
     fields = _layout()["structs"]["World"]["fields"]
     rows = [

@@ -231,7 +231,8 @@ static void jam(int i) {
    in the middle of a step: else the hop's velocity, of first order in the step, would go on.
 
    On the smooth path the velocity changes evenly from the last mid-step to the next; the difference is
-   an impulse of the surface, and the height of the hop goes to what its impulses lost. */
+   an impulse of the surface, and the height of the hop goes to what its impulses lost. Endless
+   friction acts at once, not evenly: then this would undo it, and is left out after a FEW times. */
 static void end_hop(int i, double t) {
     Disk *d = W.disks + i;
     Track *track = W.tracks + i;
@@ -276,7 +277,7 @@ static void strike(int i, int j, double t) {
     if (j >= 0 && b->mode == ASLEEP) wake(j, t);
     advance(a, t);
     if (j >= 0) advance(b, t);
-    else end_hop(i, t);
+    else if (a->impacts < FEW) end_hop(i, t);
     int impacts = j >= 0 ? MAX(a->impacts, b->impacts) : a->impacts;
     Contact c;
     double u[3];

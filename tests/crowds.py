@@ -182,8 +182,8 @@ class _Draw:
         adhesion = self.one_of(True, False)
         # Layers that are carried round the pulley run into each other: there is one, if it is slow.
         slow = self.v**2 < self.g * self.r * (radius + 22.0)
-        return {
-            **({"released": {"bed_height": 0.0}} if adhesion and slow else {}),
+        bed = {"released": {"bed_height": 0.0}} if adhesion and slow else {}
+        tables = {
             "incoming": {
                 "speed": self.v,
                 "pulley_radius": self.r * radius,
@@ -207,6 +207,12 @@ class _Draw:
                 **self.pair(),
             },
         }
+        # Nothing pushes back who is carried: a jam that reaches up to the pulley would be crushed.
+        out = tables["outgoing"]
+        takes_away = self.g > 0.0 and out["speed"] > 0.3 * self.v and out["friction"] > 0.0
+        if not takes_away:
+            tables["incoming"]["friction"] = pair["friction"]
+        return {**bed, **tables}
 
 
 # Laws
@@ -292,12 +298,18 @@ def _depths(machine, recording):
                     since, worst = look, 0.0
                 worst = max(worst, depth)
                 runs[who] = since, look, worst
-                name = " and ".join(map(str, who)) if isinstance(who[1], int) else f"{who[0]} in {who[1]}"
+                name = (
+                    " and ".join(map(str, who))
+                    if isinstance(who[1], int)
+                    else f"{who[0]} in {who[1]}"
+                )
                 lasts = (look - since) * apart / h
                 if depth > INSIDE:
                     found[who] = f"through: {name} by {depth:.2g} r at {t:.6g} s"
                 elif lasts > 1.25 and not found.get(who, "").startswith("through"):
-                    found[who] = f"pressed: {name} by {worst:.2g} r for {lasts:.3g} steps at {t:.6g} s"
+                    found[who] = (
+                        f"pressed: {name} by {worst:.2g} r for {lasts:.3g} steps at {t:.6g} s"
+                    )
     return list(found.values())
 
 
@@ -329,7 +341,7 @@ def _in_surfaces(machine, x):
 
 
 def _crossings(machine, recording):
-    """Tell whose centre goes through a face: by the cubic between two knots, at nine places each."""
+    """Tell whose centre goes through a face, by the cubic between two knots, at nine places."""
     knots, s = recording.knots, machine.segments
     whose = np.repeat(np.arange(recording.count), np.diff(recording.offsets))
     rows = np.flatnonzero((whose[1:] == whose[:-1]) & (np.diff(knots["t"]) > 0.0))

@@ -191,7 +191,7 @@ def _words(
     flying = in_flight(recording, times, near)
     still: NDArray[np.bool_] = ~np.any(subset(recording, [0]).at(times)[1], axis=(1, 2))
     captions = []
-    for t, flies, lies in zip(times, flying.tolist(), still.tolist(), strict=True):
+    for t, flies, lies in zip(times, flying.tolist(), np.asarray(still).tolist(), strict=True):
         story = int(np.searchsorted(mine["t"][stories], t, side="right")) - 1
         if story >= 0 and _still_told(mine[stories[story]], t, slow, flying=flies):
             captions.append(lines[story])

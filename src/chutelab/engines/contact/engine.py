@@ -117,7 +117,7 @@ class Job:
         return (("contacts", kind, size), ("earlier", kind, size), ("links", integer, 2 * size))
 
     def enlarge(self, what: str) -> None:
-        """Make twice as much room; contacts of the step before are kept, all else has been taken."""
+        """Make twice as much room; of what was there only contacts of the step before are kept."""
         world, kept = self.module.world, None
         if what == "contact":
             kept = self.module.array("earlier", dtype("Contact"), world.earlier_count).copy()
@@ -128,6 +128,7 @@ class Job:
             self.module.array("earlier", dtype("Contact"), len(kept))[:] = kept
 
     def settings(self, buckets: int, cells: int) -> None:
+        """Fill in the numbers of the world."""
         machine, world = self.machine, self.module.world
         alone = not machine.interact
         r = machine.particle.radius
@@ -217,11 +218,12 @@ class Job:
                 progress(self.share())
 
     def share(self) -> float:
+        """Return the share of the run that is done."""
         world, n = self.module.world, self.machine.count
-        ended = world.done / n
+        ended: float = world.done / n
         if not self.machine.interact:
             return ended
-        passed = world.t / self.machine.end_time if self.machine.end_time > 0 else 1.0
+        passed: float = world.t / self.machine.end_time if self.machine.end_time > 0 else 1.0
         return min(1.0, max(ended, passed))
 
     def drain(self) -> dict[str, int]:
@@ -245,7 +247,8 @@ class Job:
             events = np.empty(len(rows), EVENT)
             for name, source in (("t", "t"), ("particle", "disk"), ("other", "other"),
                                  ("kind", "kind"), ("surface", "surface"),
-                                 ("normal_impulse", "normal"), ("tangential_impulse", "tangent")):  # fmt: skip
+                                 ("normal_impulse", "normal"),
+                                 ("tangential_impulse", "tangent")):  # fmt: skip
                 events[name] = rows[source]
             events["position"][:, 0], events["position"][:, 1] = rows["x"], rows["y"]
             for when in ("before", "after"):

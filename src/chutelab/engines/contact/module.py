@@ -10,11 +10,13 @@ import json
 from enum import IntEnum
 from functools import cache
 from importlib.resources import files
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import wasmtime
-from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 PAGE = 65536
 """Bytes of a page of WebAssembly's memory."""
@@ -40,7 +42,9 @@ def dtype(struct: str) -> np.dtype[Any]:
     return np.dtype(
         {
             "names": list(fields),
-            "formats": [(TYPES[kind], (n,)) if n > 1 else TYPES[kind] for _, kind, n in fields.values()],
+            "formats": [
+                (TYPES[kind], (n,)) if n > 1 else TYPES[kind] for _, kind, n in fields.values()
+            ],
             "offsets": [offset for offset, _, _ in fields.values()],
             "itemsize": described["size"],
         }
@@ -52,7 +56,9 @@ def _world() -> type[ctypes.Structure]:
     """Return `World` as a structure of ctypes: a field is read and set in a tenth of NumPy's time."""
     kinds = {"double": ctypes.c_double, "int": ctypes.c_int32, "pointer": ctypes.c_uint32}
     fields = _layout()["structs"]["World"]["fields"]
-    rows = [(name, kinds[kind] * n if n > 1 else kinds[kind]) for name, (_, kind, n) in fields.items()]
+    rows = [
+        (name, kinds[kind] * n if n > 1 else kinds[kind]) for name, (_, kind, n) in fields.items()
+    ]
     return type("World", (ctypes.Structure,), {"_fields_": rows})
 
 
@@ -63,8 +69,16 @@ def constants(enum: str) -> dict[str, int]:
     return values
 
 
-Status = IntEnum("Status", constants("Status"))  # type: ignore[misc]
-"""Why the core came back."""
+class Status(IntEnum):
+    """Why the core came back, as in layout.h."""
+
+    DONE = 0
+    PAUSED = 1
+    FULL_KNOTS = 2
+    FULL_EVENTS = 3
+    FULL_NEAR = 4
+    FULL_CONTACTS = 5
+    STALLED = 6
 
 
 class Module:
@@ -77,10 +91,14 @@ class Module:
         engine, module = _compiled()
         self._store = wasmtime.Store(engine)
         exports = wasmtime.Instance(self._store, module, []).exports(self._store)
-        exports["_initialize"](self._store)
-        self._memory, self._run = exports["memory"], exports["run"]
-        self._base: int = exports["__heap_base"].value(self._store)
-        self._world: int = exports["world"](self._store)
+        initialize: Any = exports["_initialize"]
+        initialize(self._store)
+        self._memory: Any = exports["memory"]
+        self._run: Any = exports["run"]
+        base: Any = exports["__heap_base"]
+        world: Any = exports["world"]
+        self._base: int = base.value(self._store)
+        self._world: int = world(self._store)
         self.forget()
 
     def forget(self) -> None:
@@ -93,7 +111,7 @@ class Module:
         """Look at the memory anew; it moves when it grows, and with it every array."""
         size = self._memory.data_len(self._store)
         address = ctypes.addressof(self._memory.data_ptr(self._store).contents)
-        self._bytes = np.frombuffer((ctypes.c_uint8 * size).from_address(address), np.uint8)
+        self._bytes = np.ctypeslib.as_array((ctypes.c_uint8 * size).from_address(address))
         self.world: Any = _world().from_address(address + self._world)
 
     @property
@@ -117,8 +135,9 @@ class Module:
 
     def array(self, name: str, kind: np.dtype[Any], count: int) -> NDArray[Any]:
         """Return a view of the array that `World.name` points to; `place` makes it invalid."""
-        begin = getattr(self.world, name)
-        return self._bytes[begin : begin + kind.itemsize * count].view(kind)
+        begin: int = getattr(self.world, name)
+        rows: NDArray[Any] = self._bytes[begin : begin + kind.itemsize * count].view(kind)
+        return rows
 
     def run(self, steps: int) -> Status:
         """Run on for at most so many steps."""

@@ -87,7 +87,8 @@ typedef struct {
     double load_t[3];
     double end_of_face;   /* s; when it left the end of a face */
     int bent, open;       /* bend is known; `held` is no knot yet */
-    int lasted;           /* steps of this contact, 0 in flight */
+    int lasted;           /* steps of this contact since the last blow, 0 in flight */
+    int stays;            /* steps on one surface, blows or not */
     int held_back;        /* `knot` is one after a blow and not written yet */
 } Track;
 

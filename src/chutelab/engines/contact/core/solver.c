@@ -214,6 +214,22 @@ void sweep_contacts(Contact *list, int count, int sweeps, double accurate) {
     }
 }
 
+/* Where the slip of a disk by itself turns round within a step, since friction cannot hold it, the
+   friction turns too. The sweeps would bring the slip to zero, which is wrong in first order. */
+static void turn_slip(Contact *c) {
+    double h = W.step_end - W.t, past = W.tracks[c->i].lasted ? 0.5 * W.length_before : 0, u[3], v[3];
+    double span = past + 0.5 * h, pull = 2 * c->drift / h, hold = c->friction * c->impulse[0];
+    relative(c, 1, u);
+    relative(c, 0, v);
+    double from = u[1] - pull * past, to = v[1] + c->drift, rate = hold / (c->mass[1] * span);
+    if (c->j >= 0 || fabs(pull) <= rate || from * pull >= 0 || to * from > 0) return;
+    double slow = pull + (pull > 0 ? rate : -rate), fast = pull - (pull > 0 ? rate : -rate);
+    double change[3] = {0, c->mass[1] * (fast * (span + from / slow) - to), 0};
+    if (-from / slow > span || fabs(c->impulse[1] + change[1]) > hold) return;
+    push(c, change);
+    c->impulse[1] += change[1];
+}
+
 void solve_contacts(void) {
     for (int n = 0; n < W.contact_count; n++) push(W.contacts + n, W.contacts[n].impulse);
     sweep_contacts(W.contacts, W.contact_count, W.sweeps, W.accurate);
@@ -226,6 +242,7 @@ void solve_contacts(void) {
         push(c, c->impulse);
         c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
     }
+    if (!W.interact && W.contact_count == 1) turn_slip(W.contacts);
     W.solve_count++;
 }
 
@@ -306,6 +323,26 @@ static void settle(int i, const Contact *last, double h) {
     finish(i, BY_SETTLING);
 }
 
+/* Write the separation of a disk that no surface presses any more. The load fell to nothing between
+   the last steps: where its line through two full ones crosses zero the contact ended. */
+static void tell_separation(int i) {
+    const Disk *d = W.disks + i;
+    const Track *track = W.tracks + i;
+    if (track->lasted < 3) {
+        event_here(SEPARATION, i, d->on);
+        return;
+    }
+    double t = track->load_t[1], fall = track->load[2] - track->load[1];
+    if (fall > 0) t += track->load[1] / fall * (t - track->load_t[2]);
+    if (track->end_of_face >= track->held[0]) t = track->end_of_face;
+    t = MIN(MAX(t, track->load_t[1]), d->t);
+    const double *from = t < track->held[0] ? track->past : track->held;
+    double s = t - from[0], span = d->t - from[0], place[2], after[3];
+    for (int n = 0; n < 3; n++) after[n] = from[3 + n] + s / span * ((&d->vx)[n] - from[3 + n]);
+    for (int n = 0; n < 2; n++) place[n] = from[1 + n] + 0.5 * s * (from[3 + n] + after[n]);
+    write_event(SEPARATION, i, -1, d->on, t, place, after, after, 0, 0);
+}
+
 /* After the solve: entries, supports, timers, tracks. */
 void close_step(double h) {
     /* The share of the impulses that belongs to the step before; of a new contact, none. */
@@ -368,26 +405,10 @@ void close_step(double h) {
         if (d->mode != FREE) continue;
         if (!d->supports) {
             d->calm = d->rest = 0;
-            if (track->lasted) {
-                /* The load fell to nothing between the last steps: where its line through two full
-                   ones crosses zero the contact ended. */
-                if (d->on >= 0 && track->lasted >= (W.interact ? LASTS : 3)) {
-                    double t = track->load_t[1], fall = track->load[2] - track->load[1];
-                    if (fall > 0) t += track->load[1] / fall * (t - track->load_t[2]);
-                    if (track->end_of_face >= track->held[0]) t = track->end_of_face;
-                    t = MIN(MAX(t, track->load_t[1]), d->t);
-                    const double *from = t < track->held[0] ? track->past : track->held;
-                    double s = t - from[0], span = d->t - from[0];
-                    double place[2] = {from[1] + s * from[3] + 0.5 * s * s * (d->vx - from[3]) / span,
-                                       from[2] + s * from[4] + 0.5 * s * s * (d->vy - from[4]) / span};
-                    double after[3];
-                    for (int n = 0; n < 3; n++)
-                        after[n] = from[3 + n] + (s / span) * ((&d->vx)[n] - from[3 + n]);
-                    write_event(SEPARATION, i, -1, d->on, t, place, after, after, 0, 0);
-                }
-                d->on = -1;
-                flush_track(i);
-            }
+            if (d->on >= 0 && track->stays >= (W.interact ? LASTS : 3)) tell_separation(i);
+            if (track->lasted || track->stays) d->on = -1;
+            track->stays = 0;
+            flush_track(i);
             continue;
         }
         const Contact *only = 0;
@@ -414,10 +435,12 @@ void close_step(double h) {
                 const Contact *c = W.contacts + link / 2;
                 if (c->impulse[0] > 0 && c->j < 0) ground = c->owner;
             }
-            if (ground < 0 && d->on >= 0 && track->lasted >= LASTS) event_here(SEPARATION, i, d->on);
+            if (ground < 0 && d->on >= 0 && track->stays >= LASTS) event_here(SEPARATION, i, d->on);
+            if (d->on != ground) track->stays = 0;
             d->slips = 1;
             d->on = ground;
         }
+        if (d->on >= 0) track->stays++;
         d->changes++;
         if (d->mode == GONE) continue;
         track_lasting(i);

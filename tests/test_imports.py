@@ -68,6 +68,11 @@ def loaded_by(*arguments, cwd=None):
             {"click", "pydantic", "numpy", "wasmtime"},
         ),
         (
+            ["run", "stream", "--json", "--set", "stream.count=3"],
+            {"click", "pydantic", "numpy", "wasmtime"},
+        ),
+        (["check", "stream"], {"click", "pydantic", "numpy", "wasmtime"}),
+        (
             ["run", "perpendicular", "--json", "--out", "out", "--only", "csv,npz,json"],
             {"click", "pydantic", "numpy"},
         ),

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from chutelab.stepper.solids import HALF_THICKNESS
 from click.testing import CliRunner
 
 from chutelab import compare, load, simulate
@@ -394,7 +393,7 @@ STATED = {
     },
     8: {
         "at {4.28} m/s onto": DOWN,
-        "means dt < {1.4} ms": 1e3 * 0.006 / DOWN,
+        "dt < {0.93} ms": 1e3 * 0.004 / DOWN,
         "takes {0.298} s": 0.596 / 2.0,
     },
     9: {
@@ -673,8 +672,8 @@ def test_particles_fall_through_as_lesson_8_says():
         kinds = (Kind.IMPACT, Kind.LANDING)
         return {recording.surfaces[i] for i in recording.select(*kinds)["surface"]}
 
-    assert surfaces(2e-3) == surfaces(1.3e-3) == {"plate", "outgoing"}
+    for dt in (2e-3, 9.3e-4, 8e-4, 4e-4):  # by luck, and then by 0.93 ms
+        assert surfaces(dt) == {"plate", "outgoing"}
     assert surfaces(5e-3) == surfaces(1e-2) == {"plate"}
     assert surfaces(8e-3) == set()
-    assert HALF_THICKNESS == 0.5 * 4e-3
     assert scene_of(find(8)).run.dt == 1e-2

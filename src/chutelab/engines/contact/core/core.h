@@ -25,7 +25,9 @@ extern World W;
    step) has no restitution, and a fast one: the infinitely many of an inelastic collapse end. */
 #define FEW 10
 #define SLOW 20.0
-#define TOO_MANY 200
+#define TOO_MANY 50
+/* ... and in whole numbers of which what disks leave over grows further. */
+#define ENDLESS 1000
 /* Impacts in a step from which on a disk counts as jammed: all it touches is solved at once. */
 #define JAM 40
 /* ... and from which on the step ends, so that the whole crowd round it is solved at once. */

@@ -65,7 +65,7 @@ double left_over(const Disk *d, int impacts, int surface, double radius) {
     for (int n = 0; n < d->held_count; n++)
         if (d->held[n] == surface) least = MAX(least, 1.000001 * W.g * W.step);
     if (impacts <= MANY) return least;
-    double most = skip * (MOST_SKIP / SKIP) * (surface < 0 ? MAX(1, impacts / CROWDED) : 1);
+    double most = skip * (MOST_SKIP / SKIP) * (surface < 0 ? MAX(1, impacts / ENDLESS) : 1);
     return MAX(least, MIN(skip * pow(GROW, MIN(impacts - MANY, 1000)), most));
 }
 

@@ -106,10 +106,12 @@ def report(count, repeats):
     scene = load(name, [f"stream.count={count}"])
     first, recording = seconds(simulate, scene)
     each = 9 if count <= 1000 else 1
-    ours, theirs = [], []
-    # Turn and turn about, so that a busy machine is busy for both.
+    ours, theirs, core = [], [], []
+    # Turn and turn about, so that a busy machine is busy for all.
     for _ in range(repeats):
         theirs.append(seconds(dop853, repeats=9)[0])
+        if count == 1:
+            core.append(seconds(simulate, scene, "contact", repeats=9)[0])
         ours.append(seconds(simulate, scene, repeats=each)[0])
     time, reference = median(ours), median(theirs)
     heights = recording.select(Kind.RELEASE)["position"][:, 1] - PULLEY - RADIUS
@@ -125,6 +127,9 @@ def report(count, repeats):
     print(f"                  {error:9.0e} error, {share:.0e} ledger residual")
     print(f"    DOP853        {reference * count * 1e3:9.3f} ms, {dop853_error():.0e} error:")
     print(f"                  {reference * count / time:9.2f} times the time of exact")
+    if core:
+        share = median(a / b for a, b in zip(core, theirs, strict=True))
+        print(f"    contact       {median(core) * 1e3:9.3f} ms, {share:.2f} of DOP853's")
     least = floor(recording)
     print(
         f"    memory traffic{least * 1e3:9.3f} ms at least: exact takes {time / least:.1f} times it"

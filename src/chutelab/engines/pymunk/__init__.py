@@ -1,1 +1,90 @@
-"""x"""
+"""The machine in Pymunk: Chipmunk finds the contacts and solves them.
+
+Nothing here is shared with the other engines but the machine and the recorder: the check from
+outside.
+
+- `world`: the machine as a `pymunk.Space`; rides on the belt that holds; tracks.
+- `lone`: one particle whose steps end at its contacts.
+- `shared`: all particles in one Space, in steps that are all alike.
+"""
+
+from __future__ import annotations
+
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+from chutelab.engines.pymunk.lone import Lone
+from chutelab.engines.pymunk.shared import Shared
+from chutelab.engines.pymunk.world import World
+from chutelab.machine import moved, origin
+from chutelab.recorder import Recorder, StalledError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from chutelab.machine import Machine
+    from chutelab.recording import Recording
+
+
+def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Recording:
+    """Run a machine in Pymunk.
+
+    Parameters
+    ----------
+    machine : Machine
+        From `chutelab.machine.build`; the radius must be more than 0.
+    progress : callable, optional
+        Called with the share of the run that is done.
+
+    Returns
+    -------
+    Recording
+        With `align`, a lone particle's blows to rounding error and its lasting contacts of order 2
+        in the step, which is no longer than `dt` and half a radius' way. Particles that meet, and
+        steps that are all alike, of order 1.
+
+    Raises
+    ------
+    ValueError
+        If the particle has no radius.
+    StalledError
+        If a lone particle goes on without getting on; it has the recording so far.
+    """
+    if machine.particle.radius <= 0.0:
+        raise ValueError("particle.radius = 0: pymunk needs disks with a radius above 0 m")
+    begin, steps = perf_counter(), 0
+    place = origin(machine)
+    machine = moved(machine, -place[0], -place[1])
+    recorder = Recorder(machine.count, machine.surfaces)
+
+    def finished() -> Recording:
+        return recorder.finish(
+            scene=machine.text, title=machine.title, engine="pymunk", particle=machine.particle,
+            gravity=machine.gravity, steps=steps, seconds=perf_counter() - begin, origin=place,
+        )  # fmt: skip
+
+    def report(share: float) -> None:
+        if progress is not None:
+            progress(share)
+
+    world = World(machine)
+    try:
+        if machine.interact or not machine.align:
+            shared = Shared(machine, world, recorder)
+            shared.run(report)
+            steps = shared.steps
+        else:
+            for i in range(machine.count):
+                lone = Lone(machine, world, recorder, i)
+                try:
+                    lone.run()
+                finally:
+                    steps += lone.steps
+                report((i + 1) / machine.count)
+        report(1.0)
+    except StalledError as stalled:
+        stalled.recording = finished()
+        x, y = stalled.position
+        stalled.position = x + place[0], y + place[1]
+        raise
+    return finished()

@@ -12,11 +12,11 @@ from math import ceil, inf, sqrt
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
 import pymunk
 from pymunk import Vec2d
 
-from chutelab.engines.pymunk.carriage import Carriage
-from chutelab.engines.pymunk.world import Contact, Face, Track, World
+from chutelab.engines.pymunk.world import PARTICLE, SURFACE, Carriage, Face, Tracks, World, time_out
 from chutelab.recorder import StalledError
 from chutelab.recording import REASONS, Kind
 
@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 
     from chutelab.machine import Machine
     from chutelab.recorder import Recorder
+
+ITERATIONS = 60
+"""Of Chipmunk's solver; one is exact for one contact, a disk in a wedge needs more."""
 
 INSTANT = 1e-30
 """s; the step that resolves a blow: nothing moves in it."""
@@ -67,6 +70,28 @@ TURNS = 200
 """Blows at one instant, one surface after the other, before all are solved together."""
 
 
+ALONE = np.ones(1, dtype=bool)
+"""Row of the only particle in its `Tracks`."""
+
+
+class Contact(NamedTuple):
+    """What Chipmunk did at one contact in one step; the impulse (N s) acts on the particle."""
+
+    face: Face
+    normal: Vec2d
+    impulse: Vec2d
+
+    @property
+    def push(self) -> float:
+        """Normal impulse, N s."""
+        return float(self.impulse.dot(self.normal))
+
+    @property
+    def rub(self) -> float:
+        """Tangential impulse, N s, along (n_y, -n_x)."""
+        return float(self.impulse.cross(self.normal))
+
+
 class Ridden(NamedTuple):
     """End of a trial step in a lasting contact."""
 
@@ -79,15 +104,13 @@ class Ridden(NamedTuple):
     @property
     def pushed(self) -> list[Contact]:
         """Contacts at which a surface pushed."""
-        return [c for c in self.contacts if c.impulse.dot(c.normal) > 0.0]
+        return [c for c in self.contacts if c.push > 0.0]
 
     @property
     def slips(self) -> bool:
         """Whether friction was used up at a contact."""
         return any(
-            abs(c.impulse.cross(c.normal))
-            >= c.face.friction * c.impulse.dot(c.normal) * (1.0 - SLACK)
-            for c in self.pushed
+            abs(c.rub) >= c.face.friction * c.push * (1.0 - SLACK) for c in self.pushed
         )
 
 
@@ -96,7 +119,8 @@ class Lone:
 
     def __init__(self, machine: Machine, world: World, recorder: Recorder, particle: int) -> None:
         self.machine, self.world = machine, world
-        self.track = Track(machine, recorder, particle)
+        self.tracks = Tracks(recorder, machine.particle.radius, range(particle, particle + 1))
+        self.entries = recorder.entries[particle]
         self.recorder, self.particle = recorder, particle
         p, start = machine.particle, machine.releases
         self.r, self.g, self.dt = p.radius, machine.gravity, machine.dt
@@ -107,7 +131,8 @@ class Lone:
         self.omega = 0.0
         self.body, self.circle = world.disk()
         world.space.add(self.body, self.circle)
-        world.space.on_collision(1, 2, pre_solve=self._before, post_solve=self._after)
+        world.space.iterations = ITERATIONS
+        world.space.on_collision(PARTICLE, SURFACE, pre_solve=self._before, post_solve=self._after)
         self.law: Callable[[Face, Vec2d], float | None] = _ignore
         self.contacts: list[Contact] = []
         self.on = -1
@@ -118,12 +143,12 @@ class Lone:
         self.blows, self.since = 0, self.t
         self.turns = self.t, 0
 
-    def run(self, _report: Callable[[float], None]) -> None:
+    def run(self) -> None:
         """Run to the end."""
         if self.t >= self.machine.end_time:
             return
-        self.track.knot(self.t, self.x, self.v, self.omega)
-        self.track.event(Kind.RELEASE, self.t, self.x, (self.v, self.omega))
+        self.tracks.knot(0, self.t, self.x, self.v, self.omega)
+        self._tell(Kind.RELEASE)
         if self.machine.releases.carried[self.particle]:
             self._carry()
             if not (self.ended or self._approached(self._touching())):
@@ -204,9 +229,9 @@ class Lone:
             if found < span:
                 span, reason = found, ""
         self._soar(span)
-        self.track.knot(self.t, self.x, self.v, self.omega)
+        self.tracks.knot(0, self.t, self.x, self.v, self.omega)
         if reason == "exit":
-            self.track.event(Kind.EXIT, self.t, self.x, (self.v, self.omega))
+            self._tell(Kind.EXIT)
         if reason:
             self._end(reason)
 
@@ -225,20 +250,10 @@ class Lone:
 
     def _way_out(self) -> tuple[float, str]:
         """Return the time left (s) until the exit box or the end of the run, and which it is."""
-        left, right, bottom, top = self.machine.exit_box
-        out = inf
-        if self.g > 0.0:
-            rise = self.v.y / self.g
-            out = rise + sqrt(max(rise * rise + 2.0 * (self.x.y - bottom) / self.g, 0.0))
-        else:
-            for x, v, low, high in (
-                (self.x.x, self.v.x, left, right), (self.x.y, self.v.y, bottom, top)
-            ):  # fmt: skip
-                if v != 0.0:
-                    out = min(out, max(((high if v > 0.0 else low) - x) / v, 0.0))
         rest = self.machine.end_time - self.t
         if self.machine.until == "time":
             return rest, "time"
+        out = time_out(self.machine, self.x, self.v)
         return (out, "exit") if out < rest else (rest, "time")
 
     def _meets(self, face: Face, span: float, leaving: bool) -> float:
@@ -307,20 +322,19 @@ class Lone:
             return self._restitution(face, normal) if together or face is struck else None
 
         contacts = self._step(self.x, self.v, INSTANT, Vec2d(0, 0), law)
-        after = self.body.velocity, self.body.angular_velocity
-        self.v, self.omega = after
+        self.v, self.omega = self.body.velocity, self.body.angular_velocity
         landed = False
         for contact in contacts:
-            if contact.impulse.dot(contact.normal) <= 0.0:
+            if contact.push <= 0.0:
                 continue
-            self.track.book(contact, before, after)
+            self._book(contact, before)
             lands = contact.face.surface == self.machine.landing and not self.landed
             self.landed |= lands
             landed |= lands
             kind = Kind.LANDING if lands else Kind.IMPACT
-            self.track.event(kind, self.t, self.x, after, before, contact)
+            self._tell(kind, contact.face.surface, before, contact)
             self.recorder.contacts += 1
-        self.track.knot(self.t, self.x, self.v, self.omega)
+        self.tracks.knot(0, self.t, self.x, self.v, self.omega)
         if landed and self.machine.until == "landed":
             self._end("landed")
         self.blows += 1
@@ -419,7 +433,7 @@ class Lone:
             contacts = self._step(middle - h * self.v, self.v, h, self.pull, law)
         v, omega = self.body.velocity, self.body.angular_velocity
         x = middle + 0.5 * h * v
-        pushed = [c.face for c in contacts if c.impulse.dot(c.normal) > 0.0]
+        pushed = [c.face for c in contacts if c.push > 0.0]
         for face in pushed:
             gap, normal = self._gap(face, x)
             x -= gap * normal
@@ -429,21 +443,25 @@ class Lone:
 
     def _accept(self, end: Ridden, h: float) -> None:
         """Take a step that was tried."""
-        before = self.v, self.omega
+        before, entries = self._row(), self.entries[:, None].copy()
+        motion = self.v, self.omega
         self.x, self.v, self.omega = end.x, end.v, end.omega
-        after = self.v, self.omega
         self.t += h
         pushed = end.pushed
         for contact in pushed:
-            self.track.book(contact, before, after)
+            self._book(contact, motion)
         slips, on = end.slips, pushed[0].face.surface if pushed else self.on
         if self.on >= 0 and slips != self.slipping and self.slipping is not None:
             kind = Kind.SLIP if slips else Kind.STICK
-            self.track.event(kind, self.t, self.x, after, surface=on)
+            self._tell(kind, on)
         self.on, self.slipping = on, slips
-        self.track.sample(self.t, self.x, self.v, self.omega)
+        state = np.array([before, self._row()])[:, :, None]
+        self.tracks.step(ALONE, (self.t - h, self.t), state, entries)
         if self.t >= self.machine.end_time:
             self._end("time")
+
+    def _row(self) -> tuple[float, ...]:
+        return (*self.x, *self.v, self.omega)
 
     def _lies(self, end: Ridden, h: float) -> bool:
         """Tell whether a step without slip changed nothing, on a surface to settle on."""
@@ -461,16 +479,16 @@ class Lone:
     def _settle(self, end: Ridden) -> None:
         surface = end.pushed[0].face.surface
         if self.slipping:
-            self.track.event(Kind.STICK, self.t, self.x, (self.v, self.omega), surface=surface)
-        self.track.knot(self.t, self.x, self.v, self.omega)
-        self.track.event(Kind.SETTLE, self.t, self.x, (self.v, self.omega), surface=surface)
+            self._tell(Kind.STICK, surface)
+        self.tracks.knot(0, self.t, self.x, self.v, self.omega)
+        self._tell(Kind.SETTLE, surface)
         self._end("settled")
 
     def _part(self) -> None:
         """Write that a lasting contact has ended."""
         if self.on >= 0:
-            self.track.knot(self.t, self.x, self.v, self.omega)
-            self.track.event(Kind.SEPARATION, self.t, self.x, (self.v, self.omega), surface=self.on)
+            self.tracks.knot(0, self.t, self.x, self.v, self.omega)
+            self._tell(Kind.SEPARATION, self.on)
         self.on, self.slipping = -1, None
 
     def _carry(self) -> None:
@@ -478,22 +496,45 @@ class Lone:
         belt = self.machine.pulley
         assert belt is not None
         if self.v.x == 0.0 and self.machine.until == "settled":
-            self.track.event(Kind.SETTLE, self.t, self.x, (self.v, 0.0), surface=belt.surface)
+            self._tell(Kind.SETTLE, belt.surface)
             self._end("settled")
             return
-        ride = Carriage(self.machine, self.world, self.particle)
-        ride.write(self.track, ride.until)
+        ride = Carriage(self.machine, self.world, self.particle, self.t)
+        ride.write(self.recorder, ride.until)
         self.t, (self.x, self.v) = ride.until, ride.state(ride.until)
         if self.t >= self.machine.end_time:
             self._end("time")
         else:
-            self.track.event(Kind.SEPARATION, self.t, self.x, (self.v, 0.0), surface=belt.surface)
+            self._tell(Kind.SEPARATION, belt.surface)
 
     # The end
 
     def _end(self, reason: str) -> None:
         self.ended = True
-        self.track.finish(REASONS.index(reason))
+        self.tracks.knot(0, self.t, self.x, self.v, self.omega)
+        self.recorder.ended[self.particle] = REASONS.index(reason)
+
+    def _tell(
+        self, kind: Kind, surface: int = -1, before: tuple[Vec2d, float] | None = None,
+        contact: Contact | None = None,
+    ) -> None:  # fmt: skip
+        """Write an event; of a blow with its impulses."""
+        v, omega = before or (self.v, self.omega)
+        self.recorder.events(
+            kind, self.particle, self.t, self.x, self.v, self.omega, velocity_before=v,
+            omega_before=omega, surface=surface, normal_impulse=contact.push if contact else 0.0,
+            tangential_impulse=contact.rub if contact else 0.0,
+        )  # fmt: skip
+
+    def _book(self, contact: Contact, before: tuple[Vec2d, float]) -> None:
+        """Book an impulse J: J·(u before + u now)/2, u the relative velocity at the contact."""
+        v, omega = 0.5 * (before[0] + self.v), 0.5 * (before[1] + self.omega)
+        belt = contact.face.belt(contact.normal)
+        slip = v.cross(contact.normal) + self.r * omega - belt
+        self.recorder.book(
+            self.particle, contact.face.surface, contact.rub * belt,
+            -contact.push * v.dot(contact.normal), -contact.rub * slip,
+        )  # fmt: skip
 
     def _stalled(self, reason: str) -> StalledError:
         self._end("time")

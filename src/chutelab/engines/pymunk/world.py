@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import acos, ceil, cos, inf, sin, sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pymunk
@@ -22,9 +22,6 @@ if TYPE_CHECKING:
 
 PARTICLE, SURFACE = 1, 2
 """Collision types of disks and of everything they meet."""
-
-ITERATIONS = 60
-"""Of Chipmunk's solver; one is exact for one contact, a disk in a wedge needs more."""
 
 GRIP = 1e9
 """Friction coefficient that stands for inf, which Chipmunk would multiply with an impulse of 0."""
@@ -79,14 +76,6 @@ class Face:
         if self.tangent is None or self.tangent.cross(normal) >= 0.0:
             return self.speed
         return -self.speed
-
-
-class Contact(NamedTuple):
-    """What Chipmunk did at one contact of a disk in one step; the impulse (N s) acts on it."""
-
-    face: Face
-    normal: Vec2d
-    impulse: Vec2d
 
 
 class World:
@@ -226,15 +215,15 @@ class Tracks:
     when the one of the first step since the last knot does not lead to where the particle is.
     """
 
-    def __init__(self, machine: Machine, recorder: Recorder) -> None:
-        self.recorder, count = recorder, machine.count
-        self.tolerance = ROUGH * machine.particle.radius
+    def __init__(self, recorder: Recorder, radius: float, particles: range) -> None:
+        self.recorder, self.first, count = recorder, particles.start, len(particles)
+        self.tolerance = ROUGH * radius
         self.t, self.x, self.v = np.zeros(count), np.zeros((2, count)), np.zeros((2, count))
         self.pull, self.fresh = np.zeros((2, count)), np.ones(count, dtype=bool)
 
     def knot(self, i: int, t: float, x: ArrayLike, v: ArrayLike, omega: float = 0.0) -> None:
-        """Write a knot, with the entries booked so far."""
-        self.recorder.knots(i, t, x, v, omega)
+        """Write a knot of the particle in a row, with the entries booked so far."""
+        self.recorder.knots(self.first + i, t, x, v, omega)
         self.t[i], self.x[:, i], self.v[:, i], self.fresh[i] = t, x, v, True
 
     def step(
@@ -261,7 +250,7 @@ class Tracks:
             before = state[0][:, due]
             knots["t"], knots["position"], knots["velocity"] = times[0], before[:2].T, before[2:4].T
             knots["omega"], knots["entries"] = before[4], entries[:, due].T
-            self.recorder.add(due, knots)
+            self.recorder.add(self.first + due, knots)
             self.t[due], self.x[:, due], self.v[:, due] = times[0], before[:2], before[2:4]
             self.pull[:, due] = (v[:, due] - before[2:4]) / (times[1] - times[0])
 

@@ -4,6 +4,9 @@ Flight is stepped with the velocity half a step ahead, which makes Chipmunk's in
 a flight ends is asked of Chipmunk's own distance queries along its parabola; what the contact does,
 of `Space.step`. A lasting contact is stepped by the midpoint rule: the contact is solved half-way
 through the step, with the velocities at its ends.
+
+Not resolved, whatever the step: bounces lower than two hairs, h = 2 `World.hair`, some 1e-13 m. The
+particle lies by 2 √(2 h/g)/(1 - ε) too early, some 1e-6 s.
 """
 
 from __future__ import annotations
@@ -58,17 +61,16 @@ SHORT = 1e-5
 """Share of a step; a contact that lasts less has ended."""
 
 WINDOW = 10_000
-"""Blows after which it is asked whether the particle gets on; queries on one flight, at most."""
+"""Blows at one instant of a particle that does not get on; queries on one flight, at most."""
 
 TICK = 1e-12
-"""s; mean time between blows of a particle that does not get on."""
+"""s; blows closer to each other are at one instant."""
 
 LOW = 2.0
 """Hairs; bounces lower than this cannot be told from lying on the surface."""
 
 TURNS = 200
 """Blows at one instant, one surface after the other, before all are solved together."""
-
 
 ALONE = np.ones(1, dtype=bool)
 """Row of the only particle in its `Tracks`."""
@@ -107,11 +109,12 @@ class Ridden(NamedTuple):
         return [c for c in self.contacts if c.push > 0.0]
 
     @property
-    def slips(self) -> bool:
-        """Whether friction was used up at a contact."""
-        return any(
-            abs(c.rub) >= c.face.friction * c.push * (1.0 - SLACK) for c in self.pushed
-        )
+    def slips(self) -> int:
+        """Which way friction acts where it is used up, 0 if it is nowhere."""
+        for c in self.pushed:
+            if abs(c.rub) >= c.face.friction * c.push * (1.0 - SLACK):
+                return 1 if c.rub >= 0.0 else -1
+        return 0
 
 
 class Lone:
@@ -136,12 +139,11 @@ class Lone:
         self.law: Callable[[Face, Vec2d], float | None] = _ignore
         self.contacts: list[Contact] = []
         self.on = -1
-        self.slipping: bool | None = None
+        self.slipping: int | None = None
         self.ended = False
         self.steps, self.last = 0, 0.0
         self.landed = False
-        self.blows, self.since = 0, self.t
-        self.turns = self.t, 0
+        self.blows, self.struck = 0, -inf
 
     def run(self) -> None:
         """Run to the end."""
@@ -223,7 +225,10 @@ class Lone:
     def _fly(self, touching: dict[Face, Vec2d]) -> None:
         """Fly to the next contact, the exit or the end."""
         self._part()
-        span, reason = self._way_out()
+        span, reason = self.machine.end_time - self.t, "time"
+        out = time_out(self.machine, self.x, self.v)
+        if out < span and self.machine.until != "time":
+            span, reason = out, "exit"
         for face in self.world.faces:
             found = self._meets(face, span, face in touching)
             if found < span:
@@ -248,14 +253,6 @@ class Lone:
         self.t += span
         self.x, self.v = x, self.v + span * self.pull
 
-    def _way_out(self) -> tuple[float, str]:
-        """Return the time left (s) until the exit box or the end of the run, and which it is."""
-        rest = self.machine.end_time - self.t
-        if self.machine.until == "time":
-            return rest, "time"
-        out = time_out(self.machine, self.x, self.v)
-        return (out, "exit") if out < rest else (rest, "time")
-
     def _meets(self, face: Face, span: float, leaving: bool) -> float:
         """Return when (s from now) the parabola meets a surface, inf if not within `span`.
 
@@ -267,15 +264,19 @@ class Lone:
         after times that grow by half.
         """
         t = last = 0.0
-        x0, v0, g, hair = self.x, self.v, self.g, self.world.hair
+        g, hair = self.g, self.world.hair
+
+        def gap_at(t: float) -> tuple[float, Vec2d]:
+            return self._gap(face, self.x + t * (self.v + 0.5 * t * self.pull))
+
         for _ in range(WINDOW):
-            v = v0 + t * self.pull
-            gap, normal = self._gap(face, x0 + (0.5 * t) * (v0 + v))
+            v = self.v + t * self.pull
+            gap, normal = gap_at(t)
             rate = v.dot(normal)
             slow = TINY * (1.0 + v.length)
             if leaving:
                 if gap < -hair and t > 0.0:
-                    return self._pierced(face, last, t)
+                    return _longest(lambda t: gap_at(t)[0] >= -0.5 * hair, t, last)
                 leaving = gap <= hair or rate > 0.0
             elif gap <= self.world.rounding:
                 if rate < -slow:
@@ -296,15 +297,6 @@ class Lone:
                 return inf
         raise self._stalled("it slides past a surface without touching it; lower run.max_time")
 
-    def _pierced(self, face: Face, low: float, high: float) -> float:
-        """Return when, between two times, a flight enters a surface."""
-        while (middle := 0.5 * (low + high)) not in (low, high):
-            x = self.x + middle * (self.v + 0.5 * middle * self.pull)
-            low, high = (
-                (low, middle) if self._gap(face, x)[0] < -0.5 * self.world.hair else (middle, high)
-            )
-        return low
-
     # Blows
 
     def _blow(self, touching: dict[Face, Vec2d]) -> None:
@@ -313,38 +305,31 @@ class Lone:
         struck = min(touching, key=lambda face: self.v.dot(touching[face]))
         gap, normal = self._gap(struck, self.x)
         self.x -= gap * normal
-        if self.turns[0] != self.t:
-            self.turns = self.t, 0
-        self.turns = self.t, self.turns[1] + 1
+        self.blows = self.blows + 1 if self.t - self.struck < TICK else 0
+        self.struck = self.t
+        together = self.blows > TURNS
 
         def law(face: Face, normal: Vec2d) -> float | None:
-            together = self.turns[1] > TURNS
             return self._restitution(face, normal) if together or face is struck else None
 
         contacts = self._step(self.x, self.v, INSTANT, Vec2d(0, 0), law)
         self.v, self.omega = self.body.velocity, self.body.angular_velocity
-        landed = False
         for contact in contacts:
-            if contact.push <= 0.0:
-                continue
-            self._book(contact, before)
-            lands = contact.face.surface == self.machine.landing and not self.landed
-            self.landed |= lands
-            landed |= lands
-            kind = Kind.LANDING if lands else Kind.IMPACT
-            self._tell(kind, contact.face.surface, before, contact)
-            self.recorder.contacts += 1
+            if contact.push > 0.0:
+                self._book(contact, before)
+                lands = contact.face.surface == self.machine.landing and not self.landed
+                self.landed |= lands
+                kind = Kind.LANDING if lands else Kind.IMPACT
+                self._tell(kind, contact.face.surface, before, contact)
+                self.recorder.contacts += 1
         self.tracks.knot(0, self.t, self.x, self.v, self.omega)
-        if landed and self.machine.until == "landed":
+        if self.landed and self.machine.until == "landed":
             self._end("landed")
-        self.blows += 1
-        if self.blows % WINDOW == 0:
-            if self.t - self.since < WINDOW * TICK:
-                raise self._stalled(
-                    f"{WINDOW} blows in no time: it is driven to and fro in a narrow place; move"
-                    " the surfaces there apart, or lower their restitution"
-                )
-            self.since = self.t
+        elif self.blows > WINDOW:
+            raise self._stalled(
+                f"{WINDOW} blows in no time: it is driven to and fro in a narrow place; move"
+                " the surfaces there apart, or lower their restitution"
+            )
 
     def _restitution(self, face: Face, normal: Vec2d) -> float:
         """Return ε, or 0 where the bounces that would follow are over within a step."""
@@ -392,20 +377,23 @@ class Lone:
         # What half of a step twice as long finds goes for the end of this one.
         floor = SHORT * h
         if not holds(2.0 * h):
-            if not holds(floor):
-                return False
-            h = 0.5 * _longest(holds, 2.0 * h, floor)
+            h = 0.5 * _longest(holds, 2.0 * h, floor) if holds(floor) else 0.0
             if h <= floor:
                 return False
         end = trial(h)
         if not clear(end):
             h = _longest(lambda span: clear(trial(span)), h, 0.0)
             end = trial(h)
-        if self.slipping and not end.slips:
-            h = _longest(lambda span: trial(span).slips, h, floor, upper=True)
+        if self.slipping and end.slips != self.slipping:
+            # It grips, or turns back.
+            h = _longest(lambda span: trial(span).slips == self.slipping, h, floor, upper=True)
             end = trial(h)
         if self.machine.until == "settled" and self._lies(end, h):
-            self._settle(end)
+            surface = end.pushed[0].face.surface
+            if self.slipping:
+                self._tell(Kind.STICK, surface)
+            self._tell(Kind.SETTLE, surface)
+            self._end("settled")
         else:
             self._accept(end, h)
         return True
@@ -437,7 +425,7 @@ class Lone:
         for face in pushed:
             gap, normal = self._gap(face, x)
             x -= gap * normal
-            if len(pushed) == 1:
+            if len(pushed) == 1 and (face.tangent is None or self._on_end(face, middle)):
                 v -= v.dot(normal) * normal
         return Ridden(x, v, omega, contacts, middle)
 
@@ -451,7 +439,7 @@ class Lone:
         for contact in pushed:
             self._book(contact, motion)
         slips, on = end.slips, pushed[0].face.surface if pushed else self.on
-        if self.on >= 0 and slips != self.slipping and self.slipping is not None:
+        if self.slipping is not None and bool(slips) != bool(self.slipping):
             kind = Kind.SLIP if slips else Kind.STICK
             self._tell(kind, on)
         self.on, self.slipping = on, slips
@@ -464,25 +452,21 @@ class Lone:
         return (*self.x, *self.v, self.omega)
 
     def _lies(self, end: Ridden, h: float) -> bool:
-        """Tell whether a step without slip changed nothing, on a surface to settle on."""
+        """Tell whether a step without slip changed nothing, on a surface to settle on.
+
+        In a wedge friction may be used up where nothing slips: it is the motion that counts.
+        """
         still = STILL * self.g * h
         return (
             bool(end.pushed)
-            and not end.slips
             and (end.v - self.v).length <= still
             and self.r * abs(end.omega - self.omega) <= still
             and all(
-                c.face.speed == 0.0 or c.face.surface == self.machine.landing for c in end.pushed
+                abs(end.v.cross(c.normal) + self.r * end.omega - c.face.belt(c.normal)) <= still
+                and (c.face.speed == 0.0 or c.face.surface == self.machine.landing)
+                for c in end.pushed
             )
         )
-
-    def _settle(self, end: Ridden) -> None:
-        surface = end.pushed[0].face.surface
-        if self.slipping:
-            self._tell(Kind.STICK, surface)
-        self.tracks.knot(0, self.t, self.x, self.v, self.omega)
-        self._tell(Kind.SETTLE, surface)
-        self._end("settled")
 
     def _part(self) -> None:
         """Write that a lasting contact has ended."""

@@ -3,15 +3,13 @@
 Nothing here is shared with the other engines but the machine and the recorder: the check from
 outside.
 
-- `world`: the machine as a `pymunk.Space`; tracks and books.
-- `carriage`: the adhesion ride, in closed form.
+- `world`: the machine as a `pymunk.Space`; rides on the belt that holds; tracks.
 - `lone`: one particle whose steps end at its contacts.
-- `shared`: particles in one Space, in steps that are all alike.
+- `shared`: all particles in one Space, in steps that are all alike.
 """
 
 from __future__ import annotations
 
-from functools import partial
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -65,26 +63,25 @@ def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Re
             gravity=machine.gravity, steps=steps, seconds=perf_counter() - begin, origin=place,
         )  # fmt: skip
 
-    def report(done: int, share: float) -> None:
+    def report(share: float) -> None:
         if progress is not None:
-            progress((done + share) / len(groups))
+            progress(share)
 
-    everybody = range(machine.count)
-    groups = [everybody] if machine.interact else [range(i, i + 1) for i in everybody]
-    lone = machine.align and not machine.interact
     world = World(machine)
     try:
-        for n, group in enumerate(groups):
-            part: Lone | Shared
-            if lone:
-                part = Lone(machine, world, recorder, group[0])
-            else:
-                part = Shared(machine, World(machine), recorder, group)
-            try:
-                part.run(partial(report, n))
-            finally:
-                steps += part.steps
-        report(len(groups), 0.0)
+        if machine.interact or not machine.align:
+            shared = Shared(machine, world, recorder)
+            shared.run(report)
+            steps = shared.steps
+        else:
+            for i in range(machine.count):
+                lone = Lone(machine, world, recorder, i)
+                try:
+                    lone.run()
+                finally:
+                    steps += lone.steps
+                report((i + 1) / machine.count)
+        report(1.0)
     except StalledError as stalled:
         stalled.recording = finished()
         x, y = stalled.position

@@ -4,6 +4,9 @@ Flight is stepped with the velocity half a step ahead, which makes Chipmunk's in
 a flight ends is asked of Chipmunk's own distance queries along its parabola; what the contact does,
 of `Space.step`. A lasting contact is stepped by the midpoint rule: the contact is solved half-way
 through the step, with the velocities at its ends.
+
+Not resolved, whatever the step: bounces lower than two hairs, h = 2 `World.hair`, some 1e-13 m. The
+particle lies by 2 √(2 h/g)/(1 - ε) too early, some 1e-6 s.
 """
 
 from __future__ import annotations
@@ -12,11 +15,11 @@ from math import ceil, inf, sqrt
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
 import pymunk
 from pymunk import Vec2d
 
-from chutelab.engines.pymunk.carriage import Carriage
-from chutelab.engines.pymunk.world import Contact, Face, Track, World
+from chutelab.engines.pymunk.world import PARTICLE, SURFACE, Carriage, Face, Tracks, World, time_out
 from chutelab.recorder import StalledError
 from chutelab.recording import REASONS, Kind
 
@@ -25,6 +28,9 @@ if TYPE_CHECKING:
 
     from chutelab.machine import Machine
     from chutelab.recorder import Recorder
+
+ITERATIONS = 60
+"""Of Chipmunk's solver; one is exact for one contact, a disk in a wedge needs more."""
 
 INSTANT = 1e-30
 """s; the step that resolves a blow: nothing moves in it."""
@@ -55,16 +61,37 @@ SHORT = 1e-5
 """Share of a step; a contact that lasts less has ended."""
 
 WINDOW = 10_000
-"""Blows after which it is asked whether the particle gets on; queries on one flight, at most."""
+"""Blows at one instant of a particle that does not get on; queries on one flight, at most."""
 
 TICK = 1e-12
-"""s; mean time between blows of a particle that does not get on."""
+"""s; blows closer to each other are at one instant."""
 
 LOW = 2.0
 """Hairs; bounces lower than this cannot be told from lying on the surface."""
 
 TURNS = 200
 """Blows at one instant, one surface after the other, before all are solved together."""
+
+ALONE = np.ones(1, dtype=bool)
+"""Row of the only particle in its `Tracks`."""
+
+
+class Contact(NamedTuple):
+    """What Chipmunk did at one contact in one step; the impulse (N s) acts on the particle."""
+
+    face: Face
+    normal: Vec2d
+    impulse: Vec2d
+
+    @property
+    def push(self) -> float:
+        """Normal impulse, N s."""
+        return float(self.impulse.dot(self.normal))
+
+    @property
+    def rub(self) -> float:
+        """Tangential impulse, N s, along (n_y, -n_x)."""
+        return float(self.impulse.cross(self.normal))
 
 
 class Ridden(NamedTuple):
@@ -79,16 +106,15 @@ class Ridden(NamedTuple):
     @property
     def pushed(self) -> list[Contact]:
         """Contacts at which a surface pushed."""
-        return [c for c in self.contacts if c.impulse.dot(c.normal) > 0.0]
+        return [c for c in self.contacts if c.push > 0.0]
 
     @property
-    def slips(self) -> bool:
-        """Whether friction was used up at a contact."""
-        return any(
-            abs(c.impulse.cross(c.normal))
-            >= c.face.friction * c.impulse.dot(c.normal) * (1.0 - SLACK)
-            for c in self.pushed
-        )
+    def slips(self) -> int:
+        """Which way friction acts where it is used up, 0 if it is nowhere."""
+        for c in self.pushed:
+            if abs(c.rub) >= c.face.friction * c.push * (1.0 - SLACK):
+                return 1 if c.rub >= 0.0 else -1
+        return 0
 
 
 class Lone:
@@ -96,7 +122,8 @@ class Lone:
 
     def __init__(self, machine: Machine, world: World, recorder: Recorder, particle: int) -> None:
         self.machine, self.world = machine, world
-        self.track = Track(machine, recorder, particle)
+        self.tracks = Tracks(recorder, machine.particle.radius, range(particle, particle + 1))
+        self.entries = recorder.entries[particle]
         self.recorder, self.particle = recorder, particle
         p, start = machine.particle, machine.releases
         self.r, self.g, self.dt = p.radius, machine.gravity, machine.dt
@@ -107,23 +134,23 @@ class Lone:
         self.omega = 0.0
         self.body, self.circle = world.disk()
         world.space.add(self.body, self.circle)
-        world.space.on_collision(1, 2, pre_solve=self._before, post_solve=self._after)
+        world.space.iterations = ITERATIONS
+        world.space.on_collision(PARTICLE, SURFACE, pre_solve=self._before, post_solve=self._after)
         self.law: Callable[[Face, Vec2d], float | None] = _ignore
         self.contacts: list[Contact] = []
         self.on = -1
-        self.slipping: bool | None = None
+        self.slipping: int | None = None
         self.ended = False
         self.steps, self.last = 0, 0.0
         self.landed = False
-        self.blows, self.since = 0, self.t
-        self.turns = self.t, 0
+        self.blows, self.struck = 0, -inf
 
-    def run(self, _report: Callable[[float], None]) -> None:
+    def run(self) -> None:
         """Run to the end."""
         if self.t >= self.machine.end_time:
             return
-        self.track.knot(self.t, self.x, self.v, self.omega)
-        self.track.event(Kind.RELEASE, self.t, self.x, (self.v, self.omega))
+        self.tracks.knot(0, self.t, self.x, self.v, self.omega)
+        self._tell(Kind.RELEASE)
         if self.machine.releases.carried[self.particle]:
             self._carry()
             if not (self.ended or self._approached(self._touching())):
@@ -198,15 +225,18 @@ class Lone:
     def _fly(self, touching: dict[Face, Vec2d]) -> None:
         """Fly to the next contact, the exit or the end."""
         self._part()
-        span, reason = self._way_out()
+        span, reason = self.machine.end_time - self.t, "time"
+        out = time_out(self.machine, self.x, self.v)
+        if out < span and self.machine.until != "time":
+            span, reason = out, "exit"
         for face in self.world.faces:
             found = self._meets(face, span, face in touching)
             if found < span:
                 span, reason = found, ""
         self._soar(span)
-        self.track.knot(self.t, self.x, self.v, self.omega)
+        self.tracks.knot(0, self.t, self.x, self.v, self.omega)
         if reason == "exit":
-            self.track.event(Kind.EXIT, self.t, self.x, (self.v, self.omega))
+            self._tell(Kind.EXIT)
         if reason:
             self._end(reason)
 
@@ -223,24 +253,6 @@ class Lone:
         self.t += span
         self.x, self.v = x, self.v + span * self.pull
 
-    def _way_out(self) -> tuple[float, str]:
-        """Return the time left (s) until the exit box or the end of the run, and which it is."""
-        left, right, bottom, top = self.machine.exit_box
-        out = inf
-        if self.g > 0.0:
-            rise = self.v.y / self.g
-            out = rise + sqrt(max(rise * rise + 2.0 * (self.x.y - bottom) / self.g, 0.0))
-        else:
-            for x, v, low, high in (
-                (self.x.x, self.v.x, left, right), (self.x.y, self.v.y, bottom, top)
-            ):  # fmt: skip
-                if v != 0.0:
-                    out = min(out, max(((high if v > 0.0 else low) - x) / v, 0.0))
-        rest = self.machine.end_time - self.t
-        if self.machine.until == "time":
-            return rest, "time"
-        return (out, "exit") if out < rest else (rest, "time")
-
     def _meets(self, face: Face, span: float, leaving: bool) -> float:
         """Return when (s from now) the parabola meets a surface, inf if not within `span`.
 
@@ -252,15 +264,19 @@ class Lone:
         after times that grow by half.
         """
         t = last = 0.0
-        x0, v0, g, hair = self.x, self.v, self.g, self.world.hair
+        g, hair = self.g, self.world.hair
+
+        def gap_at(t: float) -> tuple[float, Vec2d]:
+            return self._gap(face, self.x + t * (self.v + 0.5 * t * self.pull))
+
         for _ in range(WINDOW):
-            v = v0 + t * self.pull
-            gap, normal = self._gap(face, x0 + (0.5 * t) * (v0 + v))
+            v = self.v + t * self.pull
+            gap, normal = gap_at(t)
             rate = v.dot(normal)
             slow = TINY * (1.0 + v.length)
             if leaving:
                 if gap < -hair and t > 0.0:
-                    return self._pierced(face, last, t)
+                    return _longest(lambda t: gap_at(t)[0] >= -0.5 * hair, t, last)
                 leaving = gap <= hair or rate > 0.0
             elif gap <= self.world.rounding:
                 if rate < -slow:
@@ -281,15 +297,6 @@ class Lone:
                 return inf
         raise self._stalled("it slides past a surface without touching it; lower run.max_time")
 
-    def _pierced(self, face: Face, low: float, high: float) -> float:
-        """Return when, between two times, a flight enters a surface."""
-        while (middle := 0.5 * (low + high)) not in (low, high):
-            x = self.x + middle * (self.v + 0.5 * middle * self.pull)
-            low, high = (
-                (low, middle) if self._gap(face, x)[0] < -0.5 * self.world.hair else (middle, high)
-            )
-        return low
-
     # Blows
 
     def _blow(self, touching: dict[Face, Vec2d]) -> None:
@@ -298,39 +305,31 @@ class Lone:
         struck = min(touching, key=lambda face: self.v.dot(touching[face]))
         gap, normal = self._gap(struck, self.x)
         self.x -= gap * normal
-        if self.turns[0] != self.t:
-            self.turns = self.t, 0
-        self.turns = self.t, self.turns[1] + 1
+        self.blows = self.blows + 1 if self.t - self.struck < TICK else 0
+        self.struck = self.t
+        together = self.blows > TURNS
 
         def law(face: Face, normal: Vec2d) -> float | None:
-            together = self.turns[1] > TURNS
             return self._restitution(face, normal) if together or face is struck else None
 
         contacts = self._step(self.x, self.v, INSTANT, Vec2d(0, 0), law)
-        after = self.body.velocity, self.body.angular_velocity
-        self.v, self.omega = after
-        landed = False
+        self.v, self.omega = self.body.velocity, self.body.angular_velocity
         for contact in contacts:
-            if contact.impulse.dot(contact.normal) <= 0.0:
-                continue
-            self.track.book(contact, before, after)
-            lands = contact.face.surface == self.machine.landing and not self.landed
-            self.landed |= lands
-            landed |= lands
-            kind = Kind.LANDING if lands else Kind.IMPACT
-            self.track.event(kind, self.t, self.x, after, before, contact)
-            self.recorder.contacts += 1
-        self.track.knot(self.t, self.x, self.v, self.omega)
-        if landed and self.machine.until == "landed":
+            if contact.push > 0.0:
+                self._book(contact, before)
+                lands = contact.face.surface == self.machine.landing and not self.landed
+                self.landed |= lands
+                kind = Kind.LANDING if lands else Kind.IMPACT
+                self._tell(kind, contact.face.surface, before, contact)
+                self.recorder.contacts += 1
+        self.tracks.knot(0, self.t, self.x, self.v, self.omega)
+        if self.landed and self.machine.until == "landed":
             self._end("landed")
-        self.blows += 1
-        if self.blows % WINDOW == 0:
-            if self.t - self.since < WINDOW * TICK:
-                raise self._stalled(
-                    f"{WINDOW} blows in no time: it is driven to and fro in a narrow place; move"
-                    " the surfaces there apart, or lower their restitution"
-                )
-            self.since = self.t
+        elif self.blows > WINDOW:
+            raise self._stalled(
+                f"{WINDOW} blows in no time: it is driven to and fro in a narrow place; move"
+                " the surfaces there apart, or lower their restitution"
+            )
 
     def _restitution(self, face: Face, normal: Vec2d) -> float:
         """Return ε, or 0 where the bounces that would follow are over within a step."""
@@ -378,20 +377,23 @@ class Lone:
         # What half of a step twice as long finds goes for the end of this one.
         floor = SHORT * h
         if not holds(2.0 * h):
-            if not holds(floor):
-                return False
-            h = 0.5 * _longest(holds, 2.0 * h, floor)
+            h = 0.5 * _longest(holds, 2.0 * h, floor) if holds(floor) else 0.0
             if h <= floor:
                 return False
         end = trial(h)
         if not clear(end):
             h = _longest(lambda span: clear(trial(span)), h, 0.0)
             end = trial(h)
-        if self.slipping and not end.slips:
-            h = _longest(lambda span: trial(span).slips, h, floor, upper=True)
+        if self.slipping and end.slips != self.slipping:
+            # It grips, or turns back.
+            h = _longest(lambda span: trial(span).slips == self.slipping, h, floor, upper=True)
             end = trial(h)
         if self.machine.until == "settled" and self._lies(end, h):
-            self._settle(end)
+            surface = end.pushed[0].face.surface
+            if self.slipping:
+                self._tell(Kind.STICK, surface)
+            self._tell(Kind.SETTLE, surface)
+            self._end("settled")
         else:
             self._accept(end, h)
         return True
@@ -419,58 +421,58 @@ class Lone:
             contacts = self._step(middle - h * self.v, self.v, h, self.pull, law)
         v, omega = self.body.velocity, self.body.angular_velocity
         x = middle + 0.5 * h * v
-        pushed = [c.face for c in contacts if c.impulse.dot(c.normal) > 0.0]
+        pushed = [c.face for c in contacts if c.push > 0.0]
         for face in pushed:
             gap, normal = self._gap(face, x)
             x -= gap * normal
-            if len(pushed) == 1:
+            if len(pushed) == 1 and (face.tangent is None or self._on_end(face, middle)):
                 v -= v.dot(normal) * normal
         return Ridden(x, v, omega, contacts, middle)
 
     def _accept(self, end: Ridden, h: float) -> None:
         """Take a step that was tried."""
-        before = self.v, self.omega
+        before, entries = self._row(), self.entries[:, None].copy()
+        motion = self.v, self.omega
         self.x, self.v, self.omega = end.x, end.v, end.omega
-        after = self.v, self.omega
         self.t += h
         pushed = end.pushed
         for contact in pushed:
-            self.track.book(contact, before, after)
+            self._book(contact, motion)
         slips, on = end.slips, pushed[0].face.surface if pushed else self.on
-        if self.on >= 0 and slips != self.slipping and self.slipping is not None:
+        if self.slipping is not None and bool(slips) != bool(self.slipping):
             kind = Kind.SLIP if slips else Kind.STICK
-            self.track.event(kind, self.t, self.x, after, surface=on)
+            self._tell(kind, on)
         self.on, self.slipping = on, slips
-        self.track.sample(self.t, self.x, self.v, self.omega)
+        state = np.array([before, self._row()])[:, :, None]
+        self.tracks.step(ALONE, (self.t - h, self.t), state, entries)
         if self.t >= self.machine.end_time:
             self._end("time")
 
+    def _row(self) -> tuple[float, ...]:
+        return (*self.x, *self.v, self.omega)
+
     def _lies(self, end: Ridden, h: float) -> bool:
-        """Tell whether a step without slip changed nothing, on a surface to settle on."""
+        """Tell whether a step without slip changed nothing, on a surface to settle on.
+
+        In a wedge friction may be used up where nothing slips: it is the motion that counts.
+        """
         still = STILL * self.g * h
         return (
             bool(end.pushed)
-            and not end.slips
             and (end.v - self.v).length <= still
             and self.r * abs(end.omega - self.omega) <= still
             and all(
-                c.face.speed == 0.0 or c.face.surface == self.machine.landing for c in end.pushed
+                abs(end.v.cross(c.normal) + self.r * end.omega - c.face.belt(c.normal)) <= still
+                and (c.face.speed == 0.0 or c.face.surface == self.machine.landing)
+                for c in end.pushed
             )
         )
-
-    def _settle(self, end: Ridden) -> None:
-        surface = end.pushed[0].face.surface
-        if self.slipping:
-            self.track.event(Kind.STICK, self.t, self.x, (self.v, self.omega), surface=surface)
-        self.track.knot(self.t, self.x, self.v, self.omega)
-        self.track.event(Kind.SETTLE, self.t, self.x, (self.v, self.omega), surface=surface)
-        self._end("settled")
 
     def _part(self) -> None:
         """Write that a lasting contact has ended."""
         if self.on >= 0:
-            self.track.knot(self.t, self.x, self.v, self.omega)
-            self.track.event(Kind.SEPARATION, self.t, self.x, (self.v, self.omega), surface=self.on)
+            self.tracks.knot(0, self.t, self.x, self.v, self.omega)
+            self._tell(Kind.SEPARATION, self.on)
         self.on, self.slipping = -1, None
 
     def _carry(self) -> None:
@@ -478,22 +480,45 @@ class Lone:
         belt = self.machine.pulley
         assert belt is not None
         if self.v.x == 0.0 and self.machine.until == "settled":
-            self.track.event(Kind.SETTLE, self.t, self.x, (self.v, 0.0), surface=belt.surface)
+            self._tell(Kind.SETTLE, belt.surface)
             self._end("settled")
             return
-        ride = Carriage(self.machine, self.world, self.particle)
-        ride.write(self.track, ride.until)
+        ride = Carriage(self.machine, self.world, self.particle, self.t)
+        ride.write(self.recorder, ride.until)
         self.t, (self.x, self.v) = ride.until, ride.state(ride.until)
         if self.t >= self.machine.end_time:
             self._end("time")
         else:
-            self.track.event(Kind.SEPARATION, self.t, self.x, (self.v, 0.0), surface=belt.surface)
+            self._tell(Kind.SEPARATION, belt.surface)
 
     # The end
 
     def _end(self, reason: str) -> None:
         self.ended = True
-        self.track.finish(REASONS.index(reason))
+        self.tracks.knot(0, self.t, self.x, self.v, self.omega)
+        self.recorder.ended[self.particle] = REASONS.index(reason)
+
+    def _tell(
+        self, kind: Kind, surface: int = -1, before: tuple[Vec2d, float] | None = None,
+        contact: Contact | None = None,
+    ) -> None:  # fmt: skip
+        """Write an event; of a blow with its impulses."""
+        v, omega = before or (self.v, self.omega)
+        self.recorder.events(
+            kind, self.particle, self.t, self.x, self.v, self.omega, velocity_before=v,
+            omega_before=omega, surface=surface, normal_impulse=contact.push if contact else 0.0,
+            tangential_impulse=contact.rub if contact else 0.0,
+        )  # fmt: skip
+
+    def _book(self, contact: Contact, before: tuple[Vec2d, float]) -> None:
+        """Book an impulse J: J·(u before + u now)/2, u the relative velocity at the contact."""
+        v, omega = 0.5 * (before[0] + self.v), 0.5 * (before[1] + self.omega)
+        belt = contact.face.belt(contact.normal)
+        slip = v.cross(contact.normal) + self.r * omega - belt
+        self.recorder.book(
+            self.particle, contact.face.surface, contact.rub * belt,
+            -contact.push * v.dot(contact.normal), -contact.rub * slip,
+        )  # fmt: skip
 
     def _stalled(self, reason: str) -> StalledError:
         self._end("time")

@@ -1,26 +1,27 @@
-"""The machine as a `pymunk.Space`, and what every contact in it is booked as."""
+"""The machine as a `pymunk.Space`, rides on the belt that holds, and the tracks."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf
-from typing import TYPE_CHECKING, Any, NamedTuple
+from math import acos, ceil, cos, inf, sin, sqrt
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pymunk
 from pymunk import Vec2d
 
-from chutelab.recording import KNOT, Kind
+from chutelab.recording import KNOT
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
     from chutelab.machine import Machine
     from chutelab.recorder import Recorder
 
+    Floats = NDArray[np.float64]
+
 PARTICLE, SURFACE = 1, 2
 """Collision types of disks and of everything they meet."""
-
-ITERATIONS = 60
-"""Of Chipmunk's solver; one is exact for one contact, a disk in a wedge needs more."""
 
 GRIP = 1e9
 """Friction coefficient that stands for inf, which Chipmunk would multiply with an impulse of 0."""
@@ -32,11 +33,11 @@ sees a contact where centre and surface are one radius apart. Levers are off by 
 DIGITS = 16.0 * float(np.finfo(float).eps)
 """Share of the machine's size below which a gap is rounding."""
 
-ROUGH = 1e-5
-"""Share of the radius by which a track between two knots of a lasting contact may be off."""
+ROUGH = 1e-4
+"""Share of the radius by which a track may be off between two knots."""
 
-SAMPLES = 4
-"""States between two knots that are held against the curve through the knots."""
+ARC = 0.025
+"""rad between knots round the pulley: ρ Δφ⁴/384, the curve's error, is 1e-9 of the radius."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,14 +78,6 @@ class Face:
         return -self.speed
 
 
-class Contact(NamedTuple):
-    """What Chipmunk did at one contact of a disk in one step; the impulse (N s) acts on it."""
-
-    face: Face
-    normal: Vec2d
-    impulse: Vec2d
-
-
 class World:
     """A Space with all surfaces of a machine.
 
@@ -104,7 +97,6 @@ class World:
     def __init__(self, machine: Machine) -> None:
         self.machine = machine
         self.space = pymunk.Space()
-        self.space.iterations = ITERATIONS
         parts, r = machine.segments, machine.particle.radius
         size = float(np.abs([*parts.start.ravel(), *parts.end.ravel(), r]).max())
         self.rounding = DIGITS * size
@@ -147,89 +139,130 @@ class World:
         return body, circle
 
 
-class Track:
-    """Knots, events and books of one particle."""
+class Carriage:
+    """Ride of one particle at the belt's speed, not turning, at the height it is released at.
 
-    def __init__(self, machine: Machine, recorder: Recorder, particle: int) -> None:
-        self.recorder, self.particle = recorder, particle
-        self.radius, self.mass = machine.particle.radius, machine.particle.mass
-        self.rows: list[tuple[Any, ...]] = []
-        self.pending: list[tuple[Any, ...]] = []
-        self.entries = recorder.entries[particle]
+    Parameters
+    ----------
+    t : float
+        s; its start.
 
-    def knot(self, t: float, x: Vec2d, v: Vec2d, omega: float) -> None:
-        """Write a knot."""
-        self.rows += self.pending[-1:]
-        self.pending.clear()
-        row = (t, tuple(x), tuple(v), omega, tuple(self.entries.tolist()))
-        if not self.rows or row != self.rows[-1]:
-            self.rows.append(row)
+    Attributes
+    ----------
+    top : float
+        s; when it is above the pulley's axis.
+    until : float
+        s; separation at cos φ1 = v²/(g ρ), at the top if that is 1 or more; or where another
+        surface is met; or the end of the run.
+    """
 
-    def sample(self, t: float, x: Vec2d, v: Vec2d, omega: float) -> None:
-        """Note the state after a step of a lasting contact; a knot where the curve asks for one."""
-        row = (t, tuple(x), tuple(v), omega, tuple(self.entries.tolist()))
-        if not all(_near(self.rows[-1], row, s, ROUGH * self.radius) for s in self.pending):
-            self.rows.append(self.pending[-1])
-            self.pending.clear()
-        self.pending.append(row)
-        if len(self.pending) > SAMPLES:
-            del self.pending[:-1:2]
+    def __init__(self, machine: Machine, world: World, particle: int, t: float) -> None:
+        assert machine.pulley is not None
+        start = machine.releases
+        self.particle, self.surface, self.t = particle, machine.pulley.surface, t
+        self.weight = machine.particle.mass * machine.gravity
+        self.x, self.rho = start.position[particle].tolist()
+        self.speed = float(start.velocity[particle, 0])
+        self.until, self.height, self.written = machine.end_time, self.rho, -inf
+        self.top = inf
+        if self.speed > 0.0:
+            cosine = self.speed**2 / (machine.gravity * self.rho) if machine.gravity > 0.0 else inf
+            path = max(0.0, -self.x) + self.rho * acos(min(cosine, 1.0))
+            path = min(path, self.speed * (self.until - t))
+            path = self._clear(world, machine.particle.radius, path)
+            self.until = min(t + path / self.speed, self.until)
+            self.top = t + max(0.0, -self.x / self.speed)
 
-    def book(
-        self, contact: Contact, before: tuple[Vec2d, float], after: tuple[Vec2d, float]
+    def state(self, t: float) -> tuple[Vec2d, Vec2d]:
+        """Return place (m) and velocity (m/s) at a time (s)."""
+        return self._at(self.x + self.speed * (t - self.t))
+
+    def _at(self, along: float) -> tuple[Vec2d, Vec2d]:
+        if along <= 0.0:
+            return Vec2d(along, self.rho), Vec2d(self.speed, 0.0)
+        c, s = cos(along / self.rho), sin(along / self.rho)
+        return Vec2d(self.rho * s, self.rho * c), Vec2d(self.speed * c, -self.speed * s)
+
+    def _clear(self, world: World, radius: float, path: float) -> float:
+        """Return how much of a path (m) is clear of surfaces other than the own belt."""
+        for face in world.faces:
+            along = 0.0
+            while face.surface != self.surface and along < path:
+                x, v = self._at(self.x + along)
+                found = face.shape.point_query(x)
+                gap = found.distance - radius
+                if gap <= world.rounding and v.dot(found.gradient) < 0.0:
+                    path = along
+                along += max(gap, world.rounding)
+        return path
+
+    def write(self, recorder: Recorder, end: float) -> None:
+        """Write the knots up to a time (s), with what the belt pays: it lets the particle down."""
+        turn = self.speed / self.rho * max(end - self.top, 0.0)
+        round_it = np.linspace(self.top, end, ceil(turn / ARC) + 1).tolist() if turn else []
+        for t in (self.t, *round_it, end):
+            if t > self.written:
+                x, v = self.state(t)
+                recorder.book(self.particle, self.surface, self.weight * (x.y - self.height))
+                recorder.knots(self.particle, t, tuple(x), tuple(v), 0.0)
+                self.height, self.written = x.y, t
+
+
+class Tracks:
+    """Knots of particles that are stepped, only as many as the curve through them needs.
+
+    Between knots a track is a cubic, which a constant acceleration makes exact: a new knot is due
+    when the one of the first step since the last knot does not lead to where the particle is.
+    """
+
+    def __init__(self, recorder: Recorder, radius: float, particles: range) -> None:
+        self.recorder, self.first, count = recorder, particles.start, len(particles)
+        self.tolerance = ROUGH * radius
+        self.t, self.x, self.v = np.zeros(count), np.zeros((2, count)), np.zeros((2, count))
+        self.pull, self.fresh = np.zeros((2, count)), np.ones(count, dtype=bool)
+
+    def knot(self, i: int, t: float, x: ArrayLike, v: ArrayLike, omega: float = 0.0) -> None:
+        """Write a knot of the particle in a row, with the entries booked so far."""
+        self.recorder.knots(self.first + i, t, x, v, omega)
+        self.t[i], self.x[:, i], self.v[:, i], self.fresh[i] = t, x, v, True
+
+    def step(
+        self, rows: NDArray[np.bool_], times: tuple[float, float], state: Floats, entries: Floats
     ) -> None:
-        """Book an impulse J: J·(u before + u after)/2, u the relative velocity at the contact."""
-        face, n, impulse = contact
-        t = Vec2d(n.y, -n.x)
-        belt = face.belt(n)
-        normal = 0.5 * (before[0] + after[0]).dot(n)
-        spin = 0.5 * self.radius * (before[1] + after[1])
-        slip = 0.5 * (before[0] + after[0]).dot(t) + spin - belt
-        push, rub = impulse.dot(n), impulse.dot(t)
-        self.pay(face.surface, rub * belt, -push * normal, -rub * slip)
+        """Note a step of the particles in some rows; write knots of the states before where due.
 
-    def pay(self, surface: int, belt: float, restitution: float, friction: float) -> None:
-        """Book entries (J) on the particle and on a surface."""
-        for row in (self.entries, self.recorder.by_surface[surface]):
-            row[0] += belt
-            row[1] += restitution
-            row[2] += friction
-
-    def event(
-        self, kind: Kind, t: float, x: Vec2d, after: tuple[Vec2d, float],
-        before: tuple[Vec2d, float] | None = None, contact: Contact | None = None,
-        surface: int = -1,
-    ) -> None:  # fmt: skip
-        """Write an event; of a contact with its impulses."""
-        n, impulse = (contact.normal, contact.impulse) if contact else (Vec2d(0, 0), Vec2d(0, 0))
-        before = before or after
-        self.recorder.events(
-            kind, self.particle, t, tuple(x), tuple(after[0]), after[1],
-            velocity_before=tuple(before[0]), omega_before=before[1],
-            surface=contact.face.surface if contact else surface,
-            normal_impulse=impulse.dot(n), tangential_impulse=impulse.dot(Vec2d(n.y, -n.x)),
-        )  # fmt: skip
-
-    def finish(self, reason: int) -> None:
-        """Hand the knots over."""
-        self.rows += self.pending[-1:]
-        self.pending.clear()
-        knots = np.array(self.rows, dtype=KNOT)
-        self.recorder.add(np.full(len(knots), self.particle), knots)
-        self.recorder.ended[self.particle] = reason
+        `times` (s) and `state` (2, 5, N), of x, y, vx, vy and ω, are those at both ends; `entries`
+        (3, N) are those before.
+        """
+        tau = times[1] - self.t
+        x, v = state[1, :2], state[1, 2:4]
+        new = self.fresh & rows
+        if new.any():
+            self.pull[:, new] = (v[:, new] - self.v[:, new]) / tau[new]
+        gain = tau * self.pull
+        off = np.abs(x - self.x - tau * (self.v + 0.5 * gain))
+        # A cubic is off by 4/27 τ of what one of its end velocities is.
+        off += 4.0 / 27.0 * tau * np.abs(v - self.v - gain)
+        due = np.flatnonzero((off[0] + off[1] > self.tolerance) & rows & ~new)
+        self.fresh &= ~rows
+        if len(due):
+            knots = np.empty(len(due), dtype=KNOT)
+            before = state[0][:, due]
+            knots["t"], knots["position"], knots["velocity"] = times[0], before[:2].T, before[2:4].T
+            knots["omega"], knots["entries"] = before[4], entries[:, due].T
+            self.recorder.add(self.first + due, knots)
+            self.t[due], self.x[:, due], self.v[:, due] = times[0], before[:2], before[2:4]
+            self.pull[:, due] = (v[:, due] - before[2:4]) / (times[1] - times[0])
 
 
-def _near(a: tuple[Any, ...], b: tuple[Any, ...], s: tuple[Any, ...], tolerance: float) -> bool:
-    """Tell whether the cubic from knot a to knot b passes a state s."""
-    h = b[0] - a[0]
-    if h <= 0.0:
-        return True
-    u = (s[0] - a[0]) / h
-    w = 1.0 - u
-    for axis in (0, 1):
-        place = w * w * ((1.0 + 2.0 * u) * a[1][axis] + u * h * a[2][axis]) + u * u * (
-            (1.0 + 2.0 * w) * b[1][axis] - w * h * b[2][axis]
-        )
-        if abs(place - s[1][axis]) > tolerance:
-            return False
-    return True
+def time_out(machine: Machine, x: Vec2d, v: Vec2d) -> float:
+    """Return the time (s) in which a free flight leaves the scene, inf if never."""
+    left, right, bottom, top = machine.exit_box
+    if machine.gravity > 0.0:
+        rise = v.y / machine.gravity
+        return float(rise + sqrt(max(rise**2 + 2.0 * (x.y - bottom) / machine.gravity, 0.0)))
+    out = inf
+    for place, speed, low, high in ((x.x, v.x, left, right), (x.y, v.y, bottom, top)):
+        if speed != 0.0:
+            out = min(out, max(((high if speed > 0.0 else low) - place) / speed, 0.0))
+    return out

@@ -68,7 +68,7 @@ def build(folder: Path) -> None:
     command = [sys.executable, "-m", "ziglang", "cc", *FLAGS, "-o", output, *sources, "-lm"]
     subprocess.run(command, check=True, cwd=CORE)
     described = layout((CORE / "layout.h").read_text(encoding="utf-8"))
-    text = json.dumps(described, indent=1) + "\n"
+    text = json.dumps(described) + "\n"
     (folder / "layout.json").write_text(text, encoding="utf-8")
 
 

@@ -347,7 +347,6 @@ void close_step(double h) {
     /* The share of the impulses that belongs to the step before; of a new contact, none. */
     W.before = W.length_before > 0 ? W.length_before / (W.length_before + h) : 0.5;
     if (!W.interact && !W.tracks[W.low].lasted) W.before = 0;
-    double calm_bound = CALM;
     for (int i = W.low; i < W.high; i++) {
         Disk *d = W.disks + i;
         d->links = d->before = -1;
@@ -396,7 +395,7 @@ void close_step(double h) {
         double off = fabs(0.5 * (u[0] + v[0])), slip = fabs(v[1] + c->drift);
         double turn = fabs(v[2]) * a->radius, rest = REST * sqrt(W.g * a->radius);
         int driven = !b && W.surfaces[-1 - c->j].speed != 0 && c->owner != W.landing;
-        if (off > calm_bound || slip > calm_bound || driven || (b && b->mode == RIDING)) {
+        if (off > CALM || slip > CALM || driven || (b && b->mode == RIDING)) {
             a->calm = 0;
             if (b) b->calm = 0;
         }

@@ -143,7 +143,7 @@ class Job:
             ("sweeps", SWEEPS_ALONE if alone else SWEEPS), ("sleeps", not alone),
             ("gy", -machine.gravity), ("g", machine.gravity), ("dt", machine.dt),
             ("end_time", machine.end_time),
-            ("smooth_x", (1e-5 if alone else 1e-4) * r), ("smooth_v", 1e-4 if alone else 1e-3),
+            ("smooth_x", (1e-5 if alone else 1e-4) * r), ("smooth_v", 1e-4),
             ("accurate", 1e-15 if alone else 3e-4),
         ):  # fmt: skip
             setattr(world, name, value)

@@ -78,6 +78,7 @@ typedef struct {
 typedef struct {
     double knot[6];       /* last knot written: t, x, y, vx, vy, spin */
     double blow_entries[3]; /* of a knot that is held back */
+    double blow[6], blow_before[3]; /* state and entries before the latest blow, if no knot yet */
     double bend[3];       /* acceleration foretold from it on, of x, y and spin */
     double held[6];       /* latest state in lasting contact, halfway through its impulses */
     double held_entries[3];
@@ -91,6 +92,8 @@ typedef struct {
     int lasted;           /* steps of this contact since the last blow, 0 in flight */
     int stays;            /* steps on one surface, blows or not */
     int held_back;        /* `knot` is one after a blow and not written yet */
+    int again;            /* the latest blow may be told together with the one before */
+    int pad;
 } Track;
 
 typedef struct {

@@ -3,6 +3,9 @@
 #include <string.h>
 #include "core.h"
 
+/* Of what gravity does in two steps: a blow that changes a velocity by less is soft. */
+#define SOFT_BLOW 0.1
+
 static void emit(int i, const double *state, const double *entries) {
     Knot *k = W.knots + W.knot_count++;
     memcpy(&k->t, state, 6 * sizeof(double));
@@ -41,14 +44,17 @@ void knot_before(int i, double t, double vx, double vy, double spin) {
 }
 
 /* The same before a blow. In a crowd a rattling disk has many of them within a thousandth of a
-   radius: of these the state before the first and that after the last are told. */
+   radius: of these, if they are soft, the state before the first and that after the last are told. */
 void knot_before_blow(int i) {
     const Disk *d = W.disks + i;
     Track *track = W.tracks + i;
-    if (track->held_back && d->t - track->knot[0] < W.step
-        && fabs(d->x - track->knot[1]) + fabs(d->y - track->knot[2]) < W.smooth_x)
-        track->held_back = 0;
-    else knot_before(i, d->t, d->vx, d->vy, d->spin);
+    double state[6] = {d->t, d->x, d->y, d->vx, d->vy, d->spin};
+    track->again = track->held_back && d->t - track->knot[0] < W.step
+        && fabs(d->x - track->knot[1]) + fabs(d->y - track->knot[2]) < W.smooth_x;
+    if (track->again) {
+        memcpy(track->blow, state, sizeof state);
+        memcpy(track->blow_before, d->entries, sizeof track->blow_before);
+    } else knot_before(i, d->t, d->vx, d->vy, d->spin);
 }
 
 /* Note the state after a blow; in a crowd it is held back, since that of the next may replace it. */
@@ -60,9 +66,17 @@ void knot_after(int i) {
         knot_now(i);
         return;
     }
+    if (track->again) {
+        const double *was = track->blow;
+        double change = fabs(d->vx - was[3]) + fabs(d->vy - was[4]) + fabs(d->spin - was[5]) * d->radius;
+        if (change > SOFT_BLOW * W.soft) {
+            let_go(i);
+            emit(i, track->blow, track->blow_before);
+        }
+    }
     memcpy(track->knot, state, sizeof state);
     memcpy(track->blow_entries, d->entries, sizeof track->blow_entries);
-    track->bent = track->open = 0;
+    track->bent = track->open = track->again = 0;
     track->held_back = 1;
 }
 

@@ -494,8 +494,19 @@ GIVEN = {
     5: {"0.1", "0.3", "0.8"},
     6: {"0.5"},
     7: {"0.5", "3.6", "3.3"},
-    8: {"0.4", "0.2", "0.1", "0.05", "0.02", "9.7e-4", "4.9e-4", "2.4e-4", "2.6e-5"}
-    | {"1.6e-8", "4.0e-9", "9.9e-10"},
+    8: {
+        "0.2",
+        "0.16",
+        "0.1",
+        "0.05",
+        "0.02",
+        "1.2",
+        "9.7e-4",
+        "4.9e-4",
+        "6.5e-4",
+        "7.8e-4",
+        "2.4e-4",
+    },
     9: {"0.1", "0.5", "0.05"},
 }
 """Further numbers with decimals: what the scenes set, and what other tests look at."""
@@ -615,26 +626,27 @@ def test_collisions_of_lesson_7_begin_where_it_says():
     assert 3.0 < lost["restitution_loss"] + lost["friction_loss"] < 9.0
 
 
-def test_impacts_of_lesson_8_are_late_by_a_step_or_on_time_as_it_says():
-    late = []
-    for dt in (4e-4, 2e-4, 1e-4, 5e-5):
+def test_impacts_of_lesson_8_are_late_by_a_step_or_a_part_of_one_as_it_says():
+    # After 0.5 s on the belt, a whole number of steps in each case.
+    for dt in (2e-4, 1e-4, 5e-5, 2e-5):
         assert 0.298 / dt == pytest.approx(round(0.298 / dt), abs=1e-9)
+    assert pytest.approx(1862.5) == 0.298 / 1.6e-4
+    for dt, share in ((2e-4, 1.0), (1e-4, 1.0), (1.6e-4, 0.5)):
         scene = load(find(8).folder / "fixed-steps.toml", [f"run.dt={dt}"])
-        late.append((compare(simulate(scene)).simulated["t2"] - 0.298) / dt)
-    assert late == pytest.approx([0.0, 1.0, 1.0, 1.0], abs=1e-8)
-    assert fixed(4e-4)[0] < fixed(2e-4)[0]
+        late = (compare(simulate(scene)).simulated["t2"] - 0.298) / dt
+        assert late == pytest.approx(share, abs=1e-8)
+    between = fixed(1.6e-4)[0]
+    promised = 1.6 * fixed(1e-4)[0]
+    said = f"with 0.16 ms it is {between:.1e}, not {promised:.1e}".replace("e-0", "e-")
+    assert said in worksheet(8)
 
 
 def test_errors_and_orders_of_lesson_8_are_as_it_says():
     (e1, r1), (e2, r2), (e3, r3) = (fixed(dt) for dt in (2e-4, 1e-4, 5e-5))
-    text = worksheet(8)
-    assert f"{e1:.1e}, {e2:.1e}, {e3:.1e}".replace("e-0", "e-") in text
+    assert f"{e1:.1e}, {e2:.1e}, {e3:.1e}".replace("e-0", "e-") in worksheet(8)
     assert log(e1 / e2) / log(2.0) == pytest.approx(1.0, abs=0.01)
     assert log(e2 / e3) / log(2.0) == pytest.approx(1.0, abs=0.01)
-    said = f"{r1:.1e}, {r2:.1e}, {r3:.1e}".replace("e-0", "e-")
-    assert said in text
-    assert log(r1 / r2) / log(2.0) == pytest.approx(2.0, abs=0.01)
-    assert log(r2 / r3) / log(2.0) == pytest.approx(2.0, abs=0.01)
+    assert max(r1, r2, r3) <= 1e-13
 
 
 def test_the_uncertainty_of_lesson_9_is_as_it_says():
@@ -661,11 +673,6 @@ def test_the_uncertainty_of_lesson_9_is_as_it_says():
     assert "and 1 % that of the speed" in said
 
 
-@pytest.mark.slow
-def test_the_lucky_step_of_lesson_8_is_lucky():
-    assert f"{fixed(2e-5)[0]:.1e}".replace("e-0", "e-") in worksheet(8)
-
-
 def test_particles_fall_through_as_lesson_8_says():
     def surfaces(dt):
         recording = simulate(load(find(8).folder / "fixed-steps.toml", [f"run.dt={dt}"]))
@@ -674,6 +681,6 @@ def test_particles_fall_through_as_lesson_8_says():
 
     for dt in (2e-3, 9.3e-4, 8e-4, 4e-4):  # by luck, and then by 0.93 ms
         assert surfaces(dt) == {"plate", "outgoing"}
-    assert surfaces(5e-3) == surfaces(1e-2) == {"plate"}
-    assert surfaces(8e-3) == set()
-    assert scene_of(find(8)).run.dt == 1e-2
+    assert surfaces(1.2e-3) == surfaces(4e-3) == {"plate"}
+    assert surfaces(8e-3) == surfaces(1e-2) == set()
+    assert scene_of(find(8)).run.dt == 4e-3

@@ -281,7 +281,7 @@ def test_a_wall_ends_the_ride_on_a_belt_that_holds(low, high, align):
     # upper end if that is lower than the centre.
     r = 0.02
     m = machine(
-        "belt-landing", f"particle.radius={r}", f"run.align={align}", 'run.until="settled"',
+        "belt-landing", f"particle.radius={r}", f"run.align={align}", "run.until=0.4",
         f"surface=[{{name='wall', from=[-0.3, {0.1 + low * r}], to=[-0.3, {0.1 + high * r}]}}]",
     )  # fmt: skip
     got = run(m)

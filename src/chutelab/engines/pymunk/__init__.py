@@ -41,7 +41,8 @@ def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Re
     Recording
         With `align`, a lone particle's blows to rounding error and its lasting contacts of order 2
         in the step, which is no longer than `dt` and half a radius' way. Particles that meet, and
-        steps that are all alike, of order 1.
+        steps that are all alike, of order 1: `dt` times the speed should be less than the radius,
+        or disks overlap by as much, and pass through surfaces.
 
     Raises
     ------
@@ -63,10 +64,7 @@ def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Re
             gravity=machine.gravity, steps=steps, seconds=perf_counter() - begin, origin=place,
         )  # fmt: skip
 
-    def report(share: float) -> None:
-        if progress is not None:
-            progress(share)
-
+    report = progress or (lambda _share: None)
     world = World(machine)
     try:
         if machine.interact or not machine.align:

@@ -42,7 +42,9 @@ def dtype(struct: str) -> np.dtype[Any]:
     return np.dtype(
         {
             "names": list(fields),
-            "formats": [(TYPES[kind], (n,)) if n > 1 else TYPES[kind] for _, kind, n in fields.values()],
+            "formats": [
+                (TYPES[kind], (n,)) if n > 1 else TYPES[kind] for _, kind, n in fields.values()
+            ],
             "offsets": [offset for offset, _, _ in fields.values()],
             "itemsize": described["size"],
         }

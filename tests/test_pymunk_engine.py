@@ -350,8 +350,8 @@ def unresolved(m, recording):
 
 
 FINER = {112: 3e-5}
-"""Second step (s) of a seed, by default 1e-4. In 112 errors of opposite sign cancel at 1e-3: 1.5e-6,
-and 1.2e-6, 1.3e-6, 1.4e-7 and 1.3e-8 at 3e-4, 1e-4, 3e-5 and 1e-5."""
+"""Second step (s) of a seed, by default 1e-4. In 112 errors of opposite sign cancel at 1e-3: it is
+1.5e-6 there, and 1.2e-6, 1.3e-6, 1.4e-7 and 1.3e-8 at 3e-4, 1e-4, 3e-5 and 1e-5."""
 
 
 def check_drawn(seed):

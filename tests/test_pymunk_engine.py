@@ -11,7 +11,6 @@ import chutelab
 import chutelab.impact
 from chutelab.engines.pymunk import run
 from chutelab.engines.pymunk.world import World
-from chutelab.exact import CornerError
 from chutelab.exact import run as exact
 from chutelab.ledger import ledger
 from chutelab.machine import build
@@ -337,17 +336,6 @@ def drawn(seed, dt=1e-3):
     return "\n".join(lines)
 
 
-def ends_of_belts(recording, m):
-    """Whether a moving surface was met at an end, where the engines' rules differ for now."""
-    parts = m.segments
-    for event in recording.select(Kind.IMPACT, Kind.LANDING):
-        for s in np.flatnonzero((parts.surface == event["surface"]) & (parts.speed != 0.0)):
-            along = (event["position"] - parts.start[s]) @ parts.tangent[s]
-            if not 0.0 <= along <= parts.length[s]:
-                return True
-    return False
-
-
 def unresolved(m, recording):
     """How far a particle moves in bounces lower than two hairs (see `lone`), m.
 
@@ -361,17 +349,15 @@ def unresolved(m, recording):
     return fall * max(1.0, float(np.hypot(*hits[-1]["velocity_after"])))
 
 
+FINER = {112: 3e-5}
+"""Second step (s) of a seed, by default 1e-4. In 112 errors of opposite sign cancel at 1e-3: it is
+1.5e-6 there, and 1.2e-6, 1.3e-6, 1.4e-7 and 1.3e-8 at 3e-4, 1e-4, 3e-5 and 1e-5."""
+
+
 def check_drawn(seed):
     m = build(parse(drawn(seed)))
-    got = run(m)
-    assert ledger(got).relative_residual < 1e-3
-    try:
-        want = exact(m)
-    except CornerError:
-        # Nothing to hold it against but its own books.
-        return
-    if ends_of_belts(want, m):
-        return
+    got, want = run(m), exact(m)
+    assert ledger(got).relative_residual < 1e-6
     lasting = any(
         LASTING & set(r.events["kind"].tolist())
         or len(r.select(Kind.SEPARATION)) > len(r.select(Kind.RELEASE))
@@ -380,7 +366,7 @@ def check_drawn(seed):
     error = off(got, want)
     if lasting or "adhesion" not in m.scene:
         # Steps are no longer than half a radius either, some 3e-4 s for the smallest disks.
-        finer = off(run(build(parse(drawn(seed, 1e-4)))), want)
+        finer = off(run(build(parse(drawn(seed, FINER.get(seed, 1e-4))))), want)
         assert error < 1e-3
         assert finer < max(0.3 * error, 1e-6, unresolved(m, want))
     else:

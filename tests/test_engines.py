@@ -298,7 +298,7 @@ def test_a_blow_goes_through_a_row_within_one_step():
 
 @pytest.mark.parametrize(
     "engine",
-    ["contact", pytest.param("pymunk", marks=pytest.mark.xfail(reason="pymunk: never settles"))],
+    ["contact", "pymunk"],
 )
 def test_bounces_come_to_rest_in_the_time_of_the_closed_form(engine):
     fall, e = 0.1, 0.5

@@ -234,11 +234,12 @@ class Lone:
             if found < span:
                 span, reason = found, ""
         self._soar(span)
-        self.tracks.knot(0, self.t, self.x, self.v, self.omega)
         if reason == "exit":
             self._tell(Kind.EXIT)
         if reason:
             self._end(reason)
+        else:
+            self.tracks.knot(0, self.t, self.x, self.v, self.omega)
 
     def _soar(self, span: float) -> None:
         """Step freely for a time (s), by `dt` at most."""

@@ -310,7 +310,7 @@ static void settle(int i, const Contact *last, double h) {
     relative(&hop, 0, v);
     share_out(&hop, u, v, 0, entries, given);
     double back = d->t - d->since;
-    entries[0] += d->mass * (W.gx * d->vx + W.gy * d->vy) * back;
+    entries[0] += d->mass * (W.gx * hop.ny - W.gy * hop.nx) * hop.other[1] * back;
     book(d->entries, 0, hop.owner, entries);
     d->x -= d->vx * back;
     d->y -= d->vy * back;

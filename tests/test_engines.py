@@ -479,9 +479,7 @@ speed = {speed}
         (3.0, True),
         (3.0, False),
         ('"settled"\nmax_time = 3.0', True),
-        pytest.param(
-            '"settled"\nmax_time = 3.0', False, marks=pytest.mark.xfail(reason="core: settles")
-        ),
+        ('"settled"\nmax_time = 3.0', False),
     ],
 )
 def test_a_disk_that_belts_wedge_rests_where_it_touches_both(until, spin, restitution):
@@ -505,10 +503,7 @@ def test_a_disk_that_belts_wedge_rests_where_it_touches_both(until, spin, restit
 
 
 @pytest.mark.parametrize("speed", [0.1, 2.0])
-@pytest.mark.parametrize(
-    "degrees",
-    [*(pytest.param(d, marks=pytest.mark.xfail(reason="core: jerks")) for d in (0.5, 2.0)), 8.0],
-)
+@pytest.mark.parametrize("degrees", [0.5, 2.0, 8.0])
 def test_a_narrow_wedge_of_belts_is_no_way_through(speed, degrees):
     # Both faces touch a disk at the origin, and go on below it.
     r, c, s = 0.02, cos(radians(degrees)), sin(radians(degrees))

@@ -44,6 +44,8 @@ void describe(Contact *c, int i, int j) {
     c->mass[1] = 1 / c->mass[1];
     c->mass[2] = spin_mass > 0 ? 1 / spin_mass : 0;
     c->rest = pair->restitution;
+    c->share = 1;
+    c->change = 0;
     c->friction = pair->friction;
     c->arm = pair->rolling * reach;
 }

@@ -125,6 +125,8 @@ typedef struct {
     double friction, arm;   /* coefficient; rolling friction as an arm, m */
     double other[3];        /* velocity of a surface or rider there: normal, tangential, spin */
     double rest;            /* coefficient of restitution */
+    double share;           /* of its friction that acts; below 1 where surfaces wedge a disk */
+    double change;          /* m/s; by which the last sweep changed its slip */
     int i, j;
     int two;                /* whether j is a free disk, which feels the impulse too */
     int owner;              /* of the ledger entries */

@@ -17,6 +17,10 @@
 #define LEAVE 1e-4
 /* Friction from which on it is lowered where sweeps diverge: 76 degrees. */
 #define ROUGH 4.0
+/* Of the greatest change where sweeps diverge: contacts that change by so much are lowered. */
+#define FOLLOWS 0.01
+/* Sine of the angle between surfaces that count as one: of less nothing is left by rounding. */
+#define PARALLEL 1e-7
 /* Steps that a contact in a crowd lasts at least if its end is told as a separation. */
 #define LASTS 10
 /* Of momentum. */
@@ -155,34 +159,112 @@ int find_contacts(double h, int *woke) {
     return 1;
 }
 
-/* Sweep over contacts until no relative velocity changes by more than `accurate`; return by how much
-   one changed in the last sweep, or INFINITY if the sweeps diverge. */
-static double sweep(Contact *list, int count, int sweeps, double accurate, double share) {
+/* Give a contact the normal impulse that keeps its gap closed; return by how much it changed, m/s. */
+static double press(Contact *c) {
+    const Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
+    double x = a->vx - a->ux, y = a->vy - a->uy;
+    if (c->two) {
+        x -= b->vx - b->ux;
+        y -= b->vy - b->uy;
+    }
+    double normal = MAX(c->impulse[0] - c->mass[0] * (x * c->nx + y * c->ny - c->need), 0);
+    double change[3] = {normal - c->impulse[0], 0, 0};
+    if (change[0] != 0) push(c, change);
+    c->impulse[0] = normal;
+    return fabs(change[0]) / c->mass[0];
+}
+
+/* How far a change of velocity (x, y) is from keeping all gaps closed, m/s. */
+static double violation(const Contact *list, int count, double x, double y) {
+    double worst = 0;
+    for (int n = 0; n < count; n++)
+        worst = MAX(worst, list[n].need - x * list[n].nx - y * list[n].ny);
+    return worst;
+}
+
+/* The same for all surfaces that one disk touches, at once: in a narrow wedge impulses one by one
+   would take a thousand sweeps. The change of velocity becomes the one nearest to what it is without
+   them that keeps all gaps closed: itself, or on the bound of one surface, or of two. */
+static double press_corner(Contact *list, int count) {
+    Disk *d = W.disks + list->i;
+    double x = d->vx - d->ux, y = d->vy - d->uy, m = d->inv_mass;
+    double best[2] = {0, 0}, rounding = 1e-15 * (fabs(x) + fabs(y)), changed = 0;
+    int at[2] = {0, 0};
+    for (int n = 0; n < count; n++) {
+        x -= list[n].impulse[0] * m * list[n].nx;
+        y -= list[n].impulse[0] * m * list[n].ny;
+    }
+    double least = violation(list, count, x, y);
+    for (int i = 0; i < count && least > rounding; i++) {
+        const Contact *c = list + i;
+        double one = c->need - x * c->nx - y * c->ny;
+        double left = violation(list, count, x + one * c->nx, y + one * c->ny);
+        if (one <= 0 || left >= least) continue;
+        least = left;
+        best[0] = one; best[1] = 0;
+        at[0] = at[1] = i;
+    }
+    for (int i = 0; i < count && least > rounding; i++)
+        for (int j = 0; j < i && least > rounding; j++) {
+            const Contact *c = list + i, *o = list + j;
+            double cosine = c->nx * o->nx + c->ny * o->ny, sine = c->nx * o->ny - c->ny * o->nx;
+            double one = c->need - x * c->nx - y * c->ny, two = o->need - x * o->nx - y * o->ny;
+            if (fabs(sine) < PARALLEL) continue;
+            double first = (one - cosine * two) / (sine * sine), then = (two - cosine * one) / (sine * sine);
+            double left = violation(list, count, x + first * c->nx + then * o->nx,
+                                    y + first * c->ny + then * o->ny);
+            if (first < 0 || then < 0 || left >= least) continue;
+            least = left;
+            best[0] = first; best[1] = then;
+            at[0] = i; at[1] = j;
+        }
+    for (int n = 0; n < count; n++) {
+        double normal = (n == at[0] ? best[0] : 0) + (n == at[1] && at[1] != at[0] ? best[1] : 0);
+        double change[3] = {normal / m - list[n].impulse[0], 0, 0};
+        push(list + n, change);
+        list[n].impulse[0] = normal / m;
+        changed = MAX(changed, fabs(change[0]) * m);
+    }
+    return changed;
+}
+
+/* Give a contact the friction that stops its slip and its rolling, as far as it is pressed. */
+static double rub(Contact *c) {
+    double *J = c->impulse, v[3], change[3] = {0, 0, 0};
+    double rough = c->share < 1 ? c->share * MIN(c->friction, ROUGH) : c->friction;
+    double most = rough * J[0], arm = c->share * c->arm * J[0];
+    relative(c, 0, v);
+    change[1] = MIN(MAX(J[1] - c->mass[1] * (v[1] + c->drift), -most), most) - J[1];
+    change[2] = MIN(MAX(J[2] - c->mass[2] * v[2], -arm), arm) - J[2];
+    if (change[1] == 0 && change[2] == 0) return 0;
+    push(c, change);
+    J[1] += change[1];
+    J[2] += change[2];
+    double roll = c->mass[2] > 0 ? fabs(change[2]) / c->mass[2] * W.disks[c->i].radius : 0;
+    return MAX(fabs(change[1]) / c->mass[1], roll);
+}
+
+/* Sweep over contacts, those of one disk with surfaces as one, until no relative velocity changes by
+   more than `accurate`; return by how much one changed in the last sweep, or INFINITY if the sweeps
+   diverge. */
+static double sweep(Contact *list, int count, int sweeps, double accurate) {
     double first = 0, worst = 0;
     for (int n = 0; n < sweeps; n++) {
         worst = 0;
-        for (int m = 0; m < count; m++) {
+        for (int m = 0, size; m < count; m += size) {
             /* To and fro, so that what one end of a pile does reaches the other in one sweep. */
-            Contact *c = list + (n % 2 == 0 ? m : count - 1 - m);
-            const Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
-            double *J = c->impulse, K[3], most, v[3], x = a->vx - a->ux, y = a->vy - a->uy;
-            if (c->two) {
-                x -= b->vx - b->ux;
-                y -= b->vy - b->uy;
+            int to = n % 2 == 0;
+            Contact *c = list + (to ? m : count - 1 - m), *last = c;
+            for (size = 1; c->j < 0 && m + size < count; size++, last += to ? 1 : -1)
+                if ((to ? last + 1 : last - 1)->i != c->i || (to ? last + 1 : last - 1)->j >= 0) break;
+            if (!to) c = last;
+            double change = size > 1 ? press_corner(c, size) : press(c);
+            for (int k = 0; k < size; k++) {
+                c[k].change = rub(c + k);
+                change = MAX(change, c[k].change);
             }
-            relative(c, 0, v);
-            K[0] = MAX(J[0] - c->mass[0] * (x * c->nx + y * c->ny - c->need), 0);
-            most = (share < 1 ? share * MIN(c->friction, ROUGH) : c->friction) * K[0];
-            K[1] = MIN(MAX(J[1] - c->mass[1] * (v[1] + c->drift), -most), most);
-            most = share * c->arm * K[0];
-            K[2] = MIN(MAX(J[2] - c->mass[2] * v[2], -most), most);
-            double change[3] = {K[0] - J[0], K[1] - J[1], K[2] - J[2]};
-            if (change[0] == 0 && change[1] == 0 && change[2] == 0) continue;
-            push(c, change);
-            for (int k = 0; k < 3; k++) J[k] = K[k];
-            worst = MAX(worst, fabs(change[0]) / c->mass[0]);
-            worst = MAX(worst, fabs(change[1]) / c->mass[1]);
-            if (c->mass[2] > 0) worst = MAX(worst, fabs(change[2]) / c->mass[2] * a->radius);
+            if (size > 1) press_corner(c, size);
+            worst = MAX(worst, change);
         }
         W.sweep_count++;
         if (n == 0) first = worst;
@@ -193,14 +275,16 @@ static double sweep(Contact *list, int count, int sweeps, double accurate, doubl
 }
 
 /* Solve contacts by sweeps. Where belts drive a disk into a wedge that locks itself, rigid bodies
-   with all of the friction have no solution: the friction is lowered until they have one. */
+   with all of the friction have no solution: there the friction is lowered until they have one. */
 void sweep_contacts(Contact *list, int count, int sweeps, double accurate) {
-    double share = 1, enough = W.interact ? 1e300 : MAX(accurate, 1e-9);
-    while (!(sweep(list, count, sweeps, accurate, share) <= enough) && share > 0) {
-        share = share > 1e-3 ? 0.5 * share : 0;
+    double enough = W.interact ? 1e300 : MAX(accurate, 1e-9);
+    for (int tries = 0; tries < 60 && !(sweep(list, count, sweeps, accurate) <= enough); tries++) {
+        double worst = 0;
+        for (int n = 0; n < count; n++) worst = MAX(worst, list[n].change);
         for (int n = 0; n < count; n++) {
             Contact *c = list + n;
             Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
+            if (c->change >= FOLLOWS * worst) c->share = c->share > 1e-3 ? 0.5 * c->share : 0;
             a->vx = a->ux;
             a->vy = a->uy;
             a->spin = a->uspin;
@@ -450,10 +534,13 @@ void close_step(double h) {
         if (d->mode == GONE) continue;
         track_lasting(i);
         for (int n = 0; n < 3; n++) d->entries[n] += d->gain[n];
-        /* Held in a corner, whatever runs along it. */
+        /* Held in a corner by what is at rest. */
         if (owners > 1 && !W.interact && W.until == UNTIL_SETTLED && track->lasted > 3) {
             const double *s = track->held + 3, *p = track->past + 3;
             double most = MAX(fabs(s[0]) + fabs(s[1]), fabs(p[0]) + fabs(p[1]));
+            for (int link = d->links; link >= 0; link = W.links[link])
+                if (W.contacts[link / 2].impulse[0] > 0)
+                    most = MAX(most, fabs(W.contacts[link / 2].other[1]));
             if (most + fabs(s[2]) * d->radius < 1e-9) reason = BY_SETTLING;
         }
         if (W.until == UNTIL_LANDED && d->landed) reason = BY_LANDING;

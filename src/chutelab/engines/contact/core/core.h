@@ -22,16 +22,13 @@ extern World W;
 #define MANY 20
 #define GROW 1.2
 /* Impacts of a disk in a step from which on a slow one (below SLOW times what gravity does in a
-   step) has no restitution, and a fast one: the infinitely many of an inelastic collapse end. */
+   step) has no restitution: the infinitely many of an inelastic collapse end. */
 #define FEW 10
 #define SLOW 20.0
-#define TOO_MANY 50
-/* ... and in whole numbers of which what disks leave over grows further. */
-#define ENDLESS 1000
-/* Impacts in a step from which on a disk counts as jammed: all it touches is solved at once. */
+/* ... and from which on it counts as jammed, with all it touches; ENDLESS where all is elastic: a
+   fast one in a dense gas has hundreds. */
 #define JAM 40
-/* ... and from which on the step ends, so that the whole crowd round it is solved at once. */
-#define CROWDED 50
+#define ENDLESS 1000
 /* Of the speed; a slower approach grazes, and rounding may well have made it. */
 #define GRAZE 1e-6
 /* Impacts of a disk in a step that no collapse needs: something is wrong, the run stops. */
@@ -114,7 +111,7 @@ void was_moved(int i);
 
 /* solver.c */
 int find_contacts(double h, int *woke);
-void sweep_contacts(Contact *list, int count, int sweeps, double accurate);
+void sweep_contacts(Contact *list, int count, int sweeps, double accurate, double enough);
 void solve_contacts(void);
 void close_step(double h);
 void take_back(int i);

@@ -65,7 +65,7 @@ double left_over(const Disk *d, int impacts, int surface, double radius) {
     for (int n = 0; n < d->held_count; n++)
         if (d->held[n] == surface) least = MAX(least, 1.000001 * W.g * W.step);
     if (impacts <= MANY) return least;
-    double most = skip * (MOST_SKIP / SKIP) * (surface < 0 ? MAX(1, impacts / ENDLESS) : 1);
+    double most = skip * (MOST_SKIP / SKIP);
     return MAX(least, MIN(skip * pow(GROW, MIN(impacts - MANY, 1000)), most));
 }
 
@@ -150,8 +150,8 @@ void was_moved(int i) {
     Disk *d = W.disks + i;
     d->impacts++;
     d->calm = d->rest = 0;
-    if (d->moved != W.stamp) {
-        d->moved = W.stamp;
+    if (d->moved != W.shocks) {
+        d->moved = W.shocks;
         W.moved[W.moved_count++] = i;
         knot_before_blow(i);
     }
@@ -193,23 +193,55 @@ static void support(int i, int k, double t) {
     }
 }
 
-/* Bring a disk to rest that rattles without end where surfaces meet, as far as they let it: what
-   touches is solved at once, without restitution. */
-static void jam(int i) {
-    Disk *d = W.disks + i;
-    Contact list[MAX_HELD];
-    int count = 0;
-    d->ux = d->vx;
-    d->uy = d->vy;
-    d->uspin = d->spin;
-    for (int k = 0; k < W.surface_count && count < MAX_HELD; k++) {
-        Contact *c = list + count;
-        if (W.surfaces[k].there != THERE || !is_near(W.surfaces + k, d)) continue;
-        describe(c, i, -1 - k);
-        if (c->gap > TOUCH * d->radius) continue;
-        c->impulse[0] = c->impulse[1] = c->impulse[2] = c->need = c->drift = 0;
-        hold(d, k);
-        count++;
+/* Add a contact between what touches now to a list that a jam solves; 0 if there is no room. */
+static int add_touching(int i, int j, double radius, int *count) {
+    Contact *c = W.earlier + *count;
+    if (*count >= W.contact_room) return 0;
+    describe(c, i, j);
+    if (c->gap > TOUCH * radius) return 0;
+    c->impulse[0] = c->impulse[1] = c->impulse[2] = c->drift = 0;
+    *count += 1;
+    return 1;
+}
+
+/* Bring to rest what rattles without end, as far as it can: a disk, all that it touches and what
+   touches that are solved at once, without restitution. The contacts of the step before, which
+   nobody needs within a step, make room for the list. */
+static void jam(Contact *struck, double t) {
+    int i = struck->i, count = 0, last = i, found;
+    Contact *list = W.earlier;
+    W.jams++;
+    W.disks[i].jam = W.jams;
+    W.disks[i].jam_next = -1;
+    for (int m = i; m >= 0; m = W.disks[m].jam_next) {
+        Disk *a = W.disks + m;
+        was_moved(m);
+        found = reachable(m);
+        a->jam = -W.jams;
+        for (int n = 0; n < found; n++) {
+            int k = W.found[n];
+            Disk *b = W.disks + k;
+            if (b->jam == -W.jams) continue;
+            double x = b->x + (b->vx + 0.5 * W.gx * (t - b->t)) * (t - b->t) - a->x;
+            double y = b->y + (b->vy + 0.5 * W.gy * (t - b->t)) * (t - b->t) - a->y;
+            double reach = a->radius + b->radius + TOUCH * MIN(a->radius, b->radius);
+            if (x * x + y * y > reach * reach) continue;
+            if (b->mode == ASLEEP) wake(k, t);
+            advance(b, t);
+            if (!add_touching(m, k, MIN(a->radius, b->radius), &count)) continue;
+            if (b->jam == W.jams || b->mode != FREE) continue;
+            b->jam = W.jams;
+            b->jam_next = -1;
+            W.disks[last].jam_next = k;
+            last = k;
+        }
+        for (int k = 0; k < W.surface_count; k++)
+            if (W.surfaces[k].there == THERE && is_near(W.surfaces + k, a)
+                    && add_touching(m, -1 - k, a->radius, &count))
+                hold(a, k);
+        a->ux = a->vx;
+        a->uy = a->vy;
+        a->uspin = a->spin;
     }
     for (int n = 0; n < count; n++) {
         /* No approach afterwards; separating is allowed. */
@@ -217,13 +249,20 @@ static void jam(int i) {
         relative(list + n, 0, u);
         list[n].need = -u[0];
     }
-    sweep_contacts(list, count, W.sweeps, 0);
+    struck->impulse[0] = struck->impulse[1] = 0;
+    double left = 0.5 * (MOST_SKIP / SKIP) * W.skip * W.disks[i].radius;
+    sweep_contacts(list, count, W.sweeps, 1e-3 * left, left);
     for (int n = 0; n < count; n++) {
+        const Contact *c = list + n;
+        Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
         double u[3], v[3], entries[3], given[3];
-        relative(list + n, 1, u);
-        relative(list + n, 0, v);
-        share_out(list + n, u, v, 0, entries, given);
-        book(d->entries, 0, list[n].owner, entries);
+        relative(c, 1, u);
+        relative(c, 0, v);
+        share_out(c, u, v, 0, entries, given);
+        book(a->entries, c->two ? b->entries : 0, c->owner, entries);
+        if (given[0] != 0) book(a->entries, 0, W.ride_owner, given);
+        if ((c->i == i && c->j == struck->j) || (c->i == struck->j && c->j == i))
+            for (int k = 0; k < 2; k++) struck->impulse[k] = c->impulse[k];
     }
 }
 
@@ -289,7 +328,8 @@ static void strike(int i, int j, double t) {
     if (u[0] >= 0) return;
     double back = -c.rest * u[0];
     if (j >= 0 && -u[0] < W.soft && (a->supports || b->supports || !c.two)) back = 0;
-    if (c.rest < 1 && ((impacts >= FEW && -u[0] < SLOW * W.g * W.dt) || impacts >= TOO_MANY)) back = 0;
+    int jammed = impacts >= (c.rest < 1 ? JAM : ENDLESS);
+    if (jammed || (c.rest < 1 && impacts >= FEW && -u[0] < SLOW * W.g * W.dt)) back = 0;
     double press = j < 0 ? press_on(a, W.surfaces + (-1 - j), c.nx, c.ny) : 0, later = 0;
     int rests = j < 0 && back <= press * W.step;
     if (rests) {
@@ -298,7 +338,7 @@ static void strike(int i, int j, double t) {
         back = 0;
     }
     double before[3] = {a->vx, a->vy, a->spin};
-    if (j < 0 && impacts >= (c.rest < 1 ? JAM : CROWDED)) jam(i);
+    if (jammed) jam(&c, t);
     else give(&c, c.mass[0] * (back - u[0]));
     a->since = t + later;
     if (c.two) b->since = t;
@@ -349,7 +389,7 @@ static void queue_up(int i, int *tail) {
 void shock(int i, int j, double t) {
     int head = 0, tail = 0, budget = SHOCKS * W.contact_count;
     W.moved_count = 0;
-    W.stamp++;
+    W.shocks++;
     W.now = t;
     strike(i, j, t);
     queue_up(i, &tail);

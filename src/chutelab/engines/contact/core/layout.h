@@ -60,7 +60,8 @@ typedef struct {
     int heap_place;
     int links;                  /* first of its lasting contacts in `World.links`, or -1 */
     int before;                 /* first of those of the step before, or -1 */
-    int queued, moved, mark;    /* marks of the shock and of queries */
+    int queued, moved, mark, jam; /* marks of the shock, of queries, and of the latest jam */
+    int jam_next;               /* the next disk in that jam, or -1 */
     int island;
     int held_count;
     int held[MAX_HELD];         /* surfaces it lies on */
@@ -187,7 +188,8 @@ typedef struct {
     int stalled;         /* which disk */
     /* within the step */
     int low, high;       /* disks that this part of the run is about */
-    int phase, cell_count, heap_count, moved_count, wide_count, stamp;
+    int phase, cell_count, heap_count, moved_count, wide_count;
+    int stamp, shocks, jams; /* numbers of the latest query, shock and jam, for marks */
     double t, now, step, step_end, cell;
     double length, length_before; /* s; of this step and of the one before */
     double before;       /* share of this step's impulses that belongs to the one before */

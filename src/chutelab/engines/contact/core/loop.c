@@ -329,10 +329,6 @@ static int go_through(void) {
         }
         W.now = t;
         if (j != ALARM) {
-            if (W.interact && d->impacts > CROWDED && t > W.t) {
-                W.step_end = t;
-                return DONE;
-            }
             shock(i, j, t);
             continue;
         }
@@ -365,9 +361,10 @@ static void end_step(void) {
     W.contacts = W.earlier;
     W.earlier = c;
     W.earlier_count = W.contact_count;
-    if (W.stamp > 1000000000) {
-        W.stamp = 0;
-        for (int i = 0; i < W.disk_count; i++) W.disks[i].mark = W.disks[i].moved = 0;
+    if (MAX(W.stamp, W.shocks) > 1000000000) {
+        W.stamp = W.shocks = W.jams = 0;
+        for (int i = 0; i < W.disk_count; i++)
+            W.disks[i].mark = W.disks[i].moved = W.disks[i].jam = 0;
     }
 }
 

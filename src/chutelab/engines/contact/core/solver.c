@@ -135,7 +135,7 @@ int find_contacts(double h, int *woke) {
         if (square(a->x - b->x) + square(a->y - b->y) > reach * reach) continue;
         /* What the step before left over is taken up here. */
         int impacts = MAX(a->impacts, b->impacts);
-        double bound = impacts > CROWDED ? INFINITY : left_over(a, impacts, -1, least);
+        double bound = left_over(a, impacts, -1, least);
         if (a->supports || b->supports || a->mode != FREE || b->mode != FREE)
             bound = MAX(bound, MAX(W.soft, W.skip * least));
         if (a->mode == ASLEEP || b->mode == ASLEEP) {
@@ -150,7 +150,7 @@ int find_contacts(double h, int *woke) {
         Disk *d = W.disks + i;
         if (d->mode != FREE) continue;
         int first = W.contact_count;
-        double bound = d->impacts > CROWDED ? INFINITY : left_over(d, d->impacts, -1, d->radius);
+        double bound = left_over(d, d->impacts, -1, d->radius);
         if (d->supports) bound = MAX(bound, W.interact ? MAX(W.soft, W.skip * d->radius) : W.soft);
         for (int k = 0; k < W.surface_count; k++)
             if (is_near(W.surfaces + k, d) && !add(i, -1 - k, d->radius, bound, h)) return 0;
@@ -274,17 +274,35 @@ static double sweep(Contact *list, int count, int sweeps, double accurate) {
     return worst;
 }
 
-/* Solve contacts by sweeps. Where belts drive a disk into a wedge that locks itself, rigid bodies
-   with all of the friction have no solution: there the friction is lowered until they have one. */
-void sweep_contacts(Contact *list, int count, int sweeps, double accurate) {
-    double enough = W.interact ? 1e300 : MAX(accurate, 1e-9);
-    for (int tries = 0; tries < 60 && !(sweep(list, count, sweeps, accurate) <= enough); tries++) {
-        double worst = 0;
+/* Solve contacts by sweeps until changes are `accurate`; less will do if they are `enough`. Where
+   belts drive disks into a wedge that locks itself, rigid bodies with all of the friction have no
+   solution: there the friction is lowered until they have one. */
+void sweep_contacts(Contact *list, int count, int sweeps, double accurate, double enough) {
+    int lowered = 1;
+    for (;;) {
+        double worst = sweep(list, count, sweeps, accurate);
+        if (worst <= accurate || !lowered) break;
+        if (worst < INFINITY) {
+            worst = 0;
+            for (int n = 0; n < count; n++) {
+                const Contact *c = list + n;
+                double u[3], v[3];
+                relative(c, 1, u);
+                relative(c, 0, v);
+                worst = MAX(worst, c->need - v[0] + u[0]);
+            }
+        }
+        if (worst <= enough) break;
+        lowered = 0;
+        worst = 0;
         for (int n = 0; n < count; n++) worst = MAX(worst, list[n].change);
         for (int n = 0; n < count; n++) {
             Contact *c = list + n;
             Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
-            if (c->change >= FOLLOWS * worst) c->share = c->share > 1e-3 ? 0.5 * c->share : 0;
+            if (c->share > 0 && c->change >= FOLLOWS * worst) {
+                c->share = c->share > 1e-3 ? 0.5 * c->share : 0;
+                lowered = 1;
+            }
             a->vx = a->ux;
             a->vy = a->uy;
             a->spin = a->uspin;
@@ -317,7 +335,8 @@ static void turn_slip(Contact *c) {
 
 void solve_contacts(void) {
     for (int n = 0; n < W.contact_count; n++) push(W.contacts + n, W.contacts[n].impulse);
-    sweep_contacts(W.contacts, W.contact_count, W.sweeps, W.accurate);
+    sweep_contacts(W.contacts, W.contact_count, W.sweeps, W.accurate,
+                   W.interact ? 1e300 : MAX(W.accurate, 1e-9));
     for (int n = 0; n < W.contact_count; n++) {
         /* Rounding presses nobody; with endless friction even that would pull. */
         Contact *c = W.contacts + n;

@@ -87,7 +87,7 @@ class Job:
         self.rooms = {
             "knot": (100 if machine.releases.carried.any() else 30) * n + 200,
             "event": 40 * n + 1200,
-            "contact": 6 * n + 16,
+            "contact": 8 * n + 16,
             "near": 16 * n + 16 if machine.interact else 1,
         }
         integer, real = np.dtype("<i4"), np.dtype("<f8")

@@ -29,6 +29,8 @@ extern World W;
    fast one in a dense gas has hundreds. */
 #define JAM 40
 #define ENDLESS 1000
+/* Contacts per disk that a jam may have: disks in a plane have three pairs each at most. */
+#define TOUCHES 8
 /* Of the speed; a slower approach grazes, and rounding may well have made it. */
 #define GRAZE 1e-6
 /* Impacts of a disk in a step that no collapse needs: something is wrong, the run stops. */

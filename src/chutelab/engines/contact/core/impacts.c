@@ -193,10 +193,10 @@ static void support(int i, int k, double t) {
     }
 }
 
-/* Add a contact between what touches now to a list that a jam solves; 0 if there is no room. */
+/* Add a contact to the list that a jam solves, if it touches now; 0 if not. */
 static int add_touching(int i, int j, double radius, int *count) {
     Contact *c = W.earlier + *count;
-    if (*count >= W.contact_room) return 0;
+    if (*count >= TOUCHES * (W.high - W.low)) return 0;
     describe(c, i, j);
     if (c->gap > TOUCH * radius) return 0;
     c->impulse[0] = c->impulse[1] = c->impulse[2] = c->drift = 0;

@@ -256,6 +256,7 @@ static void look_ahead(int i) {
    what was too small, and nothing has happened yet. */
 static int begin_step(void) {
     int woke;
+    if (W.contact_room < TOUCHES * (W.high - W.low)) return FULL_CONTACTS;
     double next = set_gates(W.t), h = W.dt, stride = 0;
     if (W.g > 0)
         for (int i = W.low; i < W.high; i++) h = MIN(h, sqrt(8 * HOP * W.disks[i].radius / W.g));

@@ -251,7 +251,7 @@ static void jam(Contact *struck, double t) {
     }
     struck->impulse[0] = struck->impulse[1] = 0;
     double left = 0.5 * (MOST_SKIP / SKIP) * W.skip * W.disks[i].radius;
-    sweep_contacts(list, count, W.sweeps, 1e-3 * left, left);
+    sweep_contacts(list, count, 4 * W.sweeps, 0.1 * left, left);
     for (int n = 0; n < count; n++) {
         const Contact *c = list + n;
         Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);

@@ -300,7 +300,7 @@ void sweep_contacts(Contact *list, int count, int sweeps, double accurate, doubl
             Contact *c = list + n;
             Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
             if (c->share > 0 && c->change >= FOLLOWS * worst) {
-                c->share = c->share > 1e-3 ? 0.5 * c->share : 0;
+                c->share = c->share > 0.01 ? 0.25 * c->share : 0;
                 lowered = 1;
             }
             a->vx = a->ux;

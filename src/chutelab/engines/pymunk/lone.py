@@ -200,8 +200,8 @@ class Lone:
 
     def _gap(self, face: Face, x: Vec2d) -> tuple[float, Vec2d]:
         """Return gap (m) between disk and surface, and the normal, as Chipmunk has them."""
-        found = face.shape.point_query(x)
-        return found.distance - self.r, found.gradient
+        distance, normal = face.away(x)
+        return distance - self.r, normal
 
     def _on_end(self, face: Face, x: Vec2d) -> bool:
         """Tell whether the nearest point of a segment is one of its ends."""

@@ -290,6 +290,10 @@ class Shared:
         push, values, ids = push[pushing], values[:, pushing], ids[:, pushing]
         a, b = self._rows(ids[:2])
         one, other = np.minimum(a, b), np.maximum(a, b)
+        # They come as Chipmunk hashes addresses; sums must not depend on where shapes lie in memory.
+        order = np.lexsort((push, other, one))
+        a, one, other, push = a[order], one[order], other[order], push[order]
+        values, ids = values[:, order], ids[:, order]
         jx, jy, nx, ny = np.where(a == one, 1.0, -1.0) * values * TOWARDS
         rub = jx * ny - jy * nx
         speed = self.speed[other]

@@ -68,6 +68,15 @@ class Face:
         """Both ends of a segment (m)."""
         return (self.shape.a, self.shape.b) if isinstance(self.shape, pymunk.Segment) else ()
 
+    def away(self, x: Vec2d) -> tuple[float, Vec2d]:
+        """Return the distance (m) of a point from the surface, and the normal there.
+
+        Nearer than 1e-5 m Chipmunk has a segment's own normal for it, on either side.
+        """
+        found = self.shape.point_query(x)
+        normal = found.gradient if self.tangent is None else (x - found.point).normalized()
+        return found.distance, normal
+
     def belt(self, normal: Vec2d) -> float:
         """Return the speed (m/s) of the surface along (n_y, -n_x) where a disk touches it.
 
@@ -189,9 +198,9 @@ class Carriage:
             along = 0.0
             while face.surface != self.surface and along < path:
                 x, v = self._at(self.x + along)
-                found = face.shape.point_query(x)
-                gap = found.distance - radius
-                if gap <= world.rounding and v.dot(found.gradient) < 0.0:
+                distance, normal = face.away(x)
+                gap = distance - radius
+                if gap <= world.rounding and v.dot(normal) < 0.0:
                     path = along
                 along += max(gap, world.rounding)
         return path

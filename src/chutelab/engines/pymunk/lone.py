@@ -24,13 +24,14 @@ from chutelab.recorder import StalledError
 from chutelab.recording import REASONS, Kind
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Collection
 
     from chutelab.machine import Machine
     from chutelab.recorder import Recorder
 
-ITERATIONS = 60
-"""Of Chipmunk's solver; one is exact for one contact, a disk in a wedge needs more."""
+WEDGED = 1000
+"""Iterations of Chipmunk's solver for a disk held by several surfaces, each of which takes off a
+share: a wedge of 5° needs 200. One is exact for one contact."""
 
 INSTANT = 1e-30
 """s; the step that resolves a blow: nothing moves in it."""
@@ -46,10 +47,13 @@ LATE, HOP = 1e-3, 1e-6
 one less than the second."""
 
 STRIDE = 0.5
-"""Share of the radius that a lasting contact moves on in a step, at most: it meets every end."""
+"""Share of the radius that a step of a lasting contact may always be long: it meets every end."""
 
 STILL = 1e-6
 """Share of a free fall's gain; a step that changes the velocity by less changes nothing."""
+
+LEVERS = 2.0
+"""Share of hair over radius by which levers, and with them the speed of a rim, may be off."""
 
 SLACK = 1e-9
 """Share of the friction limit below which a contact is held to grip."""
@@ -134,8 +138,9 @@ class Lone:
         self.omega = 0.0
         self.body, self.circle = world.disk()
         world.space.add(self.body, self.circle)
-        world.space.iterations = ITERATIONS
         world.space.on_collision(PARTICLE, SURFACE, pre_solve=self._before, post_solve=self._after)
+        # Rounding tilts normals, and a speed along a surface is then one into it.
+        self.tiny = max(TINY, world.rounding / self.r)
         self.law: Callable[[Face, Vec2d], float | None] = _ignore
         self.contacts: list[Contact] = []
         self.on = -1
@@ -181,8 +186,9 @@ class Lone:
         self.contacts.append(Contact(face, -arbiter.normal, arbiter.total_impulse))
 
     def _step(
-        self, x: Vec2d, v: Vec2d, h: float, pull: Vec2d, law: Callable[[Face, Vec2d], float | None]
-    ) -> list[Contact]:
+        self, x: Vec2d, v: Vec2d, h: float, pull: Vec2d,
+        law: Callable[[Face, Vec2d], float | None], wedged: bool = False,
+    ) -> list[Contact]:  # fmt: skip
         """Let Chipmunk step by h (s); return the contacts that it solved."""
         body, space = self.body, self.world.space
         if h != self.last:
@@ -192,6 +198,7 @@ class Lone:
             self.last = h
         body.position, body.velocity, body.angular_velocity = x, v, self.omega
         self.law, space.gravity, self.contacts = law, pull, []
+        space.iterations = WEDGED if wedged else 1
         space.step(h)
         self.steps += 1
         return self.contacts
@@ -217,7 +224,7 @@ class Lone:
 
     def _approached(self, touching: dict[Face, Vec2d]) -> bool:
         """Tell whether the particle moves into a surface in touch."""
-        slow = (TINY if self.on < 0 else SEAM) * (1.0 + self.v.length)
+        slow = (self.tiny if self.on < 0 else max(SEAM, self.tiny)) * (1.0 + self.v.length)
         return any(self.v.dot(normal) < -slow for normal in touching.values())
 
     # Flight
@@ -261,11 +268,13 @@ class Lone:
         so from where gap and rate of change are known it stays above gap + rate τ - g τ²/2.
         Stepping from root to root of that bound never passes a contact, and converges like Newton's
         method.
-        A surface that the flight has just left along its tangent gives no bound; it is looked at
-        after times that grow by half.
+        A surface that the flight is leaving along its tangent gives no bound; it is looked at after
+        times that grow by half.
         """
         t = last = 0.0
         g, hair = self.g, self.world.hair
+        if g == 0.0 and self.v.length == 0.0:
+            return inf
 
         def gap_at(t: float) -> tuple[float, Vec2d]:
             return self._gap(face, self.x + t * (self.v + 0.5 * t * self.pull))
@@ -274,11 +283,11 @@ class Lone:
             v = self.v + t * self.pull
             gap, normal = gap_at(t)
             rate = v.dot(normal)
-            slow = TINY * (1.0 + v.length)
+            slow = self.tiny * (1.0 + v.length)
             if leaving:
                 if gap < -hair and t > 0.0:
                     return _longest(lambda t: gap_at(t)[0] >= -0.5 * hair, t, last)
-                leaving = gap <= hair or rate > 0.0
+                leaving = gap <= hair and (rate <= slow or rate * rate <= 2.0 * LOW * g * hair)
             elif gap <= self.world.rounding:
                 if rate < -slow:
                     return t
@@ -293,9 +302,9 @@ class Lone:
                 tau = max(tau, min(0.5 * t + FIRST * self.dt, self.r / (v.length + g * self.dt)))
             if t + tau == t:
                 return t
-            last, t = t, t + tau
-            if t >= span:
+            if t == span:
                 return inf
+            last, t = t, min(t + tau, span)
         raise self._stalled("it slides past a surface without touching it; lower run.max_time")
 
     # Blows
@@ -303,6 +312,8 @@ class Lone:
     def _blow(self, touching: dict[Face, Vec2d]) -> None:
         """Let Chipmunk resolve the blow from the surface that the particle moves into fastest."""
         before = self.v, self.omega
+        if self.on >= 0:
+            self.tracks.knot(0, self.t, self.x, self.v, self.omega)
         struck = min(touching, key=lambda face: self.v.dot(touching[face]))
         gap, normal = self._gap(struck, self.x)
         self.x -= gap * normal
@@ -313,7 +324,7 @@ class Lone:
         def law(face: Face, normal: Vec2d) -> float | None:
             return self._restitution(face, normal) if together or face is struck else None
 
-        contacts = self._step(self.x, self.v, INSTANT, Vec2d(0, 0), law)
+        contacts = self._step(self.x, self.v, INSTANT, Vec2d(0, 0), law, together)
         self.v, self.omega = self.body.velocity, self.body.angular_velocity
         for contact in contacts:
             if contact.push > 0.0:
@@ -336,7 +347,7 @@ class Lone:
         """Return ε, or 0 where the bounces that would follow are over within a step."""
         approach, weight = -self.v.dot(normal), -self.pull.dot(normal)
         e = face.restitution
-        if approach <= TINY * (1.0 + self.v.length):
+        if approach <= self.tiny * (1.0 + self.v.length):
             return 0.0
         if weight > 0.0:
             hop = 2.0 * e * approach / weight
@@ -354,9 +365,8 @@ class Lone:
             return False
         h = min(self.dt, self.machine.end_time - self.t)
         speed = self.v.length + self.g * self.dt
-        h = min(h, STRIDE * self.r / speed) if speed > 0.0 else h
-
         rims = {face for face in touching if self._on_end(face, self.x)}
+        h = min(h, self._room(touching, rims) / speed) if speed > 0.0 else h
 
         def trial(span: float) -> Ridden:
             return self._ridden(span, touching)
@@ -399,6 +409,15 @@ class Lone:
             self._accept(end, h)
         return True
 
+    def _room(self, touching: Collection[Face], rims: Collection[Face]) -> float:
+        """Return the way (m) of a step on which it meets every end and every other surface."""
+        room = STRIDE * self.r
+        if rims or any(face.tangent is None for face in touching):
+            return room
+        ends = [(self.x - end).length - self.r for face in touching for end in face.ends]
+        others = [self._gap(face, self.x)[0] for face in self.world.faces if face not in touching]
+        return max(room, min(ends + others))
+
     def _ridden(self, h: float, touching: dict[Face, Vec2d]) -> Ridden:
         """Return where a step in contact leads, without taking it.
 
@@ -409,17 +428,17 @@ class Lone:
         middle = self.x + 0.5 * h * self.v
         gap, normal = min((self._gap(face, middle) for face in touching), key=itemgetter(0))
         middle -= gap * normal
-        turn = 1.0
+        turn, wedged = 1.0, len(touching) > 1
 
         def law(face: Face, normal: Vec2d) -> float | None:
             if face not in touching:
                 return None
             return turn if self.v.dot(normal) > 0.0 else 0.0
 
-        contacts = self._step(middle - h * self.v, self.v, h, self.pull, law)
+        contacts = self._step(middle - h * self.v, self.v, h, self.pull, law, wedged)
         if self.v.dot(normal) > SEAM * self.v.length:
             turn = self.body.velocity.dot(self.body.velocity) / self.v.dot(self.v)
-            contacts = self._step(middle - h * self.v, self.v, h, self.pull, law)
+            contacts = self._step(middle - h * self.v, self.v, h, self.pull, law, wedged)
         v, omega = self.body.velocity, self.body.angular_velocity
         x = middle + 0.5 * h * v
         pushed = [c.face for c in contacts if c.push > 0.0]
@@ -457,7 +476,8 @@ class Lone:
 
         In a wedge friction may be used up where nothing slips: it is the motion that counts.
         """
-        still = STILL * self.g * h
+        rim = max(self.v.length, self.r * abs(self.omega))
+        still = STILL * self.g * h + LEVERS * self.world.hair / self.r * rim
         return (
             bool(end.pushed)
             and (end.v - self.v).length <= still

@@ -89,7 +89,7 @@ class Shared:
         self.t = self.begin = float(machine.releases.t[0])
         span = machine.end_time - self.begin
         self.most = ceil(span / machine.dt - 1e-9)
-        self.h, self.steps = span / max(self.most, 1), 0
+        self.h, self.steps, self.clock = span / max(self.most, 1), 0, 0
         self.waiting = list(range(count))
         self.rides: dict[int, Carriage] = {}
         faces, rows = world.faces, count + len(world.faces)
@@ -161,11 +161,16 @@ class Shared:
 
     def run(self, report: Callable[[float], None]) -> None:
         """Run to the end."""
-        while self.steps < self.most and (self.waiting or self.inside.any()):
+        while self.clock < self.most and (self.waiting or self.inside.any()):
+            if not self.inside.any():
+                # Nothing to step until the next release.
+                due = float(self.machine.releases.t[self.waiting[0]])
+                self.clock = max(self.clock, int((due - self.begin) / self.h))
+                self.t = self.begin + self.clock * self.h
             self._release()
             self._step()
-            if self.steps % 64 == 0:
-                report(self.steps / self.most)
+            if self.clock % 64 == 0:
+                report(self.clock / self.most)
         for i in np.flatnonzero(self.inside).tolist():
             self._end(i, "time")
         faces = slice(self.count, None)
@@ -254,7 +259,8 @@ class Shared:
             self._ride()
         self.world.space.step(self.h)
         self.steps += 1
-        t, self.t = self.t, self.begin + self.steps * self.h
+        self.clock += 1
+        t, self.t = self.t, self.begin + self.clock * self.h
         entries = self.entries[:, : self.count].copy()
         self._states()
         self._contacts()
@@ -290,7 +296,7 @@ class Shared:
         push, values, ids = push[pushing], values[:, pushing], ids[:, pushing]
         a, b = self._rows(ids[:2])
         one, other = np.minimum(a, b), np.maximum(a, b)
-        # They come as Chipmunk hashes addresses; sums must not depend on where shapes lie in memory.
+        # They come in the order of a hash of addresses, on which no sum may depend.
         order = np.lexsort((push, other, one))
         a, one, other, push = a[order], one[order], other[order], push[order]
         values, ids = values[:, order], ids[:, order]

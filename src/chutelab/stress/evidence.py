@@ -89,6 +89,11 @@ class Evidence:
         """Whether particles meet each other."""
         return self.machine.interact
 
+    @property
+    def alike(self) -> bool:
+        """Whether all is left to Chipmunk, in steps that are all alike."""
+        return self.engine == "fixed" or (self.crowd and self.engine == "pymunk")
+
     @cached_property
     def samples(self) -> Samples:
         """Every knot, and places between: what happens in between is no shorter than a piece."""
@@ -163,7 +168,7 @@ class Evidence:
         """
         if self.dt is None:
             return 0.0
-        if self.engine == "fixed" or (self.crowd and self.engine == "pymunk"):
+        if self.alike:
             return self.speed * self.dt + (PRESSED * self.machine.particle.radius)
         if self.crowd:
             return PRESSED * self.machine.particle.radius

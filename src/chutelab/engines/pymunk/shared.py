@@ -90,7 +90,7 @@ class Shared:
         span = machine.end_time - self.begin
         self.most = ceil(span / machine.dt - 1e-9)
         self.h, self.steps, self.clock = span / max(self.most, 1), 0, 0
-        self.waiting = list(range(count))
+        self.waiting = np.flatnonzero(machine.releases.t < machine.end_time).tolist()
         self.rides: dict[int, Carriage] = {}
         faces, rows = world.faces, count + len(world.faces)
         self.state, self.entries = np.zeros((2, 5, rows)), np.zeros((3, rows))
@@ -165,7 +165,8 @@ class Shared:
             if not self.inside.any():
                 # Nothing to step until the next release.
                 due = float(self.machine.releases.t[self.waiting[0]])
-                self.clock = max(self.clock, int((due - self.begin) / self.h))
+                clock = min(int((due - self.begin) / self.h), self.most - 1)
+                self.clock = max(self.clock, clock)
                 self.t = self.begin + self.clock * self.h
             self._release()
             self._step()
@@ -224,6 +225,9 @@ class Shared:
         late = self.t - t
         now = v + late * self.pull
         x += 0.5 * late * (v + now)
+        if late > 0.0:
+            # A blow in the next step begins at its start.
+            self.tracks.knot(i, self.t, x, now)
         body.position, body.velocity = x - 0.5 * self.h * now, now
         self.state[1, :, i] = *x, *now, 0.0
         self.free[i], self.calm[i] = True, 0.0

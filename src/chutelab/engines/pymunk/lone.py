@@ -19,7 +19,16 @@ import numpy as np
 import pymunk
 from pymunk import Vec2d
 
-from chutelab.engines.pymunk.world import PARTICLE, SURFACE, Carriage, Face, Tracks, World, time_out
+from chutelab.engines.pymunk.world import (
+    PARTICLE,
+    SURFACE,
+    Carriage,
+    Face,
+    Tracks,
+    World,
+    longest,
+    time_out,
+)
 from chutelab.recorder import StalledError
 from chutelab.recording import REASONS, Kind
 
@@ -286,7 +295,7 @@ class Lone:
             slow = self.tiny * (1.0 + v.length)
             if leaving:
                 if gap < -hair and t > 0.0:
-                    return _longest(lambda t: gap_at(t)[0] >= -0.5 * hair, t, last)
+                    return longest(lambda t: gap_at(t)[0] >= -0.5 * hair, t, last)
                 leaving = gap <= hair and (rate <= slow or rate * rate <= 2.0 * LOW * g * hair)
             elif gap <= self.world.rounding:
                 if rate < -slow:
@@ -388,16 +397,16 @@ class Lone:
         # What half of a step twice as long finds goes for the end of this one.
         floor = SHORT * h
         if not holds(2.0 * h):
-            h = 0.5 * _longest(holds, 2.0 * h, floor) if holds(floor) else 0.0
+            h = 0.5 * longest(holds, 2.0 * h, floor) if holds(floor) else 0.0
             if h <= floor:
                 return False
         end = trial(h)
         if not clear(end):
-            h = _longest(lambda span: clear(trial(span)), h, 0.0)
+            h = longest(lambda span: clear(trial(span)), h, 0.0)
             end = trial(h)
         if self.slipping and end.slips != self.slipping:
             # It grips, or turns back.
-            h = _longest(lambda span: trial(span).slips == self.slipping, h, floor, upper=True)
+            h = longest(lambda span: trial(span).slips == self.slipping, h, floor, upper=True)
             end = trial(h)
         if self.machine.until == "settled" and self._lies(end, h):
             surface = end.pushed[0].face.surface
@@ -548,15 +557,3 @@ class Lone:
 
 def _ignore(_face: Face, _normal: Vec2d) -> None:
     """Let nothing collide: when a flight ends is known before it is stepped."""
-
-
-def _longest(
-    test: Callable[[float], bool], high: float, low: float, *, upper: bool = False
-) -> float:
-    """Return the time (s) up to which a test that fails at `high` is passed, to a bit.
-
-    With `upper` the first one that fails it.
-    """
-    while low < (middle := 0.5 * (low + high)) < high and high - low > 1e-15 * high:
-        low, high = (middle, high) if test(middle) else (low, middle)
-    return high if upper else low

@@ -139,7 +139,8 @@ def _print(results: Sequence[Result], *, quiet: bool) -> None:
         if result.broken:
             click.echo(f"FAILED {result.case}, {where}: {result.law}: {_said(result)}")
         elif result.unpromised:
-            click.echo(f"not promised {result.case}, {where}: {result.law}: {result.unpromised}")
+            said = f"{_said(result)}; {result.unpromised}"
+            click.echo(f"not promised {result.case}, {where}: {result.law}: {said}")
 
 
 def _line(run: Run, case: str) -> Text:

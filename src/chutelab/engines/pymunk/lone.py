@@ -38,6 +38,9 @@ if TYPE_CHECKING:
     from chutelab.machine import Machine
     from chutelab.recorder import Recorder
 
+    # Of a surface and its normal: its restitution, None where it is to be passed.
+    Law = Callable[[Face, Vec2d], float | None]
+
 WEDGED = 1000
 """Iterations of Chipmunk's solver for a disk held by several surfaces, each of which takes off a
 share: a wedge of 5° needs 200. One is exact for one contact."""
@@ -90,21 +93,15 @@ ALONE = np.ones(1, dtype=bool)
 
 
 class Contact(NamedTuple):
-    """What Chipmunk did at one contact in one step; the impulse (N s) acts on the particle."""
+    """What Chipmunk did at one contact in one step.
+
+    Impulses (N s) act on the particle, `push` along the normal n, `rub` along (n_y, -n_x).
+    """
 
     face: Face
     normal: Vec2d
-    impulse: Vec2d
-
-    @property
-    def push(self) -> float:
-        """Normal impulse, N s."""
-        return float(self.impulse.dot(self.normal))
-
-    @property
-    def rub(self) -> float:
-        """Tangential impulse, N s, along (n_y, -n_x)."""
-        return float(self.impulse.cross(self.normal))
+    push: float
+    rub: float
 
 
 class Ridden(NamedTuple):
@@ -150,7 +147,7 @@ class Lone:
         world.space.on_collision(PARTICLE, SURFACE, pre_solve=self._before, post_solve=self._after)
         # Rounding tilts normals, and a speed along a surface is then one into it.
         self.tiny = max(TINY, world.rounding / self.r)
-        self.law: Callable[[Face, Vec2d], float | None] = _ignore
+        self.law: Law = _ignore
         self.contacts: list[Contact] = []
         self.on = -1
         self.slipping: int | None = None
@@ -191,13 +188,13 @@ class Lone:
             arbiter.surface_velocity = face.belt(normal) * Vec2d(normal.y, -normal.x)
 
     def _after(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
-        face = self.world.by_shape[arbiter.shapes[1]]
-        self.contacts.append(Contact(face, -arbiter.normal, arbiter.total_impulse))
+        face, normal = self.world.by_shape[arbiter.shapes[1]], -arbiter.normal
+        j = arbiter.total_impulse
+        self.contacts.append(Contact(face, normal, float(j.dot(normal)), float(j.cross(normal))))
 
     def _step(
-        self, x: Vec2d, v: Vec2d, h: float, pull: Vec2d,
-        law: Callable[[Face, Vec2d], float | None], wedged: bool = False,
-    ) -> list[Contact]:  # fmt: skip
+        self, x: Vec2d, v: Vec2d, h: float, pull: Vec2d, law: Law, wedged: bool = False
+    ) -> list[Contact]:
         """Let Chipmunk step by h (s); return the contacts that it solved."""
         body, space = self.body, self.world.space
         if h != self.last:
@@ -214,11 +211,6 @@ class Lone:
 
     # Distances
 
-    def _gap(self, face: Face, x: Vec2d) -> tuple[float, Vec2d]:
-        """Return gap (m) between disk and surface, and the normal, as Chipmunk has them."""
-        distance, normal = face.away(x)
-        return distance - self.r, normal
-
     def _on_end(self, face: Face, x: Vec2d) -> bool:
         """Tell whether the nearest point of a segment is one of its ends."""
         if face.tangent is None:
@@ -228,7 +220,7 @@ class Lone:
 
     def _touching(self) -> dict[Face, Vec2d]:
         """Return the surfaces in touch and their normals."""
-        found = ((face, *self._gap(face, self.x)) for face in self.world.faces)
+        found = ((face, *face.gap(self.x)) for face in self.world.faces)
         return {face: normal for face, gap, normal in found if gap <= 0.5 * self.world.hair}
 
     def _approached(self, touching: dict[Face, Vec2d]) -> bool:
@@ -286,7 +278,7 @@ class Lone:
             return inf
 
         def gap_at(t: float) -> tuple[float, Vec2d]:
-            return self._gap(face, self.x + t * (self.v + 0.5 * t * self.pull))
+            return face.gap(self.x + t * (self.v + 0.5 * t * self.pull))
 
         for _ in range(WINDOW):
             v = self.v + t * self.pull
@@ -324,7 +316,7 @@ class Lone:
         if self.on >= 0:
             self.tracks.knot(0, self.t, self.x, self.v, self.omega)
         struck = min(touching, key=lambda face: self.v.dot(touching[face]))
-        gap, normal = self._gap(struck, self.x)
+        gap, normal = struck.gap(self.x)
         self.x -= gap * normal
         self.blows = self.blows + 1 if self.t - self.struck < TICK else 0
         self.struck = self.t
@@ -389,7 +381,7 @@ class Lone:
         def clear(end: Ridden) -> bool:
             pushed = {c.face for c in end.pushed}
             return all(
-                self._gap(face, end.x)[0] >= -0.25 * self.world.hair
+                face.gap(end.x)[0] >= -0.25 * self.world.hair
                 for face in self.world.faces
                 if face not in pushed
             )
@@ -424,7 +416,7 @@ class Lone:
         if rims or any(face.tangent is None for face in touching):
             return room
         ends = [(self.x - end).length - self.r for face in touching for end in face.ends]
-        others = [self._gap(face, self.x)[0] for face in self.world.faces if face not in touching]
+        others = [face.gap(self.x)[0] for face in self.world.faces if face not in touching]
         return max(room, min(ends + others))
 
     def _ridden(self, h: float, touching: dict[Face, Vec2d]) -> Ridden:
@@ -435,7 +427,7 @@ class Lone:
         gives the normal impulse of the speed half-way. On a face v_n is 0.
         """
         middle = self.x + 0.5 * h * self.v
-        gap, normal = min((self._gap(face, middle) for face in touching), key=itemgetter(0))
+        gap, normal = min((face.gap(middle) for face in touching), key=itemgetter(0))
         middle -= gap * normal
         turn, wedged = 1.0, len(touching) > 1
 
@@ -452,7 +444,7 @@ class Lone:
         x = middle + 0.5 * h * v
         pushed = [c.face for c in contacts if c.push > 0.0]
         for face in pushed:
-            gap, normal = self._gap(face, x)
+            gap, normal = face.gap(x)
             x -= gap * normal
             if len(pushed) == 1 and (face.tangent is None or self._on_end(face, middle)):
                 v -= v.dot(normal) * normal

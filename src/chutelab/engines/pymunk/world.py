@@ -54,6 +54,8 @@ class Face:
     ----------
     shape : pymunk.Shape
         A segment without thickness, or the pulley's circle, on a body of its own.
+    radius : float
+        Of the particles, m.
     surface : int
         Index into `Machine.surfaces`.
     tangent : Vec2d or None
@@ -63,6 +65,7 @@ class Face:
     """
 
     shape: pymunk.Shape
+    radius: float
     surface: int
     tangent: Vec2d | None
     speed: float
@@ -74,14 +77,14 @@ class Face:
         """Both ends of a segment (m)."""
         return (self.shape.a, self.shape.b) if isinstance(self.shape, pymunk.Segment) else ()
 
-    def away(self, x: Vec2d) -> tuple[float, Vec2d]:
-        """Return the distance (m) of a point from the surface, and the normal there.
+    def gap(self, x: Vec2d) -> tuple[float, Vec2d]:
+        """Return the gap (m) between the surface and a disk round a point, and the normal there.
 
         Nearer than 1e-5 m Chipmunk has a segment's own normal for it, on either side.
         """
         found = self.shape.point_query(x)
         normal = found.gradient if self.tangent is None else (x - found.point).normalized()
-        return found.distance, normal
+        return found.distance - self.radius, normal
 
     def belt(self, normal: Vec2d) -> float:
         """Return the speed (m/s) of the surface along (n_y, -n_x) where a disk touches it.
@@ -143,7 +146,17 @@ class World:
         assert shape.body is not None
         shape.collision_type = SURFACE
         self.space.add(shape.body, shape)
-        self.faces.append(Face(shape, surface, tangent, speed, restitution, min(friction, GRIP)))
+        self.faces.append(
+            Face(
+                shape,
+                self.machine.particle.radius,
+                surface,
+                tangent,
+                speed,
+                restitution,
+                min(friction, GRIP),
+            )
+        )
 
     def disk(self) -> tuple[pymunk.Body, pymunk.Circle]:
         """Return a new body with its shape, not yet in the Space."""
@@ -200,12 +213,13 @@ class Carriage:
 
     def _clear(self, world: World, radius: float, path: float) -> float:
         """Return how much of a path (m) is clear of surfaces other than the own belt."""
+        # An end that is only touched is approached like this where the gap is rounding.
+        slow = 2.0 * self.speed * sqrt(2.0 * world.rounding / radius)
 
         def free(along: float) -> tuple[float, bool]:
             x, v = self._at(self.x + along)
-            distance, normal = face.away(x)
-            gap = distance - radius
-            return gap, gap > world.rounding or v.dot(normal) >= 0.0
+            gap, normal = face.gap(x)
+            return gap, gap > (world.rounding if v.dot(normal) < -slow else -world.hair)
 
         for face in world.faces:
             along = last = 0.0

@@ -9,7 +9,7 @@ import numpy as np
 
 from chutelab.ledger import ledger
 from chutelab.stress.barriers import overlap
-from chutelab.stress.evidence import EPS, PRESSED, ROUNDINGS, Verdict
+from chutelab.stress.evidence import EPS, ROUNDINGS, Verdict
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -78,9 +78,8 @@ def _energy_of_crowd(e: Evidence) -> Verdict:
     rise = gain - np.minimum.accumulate(gain)
     at, scale = int(np.argmax(rise)), ledger(e.recording).turned_over
     where = f"of {scale:.3g} J, at t = {times[at]:.6g} s"
-    # An overlap that is parted lifts a disk by no more than it may be pressed.
-    m = e.machine
-    lifted = e.recording.count * m.particle.mass * m.gravity * PRESSED * m.particle.radius
+    # An overlap that is parted lifts a disk by no more than it was deep.
+    lifted = e.recording.count * e.machine.particle.mass * e.machine.gravity * e.late
     allowed = _energy_bound(e) + (lifted + _thinned(e)) / scale
     return Verdict(float(rise[at]) / scale, allowed, where)
 

@@ -423,6 +423,33 @@ until = 0.55
     assert hit["velocity_after"] == pytest.approx(after, abs=1e-9)
 
 
+@pytest.mark.parametrize("align", ["true", "false"])
+def test_a_ride_along_a_surface_ends_where_it_meets_it(align):
+    # A ceiling 2 r above the belt is touched all the way; a floor goes straight on at the top.
+    recording = simulated(
+        "pymunk",
+        f"""
+[incoming]
+speed = 1.0
+pulley_radius = 0.1
+[[surface]]
+name = "ceiling"
+from = [-0.5, {0.1 + 2.0 * R + 1e-14}]
+to = [-0.3, {0.1 + 2.0 * R + 1e-14}]
+[[surface]]
+name = "floor"
+from = [-0.2, 0.1]
+to = [0.5, 0.1]
+[run]
+until = 1.2
+align = {align}
+""",
+    )
+    away = recording.select(Kind.SEPARATION, surface="incoming")[0]
+    assert away["t"] == pytest.approx(1.0, abs=1e-6)
+    assert recording.seconds < 5.0
+
+
 def in_the_way(place, end):
     """Machine with one dropped in the way of a carried one."""
     machine = build(load("stream", ["stream.count=2", "stream.rate=1.0", f"run.max_time={end}"]))

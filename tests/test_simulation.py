@@ -84,14 +84,7 @@ def test_a_disk_held_in_a_moving_corner_goes_to_contact_unless_exact_was_asked_f
         ("perpendicular", (), "pymunk"),
         ("perpendicular", (), "contact"),
         ("stream", ("stream.count=5", "run.until=1.0"), "contact"),
-        pytest.param(
-            "stream",
-            ("stream.count=5", "run.until=1.0"),
-            "pymunk",
-            marks=pytest.mark.xfail(
-                strict=False, reason="after other runs in one process a Space may differ in bits"
-            ),
-        ),
+        ("stream", ("stream.count=5", "run.until=1.0"), "pymunk"),
     ],
 )
 def test_the_same_scene_and_seed_give_the_same_bits(name, overrides, engine):

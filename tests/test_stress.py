@@ -528,6 +528,36 @@ def test_the_watchdog_leaves_no_alarm_behind():
     assert signal.getsignal(signal.SIGALRM) is before
 
 
+def test_fast_disks_in_steps_all_alike_are_promised_no_surface():
+    """Who goes farther than its radius in a step may be beyond a surface before it is seen."""
+    slow, fast = (evidence(PAIR, "pymunk", dt) for dt in (1e-3, 0.1))
+    radii = np.hypot(*fast.recording.knots["velocity"].T).max() * 0.1 / 0.02
+    assert laws.unpromised(slow, "no one through") == ""
+    assert laws.unpromised(fast, "no one through").startswith(f"up to {radii:.2g} radii in a step")
+    assert laws.unpromised(fast, "ledger closes") == ""
+    assert laws.unpromised(evidence(PAIR, "contact", 0.1), "no one through") == ""
+    assert laws.unpromised(evidence(HOP, "pymunk", 0.1), "no one through") == ""
+
+
+def test_what_is_not_promised_is_a_line_and_no_failure():
+    (line,) = one(Case("hop", "test", HOP, unpromised={"exact": "too long"}))
+    assert (line.law, line.holds, line.broken) == ("runs to its end", False, False)
+    assert (line.detail, line.unpromised) == ("not run", "too long")
+    (run,) = table.runs([line])
+    assert (run.failed, run.kept, run.laws) == ((), 0, 1)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["radius-1e-0?", "radius-*-drop", "restitution-0-box", "belt--2*", "end-dead-on", "mirror-*",
+     "corner-vee-sharp", "bounces-10000", "late-*", "restitution-0-swarm"],
+)  # fmt: skip
+def test_pymunk_keeps_the_laws_that_it_promises(name):
+    found = [r for _, r in stress.results(stress.chosen([name]), ["pymunk"])]
+    assert found
+    assert [(r.case, r.law, r.figure, r.bound) for r in found if r.broken] == []
+
+
 # The cases
 
 
@@ -662,6 +692,16 @@ def test_a_broken_law_is_told_and_is_exit_code_1(tmp_path):
 def test_quiet_prints_only_what_fails():
     shown = call("--engine", "exact", "--case", "mass-1", "-q").stdout
     assert re.fullmatch(r"1 case, \d+ figures: all laws kept\n", shown)
+
+
+def test_what_is_not_promised_is_told_with_its_reason():
+    arguments = ["--engine", "pymunk", "--case", "plate-200-volley", "--case", "flight-1e6", "-q"]
+    shown = call(*arguments).stdout
+    assert "not promised flight-1e6, pymunk: runs to its end: not run; a flight is step" in shown
+    assert re.search(r"not promised plate-200-volley, pymunk at dt = 0.001 s: no one th.*40", shown)
+    assert re.search(r"\n2 cases, \d+ figures: all laws kept, 3 not promised\n$", shown)
+    told = json.loads(call(*arguments, "--json").stdout)
+    assert (told["failed"], told["unpromised"]) == (0, 3)
 
 
 def test_the_list_names_cases_and_runs_nothing(monkeypatch):

@@ -100,13 +100,15 @@ def stress(
     if out is not None:
         with writing(f"--out {out}"):
             write(found, out)
-    failed = sum(not result.holds for result in found)
+    failed = sum(result.broken for result in found)
+    unpromised = sum(bool(result.unpromised) for result in found)
     if as_json:
         shown = {"format": 1, "results": [plain(result) for result in found]}
-        console.show_json({**shown, "failed": failed})
+        console.show_json({**shown, "failed": failed, "unpromised": unpromised})
     else:
         _print(found, quiet=quiet)
         broken = f"{failed} broken" if failed else "all laws kept"
+        broken += f", {unpromised} not promised" if unpromised else ""
         ran = len({result.case for result in found})
         click.echo(f"{ran} case{'s' if ran > 1 else ''}, {len(found)} figures: {broken}")
     if failed:
@@ -133,9 +135,12 @@ def _print(results: Sequence[Result], *, quiet: bool) -> None:
         head = HEAD.format("case", "engine", "dt, s", "kept", "figure", "bound", "nearest law")
         console.show(Text(head, style="dim"), *lines, Text())
     for result in results:
-        if not result.holds:
-            where = f"{result.engine} at dt = {result.dt:.4g} s" if result.dt else result.engine
+        where = f"{result.engine} at dt = {result.dt:.4g} s" if result.dt else result.engine
+        if result.broken:
             click.echo(f"FAILED {result.case}, {where}: {result.law}: {_said(result)}")
+        elif result.unpromised:
+            said = f"{_said(result)}; {result.unpromised}"
+            click.echo(f"not promised {result.case}, {where}: {result.law}: {said}")
 
 
 def _line(run: Run, case: str) -> Text:
@@ -146,7 +151,7 @@ def _line(run: Run, case: str) -> Text:
         case,
         worst.engine,
         "-" if worst.dt is None else f"{worst.dt:.2g}",
-        f"{run.laws - len(run.failed)}/{run.laws}",
+        f"{run.kept}/{run.laws}",
         _number(worst.figure),
         _number(worst.bound),
         worst.law,

@@ -131,8 +131,9 @@ def overlap(e: Evidence) -> Verdict | None:
 def pressed(e: Evidence) -> Verdict | None:
     """No two disks stay in each other for longer than a step; the figure is a share of the radius.
 
-    It is the least overlap of a pair at two instants a step apart. Chipmunk, which sees a crowd's
-    contacts late, parts them over several steps: there it may be what two make in a step.
+    It is the least overlap of a pair at two instants a step apart. Chipmunk parts what it finds
+    over several steps, a fifth in a millisecond, so it promises nothing on how long: there the
+    bound is that of `overlap`.
     """
     if not e.crowd or e.dt is None:
         return None

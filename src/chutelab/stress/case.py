@@ -109,6 +109,8 @@ class Case:
         Engines that must refuse the scene, and the key that they have to name.
     may_refuse : mapping of str to str
         Engines that may do so instead of keeping the laws.
+    unpromised : mapping of str to str
+        Engines that do not promise to keep the laws here, and why: they are not run.
     ends : tuple of str
         How particles may end, empty: in any way.
     inside : tuple of float or None
@@ -131,6 +133,7 @@ class Case:
     formula: Callable[[Evidence], Verdict | None] | None = None
     refusals: Mapping[str, str] = field(default_factory=dict)
     may_refuse: Mapping[str, str] = field(default_factory=dict)
+    unpromised: Mapping[str, str] = field(default_factory=dict)
     ends: tuple[str, ...] = ()
     inside: tuple[float, float, float, float] | None = None
     at_rest: bool = False

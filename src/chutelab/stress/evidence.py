@@ -22,7 +22,10 @@ EPS = float(np.finfo(np.float64).eps)
 
 PRESSED = 0.05
 """Share of the radius by which disks of a crowd may be pressed into each other or into a surface:
-what the engines promise. A solver that iterates leaves some."""
+what the contact engine promises. A solver that iterates leaves some."""
+
+SLOP = 1e-3
+"""The same that Chipmunk is told to leave alone."""
 
 ROUNDINGS = 500.0
 """Roundings that one number may have gone through between two contacts: some ten operations, each
@@ -88,6 +91,11 @@ class Evidence:
     def crowd(self) -> bool:
         """Whether particles meet each other."""
         return self.machine.interact
+
+    @property
+    def alike(self) -> bool:
+        """Whether all is left to Chipmunk, in steps that are all alike."""
+        return self.engine == "fixed" or (self.crowd and self.engine == "pymunk")
 
     @cached_property
     def samples(self) -> Samples:
@@ -155,16 +163,17 @@ class Evidence:
     def late(self) -> float:
         """How far beyond a surface a step may take a disk, m; 0 for the exact engine.
 
-        Where steps are all alike a contact is seen up to a step late, so by the way of a step. A
+        Where steps are all alike a contact is seen up to a step late, so by the way of a step, and
+        Chipmunk leaves its slop. A
         lone particle's blows are found at their own instants; where it stays in contact a step goes
         straight on, off by less than a dt². On a straight surface a is the weight, on a rim it is
-        v²/ρ besides, which is no more than g where it does not lift off. In a crowd disks are
-        pressed, by what `PRESSED` says.
+        v²/ρ besides, which is no more than g where it does not lift off. In a crowd of the contact
+        engine disks are pressed, by what `PRESSED` says.
         """
         if self.dt is None:
             return 0.0
-        if self.engine == "fixed" or (self.crowd and self.engine == "pymunk"):
-            return self.speed * self.dt + (PRESSED * self.machine.particle.radius)
+        if self.alike:
+            return self.speed * self.dt + SLOP * self.machine.particle.radius
         if self.crowd:
             return PRESSED * self.machine.particle.radius
         return 2.0 * self.machine.gravity * self.dt**2

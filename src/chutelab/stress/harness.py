@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import TYPE_CHECKING
 
@@ -12,7 +12,7 @@ from chutelab.simulation import simulate
 from chutelab.stress.case import ENGINES, by_name, scene_of
 from chutelab.stress.demands import demands, order, symmetric
 from chutelab.stress.evidence import Evidence, Verdict
-from chutelab.stress.laws import LAWS
+from chutelab.stress.laws import LAWS, unpromised
 from chutelab.stress.watchdog import bounded
 
 if TYPE_CHECKING:
@@ -48,6 +48,8 @@ class Result:
         Unit, and where the worst was; what was said instead.
     seconds : float
         Wall time of the run that was judged, s.
+    unpromised : str
+        Why the engine does not promise to keep this law here, empty if it does.
     """
 
     case: str
@@ -61,6 +63,12 @@ class Result:
     holds: bool
     detail: str
     seconds: float
+    unpromised: str = ""
+
+    @property
+    def broken(self) -> bool:
+        """Whether a promised law is not kept."""
+        return not self.holds and not self.unpromised
 
 
 def results(
@@ -73,6 +81,9 @@ def results(
     for number, case in enumerate(cases):
         for engine in case.engines:
             if engine not in engines:
+                continue
+            if engine in case.unpromised:
+                yield number, _Run(case, engine, None).left_out()
                 continue
             if case.ladder is not None:
                 yield number, _Run(case, engine, None).climb()
@@ -102,9 +113,9 @@ class _Run:
             return
         for name, law in LAWS.items():
             if (verdict := law(evidence)) is not None:
-                yield self.judged(name, verdict)
+                yield self.judged(name, verdict, unpromised(evidence, name))
         for name, verdict in demands(self.case, evidence).items():
-            yield self.judged(name, verdict)
+            yield self.judged(name, verdict, unpromised(evidence, name))
         if self.case.twin is not None:
             try:
                 other = self.evidence(self.case.twin.tables)
@@ -136,10 +147,16 @@ class _Run:
             recording = simulate(scene, by_name(self.engine), progress)
         return Evidence(build(scene), recording, self.engine, self.dt)
 
-    def judged(self, law: str, verdict: Verdict) -> Result:
-        return self._result(
+    def left_out(self) -> Result:
+        """Say why the case is not run."""
+        result = self.failed(RUNS, "not run")
+        return replace(result, unpromised=self.case.unpromised[self.engine])
+
+    def judged(self, law: str, verdict: Verdict, unpromised: str = "") -> Result:
+        result = self._result(
             law, verdict.holds, verdict.detail, verdict.figure, verdict.bound, verdict.least
         )
+        return result if result.holds else replace(result, unpromised=unpromised)
 
     def raised(self, error: Exception, expected: str) -> Result:
         said = " ".join(str(error).split())

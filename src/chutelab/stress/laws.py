@@ -74,6 +74,29 @@ def lasting(e: Evidence) -> Verdict:
     return Verdict(float(short.max(initial=0.0)), ROUNDINGS * EPS * end, "s")
 
 
+UNSEEN = (
+    "no one through", "no one through another", "nobody leaves", "nobody sinks", "lies still",
+)  # fmt: skip
+"""What is lost once a disk is on the wrong side of another or of a surface."""
+
+
+def unpromised(e: Evidence, law: str) -> str:
+    """Return why an engine does not promise a law in this run, empty if it does.
+
+    Where steps are all alike Chipmunk looks for contacts at their ends only. A disk that goes
+    farther than its radius in one may have its centre on the other side then, to which it is
+    pushed.
+    """
+    velocity, r = e.recording.knots["velocity"], e.machine.particle.radius
+    if law not in UNSEEN or not e.alike or not len(velocity):
+        return ""
+    assert e.dt is not None
+    radii = float(np.hypot(*velocity.T).max()) * e.dt / r
+    if radii <= 1.0:
+        return ""
+    return f"up to {radii:.2g} radii in a step, and contacts are looked for at its end only"
+
+
 LAWS: dict[str, Law] = {
     "finite numbers": finite,
     "time goes forward": ordered,

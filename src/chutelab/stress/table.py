@@ -25,12 +25,15 @@ class Run:
         The law that comes nearest to its bound, or goes furthest beyond it.
     failed : tuple of Result
         The laws that are broken.
+    kept : int
+        How many are kept.
     laws : int
         How many it was judged by.
     """
 
     worst: Result
     failed: tuple[Result, ...]
+    kept: int
     laws: int
 
 
@@ -48,8 +51,9 @@ def runs(results: Iterable[Result]) -> Iterator[Run]:
     """Gather the results of each run, which follow each other."""
     for _, group in groupby(results, key=lambda r: (r.case, r.engine, r.dt)):
         laws = list(group)
-        failed = tuple(law for law in laws if not law.holds)
-        yield Run(max(failed or laws, key=exhausted), failed, len(laws))
+        failed = tuple(law for law in laws if law.broken)
+        kept = [law for law in laws if law.holds]
+        yield Run(max(failed or kept or laws, key=exhausted), failed, len(kept), len(laws))
 
 
 def plain(result: Result) -> dict[str, Any]:

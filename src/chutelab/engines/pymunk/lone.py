@@ -19,18 +19,31 @@ import numpy as np
 import pymunk
 from pymunk import Vec2d
 
-from chutelab.engines.pymunk.world import PARTICLE, SURFACE, Carriage, Face, Tracks, World, time_out
+from chutelab.engines.pymunk.world import (
+    PARTICLE,
+    SURFACE,
+    Carriage,
+    Face,
+    Tracks,
+    World,
+    longest,
+    time_out,
+)
 from chutelab.recorder import StalledError
 from chutelab.recording import REASONS, Kind
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Collection
 
     from chutelab.machine import Machine
     from chutelab.recorder import Recorder
 
-ITERATIONS = 60
-"""Of Chipmunk's solver; one is exact for one contact, a disk in a wedge needs more."""
+    # Of a surface and its normal: its restitution, None where it is to be passed.
+    Law = Callable[[Face, Vec2d], float | None]
+
+WEDGED = 1000
+"""Iterations of Chipmunk's solver for a disk held by several surfaces, each of which takes off a
+share: a wedge of 5° needs 200. One is exact for one contact."""
 
 INSTANT = 1e-30
 """s; the step that resolves a blow: nothing moves in it."""
@@ -46,10 +59,13 @@ LATE, HOP = 1e-3, 1e-6
 one less than the second."""
 
 STRIDE = 0.5
-"""Share of the radius that a lasting contact moves on in a step, at most: it meets every end."""
+"""Share of the radius that a step of a lasting contact may always be long: it meets every end."""
 
 STILL = 1e-6
 """Share of a free fall's gain; a step that changes the velocity by less changes nothing."""
+
+LEVERS = 2.0
+"""Share of hair over radius by which levers, and with them the speed of a rim, may be off."""
 
 SLACK = 1e-9
 """Share of the friction limit below which a contact is held to grip."""
@@ -77,21 +93,15 @@ ALONE = np.ones(1, dtype=bool)
 
 
 class Contact(NamedTuple):
-    """What Chipmunk did at one contact in one step; the impulse (N s) acts on the particle."""
+    """What Chipmunk did at one contact in one step.
+
+    Impulses (N s) act on the particle, `push` along the normal n, `rub` along (n_y, -n_x).
+    """
 
     face: Face
     normal: Vec2d
-    impulse: Vec2d
-
-    @property
-    def push(self) -> float:
-        """Normal impulse, N s."""
-        return float(self.impulse.dot(self.normal))
-
-    @property
-    def rub(self) -> float:
-        """Tangential impulse, N s, along (n_y, -n_x)."""
-        return float(self.impulse.cross(self.normal))
+    push: float
+    rub: float
 
 
 class Ridden(NamedTuple):
@@ -134,9 +144,10 @@ class Lone:
         self.omega = 0.0
         self.body, self.circle = world.disk()
         world.space.add(self.body, self.circle)
-        world.space.iterations = ITERATIONS
         world.space.on_collision(PARTICLE, SURFACE, pre_solve=self._before, post_solve=self._after)
-        self.law: Callable[[Face, Vec2d], float | None] = _ignore
+        # Rounding tilts normals, and a speed along a surface is then one into it.
+        self.tiny = max(TINY, world.rounding / self.r)
+        self.law: Law = _ignore
         self.contacts: list[Contact] = []
         self.on = -1
         self.slipping: int | None = None
@@ -177,11 +188,12 @@ class Lone:
             arbiter.surface_velocity = face.belt(normal) * Vec2d(normal.y, -normal.x)
 
     def _after(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
-        face = self.world.by_shape[arbiter.shapes[1]]
-        self.contacts.append(Contact(face, -arbiter.normal, arbiter.total_impulse))
+        face, normal = self.world.by_shape[arbiter.shapes[1]], -arbiter.normal
+        j = arbiter.total_impulse
+        self.contacts.append(Contact(face, normal, float(j.dot(normal)), float(j.cross(normal))))
 
     def _step(
-        self, x: Vec2d, v: Vec2d, h: float, pull: Vec2d, law: Callable[[Face, Vec2d], float | None]
+        self, x: Vec2d, v: Vec2d, h: float, pull: Vec2d, law: Law, wedged: bool = False
     ) -> list[Contact]:
         """Let Chipmunk step by h (s); return the contacts that it solved."""
         body, space = self.body, self.world.space
@@ -192,16 +204,12 @@ class Lone:
             self.last = h
         body.position, body.velocity, body.angular_velocity = x, v, self.omega
         self.law, space.gravity, self.contacts = law, pull, []
+        space.iterations = WEDGED if wedged else 1
         space.step(h)
         self.steps += 1
         return self.contacts
 
     # Distances
-
-    def _gap(self, face: Face, x: Vec2d) -> tuple[float, Vec2d]:
-        """Return gap (m) between disk and surface, and the normal, as Chipmunk has them."""
-        found = face.shape.point_query(x)
-        return found.distance - self.r, found.gradient
 
     def _on_end(self, face: Face, x: Vec2d) -> bool:
         """Tell whether the nearest point of a segment is one of its ends."""
@@ -212,12 +220,12 @@ class Lone:
 
     def _touching(self) -> dict[Face, Vec2d]:
         """Return the surfaces in touch and their normals."""
-        found = ((face, *self._gap(face, self.x)) for face in self.world.faces)
+        found = ((face, *face.gap(self.x)) for face in self.world.faces)
         return {face: normal for face, gap, normal in found if gap <= 0.5 * self.world.hair}
 
     def _approached(self, touching: dict[Face, Vec2d]) -> bool:
         """Tell whether the particle moves into a surface in touch."""
-        slow = (TINY if self.on < 0 else SEAM) * (1.0 + self.v.length)
+        slow = (self.tiny if self.on < 0 else max(SEAM, self.tiny)) * (1.0 + self.v.length)
         return any(self.v.dot(normal) < -slow for normal in touching.values())
 
     # Flight
@@ -261,24 +269,26 @@ class Lone:
         so from where gap and rate of change are known it stays above gap + rate τ - g τ²/2.
         Stepping from root to root of that bound never passes a contact, and converges like Newton's
         method.
-        A surface that the flight has just left along its tangent gives no bound; it is looked at
-        after times that grow by half.
+        A surface that the flight is leaving along its tangent gives no bound; it is looked at after
+        times that grow by half.
         """
         t = last = 0.0
         g, hair = self.g, self.world.hair
+        if g == 0.0 and self.v.length == 0.0:
+            return inf
 
         def gap_at(t: float) -> tuple[float, Vec2d]:
-            return self._gap(face, self.x + t * (self.v + 0.5 * t * self.pull))
+            return face.gap(self.x + t * (self.v + 0.5 * t * self.pull))
 
         for _ in range(WINDOW):
             v = self.v + t * self.pull
             gap, normal = gap_at(t)
             rate = v.dot(normal)
-            slow = TINY * (1.0 + v.length)
+            slow = self.tiny * (1.0 + v.length)
             if leaving:
                 if gap < -hair and t > 0.0:
-                    return _longest(lambda t: gap_at(t)[0] >= -0.5 * hair, t, last)
-                leaving = gap <= hair or rate > 0.0
+                    return longest(lambda t: gap_at(t)[0] >= -0.5 * hair, t, last)
+                leaving = gap <= hair and (rate <= slow or rate * rate <= 2.0 * LOW * g * hair)
             elif gap <= self.world.rounding:
                 if rate < -slow:
                     return t
@@ -293,9 +303,9 @@ class Lone:
                 tau = max(tau, min(0.5 * t + FIRST * self.dt, self.r / (v.length + g * self.dt)))
             if t + tau == t:
                 return t
-            last, t = t, t + tau
-            if t >= span:
+            if t == span:
                 return inf
+            last, t = t, min(t + tau, span)
         raise self._stalled("it slides past a surface without touching it; lower run.max_time")
 
     # Blows
@@ -303,8 +313,10 @@ class Lone:
     def _blow(self, touching: dict[Face, Vec2d]) -> None:
         """Let Chipmunk resolve the blow from the surface that the particle moves into fastest."""
         before = self.v, self.omega
+        if self.on >= 0:
+            self.tracks.knot(0, self.t, self.x, self.v, self.omega)
         struck = min(touching, key=lambda face: self.v.dot(touching[face]))
-        gap, normal = self._gap(struck, self.x)
+        gap, normal = struck.gap(self.x)
         self.x -= gap * normal
         self.blows = self.blows + 1 if self.t - self.struck < TICK else 0
         self.struck = self.t
@@ -313,7 +325,7 @@ class Lone:
         def law(face: Face, normal: Vec2d) -> float | None:
             return self._restitution(face, normal) if together or face is struck else None
 
-        contacts = self._step(self.x, self.v, INSTANT, Vec2d(0, 0), law)
+        contacts = self._step(self.x, self.v, INSTANT, Vec2d(0, 0), law, together)
         self.v, self.omega = self.body.velocity, self.body.angular_velocity
         for contact in contacts:
             if contact.push > 0.0:
@@ -336,7 +348,7 @@ class Lone:
         """Return ε, or 0 where the bounces that would follow are over within a step."""
         approach, weight = -self.v.dot(normal), -self.pull.dot(normal)
         e = face.restitution
-        if approach <= TINY * (1.0 + self.v.length):
+        if approach <= self.tiny * (1.0 + self.v.length):
             return 0.0
         if weight > 0.0:
             hop = 2.0 * e * approach / weight
@@ -354,9 +366,8 @@ class Lone:
             return False
         h = min(self.dt, self.machine.end_time - self.t)
         speed = self.v.length + self.g * self.dt
-        h = min(h, STRIDE * self.r / speed) if speed > 0.0 else h
-
         rims = {face for face in touching if self._on_end(face, self.x)}
+        h = min(h, self._room(touching, rims) / speed) if speed > 0.0 else h
 
         def trial(span: float) -> Ridden:
             return self._ridden(span, touching)
@@ -370,7 +381,7 @@ class Lone:
         def clear(end: Ridden) -> bool:
             pushed = {c.face for c in end.pushed}
             return all(
-                self._gap(face, end.x)[0] >= -0.25 * self.world.hair
+                face.gap(end.x)[0] >= -0.25 * self.world.hair
                 for face in self.world.faces
                 if face not in pushed
             )
@@ -378,16 +389,16 @@ class Lone:
         # What half of a step twice as long finds goes for the end of this one.
         floor = SHORT * h
         if not holds(2.0 * h):
-            h = 0.5 * _longest(holds, 2.0 * h, floor) if holds(floor) else 0.0
+            h = 0.5 * longest(holds, 2.0 * h, floor) if holds(floor) else 0.0
             if h <= floor:
                 return False
         end = trial(h)
         if not clear(end):
-            h = _longest(lambda span: clear(trial(span)), h, 0.0)
+            h = longest(lambda span: clear(trial(span)), h, 0.0)
             end = trial(h)
         if self.slipping and end.slips != self.slipping:
             # It grips, or turns back.
-            h = _longest(lambda span: trial(span).slips == self.slipping, h, floor, upper=True)
+            h = longest(lambda span: trial(span).slips == self.slipping, h, floor, upper=True)
             end = trial(h)
         if self.machine.until == "settled" and self._lies(end, h):
             surface = end.pushed[0].face.surface
@@ -399,6 +410,15 @@ class Lone:
             self._accept(end, h)
         return True
 
+    def _room(self, touching: Collection[Face], rims: Collection[Face]) -> float:
+        """Return the way (m) of a step on which it meets every end and every other surface."""
+        room = STRIDE * self.r
+        if rims or any(face.tangent is None for face in touching):
+            return room
+        ends = [(self.x - end).length - self.r for face in touching for end in face.ends]
+        others = [face.gap(self.x)[0] for face in self.world.faces if face not in touching]
+        return max(room, min(ends + others))
+
     def _ridden(self, h: float, touching: dict[Face, Vec2d]) -> Ridden:
         """Return where a step in contact leads, without taking it.
 
@@ -407,24 +427,24 @@ class Lone:
         gives the normal impulse of the speed half-way. On a face v_n is 0.
         """
         middle = self.x + 0.5 * h * self.v
-        gap, normal = min((self._gap(face, middle) for face in touching), key=itemgetter(0))
+        gap, normal = min((face.gap(middle) for face in touching), key=itemgetter(0))
         middle -= gap * normal
-        turn = 1.0
+        turn, wedged = 1.0, len(touching) > 1
 
         def law(face: Face, normal: Vec2d) -> float | None:
             if face not in touching:
                 return None
             return turn if self.v.dot(normal) > 0.0 else 0.0
 
-        contacts = self._step(middle - h * self.v, self.v, h, self.pull, law)
+        contacts = self._step(middle - h * self.v, self.v, h, self.pull, law, wedged)
         if self.v.dot(normal) > SEAM * self.v.length:
             turn = self.body.velocity.dot(self.body.velocity) / self.v.dot(self.v)
-            contacts = self._step(middle - h * self.v, self.v, h, self.pull, law)
+            contacts = self._step(middle - h * self.v, self.v, h, self.pull, law, wedged)
         v, omega = self.body.velocity, self.body.angular_velocity
         x = middle + 0.5 * h * v
         pushed = [c.face for c in contacts if c.push > 0.0]
         for face in pushed:
-            gap, normal = self._gap(face, x)
+            gap, normal = face.gap(x)
             x -= gap * normal
             if len(pushed) == 1 and (face.tangent is None or self._on_end(face, middle)):
                 v -= v.dot(normal) * normal
@@ -457,7 +477,8 @@ class Lone:
 
         In a wedge friction may be used up where nothing slips: it is the motion that counts.
         """
-        still = STILL * self.g * h
+        rim = max(self.v.length, self.r * abs(self.omega))
+        still = STILL * self.g * h + LEVERS * self.world.hair / self.r * rim
         return (
             bool(end.pushed)
             and (end.v - self.v).length <= still
@@ -528,15 +549,3 @@ class Lone:
 
 def _ignore(_face: Face, _normal: Vec2d) -> None:
     """Let nothing collide: when a flight ends is known before it is stepped."""
-
-
-def _longest(
-    test: Callable[[float], bool], high: float, low: float, *, upper: bool = False
-) -> float:
-    """Return the time (s) up to which a test that fails at `high` is passed, to a bit.
-
-    With `upper` the first one that fails it.
-    """
-    while low < (middle := 0.5 * (low + high)) < high and high - low > 1e-15 * high:
-        low, high = (middle, high) if test(middle) else (low, middle)
-    return high if upper else low

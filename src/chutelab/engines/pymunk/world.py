@@ -13,6 +13,8 @@ from pymunk import Vec2d
 from chutelab.recording import KNOT
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import ArrayLike, NDArray
 
     from chutelab.machine import Machine
@@ -36,6 +38,10 @@ DIGITS = 16.0 * float(np.finfo(float).eps)
 ROUGH = 1e-4
 """Share of the radius by which a track may be off between two knots."""
 
+GRAZE = 0.01
+"""Share of the radius between looks at a surface beside a ride; it misses what is met over less,
+which is 1e-5 of the radius deep."""
+
 ARC = 0.025
 """rad between knots round the pulley: ρ Δφ⁴/384, the curve's error, is 1e-9 of the radius."""
 
@@ -48,6 +54,8 @@ class Face:
     ----------
     shape : pymunk.Shape
         A segment without thickness, or the pulley's circle, on a body of its own.
+    radius : float
+        Of the particles, m.
     surface : int
         Index into `Machine.surfaces`.
     tangent : Vec2d or None
@@ -57,6 +65,7 @@ class Face:
     """
 
     shape: pymunk.Shape
+    radius: float
     surface: int
     tangent: Vec2d | None
     speed: float
@@ -67,6 +76,15 @@ class Face:
     def ends(self) -> tuple[Vec2d, ...]:
         """Both ends of a segment (m)."""
         return (self.shape.a, self.shape.b) if isinstance(self.shape, pymunk.Segment) else ()
+
+    def gap(self, x: Vec2d) -> tuple[float, Vec2d]:
+        """Return the gap (m) between the surface and a disk round a point, and the normal there.
+
+        Nearer than 1e-5 m Chipmunk has a segment's own normal for it, on either side.
+        """
+        found = self.shape.point_query(x)
+        normal = found.gradient if self.tangent is None else (x - found.point).normalized()
+        return found.distance - self.radius, normal
 
     def belt(self, normal: Vec2d) -> float:
         """Return the speed (m/s) of the surface along (n_y, -n_x) where a disk touches it.
@@ -128,7 +146,17 @@ class World:
         assert shape.body is not None
         shape.collision_type = SURFACE
         self.space.add(shape.body, shape)
-        self.faces.append(Face(shape, surface, tangent, speed, restitution, min(friction, GRIP)))
+        self.faces.append(
+            Face(
+                shape,
+                self.machine.particle.radius,
+                surface,
+                tangent,
+                speed,
+                restitution,
+                min(friction, GRIP),
+            )
+        )
 
     def disk(self) -> tuple[pymunk.Body, pymunk.Circle]:
         """Return a new body with its shape, not yet in the Space."""
@@ -185,15 +213,21 @@ class Carriage:
 
     def _clear(self, world: World, radius: float, path: float) -> float:
         """Return how much of a path (m) is clear of surfaces other than the own belt."""
+        # An end that is only touched is approached like this where the gap is rounding.
+        slow = 2.0 * self.speed * sqrt(2.0 * world.rounding / radius)
+
+        def free(along: float) -> tuple[float, bool]:
+            x, v = self._at(self.x + along)
+            gap, normal = face.gap(x)
+            return gap, gap > (world.rounding if v.dot(normal) < -slow else -world.hair)
+
         for face in world.faces:
-            along = 0.0
+            along = last = 0.0
             while face.surface != self.surface and along < path:
-                x, v = self._at(self.x + along)
-                found = face.shape.point_query(x)
-                gap = found.distance - radius
-                if gap <= world.rounding and v.dot(found.gradient) < 0.0:
-                    path = along
-                along += max(gap, world.rounding)
+                gap, clear = free(along)
+                if not clear:
+                    path = longest(lambda way: free(way)[1], along, last, upper=True)
+                last, along = along, along + max(gap, GRAZE * radius)
         return path
 
     def write(self, recorder: Recorder, end: float) -> None:
@@ -266,3 +300,15 @@ def time_out(machine: Machine, x: Vec2d, v: Vec2d) -> float:
         if speed != 0.0:
             out = min(out, max(((high if speed > 0.0 else low) - place) / speed, 0.0))
     return out
+
+
+def longest(
+    test: Callable[[float], bool], high: float, low: float, *, upper: bool = False
+) -> float:
+    """Return the value up to which a test that fails at `high` is passed, to a bit.
+
+    With `upper` the first one that fails it.
+    """
+    while low < (middle := 0.5 * (low + high)) < high and high - low > 1e-15 * high:
+        low, high = (middle, high) if test(middle) else (low, middle)
+    return high if upper else low

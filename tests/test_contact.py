@@ -162,7 +162,7 @@ PULLEYS = [
 R = 0.02
 """m; of the disks that ride."""
 
-STEPS = (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4)
+STEPS = (4e-3, 1e-3, 2.5e-4)
 WITHIN = 1e-4
 """m; of positions at dt = 1e-3 s."""
 
@@ -212,6 +212,70 @@ def test_slides_and_rolls_as_the_closed_form_says(options):
     for dt in STEPS:
         error = max(sliding(options, share * dt) for share in PHASES)
         assert error < dt**2, (dt, error)
+
+
+WITHIN_A_STEP = np.linspace(0.7, 1.0, 25)
+"""Shares of a step, so that phases end everywhere within one."""
+
+
+@pytest.mark.xfail(reason="core: may be held a step too long, or told to leave a step early")
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_over_the_end_of_a_face_in_second_order(friction):
+    # A disk that rolls over an edge at v² > g r leaves it at once: y - r = -g t²/2 from there on.
+    r, v, edge = 0.02, 1.0, 0.3
+    machine = scene_of(
+        particle={"radius": r, "spin": True},
+        surface=[{"name": "floor", "from": [-1.0, 0.0], "to": [edge, 0.0], "friction": friction,
+                  "restitution": 0.0}],
+        stream={"at": [0.0, r], "velocity": [v, 0.0]},
+        run={"until": 0.8},
+    )  # fmt: skip
+    # Without friction it slides on, else it slips until it rolls, at 2 v/3 after v/(3 µ g).
+    slip = v / (3.0 * friction * G) if friction else 0.0
+    way = v * slip - 0.5 * friction * G * slip**2
+    speed = 2.0 / 3.0 * v if friction else v
+    leaves = slip + (edge - way) / speed
+    for share in WITHIN_A_STEP:
+        dt = share * 1e-3
+        left = run(replace(machine, dt=dt))
+        told = left.select(Kind.SEPARATION)["t"]
+        assert abs(told - leaves).max() < 0.1 * dt
+        fall = left.at([0.79])[0][0, 0, 1] - r
+        assert abs(fall + 0.5 * G * (0.79 - leaves) ** 2) < 20.0 * dt**2, dt
+
+
+@pytest.mark.xfail(reason="core: of first order with endless friction")
+def test_carried_by_endless_friction_after_a_blow_it_leaves_where_gravity_takes_it():
+    # It drops on the pulley, has the belt's speed from there on, and leaves at cos φ = v²/(g ρ).
+    r, wheel, v = 0.02, 0.3, 1.0
+    machine = scene_of(
+        particle={"radius": r, "spin": False},
+        incoming={"speed": v, "pulley_radius": wheel},
+        stream={"at": [0.03, wheel + 0.2], "velocity": [0.5, 0.0]},
+        run={"until": 0.6},
+    )
+    rho = wheel + r
+    for share in WITHIN_A_STEP:
+        dt = share * 1e-3
+        recording = run(replace(machine, dt=dt))
+        met, left = (recording.select(kind) for kind in (Kind.IMPACT, Kind.SEPARATION))
+        from_, to = np.arctan2(*met["position"][0]), np.arccos(v**2 / (G * rho))
+        assert left["t"][-1] == pytest.approx(met["t"][0] + rho * (to - from_) / v, abs=0.1 * dt)
+
+
+@pytest.mark.xfail(reason="core: it is that in the middle of a hop, off by up to g dt/2")
+def test_a_separation_tells_the_velocity_without_the_hop():
+    # A belt at v² > g ρ throws at the end of its level part.
+    machine = scene_of(
+        particle={"radius": R, "spin": False},
+        incoming={"speed": 2.5, "pulley_radius": WHEEL, "friction": 0.5},
+        stream={"at": [-0.3, WHEEL + R], "velocity": [2.5, 0.0]},
+        run={"until": 0.4},
+    )
+    for share in WITHIN_A_STEP:
+        dt = share * 1e-3
+        left = run(replace(machine, dt=dt)).select(Kind.SEPARATION)[0]
+        assert abs(left["velocity_after"][1]) < 100.0 * dt**2, dt
 
 
 # A heap
@@ -314,7 +378,7 @@ def check_crowd(seed, count=None):
     assert not faults(machine, recording)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_small_crowds_obey_the_laws(seed):
     check_crowd(seed, 60)
 

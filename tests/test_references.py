@@ -50,9 +50,10 @@ def own_impacts(recording, particle):
     return events[events["particle"] == particle]
 
 
-def test_lone_disks_meet_what_they_meet_in_the_exact_engine():
+@pytest.mark.parametrize("count", [40, pytest.param(150, marks=pytest.mark.slow)])
+def test_lone_disks_meet_what_they_meet_in_the_exact_engine(count):
     compared = 0
-    for seed in range(150):
+    for seed in range(count):
         built = build(draw(seed, points=False))
         if built.gravity == 0.0:
             continue  # it may graze the belt on its way back
@@ -71,7 +72,7 @@ def test_lone_disks_meet_what_they_meet_in_the_exact_engine():
         assert [recording.surfaces[s] for s in met["surface"]] == [i.partner for i in found.of[0]]
         np.testing.assert_allclose([i.t for i in found.of[0]], met["t"], rtol=1e-12, atol=1e-13)
         compared += len(met)
-    assert compared > 50, compared
+    assert compared > count / 3, compared
 
 
 def test_likeness_counts_what_is_alike_and_names_what_is_not():
@@ -112,9 +113,10 @@ def test_a_pair_meets_when_and_as_fast_as_written_here():
     assert (found[0][0].partner, found[1][0].partner) == (1, 0)
 
 
-def test_a_gas_presses_on_its_walls_as_the_virial_theorem_says():
+@pytest.mark.parametrize("end", [1.5, pytest.param(8.0, marks=pytest.mark.slow)])
+def test_a_gas_presses_on_its_walls_as_the_virial_theorem_says(end):
     # d/dt Σ m x·v = 2 K + Σ σ J (pairs) - (walls) ½ a J, with x from the middle and a = side - 2 r.
-    count, side, r, end = 64, 1.0, 0.02, 8.0
+    count, side, r = 64, 1.0, 0.02
     built = box(count, 1, side)
     found = first_impacts(built, end).of
     mass = built.particle.mass
@@ -122,14 +124,14 @@ def test_a_gas_presses_on_its_walls_as_the_virial_theorem_says():
     every = [one for own in found for one in own]
     pairs = mass * np.array([one.approach for one in every if one.partner != "box"]) / 2.0
     walls = 2.0 * mass * np.array([one.approach for one in every if one.partner == "box"])
-    assert len(pairs) > 3000
+    assert len(pairs) > 375 * end
     inside = (2.0 * kinetic * end + 2.0 * r * pairs.sum()) / (2.0 * kinetic * end)
     assert virial(pairs, diameter=2.0 * r, time=end, kinetic=kinetic) == pytest.approx(inside)
     outside = 0.5 * (side - 2.0 * r) * walls.sum() / (2.0 * kinetic * end)
     # Of N disks all over the box Σ m x·v spreads by m √(N <x²> <v²>/2), <x²> = side²/6; at both
     # ends of the time.
     spread = mass * sqrt(2.0 * count * side**2 / 6.0 * kinetic / (mass * count))
-    assert abs(inside - outside) < 4.0 * spread / (2.0 * kinetic * end) < 0.02
+    assert abs(inside - outside) < 4.0 * spread / (2.0 * kinetic * end) < 0.16 / end
     pressure = wall_pressure(walls, perimeter=4.0 * side, time=end)
     assert pressure == pytest.approx(walls.sum() / (4.0 * side * end), rel=1e-15)
 

@@ -50,8 +50,10 @@ def own_impacts(recording, particle):
     return events[events["particle"] == particle]
 
 
-@pytest.mark.parametrize("count", [40, pytest.param(150, marks=pytest.mark.slow)])
-def test_lone_disks_meet_what_they_meet_in_the_exact_engine(count):
+@pytest.mark.parametrize(
+    ("count", "least"), [(40, 10), pytest.param(150, 50, marks=pytest.mark.slow)]
+)
+def test_lone_disks_meet_what_they_meet_in_the_exact_engine(count, least):
     compared = 0
     for seed in range(count):
         built = build(draw(seed, points=False))
@@ -72,7 +74,7 @@ def test_lone_disks_meet_what_they_meet_in_the_exact_engine(count):
         assert [recording.surfaces[s] for s in met["surface"]] == [i.partner for i in found.of[0]]
         np.testing.assert_allclose([i.t for i in found.of[0]], met["t"], rtol=1e-12, atol=1e-13)
         compared += len(met)
-    assert compared > count / 3, compared
+    assert compared > least, compared
 
 
 def test_likeness_counts_what_is_alike_and_names_what_is_not():

@@ -7,29 +7,6 @@ from math import cos
 import numpy as np
 
 from chutelab.engines.contact import engine, module
-from chutelab.machine import build
-from chutelab.scene import from_dict
-
-SCENE = {
-    "particle": {"radius": 0.01, "mass": 0.1, "spin": True},
-    "stream": {"at": [0.0, 1.0], "velocity": [0.0, 0.0]},
-    "run": {"until": 1.0, "max_time": 100.0},
-}
-
-
-def scene_of(**tables):
-    """Return a machine: `SCENE` with other tables, or with keys of its tables replaced."""
-    document = {name: dict(values) for name, values in SCENE.items()}
-    for name, values in tables.items():
-        if isinstance(values, dict):
-            document.setdefault(name, {}).update(values)
-        else:
-            document[name] = values
-    return build(from_dict(document))
-
-
-def face(name, start, end, **values):
-    return {"name": name, "from": list(start), "to": list(end), **values}
 
 
 class Core:

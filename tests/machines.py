@@ -1,5 +1,15 @@
 """Machines that several test files run."""
 
+from __future__ import annotations
+
+from dataclasses import replace
+from math import cos, sin
+
+import numpy as np
+
+from chutelab.machine import build
+from chutelab.scene import from_dict
+
 PERPENDICULAR = """
 [incoming]
 speed = 2.0
@@ -9,3 +19,109 @@ distance = 0.5
 [outgoing]
 drop = 0.5
 """
+
+SCENE = {
+    "particle": {"radius": 0.01, "mass": 0.1, "spin": True},
+    "stream": {"at": [0.0, 1.0], "velocity": [0.0, 0.0]},
+    "run": {"until": 1.0, "max_time": 100.0},
+}
+
+
+def scene_of(**tables):
+    """Return a machine: `SCENE` with other tables, or with keys of its tables replaced."""
+    document = {name: dict(values) for name, values in SCENE.items()}
+    for name, values in tables.items():
+        if isinstance(values, dict):
+            document.setdefault(name, {}).update(values)
+        else:
+            document[name] = values
+    return build(from_dict(document))
+
+
+def face(name, start, end, **values):
+    return {"name": name, "from": list(start), "to": list(end), **values}
+
+
+def thrown(machine, position, velocity=(0.0, 0.0), t=0.0):
+    """Return the machine with disks (N, 2) released where told, all at once; two or more meet."""
+    position = np.array(position, dtype=float).reshape(-1, 2)
+    count = len(position)
+    releases = replace(
+        machine.releases,
+        t=np.full(count, t, dtype=float),
+        position=position,
+        velocity=np.broadcast_to(np.array(velocity, dtype=float), position.shape).copy(),
+        carried=np.zeros(count, dtype=bool),
+    )
+    return replace(machine, releases=releases, interact=count > 1)
+
+
+def box(count, seed, side, *, radius=0.02, friction=0.0, spin=False, end=1.0, dt=1e-3):
+    """A gas: disks in a square lattice in an elastic box, velocities of variance 1 m²/s²."""
+    corners = [[0.0, 0.0], [side, 0.0], [side, side], [0.0, side], [0.0, 0.0]]
+    machine = scene_of(
+        gravity=0.0,
+        particle={"radius": radius, "spin": spin},
+        surface=[{"name": "box", "points": corners, "restitution": 1.0, "friction": 0.0}],
+        stream={"count": 2, "at": [0.5 * side, 0.5 * side], "interact": True, "restitution": 1.0,
+                "friction": friction, "bed_height": 0.4 * side, "rate": 1e-3},
+        run={"until": end, "max_time": end, "dt": dt},
+    )  # fmt: skip
+    rows = int(np.ceil(np.sqrt(count)))
+    place = (np.stack(np.divmod(np.arange(count), rows), axis=1) + 0.5) * side / rows
+    return thrown(machine, place, np.random.default_rng(seed).normal(size=(count, 2)))
+
+
+WHEEL, BELT, LENGTH = 0.5, 2.0, 0.5
+"""m, m/s, m: a pulley, its belt, and how far before the pulley's axis a disk is put on it."""
+
+
+def over_the_pulley(radius, friction, turning, speed, **run):
+    """A disk put on a Coulomb belt at a speed; `turning` is m r²/I, 0 for none."""
+    return scene_of(
+        particle={"radius": radius, "spin": turning > 0.0},
+        incoming={"speed": BELT, "pulley_radius": WHEEL, "friction": friction},
+        stream={"at": [-LENGTH, WHEEL + radius], "velocity": [speed, 0.0]},
+        run=run,
+    )
+
+
+def round_the_wheel(way, radius):
+    """Return the places (N, 2) of a disk that has come so far from above the pulley's axis (m)."""
+    rho = WHEEL + radius
+    round_it = [rho * np.sin(way / rho), rho * np.cos(way / rho)]
+    return np.where(way < 0.0, [way, np.full_like(way, rho)], round_it).T
+
+
+SLIDES = [
+    {"speed": 0.5, "belt": 2.0, "friction": 0.3},
+    {"speed": 0.5, "belt": 2.0, "friction": 0.3, "turning": 2.0},
+    {"speed": 1.0, "slope": 0.3, "friction": 0.2},
+    {"speed": 1.0, "slope": 0.3, "friction": 0.2, "turning": 2.0},
+    {"speed": 0.5, "slope": 0.6, "friction": 0.1, "belt": 1.5, "turning": 2.0},
+    {"speed": 0.0, "slope": 0.3, "friction": 0.5, "belt": -1.0},
+]
+"""Options of `references.slide`."""
+
+
+def ramp(options, **run):
+    """A disk put on a ramp or belt; its place at a way s is `start + s * along`.
+
+    Returns
+    -------
+    Machine, ndarray, ndarray
+        The machine, start and along.
+    """
+    slope, radius = options.get("slope", 0.0), 0.02
+    along, start = np.array([cos(slope), -sin(slope)]), radius * np.array([sin(slope), cos(slope)])
+    surface = face(
+        "ramp", (-20.0 * along).tolist(), (20.0 * along).tolist(), friction=options["friction"],
+        speed=options.get("belt", 0.0), restitution=0.0,
+    )  # fmt: skip
+    machine = scene_of(
+        particle={"radius": radius, "spin": options.get("turning", 0.0) > 0.0},
+        surface=[surface],
+        stream={"at": start.tolist(), "velocity": (options["speed"] * along).tolist()},
+        run={"until": 2.0, **run},
+    )
+    return machine, start, along

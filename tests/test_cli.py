@@ -33,9 +33,8 @@ FILES = [
 # The contract of section 4, copied by hand.
 KEYS = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
-    "impact", "landing", "ended", "rolling", "waited", "ledger", "theory", "theory_as_printed",
-    "error",
-    "accuracy",
+    "impact", "landing", "ended", "rolling", "waited", "squeezed", "ledger", "theory",
+    "theory_as_printed", "error", "accuracy",
 ]  # fmt: skip
 THEORY = [
     "phi1_deg", "t2", "x2", "y2", "v2", "phi2_deg", "phi2r_deg", "v2r", "t3", "x3", "y3", "v3x",
@@ -220,6 +219,18 @@ def test_a_run_says_who_waited_for_a_free_place():
     text = " ".join(call("run", "stream", *crowd).stdout.split())
     assert "2 particles waited for a free place to be released, 0.006 s at most" in text
     assert "waited" not in call("run", "stream", "--set", "stream.count=3").stdout
+
+
+def test_a_run_says_who_rode_into_others_round_the_pulley():
+    slow = ["--set=stream.count=20", "--set=incoming.speed=0.7", "--set=run.until=1.8"]
+    text = " ".join(call("run", "stream", *slow).stdout.split())
+    found = json.loads(call("run", "stream", *slow, "--json").stdout)["squeezed"]
+    assert list(found) == ["particles", "deepest", "grip"]
+    assert 1 < found["particles"] <= 20
+    assert 0.0 < found["deepest"] < 2.0 * 0.004
+    said = f"{found['particles']} particles rode into others round the pulley, "
+    assert f"{said}{found['deepest']:.6g} m deep at most" in text
+    assert "rode into" not in call("run", "stream", "--set", "stream.count=3").stdout
 
 
 def test_an_accuracy_is_reported_in_text_json_and_file():

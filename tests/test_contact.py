@@ -5,7 +5,7 @@ from __future__ import annotations
 import faulthandler
 import sys
 from dataclasses import replace
-from math import atan2, cos, degrees, hypot, sin, sqrt
+from math import atan2, degrees, hypot, sqrt
 from time import process_time
 
 import numpy as np
@@ -17,8 +17,19 @@ from chutelab.engines.contact import run
 from chutelab.ledger import ledger
 from chutelab.machine import build
 from chutelab.recording import REASONS, Kind
-from cores import Core, scene_of
+from cores import Core
 from crowds import crowd, faults, step_of
+from machines import (
+    BELT,
+    LENGTH,
+    SLIDES,
+    WHEEL,
+    box,
+    over_the_pulley,
+    ramp,
+    round_the_wheel,
+    scene_of,
+)
 from references import (
     first_impacts,
     henderson,
@@ -85,24 +96,7 @@ def gas(collisions, *, count=200, packing=0.3, seed=0):
     # Each component of velocity has variance kT/m = 1 m²/s².
     rate = 0.5 * count * 2.0 * sqrt(np.pi) * (2.0 * r) * (count / side**2) * chi
     end = collisions / rate
-    corners = [[0.0, 0.0], [side, 0.0], [side, side], [0.0, side], [0.0, 0.0]]
-    machine = scene_of(
-        gravity=0.0,
-        particle={"radius": r, "spin": False},
-        surface=[{"name": "box", "points": corners, "restitution": 1.0, "friction": 0.0}],
-        stream={"count": 2, "at": [0.5 * side, 0.5 * side], "interact": True, "restitution": 1.0,
-                "friction": 0.0, "rate": 1e-3},
-        run={"until": end, "max_time": end, "dt": 1e-3},
-    )  # fmt: skip
-    rng = np.random.default_rng(seed)
-    rows = int(np.ceil(sqrt(count)))
-    place = (np.stack(np.divmod(np.arange(count), rows), axis=1) + 0.5) * side / rows
-    releases = replace(
-        machine.releases,
-        t=np.zeros(count), position=place, velocity=rng.normal(size=(count, 2)),
-        carried=np.zeros(count, dtype=bool),
-    )  # fmt: skip
-    return replace(machine, releases=releases), side
+    return box(count, seed, side, radius=r, end=end), side
 
 
 def check_gas(collisions, within):
@@ -165,7 +159,10 @@ PULLEYS = [
     (0.15, 0.0, 2.0),
     (2.0, 2.0, 2.0),
 ]
-STEPS = (4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4)
+R = 0.02
+"""m; of the disks that ride."""
+
+STEPS = (4e-3, 1e-3, 2.5e-4)
 WITHIN = 1e-4
 """m; of positions at dt = 1e-3 s."""
 
@@ -175,21 +172,9 @@ PHASES = (1.0, 0.91, 0.83, 0.69)
 
 def ride(friction, turning, speed, found, dt):
     """Return errors of position (m) and of the time of separation (s), and how often it is told."""
-    wheel, r, length = 0.5, 0.02, 0.5
     times = np.linspace(0.0, 0.999 * found.t, 300)
-    way = found.state(times)[0]
-    place = np.where(
-        way < 0.0,
-        [way, np.full_like(way, wheel + r)],
-        [(wheel + r) * np.sin(way / (wheel + r)), (wheel + r) * np.cos(way / (wheel + r))],
-    ).T
-    document = {
-        "particle": {"radius": r, "spin": turning > 0.0},
-        "incoming": {"speed": 2.0, "pulley_radius": wheel, "friction": friction},
-        "stream": {"at": [-length, wheel + r], "velocity": [speed, 0.0]},
-        "run": {"until": found.t + 0.05, "max_time": 3.0, "dt": dt},
-    }
-    recording = run(build(scene.from_dict(document)))
+    place = round_the_wheel(found.state(times)[0], R)
+    recording = run(over_the_pulley(R, friction, turning, speed, until=found.t + 0.05, dt=dt))
     left = recording.select(Kind.SEPARATION)
     error = np.abs(recording.at(times)[0][:, 0] - place).max()
     return error, abs(left["t"][-1] - found.t), len(left)
@@ -199,7 +184,7 @@ def ride(friction, turning, speed, found, dt):
 def test_round_the_pulley_in_second_order(friction, turning, speed):
     # Errors of place stay below 60 dt² (m, s), of the time it leaves below 100 dt²/s.
     found = round_the_pulley(
-        belt=2.0, ride=0.52, friction=friction, turning=turning, way=-0.5, speed=speed
+        belt=BELT, ride=WHEEL + R, friction=friction, turning=turning, way=-LENGTH, speed=speed
     )
     for dt in STEPS:
         runs = [ride(friction, turning, speed, found, share * dt) for share in PHASES]
@@ -211,34 +196,13 @@ def test_round_the_pulley_in_second_order(friction, turning, speed):
             assert place < WITHIN
 
 
-SLIDES = [
-    {"speed": 0.5, "belt": 2.0, "friction": 0.3},
-    {"speed": 0.5, "belt": 2.0, "friction": 0.3, "turning": 2.0},
-    {"speed": 1.0, "slope": 0.3, "friction": 0.2},
-    {"speed": 1.0, "slope": 0.3, "friction": 0.2, "turning": 2.0},
-    {"speed": 0.5, "slope": 0.6, "friction": 0.1, "belt": 1.5, "turning": 2.0},
-    {"speed": 0.0, "slope": 0.3, "friction": 0.5, "belt": -1.0},
-]
-
-
 def sliding(options, dt):
     """Return the error of position, m."""
-    r, slope = 0.02, options.get("slope", 0.0)
-    along, normal = np.array([cos(slope), -sin(slope)]), np.array([sin(slope), cos(slope)])
-    surface = {
-        "name": "ramp", "from": (-20.0 * along).tolist(), "to": (20.0 * along).tolist(),
-        "friction": options["friction"], "speed": options.get("belt", 0.0), "restitution": 0.0,
-    }  # fmt: skip
-    machine = scene_of(
-        particle={"radius": r, "spin": options.get("turning", 0.0) > 0.0},
-        surface=[surface],
-        stream={"at": (r * normal).tolist(), "velocity": (options["speed"] * along).tolist()},
-        run={"until": 2.0, "dt": dt},
-    )
+    machine, start, along = ramp(options, dt=dt)
     times = np.linspace(0.0, 1.99, 200)
     way, _, _ = slide(times, **options)
     place = run(machine).at(times)[0][:, 0]
-    return np.abs(place - (r * normal + way[:, None] * along)).max()
+    return np.abs(place - (start + way[:, None] * along)).max()
 
 
 @pytest.mark.parametrize("options", SLIDES)
@@ -248,6 +212,70 @@ def test_slides_and_rolls_as_the_closed_form_says(options):
     for dt in STEPS:
         error = max(sliding(options, share * dt) for share in PHASES)
         assert error < dt**2, (dt, error)
+
+
+WITHIN_A_STEP = np.linspace(0.7, 1.0, 25)
+"""Shares of a step, so that phases end everywhere within one."""
+
+
+@pytest.mark.xfail(reason="core: may be held a step too long, or told to leave a step early")
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_over_the_end_of_a_face_in_second_order(friction):
+    # A disk that rolls over an edge at v² > g r leaves it at once: y - r = -g t²/2 from there on.
+    r, v, edge = 0.02, 1.0, 0.3
+    machine = scene_of(
+        particle={"radius": r, "spin": True},
+        surface=[{"name": "floor", "from": [-1.0, 0.0], "to": [edge, 0.0], "friction": friction,
+                  "restitution": 0.0}],
+        stream={"at": [0.0, r], "velocity": [v, 0.0]},
+        run={"until": 0.8},
+    )  # fmt: skip
+    # Without friction it slides on, else it slips until it rolls, at 2 v/3 after v/(3 µ g).
+    slip = v / (3.0 * friction * G) if friction else 0.0
+    way = v * slip - 0.5 * friction * G * slip**2
+    speed = 2.0 / 3.0 * v if friction else v
+    leaves = slip + (edge - way) / speed
+    for share in WITHIN_A_STEP:
+        dt = share * 1e-3
+        left = run(replace(machine, dt=dt))
+        told = left.select(Kind.SEPARATION)["t"]
+        assert abs(told - leaves).max() < 0.1 * dt
+        fall = left.at([0.79])[0][0, 0, 1] - r
+        assert abs(fall + 0.5 * G * (0.79 - leaves) ** 2) < 20.0 * dt**2, dt
+
+
+@pytest.mark.xfail(reason="core: of first order with endless friction")
+def test_carried_by_endless_friction_after_a_blow_it_leaves_where_gravity_takes_it():
+    # It drops on the pulley, has the belt's speed from there on, and leaves at cos φ = v²/(g ρ).
+    r, wheel, v = 0.02, 0.3, 1.0
+    machine = scene_of(
+        particle={"radius": r, "spin": False},
+        incoming={"speed": v, "pulley_radius": wheel},
+        stream={"at": [0.03, wheel + 0.2], "velocity": [0.5, 0.0]},
+        run={"until": 0.6},
+    )
+    rho = wheel + r
+    for share in WITHIN_A_STEP:
+        dt = share * 1e-3
+        recording = run(replace(machine, dt=dt))
+        met, left = (recording.select(kind) for kind in (Kind.IMPACT, Kind.SEPARATION))
+        from_, to = np.arctan2(*met["position"][0]), np.arccos(v**2 / (G * rho))
+        assert left["t"][-1] == pytest.approx(met["t"][0] + rho * (to - from_) / v, abs=0.1 * dt)
+
+
+@pytest.mark.xfail(reason="core: it is that in the middle of a hop, off by up to g dt/2")
+def test_a_separation_tells_the_velocity_without_the_hop():
+    # A belt at v² > g ρ throws at the end of its level part.
+    machine = scene_of(
+        particle={"radius": R, "spin": False},
+        incoming={"speed": 2.5, "pulley_radius": WHEEL, "friction": 0.5},
+        stream={"at": [-0.3, WHEEL + R], "velocity": [2.5, 0.0]},
+        run={"until": 0.4},
+    )
+    for share in WITHIN_A_STEP:
+        dt = share * 1e-3
+        left = run(replace(machine, dt=dt)).select(Kind.SEPARATION)[0]
+        assert abs(left["velocity_after"][1]) < 100.0 * dt**2, dt
 
 
 # A heap
@@ -350,7 +378,7 @@ def check_crowd(seed, count=None):
     assert not faults(machine, recording)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_small_crowds_obey_the_laws(seed):
     check_crowd(seed, 60)
 

@@ -18,25 +18,12 @@ from chutelab.engines.contact.module import Status, constants, dtype
 from chutelab.machine import build
 from chutelab.recording import REASONS, Kind
 from chutelab.scene import load
-from cores import Core, face, modes, scene_of
+from cores import Core, modes
+from machines import face, scene_of, thrown
 
 G = 9.81
 FAR = face("far", (-50.0, -90.0), (50.0, -90.0))
 FLOOR = face("floor", (-20.0, 0.0), (20.0, 0.0), restitution=0.0, friction=0.5)
-
-
-def thrown(machine, position, velocity, t=0.0):
-    """Return the machine with disks (N, 2) released where told, all at once."""
-    position = np.array(position, dtype=float).reshape(-1, 2)
-    count = len(position)
-    releases = replace(
-        machine.releases,
-        t=np.full(count, t, dtype=float),
-        position=position,
-        velocity=np.broadcast_to(np.array(velocity, dtype=float), position.shape).copy(),
-        carried=np.zeros(count, dtype=bool),
-    )
-    return replace(machine, releases=releases, interact=count > 1)
 
 
 def crowd_scene(**tables):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from math import inf
+import re
+from math import cos, inf, radians
 
 import pytest
 
@@ -223,6 +224,23 @@ def test_the_closed_form_covers_what_the_theory_answers(overrides):
         assert (name in found.leaves_out) is not answered
     assert found.reason == str(prediction.reason)
     assert found.reason.partition(": ")[2] in found.words
+
+
+def test_layers_that_ride_into_each_other_on_a_slow_pulley_are_noticed():
+    overrides = ["incoming.speed=0.7"]
+    (advice,) = [a for a in look("stream", *overrides).advice if "ride into others" in a.warning]
+    # The highest is drawn: 0.7² / (9.81 (0.104 + h)), 0 <= h <= 0.05 m, is 0.324 to 0.480.
+    grip = float(re.search(r"v²/\(g rho\) = ([\d.]+)", advice.warning)[1])
+    angle = float(re.search(r"for ([\d.]+)°", advice.warning)[1])
+    assert 0.324 <= grip < 0.34
+    assert cos(radians(angle)) == pytest.approx(grip, abs=2e-3)
+    assert "all layers run at 0.7 m/s" in advice.warning
+    # sqrt(9.81 * 0.154) = 1.2291
+    change, _, other = advice.change.partition(", to leave at the top, or ")
+    assert (change, other) == ("incoming.speed = 1.23", "stream.bed_height = 0")
+    for setting in (change, other):
+        again = applied("stream", overrides, setting)
+        assert not [a for a in again.advice if "ride into others" in a.warning]
 
 
 def test_words_say_when_belt_work_can_be_compared():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections import Counter
-from math import acos, atan2, cos, exp, hypot, log, pi, sin, sqrt
+from math import acos, atan2, cos, exp, hypot, pi, sin, sqrt
 
 import numpy as np
 import pytest
@@ -149,10 +149,11 @@ def test_without_scipy_it_says_what_to_install():
     assert done.stdout == 'SciPy is missing: pip install "chutelab[bench]"\n'
 
 
-def test_it_and_exact_tell_the_same_of_machines_drawn_at_random():
+@pytest.mark.parametrize("count", [20, pytest.param(60, marks=pytest.mark.slow)])
+def test_it_and_exact_tell_the_same_of_machines_drawn_at_random(count):
     """Surfaces that cross, fold, move and grip: all answers within 1e-9, but where one refuses."""
     tally = Counter()
-    for seed in range(60):
+    for seed in range(count):
         built = build(scene.from_dict(drawn(seed)))
         try:
             one, other = reference.run(built), exact.run(built)
@@ -163,5 +164,4 @@ def test_it_and_exact_tell_the_same_of_machines_drawn_at_random():
         assert off < 1e-9, (seed, which)
         assert ledger(one).relative_residual < 1e-13
         tally["agree"] += 1
-    assert tally["refused"] <= 3, tally
-    assert log(tally["agree"]) > 4.0
+    assert tally["refused"] <= 0.05 * count, tally

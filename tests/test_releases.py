@@ -8,7 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from chutelab import scene
-from chutelab.releases import draw
+from chutelab.engines import contact
+from chutelab.machine import build
+from chutelab.recording import Kind
+from chutelab.releases import DEEP, draw, squeeze
 
 G, RC, V = 9.81, 0.1 + 0.004, 2.0
 
@@ -126,3 +129,49 @@ def test_in_a_bed_with_no_room_everybody_is_due_all_the_same():
     # in two layers' height at most a few find a place, and nobody is put outside the bed
     found = drawn(count=20, rate=2000.0, interact=True, bed_height=0.016)
     assert np.ptp(found.position[:, 1]) <= 0.016
+
+
+def bed(*overrides):
+    """Return a run of layers of a bed, until all are off the pulley."""
+    found = scene.load("stream", ["stream.count=40", "run.until=2.8", *overrides])
+    recording = contact.run(build(found))
+    released = recording.select(Kind.RELEASE)
+    return recording, squeeze(found, released["t"], released["position"])
+
+
+@pytest.mark.parametrize("speed", [0.5, 0.7, 0.9])
+def test_layers_on_a_slow_pulley_ride_into_each_other(speed):
+    """As deep as the tracks of a run say, in which riders cannot be pushed."""
+    recording, found = bed(f"incoming.speed={speed}")
+    leaves = np.full(40, np.inf)
+    left = recording.first(recording.select(Kind.SEPARATION, surface="incoming"))
+    leaves[left["particle"]] = left["t"]
+    times = np.linspace(0.0, 2.8, 8000)
+    place, _ = recording.at(times)
+    place[times[:, None] >= leaves] = np.nan
+    depth = np.zeros(40)
+    for i in range(40):
+        apart = np.hypot(*np.moveaxis(place - place[:, i : i + 1], 2, 0))
+        apart[:, i] = np.nan
+        depth[i] = np.nanmax(2.0 * 0.004 - apart, initial=0.0)
+    # Between two of these times they get up to 2 v Δt nearer to each other.
+    assert depth.max() == pytest.approx(found.deepest, abs=2.0 * speed * 2.8 / 8000)
+    assert found.deepest > 0.1 * 0.004
+    assert abs(np.count_nonzero(depth > DEEP * 0.004) - found.particles) <= 1
+    highest = recording.select(Kind.RELEASE)["position"][:, 1].max()
+    assert found.grip == pytest.approx(speed**2 / (G * highest), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        # sqrt(g (0.104 + 0.05)) = 1.2291 m/s: all leave at the top.
+        ("incoming.speed=1.23",),
+        # One layer, 14 mm between centres of 8 mm: no one is nearer on the chord than its diameter.
+        ("incoming.speed=0.7", "stream.bed_height=0", "stream.rate=50"),
+        ("incoming.speed=0.7", "incoming.friction=0.5"),
+        ("incoming.speed=0.7", "stream.interact=false"),
+    ],
+)
+def test_where_none_rides_into_another_nothing_is_said(overrides):
+    assert bed(*overrides)[1] is None

@@ -17,7 +17,8 @@ from chutelab.summary import summary
 
 TOP = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
-    "impact", "landing", "ended", "rolling", "waited", "ledger", "theory", "theory_as_printed",
+    "impact", "landing", "ended", "rolling", "waited", "squeezed", "ledger", "theory",
+    "theory_as_printed",
     "error",
     "accuracy",
 ]  # fmt: skip

@@ -23,6 +23,10 @@ ON_BELT = 1e-9
 TRIES = 1000
 """Draws of a height that may overlap an earlier particle before it has to wait for its place."""
 
+DEEP = 0.01
+"""Share of the radius. Riders of one layer that touch, 2 r of arc apart, are by r³/(3 ρ²) nearer on
+the chord: by less than this where r < ρ/6."""
+
 
 @dataclass(frozen=True, eq=False)
 class Releases:
@@ -122,6 +126,72 @@ def waits(scene: Scene, recording: Recording) -> Waits | None:
         return None
     longest, mean = (float(late.max()), float(late.mean())) if len(late) else (0.0, 0.0)
     return Waits(len(late), longest, mean, never)
+
+
+@dataclass(frozen=True)
+class Squeeze:
+    """Riders by adhesion that get into each other round the pulley.
+
+    All layers of a bed have the belt's speed, the lower ones on smaller circles: where the pulley
+    does not throw them off at its top, they turn ahead, into what rides above them.
+
+    Attributes
+    ----------
+    particles : int
+        How many are in another by more than `DEEP`.
+    deepest : float
+        Overlap of the worst two, m.
+    grip : float
+        v²/(g ρ) of the highest rider: it stays on the pulley until cos φ is this.
+    """
+
+    particles: int
+    deepest: float
+    grip: float
+
+
+def squeeze(scene: Scene, t: NDArray[np.float64], position: NDArray[np.float64]) -> Squeeze | None:
+    """Return who rides into others; None if nobody does.
+
+    A ride that something ends early counts as if it went on. Two that would be in each other on the
+    belt already do not count: one of them waits.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is released, and where.
+    t, position : ndarray, (N,) and (N, 2)
+        When and where particles are released, s and m: planned, or of a run.
+    """
+    belt, radius = scene.incoming, scene.particle.radius
+    if belt is None or not isinstance(belt.friction, str) or not on_belt(scene):
+        return None
+    if not scene.stream.interact or belt.speed == 0.0 or scene.gravity == 0.0:
+        return None
+    x, rho = position.T
+    top = t - x / belt.speed
+    grip = belt.speed**2 / (scene.gravity * rho)
+    order = np.argsort(top)
+    top, rho = top[order], rho[order]
+    leaves = top + rho * np.arccos(np.minimum(grip[order], 1.0)) / belt.speed
+    depth = np.zeros(len(top))
+    for lag in range(1, len(top)):
+        # The later one is on the pulley from its own top, both are until one leaves.
+        begin, end = top[lag:], np.minimum(leaves[:-lag], leaves[lag:])
+        if (begin >= leaves[:-lag]).all():
+            break
+        mine, its = rho[:-lag], rho[lag:]
+        waits_for = np.hypot(belt.speed * (begin - top[:-lag]), mine - its) < 2.0 * radius
+        angle = belt.speed * np.array(
+            [(now - top[:-lag]) / mine - (now - begin) / its for now in (begin, end)]
+        )
+        angle = np.where(angle[1] > 0.0, angle.min(axis=0), 0.0)
+        apart = np.hypot(mine - its, 2.0 * np.sqrt(mine * its) * np.sin(0.5 * angle))
+        found = np.where((begin < end) & ~waits_for, 2.0 * radius - apart, 0.0)
+        depth[:-lag] = np.maximum(depth[:-lag], found)
+        depth[lag:] = np.maximum(depth[lag:], found)
+    particles = int(np.count_nonzero(depth > DEEP * radius))
+    return Squeeze(particles, float(depth.max()), float(grip.min())) if particles else None
 
 
 def draw(scene: Scene) -> Releases:

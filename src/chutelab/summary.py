@@ -11,7 +11,7 @@ import numpy as np
 from chutelab.compare import compare, scene_of
 from chutelab.ledger import ledger
 from chutelab.recording import REASONS, Kind
-from chutelab.releases import waits
+from chutelab.releases import squeeze, waits
 from chutelab.theory import predict
 
 if TYPE_CHECKING:
@@ -41,14 +41,16 @@ def summary(recording: Recording, accuracy: Accuracy | None = None) -> dict[str,
     Lists have one entry a particle. Lengths, times and energies are in SI units, angles in degrees
     under names that end in ``_deg``. ``accuracy`` is None unless one was asked for, ``rolling``
     unless disks settled on the outgoing belt without being carried by it (see `rolling`), and
-    ``waited`` unless particles found their place taken (see `chutelab.releases.Waits`).
+    ``waited`` unless particles found their place taken (see `chutelab.releases.Waits`), and
+    ``squeezed`` unless riders by adhesion got into each other (see `chutelab.releases.Squeeze`).
     """
     scene = scene_of(recording)
     compared = compare(recording)
     impacts = recording.select(Kind.IMPACT, surface="plate")
     landings = recording.select(Kind.LANDING)
     partings = recording.select(Kind.SEPARATION, surface="incoming")
-    waited = waits(scene, recording)
+    waited, released = waits(scene, recording), recording.select(Kind.RELEASE)
+    squeezed = squeeze(scene, released["t"], released["position"])
     return {
         "format": FORMAT,
         "scene": recording.title,
@@ -63,6 +65,7 @@ def summary(recording: Recording, accuracy: Accuracy | None = None) -> dict[str,
         "ended": _ended(recording),
         "rolling": rolling(recording),
         "waited": None if waited is None else asdict(waited),
+        "squeezed": None if squeezed is None else asdict(squeezed),
         "ledger": asdict(ledger(recording)),
         "theory": _theory(predict(scene)),
         "theory_as_printed": _as_printed(scene),

@@ -15,7 +15,7 @@ from chutelab.accuracy.wanted import Wanted
 from chutelab.compare import compare, scene_of
 from chutelab.ledger import ledger
 from chutelab.recording import REASONS, Kind
-from chutelab.releases import Waits, waits
+from chutelab.releases import Squeeze, Waits, squeeze, waits
 from chutelab.sheet import Sheet, number, wrapped
 from chutelab.summary import rolling
 
@@ -44,6 +44,10 @@ def report(recording: Recording, accuracy: Accuracy | None = None) -> list[Rende
     parts += [drawn(books), Text("\n" + "\n".join(books.notes))]
     if (late := waits(scene_of(recording), recording)) is not None:
         parts.append(Text("\n" + "\n".join(wrapped(_waited(late)))))
+    released = recording.select(Kind.RELEASE)
+    pressed = squeeze(scene_of(recording), released["t"], released["position"])
+    if pressed is not None:
+        parts.append(Text("\n" + "\n".join(wrapped(_squeezed(pressed)))))
     if (left := rolling(recording)) is not None:
         parts.append(Text("\n" + "\n".join(wrapped(_rolling(**left)))))
     return parts if accuracy is None else [*parts, _reached(accuracy)]
@@ -118,6 +122,16 @@ def _waited(late: Waits) -> str:
     if late.never:
         said.append(f"{late.never} found no free place until the end")
     return "; ".join(said) + "."
+
+
+def _squeezed(pressed: Squeeze) -> str:
+    """Say how many ride into each other, how deep and why."""
+    return (
+        f"{pressed.particles} particles rode into others round the pulley,"
+        f" {number(pressed.deepest)} m deep at most: adhesion carries all layers at one speed, the"
+        f" lower ones on smaller circles, and v²/(g rho) = {pressed.grip:.3g} keeps the highest"
+        " there past the top."
+    )
 
 
 def _rolling(particles: int, belt_work: float, belt_work_carried: float) -> str:

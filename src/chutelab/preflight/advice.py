@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import ceil, cos, floor, log10, radians
+from math import acos, ceil, cos, degrees, floor, log10, radians, sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from chutelab import scene as scenes
 from chutelab.machine import build
 from chutelab.preflight.results import Advice
 from chutelab.recording import REASONS
-from chutelab.releases import waits
+from chutelab.releases import squeeze, waits
 from chutelab.scene import SceneError
 
 if TYPE_CHECKING:
@@ -71,6 +71,7 @@ def advice(
         yield Advice(f"a trial run did not come to an end: {tried.trouble}", LOOK)
     if tried.recording is not None:
         yield from _waiting(scene, tried.recording)
+    yield from _squeezed(scene, machine)
     if scene.run.engine == "pymunk" and not machine.interact and machine.count > 1:
         yield Advice(
             f"pymunk steps {machine.count} particles one after the other, in about"
@@ -91,6 +92,24 @@ def _waiting(scene: Scene, tried: Recording) -> Iterator[Advice]:
             f" be released, up to {waited.longest:.3g} s",
             f"stream.rate = {slower:g}, or a larger stream.bed_height",
         )
+
+
+def _squeezed(scene: Scene, machine: Machine) -> Iterator[Advice]:
+    """Yield how many particles ride into others round the pulley, how deep, and why."""
+    found = squeeze(scene, machine.releases.t, machine.releases.position)
+    if found is None or scene.incoming is None:
+        return
+    highest = scene.incoming.pulley_radius + scene.particle.radius + scene.stream.bed_height
+    change = f"incoming.speed = {_up(sqrt(scene.gravity * highest)):g}, to leave at the top"
+    if scene.stream.bed_height > 0.0:
+        change += ", or stream.bed_height = 0"
+    yield Advice(
+        f"of {machine.count} particles, {found.particles} ride into others round the pulley, up"
+        f" to {1e3 * found.deepest:.3g} mm deep: all layers run at {scene.incoming.speed:g} m/s, "
+        f"the lower ones on smaller circles, and v²/(g rho) = {found.grip:.3g} keeps the highest"
+        f" there for {degrees(acos(found.grip)):.3g}°",
+        change,
+    )
 
 
 def _written(key: str, value: Any) -> str:

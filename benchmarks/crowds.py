@@ -26,9 +26,11 @@ from time import process_time
 import numpy as np
 import pymunk
 
-from chutelab import load, scene, simulate
-from chutelab.ledger import ledger
+from chutelab import scene
+from chutelab.engines.simulation import simulate
 from chutelab.machine import build
+from chutelab.results.ledger import ledger
+from chutelab.scene import load
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from references import Depth, inside_surfaces, overlaps, pair_overlaps

@@ -24,9 +24,10 @@ from time import perf_counter
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from chutelab import load, simulate
-from chutelab.ledger import ledger
-from chutelab.recording import Kind
+from chutelab.engines.simulation import simulate
+from chutelab.results import Kind
+from chutelab.results.ledger import ledger
+from chutelab.scene import load
 
 G, SPEED, PULLEY, DISTANCE, DROP, RESTITUTION, RADIUS = 9.81, 2.0, 0.1, 0.5, 0.5, 0.5, 0.004
 STATE = 20

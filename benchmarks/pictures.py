@@ -15,13 +15,13 @@ from time import process_time
 from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.patches import Rectangle
 
-from chutelab import animate, load, simulate
-from chutelab.animate import Stage, film
-from chutelab.animate.layout import lay_out
-from chutelab.animate.moments import span
-from chutelab.compare import scene_of
-from chutelab.plots import machine_of, style
-from chutelab.scene import shipped
+from chutelab.engines.simulation import simulate
+from chutelab.pictures.animation import Stage, animate, film
+from chutelab.pictures.animation.moments import span
+from chutelab.pictures.animation.stage import lay_out
+from chutelab.pictures.plots import machine_of, style
+from chutelab.results.comparison import scene_of
+from chutelab.scene import load, shipped
 from chutelab.theory import predict
 
 FRAMES, PARTICLES, FPS = 120, 60, 25
@@ -103,7 +103,7 @@ def main():
         ours, small = timed(lambda path: animate(recording, path, fps=FPS, slow=slow), path)
         theirs, large = timed(usual(recording, slow, layout, moments), path)
         print(f"{FRAMES} frames of 800 x 450, {PARTICLES} particles")
-        print(f"  chutelab.animate             {ours:6.2f} s {small / 1e3:6.0f} kB")
+        print(f"  chutelab.pictures.animation             {ours:6.2f} s {small / 1e3:6.0f} kB")
         print(f"  FuncAnimation, PillowWriter  {theirs:6.2f} s {large / 1e3:6.0f} kB")
         print(f"  {theirs / ours:.1f} times faster, {small / large:.2f} times the size")
         print("lesson.gif of each shipped scene with one particle")

@@ -14,10 +14,9 @@ from time import process_time
 
 import numpy as np
 
-from chutelab import load
-from chutelab.scene import from_dict, to_dict
-from chutelab.simulation import simulate
-from chutelab.sweep import REASON, row_of, sweep
+from chutelab.engines.simulation import simulate
+from chutelab.scene import from_dict, load, to_dict
+from chutelab.studies.sweep import REASON, row_of, sweep
 
 REPEATS = 3
 SINGLE = 300

@@ -15,9 +15,9 @@ from math import ceil, cos, inf, radians, sin, sqrt
 import numpy as np
 from scipy.spatial import cKDTree
 
-from chutelab.ledger import ledger
 from chutelab.machine import build
-from chutelab.recording import REASONS, Kind
+from chutelab.results import REASONS, Kind
+from chutelab.results.ledger import ledger
 from chutelab.scene import SceneError, from_dict
 
 KINDS = ("box", "funnel", "belts", "transfer")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from chutelab.compare import scene_of
 from chutelab.machine import build
-from chutelab.recording import Kind
+from chutelab.results import Kind
+from chutelab.results.comparison import scene_of
 from chutelab.scene import SceneError, from_dict
 
 LASTING = (Kind.SLIP, Kind.STICK, Kind.SETTLE)

@@ -20,9 +20,9 @@ from scipy.integrate import solve_ivp
 from scipy.spatial import cKDTree
 from scipy.stats import kstest
 
-from chutelab.compare import scene_of
 from chutelab.machine import build
-from chutelab.recording import Kind
+from chutelab.results import Kind
+from chutelab.results.comparison import scene_of
 
 # First impacts
 

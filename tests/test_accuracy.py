@@ -9,13 +9,25 @@ import numpy as np
 import pytest
 
 from chutelab import scene as sc
-from chutelab import simulate, theory
-from chutelab.accuracy import Accuracy, AccuracyError, Wanted, parse, reach
-from chutelab.accuracy.answers import apart, each, sizes, together
-from chutelab.accuracy.witness import FLOOR, MOST_STEPS, stirred
-from chutelab.compare import QUANTITIES, compare
-from chutelab.recording import Kind
-from chutelab.reference import UnableError
+from chutelab import theory
+from chutelab.engines.reference import UnableError
+from chutelab.engines.simulation import simulate
+from chutelab.results import Kind
+from chutelab.results.comparison import QUANTITIES, compare
+from chutelab.studies.accuracy import (
+    FLOOR,
+    MOST_STEPS,
+    Accuracy,
+    AccuracyError,
+    Wanted,
+    apart,
+    each,
+    parse,
+    reach,
+    sizes,
+    stirred,
+    together,
+)
 
 LONE = [name for name in sc.shipped() if "stream" not in name]
 
@@ -121,7 +133,7 @@ def test_the_scene_that_was_promised_too_much():
 def test_steps_are_halved_until_the_witness_is_near(order, monkeypatch):
     """An engine with a made-up error of 0.05 m (dt / 1 ms)^order in the place of its landing."""
     scene = sc.load("belt-landing", ["run.engine=pymunk"])
-    monkeypatch.setattr("chutelab.accuracy.witness.simulate", made_up(scene, order))
+    monkeypatch.setattr("chutelab.studies.accuracy.simulate", made_up(scene, order))
     _, found = reach(scene, "1mm")
     halvings = np.ceil(np.log2(50.0) / order)
     assert found.met
@@ -150,7 +162,7 @@ def made_up(scene, order, size=0.05, steps=0.1):
 def test_an_error_that_two_runs_share_is_no_accuracy(monkeypatch):
     """The same wrong answer at every step: nothing but another engine can tell."""
     scene = sc.load("belt-landing", ["run.engine=pymunk"])
-    monkeypatch.setattr("chutelab.accuracy.witness.simulate", made_up(scene, 0.0))
+    monkeypatch.setattr("chutelab.studies.accuracy.simulate", made_up(scene, 0.0))
     _, found = reach(scene, "1mm")
     assert not found.met
     assert found.reached == pytest.approx(0.05, rel=1e-9)
@@ -159,7 +171,7 @@ def test_an_error_that_two_runs_share_is_no_accuracy(monkeypatch):
 
 def test_a_search_has_a_bound(monkeypatch):
     scene = sc.load("belt-landing", ["run.engine=pymunk"])
-    monkeypatch.setattr("chutelab.accuracy.witness.simulate", made_up(scene, 1.0, steps=1.0))
+    monkeypatch.setattr("chutelab.studies.accuracy.simulate", made_up(scene, 1.0, steps=1.0))
     _, found = reach(scene, "50nm")
     assert not found.met
     assert 1.0 / found.dt <= MOST_STEPS < 2.0 / found.dt
@@ -180,7 +192,7 @@ def test_without_another_answer_nothing_is_promised(monkeypatch):
     def missing(_machine):
         raise UnableError("SciPy is missing")
 
-    monkeypatch.setattr("chutelab.reference.run", missing)
+    monkeypatch.setattr("chutelab.engines.reference.run", missing)
     _, found = reach(scene, 1e-9)
     assert (found.met, found.reached, found.against) == (False, None, None)
     assert found.method.startswith("none: no other answer; not dop853 (SciPy is missing), nor ")
@@ -189,7 +201,9 @@ def test_without_another_answer_nothing_is_promised(monkeypatch):
 def test_what_happens_in_one_answer_only_is_not_met(monkeypatch):
     scene = sc.load("perpendicular", ["run.until=settled"])
     other = simulate(sc.load("perpendicular", ["outgoing.length=0.1", "run.until=settled"]))
-    monkeypatch.setattr("chutelab.reference.run", lambda _machine: replace(other, engine="dop853"))
+    monkeypatch.setattr(
+        "chutelab.engines.reference.run", lambda _machine: replace(other, engine="dop853")
+    )
     _, found = reach(scene, 1e-3)
     assert (found.reached, found.met) == (None, False)
     assert found.method.startswith("none: exact and dop853 differ in")

@@ -10,14 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chutelab import ballistics, exact, impact, machine, reference, scene, theory
-from chutelab.accuracy import reach
-from chutelab.agreement import ANSWERS, agreement, verify
-from chutelab.agreement.pairs import order
-from chutelab.compare import QUANTITIES, compare
-from chutelab.compare import scene_of as scene_from
-from chutelab.exact import touch
-from chutelab.recording import REASONS, Kind
+from chutelab import machine, scene, theory
+from chutelab.checks.agreement import ANSWERS, agreement, order, verify
+from chutelab.engines import exact, reference
+from chutelab.engines.exact import contacts
+from chutelab.mechanics import ballistics, impact
+from chutelab.results import REASONS, Kind
+from chutelab.results.comparison import QUANTITIES, compare
+from chutelab.results.comparison import scene_of as scene_from
+from chutelab.studies.accuracy import reach
 from drawn import draw
 
 GRAVITY = 9.81
@@ -206,14 +207,14 @@ def late_descent(gap, rate, acceleration):
     return ballistics.descent(gap, rate, acceleration) * (1.0 + WRONG)
 
 
-def lively_blow(s, who, contact, before, approach, rebound, landing, blow=touch._blow):
+def lively_blow(s, who, contact, before, approach, rebound, landing, blow=contacts._blow):
     return blow(s, who, contact, before, approach, rebound * (1.0 + WRONG), landing)
 
 
 PLANTED = [
-    ("chutelab.exact.touch._blow", lively_blow),
-    ("chutelab.exact.touch.impulses", restitution_on_the_slip),
-    ("chutelab.exact.detect.descent", late_descent),
+    ("chutelab.engines.exact.contacts._blow", lively_blow),
+    ("chutelab.engines.exact.contacts.impulses", restitution_on_the_slip),
+    ("chutelab.engines.exact.detect.descent", late_descent),
 ]
 
 
@@ -237,7 +238,9 @@ def test_a_wrong_formula_is_caught_from_outside(where, wrong, until, monkeypatch
 def test_a_wrong_formula_that_places_the_belt_is_caught_by_the_theory(monkeypatch):
     """The machine's own arrays are shared by all engines; only the theory has none of them."""
     right = ballistics.crossing
-    monkeypatch.setattr("chutelab.nominal.crossing", lambda *gap: right(*gap) * (1.0 + WRONG))
+    monkeypatch.setattr(
+        "chutelab.machine.nominal.crossing", lambda *gap: right(*gap) * (1.0 + WRONG)
+    )
     drawn = scene.load("perpendicular")
     failed = [row.pair for row in agreement(drawn) if not row.holds]
     assert {"exact, theory", "dop853, theory", "contact, theory", "pymunk, theory"} <= set(failed)

@@ -16,26 +16,28 @@ from matplotlib.transforms import Bbox
 from PIL import Image
 
 from chutelab import scene, theory
-from chutelab.animate import VideoError, animate, moments, video
-from chutelab.animate.arrows import outline
-from chutelab.animate.bars import SIGNS, stacks
-from chutelab.animate.gif import GifWriter
-from chutelab.animate.layout import Layout, lay_out
-from chutelab.animate.lettering import Lettering
-from chutelab.animate.moments import Moment, film, slowness, span
-from chutelab.animate.palette import BITS, CLEAR, Palette, colours, tint
-from chutelab.animate.stage import Stage
-from chutelab.animate.words import contact_normal, going_on, in_flight, sentence
 from chutelab.cli import main
-from chutelab.compare import scene_of
+from chutelab.engines.simulation import simulate
 from chutelab.machine import build
-from chutelab.plots import style
-from chutelab.plots.sampling import energies
-from chutelab.plots.scenery import machine_of
-from chutelab.plots.window import window_of
-from chutelab.recorder import Recorder
-from chutelab.recording import Kind, Recording
-from chutelab.simulation import simulate
+from chutelab.pictures.animation import Moment, Stage, VideoError, animate, film, moments
+from chutelab.pictures.animation import film as video
+from chutelab.pictures.animation.actors import SIGNS, outline, stacks
+from chutelab.pictures.animation.film import GifWriter
+from chutelab.pictures.animation.moments import (
+    contact_normal,
+    going_on,
+    in_flight,
+    sentence,
+    slowness,
+    span,
+)
+from chutelab.pictures.animation.palette import BITS, CLEAR, Lettering, Palette, colours, tint
+from chutelab.pictures.animation.stage import Layout, lay_out
+from chutelab.pictures.plots import machine_of, style, window_of
+from chutelab.pictures.plots.scenery import energies
+from chutelab.results import Kind, Recording
+from chutelab.results.comparison import scene_of
+from chutelab.results.recorder import Recorder
 from test_plots import (
     BELT_TIME,
     DISTANCE,

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chutelab import scene as sc
+from chutelab import scene
 
 IN = "[incoming]\nspeed = 2\npulley_radius = 0.1\n"
 PLATE = "[plate]\ndistance = 0.5\n"
@@ -268,7 +268,7 @@ BROKEN = {
 
 
 def message(call, *arguments):
-    with pytest.raises(sc.SceneError) as caught:
+    with pytest.raises(scene.SceneError) as caught:
         call(*arguments)
     return str(caught.value)
 
@@ -278,7 +278,7 @@ def test_a_broken_file_is_refused_with_file_key_and_what_is_allowed(case, tmp_pa
     text, keys, allowed = BROKEN[case]
     file = tmp_path / "broken.toml"
     file.write_text(text, encoding="utf-8")
-    said = message(sc.load, file)
+    said = message(scene.load, file)
     assert said.startswith(f"{file}: ")
     for key in keys:
         assert key in said
@@ -305,7 +305,7 @@ def test_a_broken_file_is_refused_with_file_key_and_what_is_allowed(case, tmp_pa
 def test_rubbish_is_refused_with_the_file_and_the_reason(content, says, tmp_path):
     file = tmp_path / "rubbish.toml"
     file.write_bytes(content)
-    said = message(sc.load, file)
+    said = message(scene.load, file)
     assert said.startswith(f"{file}: ")
     assert says in said
     assert len(said.splitlines()) == 1
@@ -324,13 +324,13 @@ def test_rubbish_is_refused_with_the_file_and_the_reason(content, says, tmp_path
 )
 def test_a_scene_that_is_nowhere_is_answered_with_similar_names(name, says, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    said = message(sc.load, name)
+    said = message(scene.load, name)
     assert says in said
     assert len(said) < 500
 
 
 def test_a_directory_is_no_scene(tmp_path):
-    assert message(sc.load, tmp_path) == (
+    assert message(scene.load, tmp_path) == (
         f"{tmp_path}: a directory; give a scene file, or the name of a shipped scene"
     )
 
@@ -343,7 +343,7 @@ def test_a_file_that_may_not_be_read_is_said_so(tmp_path, monkeypatch):
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr("pathlib.Path.open", refuse)
-    assert message(sc.load, file) == f"{file}: cannot be read: Permission denied"
+    assert message(scene.load, file) == f"{file}: cannot be read: Permission denied"
 
 
 def test_all_faults_of_a_file_come_in_one_message_conflicts_too():
@@ -356,12 +356,12 @@ def test_all_faults_of_a_file_come_in_one_message_conflicts_too():
         '[[surface]]\nname = "a"\npoints = [[0, 0], [1, nan]]\n'
         '[run]\nuntil = "landed"\n'
     )
-    with pytest.raises(sc.SceneError) as caught:
-        sc.parse(text, "all.toml")
+    with pytest.raises(scene.SceneError) as caught:
+        scene.parse(text, "all.toml")
     faults = {fault.key: fault.value for fault in caught.value.faults}
     assert faults == {
         "incoming.speed": -1,
-        "incoming.pulley_radius": sc.MISSING,
+        "incoming.pulley_radius": scene.MISSING,
         "plate.distance": "far",
         "plate.angel_deg": 20,
         "surface[0].restitution": 2,
@@ -370,7 +370,7 @@ def test_all_faults_of_a_file_come_in_one_message_conflicts_too():
         "run.until": "landed",
         "particle.spin": True,
         "stream.interact": True,
-        "surface[0].to": sc.MISSING,
+        "surface[0].to": scene.MISSING,
         "surface[1].name": "a",
     }
     lines = str(caught.value).splitlines()
@@ -381,26 +381,26 @@ def test_all_faults_of_a_file_come_in_one_message_conflicts_too():
 
 def test_a_key_at_fault_starts_no_quarrel_with_others():
     text = IN + PLATE + "[particle]\nradius = 'small'\nspin = true\n[stream]\ninteract = true\n"
-    said = message(sc.parse, text)
+    said = message(scene.parse, text)
     assert said == ('<scene>: particle.radius = "small": must be a number from 0 to 1000000, in m')
 
 
 def test_a_coulomb_belt_takes_what_an_adhesive_one_refuses():
     release = "[stream]\nspeed_spread = 0.1\nvelocity = [1, 0]\n"
-    sc.parse(IN + "friction = 0.5\n" + release)
+    scene.parse(IN + "friction = 0.5\n" + release)
     # and so does the air above an adhesive one
-    sc.parse(IN + release + "at = [-0.5, 0.1041]\n")
-    sc.parse(IN + "[stream]\nvelocity = [2, 0]\nat = [-0.5, 0.104]\n")
+    scene.parse(IN + release + "at = [-0.5, 0.1041]\n")
+    scene.parse(IN + "[stream]\nvelocity = [2, 0]\nat = [-0.5, 0.104]\n")
 
 
 def test_interacting_alone_is_no_conflict():
-    sc.parse(IN + '[stream]\ninteract = true\n[run]\nengine = "exact"')
+    scene.parse(IN + '[stream]\ninteract = true\n[run]\nengine = "exact"')
 
 
 def test_a_long_list_of_faults_and_a_long_value_are_cut_but_not_lost():
     text = IN + "[run]\n" + "".join(f'zzz{i} = "{BIG}"\n' for i in range(100))
-    with pytest.raises(sc.SceneError) as caught:
-        sc.parse(text)
+    with pytest.raises(scene.SceneError) as caught:
+        scene.parse(text)
     assert len(caught.value.faults) == 100
     assert caught.value.faults[99].value == BIG
     lines = str(caught.value).splitlines()
@@ -409,7 +409,7 @@ def test_a_long_list_of_faults_and_a_long_value_are_cut_but_not_lost():
 
 
 def test_a_message_carries_no_terminal_commands():
-    said = message(sc.parse, '"\\u001b[31m" = "\\u001b[2J\\u009b"\n' + IN, "\x1b[1mfile.toml")
+    said = message(scene.parse, '"\\u001b[31m" = "\\u001b[2J\\u009b"\n' + IN, "\x1b[1mfile.toml")
     assert said.isprintable()
     assert "\\x1b[1mfile.toml" in said
 
@@ -438,13 +438,13 @@ def test_a_message_carries_no_terminal_commands():
     ],
 )
 def test_a_bad_override_is_named_as_it_was_given(override, says):
-    said = message(sc.parse, 'title = "T"\n' + IN + PLATE + HOOD, "x.toml", [override])
+    said = message(scene.parse, 'title = "T"\n' + IN + PLATE + HOOD, "x.toml", [override])
     assert said.startswith("x.toml: ")
     assert says in said
 
 
 def test_an_override_can_mend_a_fault():
-    assert sc.parse(IN.replace("2", "-2"), overrides=["incoming.speed=2"]).incoming is not None
+    assert scene.parse(IN.replace("2", "-2"), overrides=["incoming.speed=2"]).incoming is not None
 
 
 # Laws.
@@ -491,8 +491,8 @@ def with_key(table, key, value):
 def test_any_unknown_key_is_refused_by_its_full_path(table, key, value):
     if key in KNOWN[table]:
         key += "_"
-    with pytest.raises(sc.SceneError) as caught:
-        sc.from_dict(with_key(table, key, value))
+    with pytest.raises(scene.SceneError) as caught:
+        scene.from_dict(with_key(table, key, value))
     (fault,) = caught.value.faults
     assert fault.key.startswith(f"{table}." if table else "")
     assert "unknown key" in fault.allowed
@@ -503,8 +503,8 @@ def test_any_unknown_key_is_refused_by_its_full_path(table, key, value):
 def outcome(document, *arguments):
     """The scene, or what was said against it."""
     try:
-        return sc.from_dict(document, *arguments)
-    except sc.SceneError as error:
+        return scene.from_dict(document, *arguments)
+    except scene.SceneError as error:
         return str(error)
 
 
@@ -512,8 +512,8 @@ def outcome(document, *arguments):
 def test_any_value_at_all_is_taken_or_refused_by_name(place, value):
     table, key = place
     result = outcome(with_key(table, key, value))
-    if isinstance(result, sc.Scene):
-        assert sc.from_dict(sc.to_dict(result)) == result
+    if isinstance(result, scene.Scene):
+        assert scene.from_dict(scene.to_dict(result)) == result
     else:
         # A conflict may be told at the other key; it then names this one.
         assert (f"{table}.{key}" if table else key) in result
@@ -523,18 +523,18 @@ def test_any_value_at_all_is_taken_or_refused_by_name(place, value):
 def test_no_bytes_whatever_break_the_reader(tmp_path_factory, data):
     file = tmp_path_factory.mktemp("any") / "any.toml"
     file.write_bytes(data)
-    with pytest.raises(sc.SceneError):
-        sc.load(file)
+    with pytest.raises(scene.SceneError):
+        scene.load(file)
 
 
 @given(st.lists(st.text(max_size=30) | KEYS.map(lambda key: f"plate.{key}=1"), max_size=3))
 def test_no_override_whatever_breaks_the_reader(overrides):
     result = outcome(GOOD, "x.toml", overrides)
-    assert isinstance(result, sc.Scene) or result.startswith("x.toml: ")
+    assert isinstance(result, scene.Scene) or result.startswith("x.toml: ")
 
 
 @given(st.sampled_from(["gravity", "particle.mass", "plate.angle_deg", "stream.rate", "run.dt"]))
 def test_nothing_that_is_no_finite_number_passes_for_one(path):
     for value in ["nan", "inf", "-inf", "true", '"1.0"', "[1.0]", "1979-05-27"]:
-        said = message(sc.from_dict, GOOD, "x.toml", [f"{path}={value}"])
+        said = message(scene.from_dict, GOOD, "x.toml", [f"{path}={value}"])
         assert said.startswith(f"x.toml: {path} = {value}: must be a number")

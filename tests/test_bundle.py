@@ -9,10 +9,10 @@ from html.parser import HTMLParser
 import pytest
 from click.testing import CliRunner
 
+from chutelab.classroom.lessons import find
+from chutelab.classroom.lessons.building import bundle, html_of
+from chutelab.classroom.lessons.reading import shipped_lessons
 from chutelab.cli import main
-from chutelab.lessons import find, shipped
-from chutelab.lessons.bundle import bundle
-from chutelab.lessons.worksheets import html_of
 
 
 def chutelab(*arguments):
@@ -82,7 +82,7 @@ def test_the_bundle_of_all_lessons_is_whole_and_small(tmp_path):
     assert result.exit_code == 0
     assert broken_links(tmp_path / "web") == set()
     pages = {path.parent.name: path.stat().st_size for path in tmp_path.rglob("page.html")}
-    assert len(pages) == len(shipped())
+    assert len(pages) == len(shipped_lessons())
     # Lesson 9 varies two keys at many places each.
     assert max(pages.values()) < 2_000_000
     assert sorted(pages.values())[-2] < 500_000

@@ -16,8 +16,8 @@ from PIL import Image
 
 import chutelab
 from chutelab import scene as sc
-from chutelab.agreement.pairs import BLOWS
-from chutelab.cli import main, progress
+from chutelab.checks.agreement import BLOWS
+from chutelab.cli import console, main
 from test_bad_scenes import BROKEN
 
 SOURCES = str(Path(chutelab.__file__).parent.parent)
@@ -338,7 +338,7 @@ def test_a_destination_that_cannot_be_is_refused_before_the_run(monkeypatch):
     def never(*_arguments, **_options):
         raise AssertionError("the run began")
 
-    monkeypatch.setattr("chutelab.simulation.simulate", never)
+    monkeypatch.setattr("chutelab.engines.simulation.simulate", never)
     Path("file").write_text("", encoding="utf-8")
     assert "--out file: file is a file, not a folder" in refused("run", "slip", "--out", "file")
     assert "file is a file" in refused("run", "slip", "--out", "file/inside/it")
@@ -435,7 +435,7 @@ def test_ctrl_c_ends_with_130_and_leaves_nothing(monkeypatch):
     def interrupted(*_arguments, **_options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("chutelab.simulation.simulate", interrupted)
+    monkeypatch.setattr("chutelab.engines.simulation.simulate", interrupted)
     result = call("run", "perpendicular", "--out", "out", code=130)
     assert result.stdout == ""
     assert result.stderr.strip() == "Interrupted."
@@ -446,7 +446,7 @@ def test_a_failure_of_ours_ends_with_1_one_line_and_nothing_written(monkeypatch)
     def broken(*_arguments, **_options):
         raise ZeroDivisionError("two\nlines")
 
-    monkeypatch.setattr(sys.modules["chutelab.storage"], "to_csv", broken)
+    monkeypatch.setattr(sys.modules["chutelab.results.storage"], "to_csv", broken)
     arguments = ("run", "perpendicular", "--out", "out", "--only", "csv,npz,json")
     result = call(*arguments, code=1)
     assert result.stdout == ""
@@ -464,7 +464,7 @@ def test_a_full_disk_is_refused_in_words(monkeypatch):
     def full(*_arguments, **_options):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(sys.modules["chutelab.storage"], "save", full)
+    monkeypatch.setattr(sys.modules["chutelab.results.storage"], "save", full)
     said = refused("run", "perpendicular", "--out", "out", "--only", "npz")
     assert "--out out: cannot be written to: No space left on device" in said
 
@@ -473,7 +473,7 @@ def test_too_little_memory_is_said_in_words(monkeypatch):
     def huge(*_arguments, **_options):
         raise MemoryError("Unable to allocate 9 TiB")
 
-    monkeypatch.setattr("chutelab.simulation.simulate", huge)
+    monkeypatch.setattr("chutelab.engines.simulation.simulate", huge)
     result = call("run", "perpendicular", code=1)
     assert "not enough memory; fewer particles need less. (Unable to allocate" in result.stderr
 
@@ -505,9 +505,9 @@ class Terminal(StringIO):
 
 def test_a_bar_appears_on_standard_error_once_patience_is_over(monkeypatch, capsys):
     monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.setattr(progress, "PATIENCE", 0.0)
+    monkeypatch.setattr(console, "PATIENCE", 0.0)
     monkeypatch.setattr(sys, "stderr", terminal := Terminal())
-    with progress.progress("simulating") as update:
+    with console.progress("simulating") as update:
         assert update is not None
         for share in np.linspace(0.0, 1.0, 50):
             update(float(share))
@@ -517,14 +517,14 @@ def test_a_bar_appears_on_standard_error_once_patience_is_over(monkeypatch, caps
 
 def test_what_is_over_soon_or_watched_by_nobody_gets_no_bar(monkeypatch):
     monkeypatch.setattr(sys, "stderr", terminal := Terminal())
-    with progress.progress("simulating") as update:
+    with console.progress("simulating") as update:
         assert update is not None
         update(0.5)
-    with progress.progress("simulating", quiet=True) as update:
+    with console.progress("simulating", quiet=True) as update:
         assert update is None
     assert terminal.getvalue() == ""
     monkeypatch.setattr(sys, "stderr", pipe := StringIO())
-    with progress.progress("simulating") as update:
+    with console.progress("simulating") as update:
         assert update is None
     assert pipe.getvalue() == ""
 

@@ -8,9 +8,10 @@ from math import acos, atan2, cos, hypot, isnan, nan, pi, radians, sin
 import numpy as np
 import pytest
 
-from chutelab import scene, simulate, theory
-from chutelab.compare import QUANTITIES, compare, relative_error, scene_of
-from chutelab.recording import Kind
+from chutelab import scene, theory
+from chutelab.engines.simulation import simulate
+from chutelab.results import Kind
+from chutelab.results.comparison import QUANTITIES, compare, relative_error, scene_of
 
 M, R, r = 0.008, 0.1, 0.004
 
@@ -161,7 +162,7 @@ def test_the_belt_of_a_settled_run_pays_what_the_formula_says(name, speed):
 
 def test_a_stream_takes_its_power_steadily():
     """P = ṁ v_b (v_b - v_x), from the ledger of 100 settled particles."""
-    from chutelab.ledger import ledger
+    from chutelab.results.ledger import ledger
 
     recording = run(
         "perpendicular", "run.until=settled", "stream.count=100", "stream.rate=50",

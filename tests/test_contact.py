@@ -14,9 +14,9 @@ from scipy.optimize import brentq
 
 from chutelab import scene
 from chutelab.engines.contact import run
-from chutelab.ledger import ledger
 from chutelab.machine import build
-from chutelab.recording import REASONS, Kind
+from chutelab.results import REASONS, Kind
+from chutelab.results.ledger import ledger
 from cores import Core
 from crowds import crowd, faults, step_of
 from machines import (

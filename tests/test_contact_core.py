@@ -16,7 +16,7 @@ from scipy.special import ellipk
 
 from chutelab.engines.contact.module import Status, constants, dtype
 from chutelab.machine import build
-from chutelab.recording import REASONS, Kind
+from chutelab.results import REASONS, Kind
 from chutelab.scene import load
 from cores import Core, modes
 from machines import face, scene_of, thrown

@@ -19,15 +19,13 @@ import chutelab
 from chutelab import design, scene
 from chutelab.cli import main
 from chutelab.cli.program import RefusedError
-from chutelab.cli.uncertain import propagate
-from chutelab.design import sobol
-from chutelab.design.documents import to_toml
-from chutelab.design.evaluation import Evaluator
-from chutelab.design.families import suits
-from chutelab.design.quantities import SHORT, measured, target
-from chutelab.design.spreads import spreads
-from chutelab.plots.design import draw_scan, scan, spread
-from chutelab.variation import VaryError
+from chutelab.cli.solving import propagate
+from chutelab.pictures.plots.design import draw_scan, scan, spread
+from chutelab.scene.variants import VaryError
+from chutelab.studies.design import sensitivity
+from chutelab.studies.design.evaluation import Evaluator, suits
+from chutelab.studies.design.quantities import SHORT, measured, target, to_toml
+from chutelab.studies.design.uncertainty import spreads
 
 G, V, R, D, DROP, M = 9.81, 2.0, 0.1, 0.5, 0.5, 0.008
 
@@ -397,8 +395,8 @@ BAD = [
 @pytest.mark.parametrize(("arguments", "said"), BAD)
 def test_bad_questions_are_refused_before_anything_runs(arguments, said, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("chutelab.design.evaluation.simulate", None)
-    monkeypatch.setattr("chutelab.sweep.batch.run", None)
+    monkeypatch.setattr("chutelab.studies.design.evaluation.simulate", None)
+    monkeypatch.setattr("chutelab.studies.sweep.batch.run", None)
     result = CliRunner().invoke(main, [*SOLVE, *arguments, "--out", "out"])
     assert result.exit_code == 2, result.output
     assert said in " ".join(result.output.split())
@@ -514,8 +512,8 @@ def test_sobol_indices_of_ishigamis_function():
     # Ishigami and Homma (1990): V1 = ½ (1 + b π⁴/5)², V2 = a²/8, V13 = 8 b² π⁸/225.
     v1, v2, v13 = 0.5 * (1.0 + b * pi**4 / 5.0) ** 2, a**2 / 8.0, 8.0 * b**2 * pi**8 / 225.0
     variance = v1 + v2 + v13
-    one, other = (pi * (2.0 * shares - 1.0) for shares in sobol.design(3, 4096, seed=0))
-    found = sobol.indices(f(one), f(other), f(sobol.crossed(one, other)), seed=0)
+    one, other = (pi * (2.0 * shares - 1.0) for shares in sensitivity.design(3, 4096, seed=0))
+    found = sensitivity.indices(f(one), f(other), f(sensitivity.crossed(one, other)), seed=0)
     np.testing.assert_allclose(found.first, np.array([v1, v2, 0.0]) / variance, atol=0.01)
     np.testing.assert_allclose(found.total, np.array([v1 + v13, v2, v13]) / variance, atol=0.01)
     assert (found.first_interval[:, 0] < found.first + 1e-12).all()
@@ -582,8 +580,8 @@ def test_uniform_and_relative_spreads():
     ],
 )
 def test_bad_uncertainties_are_refused_before_anything_runs(given, said, monkeypatch):
-    monkeypatch.setattr("chutelab.design.evaluation.simulate", None)
-    monkeypatch.setattr("chutelab.sweep.batch.run", None)
+    monkeypatch.setattr("chutelab.studies.design.evaluation.simulate", None)
+    monkeypatch.setattr("chutelab.studies.sweep.batch.run", None)
     with pytest.raises((design.DesignError, VaryError), match=said):
         design.uncertainty(machine(), given)
 
@@ -639,8 +637,8 @@ def test_the_command_behind_sweep_writes_samples_and_picture(tmp_path, capsys):
     ],
 )
 def test_the_command_behind_sweep_refuses_before_it_runs(given, out, plot, said, monkeypatch):
-    monkeypatch.setattr("chutelab.design.evaluation.simulate", None)
-    monkeypatch.setattr("chutelab.sweep.batch.run", None)
+    monkeypatch.setattr("chutelab.studies.design.evaluation.simulate", None)
+    monkeypatch.setattr("chutelab.studies.sweep.batch.run", None)
     paths = {"out": out and Path(out), "plot": plot and Path(plot)}
     with pytest.raises(RefusedError, match=said):
         propagate(machine(), [given], samples=64, seed=0, as_json=False, quiet=True, **paths)

@@ -20,10 +20,10 @@ from hypothesis import strategies as st
 import chutelab
 from chutelab.engines import contact
 from chutelab.engines.contact import engine as host
-from chutelab.ledger import ledger
 from chutelab.machine import build
-from chutelab.recorder import StalledError
-from chutelab.recording import REASONS, Kind, balance
+from chutelab.results import REASONS, Kind, balance
+from chutelab.results.ledger import ledger
+from chutelab.results.recorder import StalledError
 from chutelab.scene import load, parse
 
 G, R, M = 9.81, 0.004, 0.008

@@ -12,12 +12,13 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from chutelab import exact, machine, scene
-from chutelab.exact import engine, journal
-from chutelab.ledger import ledger
-from chutelab.recorder import StalledError
-from chutelab.recording import Kind
-from chutelab.releases import Releases
+from chutelab import machine, scene
+from chutelab.engines import exact
+from chutelab.engines.exact import engine, event_log
+from chutelab.machine.releases import Releases
+from chutelab.results import Kind
+from chutelab.results.ledger import ledger
+from chutelab.results.recorder import StalledError
 
 G = 9.81
 FLOOR = {"name": "floor", "from": [-50.0, 0.0], "to": [50.0, 0.0]}
@@ -640,7 +641,7 @@ def test_a_particle_that_hardly_gets_on_is_stopped(monkeypatch):
 def test_long_runs_join_their_chunks_and_lose_nothing(monkeypatch):
     floor = {**FLOOR, "restitution": 0.9, "friction": 0.2}
     whole = thrown([0.0, 0.5], [0.3, 0.0], floor, until="settled")
-    monkeypatch.setattr(journal, "MANY", 7)
+    monkeypatch.setattr(event_log, "MANY", 7)
     pieces = thrown([0.0, 0.5], [0.3, 0.0], floor, until="settled")
     for array in ("knots", "offsets", "events", "by_surface"):
         assert getattr(whole, array).tobytes() == getattr(pieces, array).tobytes()

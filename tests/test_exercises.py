@@ -12,11 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from chutelab import simulate
-from chutelab.exercises import EXERCISES, ExerciseError, Values, Verdict, find, lesson
-from chutelab.exercises.drawing import draw, draws, solved
-from chutelab.exercises.values import shown
-from chutelab.recording import Kind
+from chutelab.classroom.exercises import EXERCISES, ExerciseError, Values, Verdict, find, lesson
+from chutelab.classroom.exercises.exercise import draw, draws, shown, solved
+from chutelab.engines.simulation import simulate
+from chutelab.results import Kind
 from chutelab.scene import from_dict
 
 NAMES = list(EXERCISES)

@@ -12,14 +12,13 @@ import pytest
 
 from chutelab import scene as sc
 from chutelab import theory
-from chutelab.agreement import measure, verify
-from chutelab.agreement.expected import MOST_ALONE
-from chutelab.compare import scene_of
-from chutelab.recording import Kind
-from chutelab.scene.measures import SYMBOLS, unit_of
+from chutelab.checks.agreement import MOST_ALONE, verify
+from chutelab.engines.simulation import simulate
+from chutelab.results import Kind
+from chutelab.results.comparison import scene_of
+from chutelab.results.summary import measure, summary
+from chutelab.scene.rules import SYMBOLS, unit_of
 from chutelab.scene.units import read_size, write_size
-from chutelab.simulation import simulate
-from chutelab.summary import summary
 from machines import PERPENDICULAR
 
 G = 9.81

@@ -13,11 +13,11 @@ from PIL import Image
 
 import chutelab
 from chutelab.cli import main
-from chutelab.figures import DRAWINGS, NUMBERS, FigureError, figure
-from chutelab.figures.flights import path
-from chutelab.figures.paths import CASES
-from chutelab.plots.figures import paper_figure
-from chutelab.recording import Kind
+from chutelab.pictures.plots.figure import paper_figure
+from chutelab.results import Kind
+from chutelab.theory.figures import DRAWINGS, NUMBERS, FigureError, figure
+from chutelab.theory.figures.model import path
+from chutelab.theory.figures.paths import CASES
 
 G, EPSILON, FALL, MASS = 9.81, 0.5, 0.5, 0.008
 

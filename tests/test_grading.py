@@ -10,14 +10,14 @@ from pathlib import Path
 import pytest
 
 import chutelab
-from chutelab.exercises import EXERCISES, lesson
-from chutelab.grading import Grade, grade, write_csv
+from chutelab.classroom.exercises import EXERCISES, lesson
+from chutelab.classroom.grading import Grade, grade, write_csv
 
 pytest.importorskip("nbclient")
 
 SOLUTIONS = Path(__file__).parent / "solutions"
 LESSONS = Path(__file__).parent.parent / "lessons"
-OPEN = 'from chutelab.exercises import lesson\ntask = lesson("the-bounce", student="{}")'
+OPEN = 'from chutelab.classroom.exercises import lesson\ntask = lesson("the-bounce", student="{}")'
 
 # What jupyter's own packages warn of when they are imported or closed is not ours to mend.
 pytestmark = pytest.mark.filterwarnings("default")
@@ -127,7 +127,7 @@ def test_a_class_is_graded_whatever_comes_back(tmp_path):
         # Printed praise and a bent check earn nothing.
         saved(
             tmp_path, "cheat.ipynb", OPEN.format("Cy"),
-            "from chutelab.exercises.task import Task\n"
+            "from chutelab.classroom.exercises.catalogue import Task\n"
             "old = Task.check\n"
             "Task.check = lambda self, n, x: (old(self, n, x), print('right'))[0]\n"
             "for n in (1, 2, 3, 4): task.check(n, 123.0)\n"

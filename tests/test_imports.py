@@ -94,17 +94,6 @@ def test_importing_the_package_loads_nothing():
     assert python("-c", code).stdout == "[]\n"
 
 
-@pytest.mark.parametrize(
-    "before", ["", "import chutelab.compare", "from chutelab.animate import film"]
-)
-def test_functions_win_over_modules_of_their_name_in_any_order(before):
-    code = (
-        f"{before}\nimport chutelab\n"
-        "print(chutelab.compare.__qualname__, chutelab.animate.__qualname__)"
-    )
-    assert python("-c", code).stdout == "compare animate\n"
-
-
 def test_the_package_offers_what_it_promises():
     for name in chutelab.__all__:
         assert getattr(chutelab, name) is not None

@@ -10,8 +10,9 @@ import pytest
 from hypothesis import HealthCheck, Phase, assume, given, settings
 from hypothesis import strategies as st
 
-from chutelab import exact, machine, scene
-from chutelab.ledger import ledger
+from chutelab import machine, scene
+from chutelab.engines import exact
+from chutelab.results.ledger import ledger
 
 unit = st.floats(-1.0, 1.0)
 points = st.tuples(unit, unit)

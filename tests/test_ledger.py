@@ -7,9 +7,10 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from chutelab import exact, machine, scene
-from chutelab.ledger import Ledger, ledger
-from chutelab.recording import ENTRIES
+from chutelab import machine, scene
+from chutelab.engines import exact
+from chutelab.results import ENTRIES
+from chutelab.results.ledger import Ledger, ledger
 
 EXACT = [name for name in scene.shipped() if name != "stream"]
 G, R, M = 9.81, 0.004, 0.008

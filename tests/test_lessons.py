@@ -13,11 +13,10 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
+from chutelab.classroom.lessons import LessonError, find, read
+from chutelab.classroom.lessons.building import Stamp, build, is_current, start
+from chutelab.classroom.lessons.reading import shipped_lessons
 from chutelab.cli import main
-from chutelab.lessons import LessonError, find, read, shipped
-from chutelab.lessons.building import build, is_current
-from chutelab.lessons.stamp import Stamp
-from chutelab.lessons.starting import start
 
 NAMES = [
     "the-parabola",
@@ -39,7 +38,7 @@ def chutelab(*arguments):
 
 
 def test_the_lessons_are_in_order():
-    lessons = shipped()
+    lessons = shipped_lessons()
     assert [lesson.name for lesson in lessons][: len(NAMES)] == NAMES
     assert [lesson.number for lesson in lessons] == list(range(1, len(lessons) + 1))
 
@@ -211,7 +210,7 @@ def test_a_picture_is_built_again_when_what_it_shows_has_changed(copied, file, o
 
 def test_other_versions_build_again(copied, monkeypatch):
     assert not build(read(copied)).made
-    monkeypatch.setattr("chutelab.lessons.building.version_of", lambda name: "0.0")
+    monkeypatch.setattr("chutelab.classroom.lessons.building.version_of", lambda name: "0.0")
     assert build(read(copied)).made
 
 
@@ -229,7 +228,7 @@ def test_nothing_half_written_is_left(copied, monkeypatch):
         path.write_bytes(b"GIF89a, half of it")
         raise RuntimeError("in the middle")
 
-    monkeypatch.setattr(sys.modules["chutelab.animate"], "animate", fail)
+    monkeypatch.setattr(sys.modules["chutelab.pictures.animation"], "animate", fail)
     before = {path.name: path.read_bytes() for path in copied.iterdir()}
     with pytest.raises(RuntimeError, match="in the middle"):
         build(read(copied), force=True)
@@ -259,7 +258,7 @@ def test_only_a_gif_can_be_stamped():
         Stamp("0" * 32, "chutelab 1").on(b"\x89PNG;")
 
 
-@pytest.mark.parametrize("lesson", shipped(), ids=lambda lesson: lesson.name)
+@pytest.mark.parametrize("lesson", shipped_lessons(), ids=lambda lesson: lesson.name)
 def test_shipped_pictures_show_what_the_lessons_say(lesson):
     assert is_current(lesson), f"run: chutelab lesson build {lesson.number}"
     picture = lesson.folder / "lesson.gif"
@@ -334,7 +333,7 @@ def test_list_names_every_lesson():
     for name in NAMES:
         assert name in printed
     listed = json.loads(chutelab("lesson", "list", "--json").stdout)["lessons"]
-    assert [one["name"] for one in listed] == [lesson.name for lesson in shipped()]
+    assert [one["name"] for one in listed] == [lesson.name for lesson in shipped_lessons()]
     assert set(listed[2]["files"]) >= {"README.md", "lesson.gif", "lesson.toml", "table-1.toml"}
 
 
@@ -378,7 +377,8 @@ def test_the_template_and_the_lessons_know_the_same_keys():
     template = Path(start.__code__.co_filename).parent / "template" / "lesson.toml"
     text = template.read_text(encoding="utf-8").replace("TITLE", '"x"').replace("# slow", "slow")
     keys = tomllib.loads(text)
-    from chutelab.lessons.models import Lesson, Page, Picture
+    from chutelab.classroom.lessons import Lesson
+    from chutelab.classroom.lessons.reading import Page, Picture
 
     assert set(keys) == set(Lesson.model_fields)
     assert set(keys["picture"]) == set(Picture.model_fields)

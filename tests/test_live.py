@@ -8,15 +8,16 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from chutelab import load, simulate, theory
-from chutelab.live import sliders
-from chutelab.live.controls import controls
-from chutelab.scene import SceneError, from_dict
+from chutelab import theory
+from chutelab.engines.simulation import simulate
+from chutelab.pictures.live import sliders
+from chutelab.pictures.live.board import controls
+from chutelab.scene import SceneError, from_dict, load
 
 pytest.importorskip("ipywidgets")
 
-from chutelab.live.board import Board
-from chutelab.live.picture import numbers as numbers_of
+from chutelab.pictures.live.board import Board
+from chutelab.pictures.live.picture import numbers as numbers_of
 
 LIMIT = 0.05
 """s of this process for one redrawing."""
@@ -146,6 +147,6 @@ def test_sliders_take_names_overrides_and_scenes():
 
 def test_without_ipywidgets_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "ipywidgets", None)
-    monkeypatch.delitem(sys.modules, "chutelab.live.board")
+    monkeypatch.delitem(sys.modules, "chutelab.pictures.live.board")
     with pytest.raises(ImportError, match=r'pip install "chutelab\[notebook\]"'):
         sliders("perpendicular")

@@ -3,7 +3,7 @@
 Where all contacts are blows there is no step to go wrong by. Where contacts last, errors vanish as
 steps shorten: as dt² in the contact engine, as dt in pymunk.
 
-What is compared is what `chutelab.accuracy` calls a run's answers, by the sizes it gives them:
+What is compared is what `studies.accuracy` calls a run's answers, by the sizes it gives them:
 where, when and how fast each surface is struck first and left first, the impulses, the end and the
 ledger. With three reservations, which are the same for every scene:
 
@@ -23,13 +23,11 @@ from math import inf, log, sqrt
 import numpy as np
 import pytest
 
-from chutelab import exact
-from chutelab.accuracy.answers import apart, each, sizes
-from chutelab.accuracy.witness import stirred
-from chutelab.engines import contact, pymunk
+from chutelab.engines import contact, exact, pymunk
 from chutelab.engines.pymunk.world import DIGITS, HAIR
 from chutelab.machine import build
-from chutelab.recording import Kind
+from chutelab.results import Kind
+from chutelab.studies.accuracy import apart, each, sizes, stirred
 from drawn import draw, only_blows
 
 LONGEST = 4e-3

@@ -10,8 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chutelab import exact, machine, nominal, scene
-from chutelab.recording import Kind
+from chutelab import machine, scene
+from chutelab.engines import exact
+from chutelab.machine import nominal
+from chutelab.results import Kind
 
 G, R, GAP, V, DROP, r = 9.81, 0.1, 0.5, 2.0, 0.5, 0.004
 

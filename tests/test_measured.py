@@ -13,13 +13,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binom
 
-from chutelab import load, measured
+from chutelab import measured
 from chutelab.cli import main
-from chutelab.measured import MeasuredError, example
-from chutelab.measured.clock import best_t0
-from chutelab.measured.diagnosis import advice
-from chutelab.measured.files import COLUMNS
-from chutelab.measured.result import plus_minus
+from chutelab.scene import load
+from chutelab.studies.measured import MeasuredError, reading
+from chutelab.studies.measured.residuals import best_t0
+from chutelab.studies.measured.result import COLUMNS, advice, plus_minus
 
 KEYS = ("plate.restitution", "incoming.speed")
 TRUTH = np.array([0.62, 1.9])
@@ -223,7 +222,7 @@ def test_residuals_are_measured_minus_parabola(real):
 
 
 def test_points_outside_the_simulated_time_are_named_and_left_out(real):
-    track = example.filmed(real).placed(t0=0.1)
+    track = reading.filmed(real).placed(t0=0.1)
     found = measured.residuals(real, track)
     early = int((track.t < -1e-9).sum())
     assert early == 12
@@ -239,7 +238,7 @@ def test_points_outside_the_simulated_time_are_named_and_left_out(real):
 def test_follows_particle_0_of_a_stream():
     stream = load("stream-independent")
     alone = load("stream-independent", ["stream.count=1"])
-    track = example.filmed(alone, noise=0.0, frames=50.0)
+    track = reading.filmed(alone, noise=0.0, frames=50.0)
     assert measured.residuals(stream, track).rms == pytest.approx((0.0, 0.0), abs=5e-5)
 
 
@@ -247,18 +246,18 @@ def test_follows_particle_0_of_a_stream():
 
 
 def test_the_shipped_track_is_what_its_generator_makes(film):
-    assert Path(film.source).read_text(encoding="utf-8") == example.shipped_text()
+    assert Path(film.source).read_text(encoding="utf-8") == reading.shipped_text()
     assert "simulated" in film.name
 
 
 def test_fit_recovers_the_answer_of_the_shipped_track(found):
-    assert tuple(example.TRUTH[key] for key in KEYS) == tuple(TRUTH)
+    assert tuple(reading.TRUTH[key] for key in KEYS) == tuple(TRUTH)
     assert (np.abs(found.values - TRUTH) < 2.0 * found.errors).all()
     assert (found.low < TRUTH).all()
     assert (found.high > TRUTH).all()
     # A fit that says it knows nothing would pass the lines above.
     assert (found.errors < [0.003, 0.0003]).all()
-    assert found.scatter == pytest.approx(example.NOISE, rel=0.2)
+    assert found.scatter == pytest.approx(reading.NOISE, rel=0.2)
     assert found.notes == ()
     assert found.after.used.all()
     assert not found.before.used.all()
@@ -267,7 +266,7 @@ def test_fit_recovers_the_answer_of_the_shipped_track(found):
 
 def test_uncertainty_of_a_belt_speed_is_the_textbook_one(real):
     """On the belt x = v t - 1 and y is fixed, so σ_v = s / √Σt², s² = Σr² / (2n - 1)."""
-    track = example.filmed(real, frames=60.0, seed=7)
+    track = reading.filmed(real, frames=60.0, seed=7)
     track = measured.Track("A", "<belt>", track.seconds[:30], track.points[:30], track.lines[:30])
     fitted = measured.fit(load("perpendicular"), track, ["incoming.speed"])
     t = track.t
@@ -286,7 +285,7 @@ def test_uncertainties_cover_the_truth_as_often_as_they_say(scene, real):
     """
     off = []
     for seed in range(32):
-        track = example.filmed(real, frames=60.0, seed=1000 + seed, begin=0.4)
+        track = reading.filmed(real, frames=60.0, seed=1000 + seed, begin=0.4)
         fitted = measured.fit(scene, track, KEYS)
         off.append(np.abs(fitted.values - TRUTH) / fitted.errors)
     for within, share in ((1.0, 0.6827), (2.0, 0.9545)):
@@ -296,7 +295,7 @@ def test_uncertainties_cover_the_truth_as_often_as_they_say(scene, real):
 
 
 def test_points_without_noise_give_the_parameters_exactly(scene, real):
-    track = example.filmed(real, noise=0.0)
+    track = reading.filmed(real, noise=0.0)
     exact = measured.residuals(real, track).simulated
     track = measured.Track("A", "<exact>", track.seconds, exact, track.lines)
     fitted = measured.fit(scene, track, KEYS)
@@ -305,19 +304,19 @@ def test_points_without_noise_give_the_parameters_exactly(scene, real):
 
 
 def test_finds_the_clock_from_anywhere(scene, real):
-    track = example.filmed(real, begin=0.45, seed=3).placed(t0=-40.0)
+    track = reading.filmed(real, begin=0.45, seed=3).placed(t0=-40.0)
     fitted = measured.fit(scene, track, [*KEYS, "t0"])
     assert fitted.values == pytest.approx([*TRUTH, 0.0], abs=0.01)
     assert (np.abs(fitted.values - [*TRUTH, 0.0]) < 3.0 * fitted.errors).all()
     assert fitted.after.track.placement.t0 == fitted.values[2]
     assert any("correlated" in note for note in fitted.notes)
-    assert best_t0(measured.residuals(real, example.filmed(real)).recording, track) == (
+    assert best_t0(measured.residuals(real, reading.filmed(real)).recording, track) == (
         pytest.approx(0.0, abs=0.002)
     )
 
 
 def test_fits_how_the_points_lie(real):
-    track = example.filmed(real, seed=5)
+    track = reading.filmed(real, seed=5)
     # As a camera would have it: pixels of 2 mm, from the upper left, y downward.
     pixels = track.points * [500.0, -500.0] + [310.0, 95.0]
     camera = measured.Track(
@@ -332,7 +331,7 @@ def test_fits_how_the_points_lie(real):
 
 
 def test_a_robust_fit_believes_an_outlier_less(scene, real):
-    track = example.filmed(real, seed=6, begin=0.4)
+    track = reading.filmed(real, seed=6, begin=0.4)
     points = track.points.copy()
     points[[20, 60]] += [[0.3, 0.0], [0.0, 0.25]]
     spoilt = measured.Track("A", "<spoilt>", track.seconds, points, track.lines)
@@ -349,7 +348,7 @@ def test_stays_within_what_the_scene_allows(scene):
     real = load("perpendicular", ["plate.restitution=1.0"])
     at_the_edge = 0
     for seed in range(6):
-        track = example.filmed(real, seed=seed, noise=0.01)
+        track = reading.filmed(real, seed=seed, noise=0.01)
         fitted = measured.fit(scene, track, ["plate.restitution"])
         assert fitted.values[0] <= 1.0
         if fitted.values[0] > 1.0 - 1e-6:
@@ -402,7 +401,7 @@ def test_says_which_keys_cannot_be_fitted(scene, film, keys, said):
 def test_gets_over_a_jump(off):
     """From 1 cm beside, the particle bounces once less on the ramp, and there is a minimum."""
     plain = load("free-fall")
-    real = example.filmed(plain, noise=0.001, seed=2)
+    real = reading.filmed(plain, noise=0.001, seed=2)
     start = load("free-fall", [f"stream.at=[{plain.stream.at[0] + off}, {plain.stream.at[1]}]"])
     fitted = measured.fit(start, real, ["stream.at[0]"])
     assert abs(fitted.values[0] - plain.stream.at[0]) < 3.0 * fitted.errors[0]
@@ -482,7 +481,7 @@ def test_writes_a_picture_the_points_and_the_fit(tmp_path, found):
 
 
 def test_draws_points_tracks_and_residuals(found):
-    from chutelab.plots.measured import measured as draw
+    from chutelab.pictures.plots.measured import measured as draw
 
     figure = draw(found.after, found)
     view, *panels = figure.axes

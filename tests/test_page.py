@@ -12,12 +12,11 @@ import pytest
 from click.testing import CliRunner
 
 import chutelab
-from chutelab import page
 from chutelab import scene as scenes
 from chutelab.cli import main
-from chutelab.page import runs
-from chutelab.recording import Kind
-from chutelab.variation import Vary, VaryError
+from chutelab.pictures.live import page, runs
+from chutelab.results import Kind
+from chutelab.scene.variants import Vary, VaryError
 
 ANGLES = "plate.angle_deg=-20:70:46"
 FEW = "plate.angle_deg=0,20,40"
@@ -103,7 +102,7 @@ def test_figures_agree_with_the_recording_and_with_the_parabola(inclined, html):
     assert figures["v2"]["analytic"][index] == pytest.approx(
         figures["v2"]["simulated"][index], rel=1e-12
     )
-    books = chutelab.recording.Recording.energy_at(recording, [recording.knots["t"].max()])
+    books = chutelab.results.Recording.energy_at(recording, [recording.knots["t"].max()])
     assert figures["ledger.belt_work"]["simulated"][index] == pytest.approx(books["belt_work"][0])
     assert landing["unit"] == "m"
 

@@ -12,9 +12,9 @@ import pytest
 from PIL import Image
 
 import chutelab
-from chutelab import page
 from chutelab import scene as scenes
-from chutelab.recording import Kind
+from chutelab.pictures.live import page
+from chutelab.results import Kind
 
 playwright = pytest.importorskip(
     "playwright.sync_api", reason='needs Playwright: pip install "chutelab[test]"'

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chutelab.scene import MISSING, load
-from chutelab.scene.paths import limits_of, parts_of, rule_at, value_at
+from chutelab.scene.overrides import limits_of, parts_of, rule_at, value_at
 
 
 @pytest.mark.parametrize(

@@ -17,14 +17,14 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from PIL import Image
 
-from chutelab import plots, scene, theory
-from chutelab.compare import scene_of
+from chutelab import scene, theory
+from chutelab.engines.simulation import simulate
 from chutelab.machine import build
-from chutelab.plots import sampling, style
-from chutelab.plots.window import Window
-from chutelab.recorder import Recorder
-from chutelab.recording import Kind, Recording
-from chutelab.simulation import simulate
+from chutelab.pictures import plots
+from chutelab.pictures.plots import Window, scenery, style
+from chutelab.results import Kind, Recording
+from chutelab.results.comparison import scene_of
+from chutelab.results.recorder import Recorder
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -251,7 +251,7 @@ def test_stream_tracks_are_thinned_and_those_of_the_particles() -> None:
     (stream,) = [one for one in ax.collections if one.get_gid() == "stream"]
     segments = stream.get_segments()
     assert len(segments) == 59  # and particle 0
-    chosen = sampling.spread(130, 60)[1:]
+    chosen = scenery.spread(130, 60)[1:]
     first = recording.knots["position"][recording.offsets[chosen]]
     assert np.array([segment[0] for segment in segments]) == pytest.approx(first, abs=1e-15)
     assert stream.get_alpha() < 0.5
@@ -260,7 +260,7 @@ def test_stream_tracks_are_thinned_and_those_of_the_particles() -> None:
 
 @given(st.integers(1, 500), st.integers(1, 80))
 def test_spread_takes_the_first_and_no_more_than_asked_for(count: int, at_most: int) -> None:
-    chosen = sampling.spread(count, at_most)
+    chosen = scenery.spread(count, at_most)
     assert chosen[0] == 0
     assert len(chosen) == min(count, at_most)
     assert chosen[-1] < count
@@ -269,7 +269,7 @@ def test_spread_takes_the_first_and_no_more_than_asked_for(count: int, at_most: 
 def test_subset_is_the_same_motion(runs: dict[str, Recording]) -> None:
     recording = runs["free-fall"]
     times = np.linspace(0.0, 2.0, 50)
-    some = sampling.subset(recording, [0, 3])
+    some = scenery.subset(recording, [0, 3])
     for mine, all_of_them in zip(some.at(times), recording.at(times), strict=True):
         np.testing.assert_array_equal(mine, all_of_them[:, [0, 3]])
 
@@ -371,7 +371,7 @@ def test_ledger_shows_a_planted_residual() -> None:
 
 
 def test_energies_of_a_stream_can_be_stacked(runs: dict[str, Recording]) -> None:
-    books = sampling.energies(runs["free-fall"], np.linspace(0.0, 2.0, 41))
+    books = scenery.energies(runs["free-fall"], np.linspace(0.0, 2.0, 41))
     assert (books["potential"] >= 0.0).all()
     # Five particles, one every 0.25 s: the energy at release grows in steps.
     assert len(np.unique(books["start"])) == 5
@@ -379,15 +379,15 @@ def test_energies_of_a_stream_can_be_stacked(runs: dict[str, Recording]) -> None
 
 @given(st.floats(1e-6, 1e6), st.integers(1, 40))
 def test_round_step_is_round_and_close(span: float, wanted: int) -> None:
-    step = sampling.round_step(span, wanted)
+    step = scenery.round_step(span, wanted)
     assert f"{step:.0e}"[0] in "125"
     assert float(f"{step:.0e}") == step
     assert 0.6 < span / wanted / step < 1.6
 
 
 def test_round_times_are_multiples_within_the_bounds() -> None:
-    assert sampling.round_times(0.1, 0.3, 0.1) == pytest.approx([0.1, 0.2, 0.3], rel=1e-15)
-    assert sampling.round_times(0.11, 0.29, 0.1) == pytest.approx([0.2], rel=1e-15)
+    assert scenery.round_times(0.1, 0.3, 0.1) == pytest.approx([0.1, 0.2, 0.3], rel=1e-15)
+    assert scenery.round_times(0.11, 0.29, 0.1) == pytest.approx([0.2], rel=1e-15)
 
 
 # The scene
@@ -576,7 +576,10 @@ def test_drawing_touches_neither_pyplot_nor_the_settings() -> None:
     before = dict(mpl.rcParams)
     plots.overlay(by_hand())
     assert dict(mpl.rcParams) == before
-    code = "import sys, chutelab.plots, chutelab.animate; print('matplotlib.pyplot' in sys.modules)"
+    code = (
+        "import sys, chutelab.pictures.plots, chutelab.pictures.animation\n"
+        "print('matplotlib.pyplot' in sys.modules)"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
 

@@ -9,13 +9,12 @@ import pytest
 
 from chutelab import scene as sc
 from chutelab import theory
-from chutelab.compare import QUANTITIES
+from chutelab.checks.preflight import preflight, trial
+from chutelab.engines.simulation import simulate
 from chutelab.machine import build
-from chutelab.preflight import preflight
-from chutelab.preflight import trial as trials
-from chutelab.recorder import StalledError
-from chutelab.recording import REASONS, Kind
-from chutelab.simulation import simulate
+from chutelab.results import REASONS, Kind
+from chutelab.results.comparison import QUANTITIES
+from chutelab.results.recorder import StalledError
 from machines import PERPENDICULAR
 
 LONE = [name for name in sc.shipped() if "stream" not in name]
@@ -182,7 +181,7 @@ def test_a_crowds_contacts_are_right_to_a_factor_of_three(overrides):
 
 
 def test_a_trial_that_takes_too_long_is_cut_off_and_says_so(monkeypatch):
-    monkeypatch.setattr(trials, "PATIENCE", 0.0)
+    monkeypatch.setattr(trial, "PATIENCE", 0.0)
     found = look("belt-landing")
     assert found.effort.at_least
     assert "was cut off after" in found.effort.how
@@ -196,7 +195,7 @@ def test_a_trial_that_is_stuck_is_a_warning_not_a_crash(monkeypatch):
     def stuck(*_arguments):
         raise StalledError(0, 1.5, (0.1, 0.2), "it bounces for ever")
 
-    monkeypatch.setattr(trials, "simulate", stuck)
+    monkeypatch.setattr(trial, "simulate", stuck)
     (advice,) = look("perpendicular").advice
     assert advice.warning.startswith("a trial run did not come to an end: particle 0 is stuck")
 
@@ -350,10 +349,10 @@ def test_no_shipped_scene_has_a_warning(name):
 
 def test_a_trial_is_the_beginning_of_the_stream():
     scene = sc.load("stream-independent")
-    tried = trials.trial(scene, "exact")
+    tried = trial.trial(scene, "exact")
     whole = simulate(scene)
     assert tried.recording is not None
-    assert tried.count == tried.recording.count == trials.INDEPENDENT
+    assert tried.count == tried.recording.count == trial.INDEPENDENT
     mine = tried.recording.select(Kind.LANDING)["t"][:3]
     assert mine.tolist() == whole.select(Kind.LANDING)["t"][:3].tolist()
 

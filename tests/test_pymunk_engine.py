@@ -9,12 +9,11 @@ import pymunk
 import pytest
 
 import chutelab
-import chutelab.impact
+from chutelab.engines.exact import run as exact
 from chutelab.engines.pymunk import run
-from chutelab.exact import run as exact
-from chutelab.ledger import ledger
 from chutelab.machine import build
-from chutelab.recording import REASONS, Kind
+from chutelab.results import REASONS, Kind
+from chutelab.results.ledger import ledger
 from chutelab.scene import parse
 
 LONE = ("perpendicular", "perpendicular-fast", "inclined-20", "inclined-40", "inclined-60",
@@ -361,13 +360,13 @@ def test_a_fault_in_the_formulas_does_not_reach_it(monkeypatch):
     m = machine("perpendicular")
     before, right = run(m), exact(m)
     assert off(before, right) < 1e-11
-    true = chutelab.impact.impulses
+    true = chutelab.mechanics.impact.impulses
 
     def wrong(approach, slip, restitution, friction, share):
         return true(1.01 * approach, slip, restitution, friction, share)
 
-    monkeypatch.setattr("chutelab.impact.impulses", wrong)
-    monkeypatch.setattr("chutelab.exact.touch.impulses", wrong)
+    monkeypatch.setattr("chutelab.mechanics.impact.impulses", wrong)
+    monkeypatch.setattr("chutelab.engines.exact.contacts.impulses", wrong)
     assert off(exact(m), right) > 1e-6
     np.testing.assert_array_equal(final(run(m)), final(before))
 

@@ -10,10 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from chutelab import exact, machine, scene
-from chutelab.ledger import ledger
-from chutelab.recorder import Recorder
-from chutelab.recording import ENTRIES, REASONS, Kind, Particle, tracks
+from chutelab import machine, scene
+from chutelab.engines import exact
+from chutelab.results import ENTRIES, REASONS, Kind, Particle
+from chutelab.results import recording as tracks
+from chutelab.results.ledger import ledger
+from chutelab.results.recorder import Recorder
 
 EPS = 2.0**-52
 G = 9.81

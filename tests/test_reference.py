@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from chutelab import exact, reference, scene
-from chutelab.accuracy.answers import apart, each, sizes
-from chutelab.ledger import ledger
+from chutelab import scene
+from chutelab.checks.stress.cases import machine as drawn
+from chutelab.engines import exact, reference
 from chutelab.machine import build
-from chutelab.recording import REASONS, Kind
-from chutelab.stress.drawn import machine as drawn
+from chutelab.results import REASONS, Kind
+from chutelab.results.ledger import ledger
+from chutelab.studies.accuracy import apart, each, sizes
 
 G = 9.81
 

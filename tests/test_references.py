@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from chutelab import exact, scene
+from chutelab import scene
+from chutelab.engines import exact
 from chutelab.machine import build
-from chutelab.recording import Kind
+from chutelab.results import Kind
 from drawn import draw, only_blows
 from machines import (
     BELT,

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from chutelab import scene
 from chutelab.engines import contact
 from chutelab.machine import build
-from chutelab.recording import Kind
-from chutelab.releases import DEEP, draw, squeeze
+from chutelab.machine.releases import DEEP, draw, squeeze
+from chutelab.results import Kind
 
 G, RC, V = 9.81, 0.1 + 0.004, 2.0
 

@@ -9,8 +9,8 @@ import pytest
 
 import chutelab
 from chutelab import theory
-from chutelab.ledger import ledger
-from chutelab.sheet import Sheet
+from chutelab.results.ledger import ledger
+from chutelab.util.tables import Sheet
 
 SHEET = Sheet(
     "What & where",

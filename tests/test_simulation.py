@@ -6,9 +6,10 @@ from importlib import import_module
 
 import pytest
 
-from chutelab import exact, machine, scene
-from chutelab.recording import REASONS
-from chutelab.simulation import ENGINES, choose, simulate
+from chutelab import machine, scene
+from chutelab.engines import exact
+from chutelab.engines.simulation import ENGINES, choose, simulate
+from chutelab.results import REASONS
 
 ARRAYS = ("knots", "offsets", "ended", "events", "by_surface")
 

@@ -11,10 +11,11 @@ from io import StringIO
 import numpy as np
 import pytest
 
-from chutelab import scene, simulate, storage
-from chutelab.files import whole
-from chutelab.recording import Kind, Recording
-from chutelab.storage import RecordingError
+from chutelab import scene
+from chutelab.engines.simulation import simulate
+from chutelab.results import Kind, Recording, storage
+from chutelab.results.storage import RecordingError
+from chutelab.util.files import whole
 
 ARRAYS = ("knots", "offsets", "ended", "events", "by_surface")
 

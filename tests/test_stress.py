@@ -17,24 +17,17 @@ import pytest
 from click.testing import CliRunner
 
 import chutelab
-from chutelab import cli, machine, scene, simulate, stress
+from chutelab import cli, machine, scene
+from chutelab.checks import stress
+from chutelab.checks.stress import ENGINES, Case, Evidence, Ladder, Twin, cases, harness, laws
+from chutelab.checks.stress import harness as table
+from chutelab.checks.stress import harness as watchdog
+from chutelab.checks.stress import laws as demands
+from chutelab.checks.stress.case import TRANSFER, by_name, merged, scene_of, surface, thrown
 from chutelab.cli import main
-from chutelab.recorder import StalledError
-from chutelab.recording import Kind
-from chutelab.stress import demands, harness, laws, symmetric, table, watchdog
-from chutelab.stress.case import (
-    ENGINES,
-    TRANSFER,
-    Case,
-    Ladder,
-    Twin,
-    by_name,
-    merged,
-    scene_of,
-    surface,
-    thrown,
-)
-from chutelab.stress.evidence import Evidence
+from chutelab.engines.simulation import simulate
+from chutelab.results import Kind
+from chutelab.results.recorder import StalledError
 
 SOURCES = str(Path(chutelab.__file__).parent.parent)
 
@@ -394,23 +387,23 @@ MIRROR = Twin("mirror symmetry", {}, lambda p: p * [-1.0, 1.0])
 
 
 def test_a_twin_that_moves_elsewhere_is_no_twin():
-    one, other = evidence(HOP), evidence(symmetric.mirrored(HOP))
+    one, other = evidence(HOP), evidence(cases.mirrored(HOP))
     assert demands.symmetric(one, other, MIRROR).figure < 1e-15
     assert demands.symmetric(one, other, MIRROR).holds
-    off = evidence(symmetric.mirrored(HOP), knots=adder("position", 1, [1e-6, 0.0]))
+    off = evidence(cases.mirrored(HOP), knots=adder("position", 1, [1e-6, 0.0]))
     assert demands.symmetric(one, off, MIRROR).figure == pytest.approx(1e-6, rel=0.1)
     assert not demands.symmetric(one, off, MIRROR).holds
     assert not demands.symmetric(one, evidence(HOP), MIRROR).holds
-    shorter = evidence(merged(symmetric.mirrored(HOP), {"run": {"until": 0.9}}))
+    shorter = evidence(merged(cases.mirrored(HOP), {"run": {"until": 0.9}}))
     assert not demands.symmetric(one, shorter, MIRROR).holds
 
 
 def test_moved_and_mirrored_scenes_are_that():
-    there = symmetric.moved(HOP, 3.0, 4.0)
+    there = cases.moved(HOP, 3.0, 4.0)
     assert there["surface"][0]["points"] == [[2.0, 4.0], [5.0, 4.0]]
     assert there["stream"]["at"] == [3.0, 4.3]
     assert there["stream"]["velocity"] == [0.5, 0.0]
-    assert symmetric.mirrored(HOP)["stream"]["velocity"] == [-0.5, 0.0]
+    assert cases.mirrored(HOP)["stream"]["velocity"] == [-0.5, 0.0]
     assert HOP["stream"]["at"] == [0.0, 0.3]
 
 
@@ -769,7 +762,7 @@ def stuck(loaded, **_options):
 
 
 def run_stuck(monkeypatch, tmp_path, *arguments, code=1):
-    monkeypatch.setattr("chutelab.simulation.simulate", stuck)
+    monkeypatch.setattr("chutelab.engines.simulation.simulate", stuck)
     monkeypatch.chdir(tmp_path)
     outcome = CliRunner().invoke(main, ["run", "perpendicular", *arguments])
     assert outcome.exit_code == code

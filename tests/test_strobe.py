@@ -9,8 +9,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from PIL import Image
 
 from chutelab import scene
-from chutelab.plots import strobe
-from chutelab.simulation import simulate
+from chutelab.engines.simulation import simulate
+from chutelab.pictures.plots import strobe
 from test_plots import BELT_TIME, EXACT, by_hand, expected, seen
 
 if TYPE_CHECKING:

@@ -9,11 +9,12 @@ from math import degrees
 import numpy as np
 import pytest
 
-from chutelab import scene, simulate, theory
-from chutelab.compare import compare
-from chutelab.ledger import ledger
-from chutelab.recording import REASONS, Kind
-from chutelab.summary import summary
+from chutelab import scene, theory
+from chutelab.engines.simulation import simulate
+from chutelab.results import REASONS, Kind
+from chutelab.results.comparison import compare
+from chutelab.results.ledger import ledger
+from chutelab.results.summary import summary
 
 TOP = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",

@@ -15,15 +15,25 @@ from click.testing import CliRunner
 
 import chutelab
 from chutelab.cli import main
-from chutelab.compare import compare
-from chutelab.exact import CornerError, kinds, run
-from chutelab.ledger import ledger
+from chutelab.engines.exact import CornerError, kinds, run
+from chutelab.engines.simulation import simulate
 from chutelab.machine import build
-from chutelab.recording import Kind
+from chutelab.results import Kind
+from chutelab.results.comparison import compare
+from chutelab.results.ledger import ledger
 from chutelab.scene import SceneError, load, parse, to_dict
-from chutelab.scene.family import accepted, family, is_plain, judged_by
-from chutelab.simulation import simulate
-from chutelab.sweep import (
+from chutelab.scene.variants import (
+    Vary,
+    VaryError,
+    accepted,
+    family,
+    is_plain,
+    judged_by,
+    parse_range,
+    quantity,
+)
+from chutelab.scene.variants import parse as parse_vary
+from chutelab.studies.sweep import (
     MOST_VARIANTS,
     NUMBERS,
     REASON,
@@ -32,11 +42,8 @@ from chutelab.sweep import (
     planned,
     sweep,
 )
-from chutelab.sweep.alone import alone
-from chutelab.sweep.block import Block
-from chutelab.sweep.columns import joined
-from chutelab.variation import Vary, VaryError, parse_range, quantity
-from chutelab.variation import parse as parse_vary
+from chutelab.studies.sweep.batch import Block, alone
+from chutelab.studies.sweep.rows import joined
 
 JOINED = """
 [incoming]
@@ -137,7 +144,7 @@ def test_a_batch_does_not_run_its_variants_one_by_one(monkeypatch):
     def never(*_):
         raise AssertionError("ran alone")
 
-    monkeypatch.setattr("chutelab.sweep.batch.alone", never)
+    monkeypatch.setattr("chutelab.studies.sweep.batch.alone", never)
     swept = sweep(load("perpendicular"), ["plate.angle_deg=-10:10:50", "incoming.speed=0.5,2,4"])
     assert np.isfinite(swept.columns["landing.x"]).sum() > 100
 
@@ -210,7 +217,7 @@ max_time = 2.0
             refused.append(given[0].count)
             raise
 
-    monkeypatch.setattr("chutelab.sweep.batch.run", watched)
+    monkeypatch.setattr("chutelab.studies.sweep.batch.run", watched)
     assert_same(batch.swept(block), singles)
     assert refused[0] == 10
     assert 1 <= refused.count(1) < 10
@@ -265,7 +272,7 @@ def test_a_stream_has_means_and_spreads():
 
 
 def test_what_the_belt_pays_is_that_of_solve_and_theory_only_where_runs_go_on_until_no_slip():
-    from chutelab.design import value
+    from chutelab.studies.design import value
 
     m, vb, vx, mu = 0.008, 2.0, -1.0, 0.5
     down = sqrt((9.81 * 0.298) ** 2 + 2.0 * 9.81 * 0.5)
@@ -335,13 +342,13 @@ def test_a_variant_that_cannot_be_or_misses_is_a_row_with_its_reason():
 
 
 def test_a_run_that_gets_stuck_is_a_row(monkeypatch):
-    from chutelab.recorder import StalledError
+    from chutelab.results.recorder import StalledError
 
     def stuck(*_args, **_options):
         raise StalledError(0, 1.0, (0.0, 0.5), "it hangs")
 
-    monkeypatch.setattr("chutelab.sweep.alone.simulate", stuck)
-    monkeypatch.setattr("chutelab.sweep.batch.run", stuck)
+    monkeypatch.setattr("chutelab.studies.sweep.batch.simulate", stuck)
+    monkeypatch.setattr("chutelab.studies.sweep.batch.run", stuck)
     reasons = sweep(load("perpendicular"), ["plate.restitution=0,1"]).columns[REASON]
     assert ["it hangs" in reason for reason in reasons] == [True, True]
 
@@ -415,7 +422,7 @@ def test_a_family_fills_defaults_that_are_other_keys():
     ids=lambda value: value[0] if isinstance(value, list) else None,
 )
 def test_what_cannot_be_varied_is_refused_with_what_is_allowed(varies, allowed, monkeypatch):
-    monkeypatch.setattr("chutelab.sweep.sweeping.swept", None)
+    monkeypatch.setattr("chutelab.studies.sweep.sweeping.swept", None)
     options = [option for vary in varies for option in ("--vary", vary)]
     result = call("sweep", "perpendicular", *options, "--out", "rows.csv", code=2)
     assert allowed in result.stderr
@@ -439,7 +446,7 @@ def test_what_cannot_be_varied_is_refused_with_what_is_allowed(varies, allowed, 
     ids=" ".join,
 )
 def test_options_that_cannot_be_are_refused_before_anything_runs(options, allowed, monkeypatch):
-    monkeypatch.setattr("chutelab.sweep.sweeping.swept", None)
+    monkeypatch.setattr("chutelab.studies.sweep.sweeping.swept", None)
     vary = "plate.angle_deg=0:10" if "--sample" in options else "plate.angle_deg=0,10"
     result = call("sweep", "perpendicular", "--vary", vary, *options, code=2)
     assert allowed in result.stderr
@@ -537,7 +544,7 @@ def test_the_command_prints_a_table_and_writes_files():
 
 
 def test_lines_go_through_the_rows_and_stop_where_there_are_none():
-    from chutelab.plots.sweep import sweep_figure
+    from chutelab.pictures.plots.design import sweep_figure
 
     swept = sweep(load("perpendicular"), ["plate.angle_deg=0:30:16", "incoming.speed=2,4"])
     (ax, *_) = sweep_figure(swept, "landing.vx").axes
@@ -552,7 +559,7 @@ def test_lines_go_through_the_rows_and_stop_where_there_are_none():
 
 
 def test_two_keys_with_many_values_make_a_heat_map():
-    from chutelab.plots.sweep import sweep_figure
+    from chutelab.pictures.plots.design import sweep_figure
 
     swept = sweep(load("perpendicular"), ["plate.angle_deg=-10:10:9", "incoming.speed=2:4:10"])
     figure = sweep_figure(swept, "belt_work", path="heat.png")
@@ -563,7 +570,7 @@ def test_two_keys_with_many_values_make_a_heat_map():
 
 
 def test_samples_are_dots_and_crosses_where_there_is_nothing():
-    from chutelab.plots.sweep import sweep_figure
+    from chutelab.pictures.plots.design import sweep_figure
 
     scene = load("perpendicular")
     swept = sweep(scene, ["plate.angle_deg=0:40", "incoming.speed=1:4"], sample=30)
@@ -602,7 +609,7 @@ def test_a_frame_has_the_columns():
 
 def test_nothing_heavy_is_imported_before_it_is_needed():
     code = (
-        "import sys, chutelab; from chutelab.sweep import sweep;"
+        "import sys, chutelab; from chutelab.studies.sweep import sweep;"
         "sweep(chutelab.load('perpendicular'), ['plate.angle_deg=0,10']);"
         "heavy = 'scipy', 'pyarrow', 'distributed', 'pandas', 'matplotlib', 'pymunk', 'rich';"
         "print([name for name in heavy if name in sys.modules])"

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 import chutelab
 from chutelab.scene import load
-from chutelab.sweep import (
+from chutelab.studies.sweep import (
     NUMBERS,
     REASON,
     PartError,
@@ -27,10 +27,9 @@ from chutelab.sweep import (
     sweep,
     sweep_to,
 )
-from chutelab.sweep.alone import alone
-from chutelab.sweep.columns import joined
-from chutelab.sweep.part import part_of
-from chutelab.sweep.table import columns_of, text_of
+from chutelab.studies.sweep.batch import alone
+from chutelab.studies.sweep.result import columns_of, part_of, text_of
+from chutelab.studies.sweep.rows import joined
 
 
 @pytest.fixture(autouse=True)
@@ -87,7 +86,7 @@ def test_nothing_is_written_when_a_variant_fails(monkeypatch):
     def broken(*_):
         raise RuntimeError("broken")
 
-    monkeypatch.setattr("chutelab.sweep.sweeping.swept", broken)
+    monkeypatch.setattr("chutelab.studies.sweep.sweeping.swept", broken)
     plan = planned(load("perpendicular"), SMALL)
     with crew() as team, pytest.raises(RuntimeError, match="broken"):
         sweep_to(plan, "rows.csv", team)
@@ -147,7 +146,7 @@ def test_rows_that_are_there_are_not_simulated_again(interrupted, monkeypatch):
         asked.append(len(block.values))
         return joined([alone(block, row) for row in range(len(block.values))])
 
-    monkeypatch.setattr("chutelab.sweep.sweeping.swept", noting)
+    monkeypatch.setattr("chutelab.studies.sweep.sweeping.swept", noting)
     with crew() as team:
         sweep_to(plan, "rows.csv", team, resume=True)
     assert sum(asked) == 1

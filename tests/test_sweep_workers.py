@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from chutelab.scene import load
-from chutelab.sweep import LostWorkersError, crew, planned, sweep, sweep_to
+from chutelab.studies.sweep import LostWorkersError, crew, planned, sweep, sweep_to
 
 
 @pytest.fixture(scope="module")

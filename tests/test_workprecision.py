@@ -16,37 +16,43 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
-from chutelab.cli import benching, main
-from chutelab.plots.workprecision import LOOKS
-from chutelab.plots.workprecision import scaling as draw_scaling
-from chutelab.plots.workprecision import workprecision as draw
-from chutelab.releases import draw as draw_releases
-from chutelab.simulation import simulate
-from chutelab.workprecision import (
+from chutelab.checks.workprecision import (
     METHODS,
     Record,
     Size,
     cases,
     claims,
-    environment,
     from_tsv,
     measure,
     scaling,
     to_tsv,
     whole_process,
 )
-from chutelab.workprecision.answers import MissedError, Reference, worst
-from chutelab.workprecision.crowd import FRAME, frames_of, overlaps, typical
-from chutelab.workprecision.fit import exponent, order, slope, time_at, work_slope
-from chutelab.workprecision.methods import Method
-from chutelab.workprecision.process import COMMANDS
-from chutelab.workprecision.scaling import size, stream
+from chutelab.checks.workprecision.cases import (
+    FRAME,
+    MissedError,
+    Reference,
+    frames_of,
+    overlaps,
+    typical,
+    worst,
+)
+from chutelab.checks.workprecision.claims import exponent, order, slope, time_at, work_slope
+from chutelab.checks.workprecision.measure import COMMANDS, size, stream
+from chutelab.checks.workprecision.methods import Method
+from chutelab.cli import benching, main
+from chutelab.engines.simulation import simulate
+from chutelab.machine.releases import draw as draw_releases
+from chutelab.pictures.plots.workprecision import LOOKS
+from chutelab.pictures.plots.workprecision import scaling as draw_scaling
+from chutelab.pictures.plots.workprecision import workprecision as draw
+from chutelab.util.versions import environment
 
 G, R, RADIUS, V, EPS, MU, DROP = 9.81, 0.1, 0.004, 2.0, 0.5, 0.3, 1.0
 KNOWN = cases()
 # Functions of the package hide these modules.
-MEASURE = import_module("chutelab.workprecision.measure")
-SCALING = import_module("chutelab.workprecision.scaling")
+MEASURE = import_module("chutelab.checks.workprecision.measure")
+SCALING = import_module("chutelab.checks.workprecision.measure")
 
 
 def one(case, method, value=None):
@@ -214,7 +220,7 @@ def test_dop853_is_as_accurate_as_it_is_asked_to_be(case, rtol, bound):
 
 
 def test_dop853_solves_many_one_by_one():
-    ode = pytest.importorskip("chutelab.workprecision.ode")
+    ode = pytest.importorskip("chutelab.checks.workprecision.ode")
     scene = stream("independent", 5)
     found = ode.independent(scene, 1e-9)
     assert worst(found, KNOWN["independent"].reference(scene))[0] < 1e-13
@@ -246,7 +252,7 @@ def test_plain_pymunk_passes_the_plate_with_long_steps():
 
 
 def test_plain_pymunk_with_many():
-    from chutelab.workprecision import plain
+    from chutelab.checks.workprecision import plain
 
     scene = stream("independent", 30)
     known = KNOWN["independent"].reference(scene)
@@ -715,9 +721,9 @@ def test_an_interrupt_leaves_no_files(where, tmp_path, monkeypatch):
         raise KeyboardInterrupt
 
     if where == "measure":
-        monkeypatch.setattr("chutelab.workprecision.measure", interrupt)
+        monkeypatch.setattr("chutelab.checks.workprecision.measure", interrupt)
     else:
-        monkeypatch.setattr("chutelab.plots.workprecision.workprecision", interrupt)
+        monkeypatch.setattr("chutelab.pictures.plots.workprecision.workprecision", interrupt)
     out = tmp_path / "out"
     call("transfer", "--quick", "--repeats", 1, "--method", "exact", "--out", out, code=130)
     assert not list(tmp_path.iterdir())

@@ -11,11 +11,14 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from chutelab import compare, load, simulate
+from chutelab.classroom.lessons import find, scene_of
+from chutelab.classroom.lessons.reading import shipped_lessons
 from chutelab.cli import main
-from chutelab.ledger import ledger
-from chutelab.lessons import find, scene_of, shipped
-from chutelab.recording import Kind
+from chutelab.engines.simulation import simulate
+from chutelab.results import Kind
+from chutelab.results.comparison import compare
+from chutelab.results.ledger import ledger
+from chutelab.scene import load
 from chutelab.theory import transfer
 
 G = 9.81
@@ -91,7 +94,7 @@ def test_commands_of_the_overview_run(tmp_path, monkeypatch):
     for line in commands(text):
         if "page" not in line and "build" not in line:
             assert chutelab(*line.split()[1:]).exit_code == 0, line
-    for lesson in shipped():
+    for lesson in shipped_lessons():
         row = f"({lesson.folder.name}/README.md) | {lesson.question} | {lesson.level} |"
         assert row in text
 

@@ -19,19 +19,20 @@ exact engine for pymunk or wasmtime.
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from chutelab import design, exercises, figures, measured, theory
-    from chutelab.animate import animate
-    from chutelab.compare import compare
-    from chutelab.plots import overlay
-    from chutelab.recording import Recording
+    from chutelab import theory
+    from chutelab.classroom import exercises
+    from chutelab.engines.simulation import simulate
+    from chutelab.pictures.animation import animate
+    from chutelab.pictures.plots import overlay
+    from chutelab.results import Recording
+    from chutelab.results.comparison import compare
     from chutelab.scene import Scene, SceneError, load
-    from chutelab.simulation import simulate
+    from chutelab.studies import design, measured
+    from chutelab.theory import figures
 
     __version__: str
 
@@ -52,31 +53,24 @@ __all__ = [
     "theory",
 ]
 
-_PACKAGES = {"design", "exercises", "figures", "measured", "theory"}
-
-_HOME = {
-    "Recording": "chutelab.recording",
-    "Scene": "chutelab.scene",
-    "SceneError": "chutelab.scene",
-    "animate": "chutelab.animate",
-    "compare": "chutelab.compare",
-    "load": "chutelab.scene",
-    "overlay": "chutelab.plots",
-    "simulate": "chutelab.simulation",
+_PACKAGES = {
+    "design": "chutelab.studies.design",
+    "exercises": "chutelab.classroom.exercises",
+    "figures": "chutelab.theory.figures",
+    "measured": "chutelab.studies.measured",
+    "theory": "chutelab.theory",
 }
 
-
-class _Package(ModuleType):
-    """A package whose functions `compare` and `animate` win over their modules of the same name."""
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        # Importing chutelab.compare binds the module here; callers mean the function.
-        if isinstance(value, ModuleType) and _HOME.get(name) == value.__name__:
-            value = getattr(value, name)
-        super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Package
+_HOME = {
+    "Recording": "chutelab.results",
+    "Scene": "chutelab.scene",
+    "SceneError": "chutelab.scene",
+    "animate": "chutelab.pictures.animation",
+    "compare": "chutelab.results.comparison",
+    "load": "chutelab.scene",
+    "overlay": "chutelab.pictures.plots",
+    "simulate": "chutelab.engines.simulation",
+}
 
 
 def __getattr__(name: str) -> Any:
@@ -84,7 +78,7 @@ def __getattr__(name: str) -> Any:
     if name == "__version__":
         value = _version()
     elif name in _PACKAGES:
-        value = import_module(f"chutelab.{name}")
+        value = import_module(_PACKAGES[name])
     elif name in _HOME:
         value = getattr(import_module(_HOME[name]), name)
     else:
@@ -98,6 +92,6 @@ def __dir__() -> list[str]:
 
 
 def _version() -> str:
-    from chutelab.versions import version_of
+    from chutelab.util.versions import version_of
 
     return version_of("chutelab") or "unknown (not installed)"

@@ -31,20 +31,15 @@ Modules that take long to import are imported inside the commands that need them
 """
 
 from chutelab.cli.benching import bench
-from chutelab.cli.checking import check
+from chutelab.cli.checking import check, verify
 from chutelab.cli.comparing import compare
-from chutelab.cli.figures import figure
 from chutelab.cli.lessons import lesson
-from chutelab.cli.pages import page
-from chutelab.cli.paper import tables
 from chutelab.cli.program import main
-from chutelab.cli.recordings import show
-from chutelab.cli.running import run
-from chutelab.cli.scenes import new, scenes, schema
+from chutelab.cli.running import page, run, show
+from chutelab.cli.scenes import figure, new, scenes, schema, tables
 from chutelab.cli.solving import solve
 from chutelab.cli.stressing import stress
 from chutelab.cli.sweeping import sweep
-from chutelab.cli.verifying import verify
 
 for _command in (
     run,

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from chutelab.cli.parameters import complete_scene, folder, set_option
 from chutelab.cli.program import RefusedError
+from chutelab.scene import Scene
+from chutelab.studies.measured import Fit, Residuals, Track
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from rich.console import RenderableType
 
-    from chutelab.measured import Fit, Residuals, Track
-    from chutelab.scene import Scene
 
 FILES = ("compare.png", "points.csv", "fit.json")
 
@@ -121,10 +120,10 @@ def compare(
     s² (JᵀJ)⁻¹ from how the points respond to the parameters (J) and how much they scatter (s): they
     hold if errors are independent and the model is right. Needs pip install "chutelab[fit]".
     """  # noqa: D301 - click wants the backspace
-    from chutelab import measured
+    from chutelab.cli.console import progress
     from chutelab.cli.output import destination
-    from chutelab.cli.progress import progress
     from chutelab.scene import load
+    from chutelab.studies import measured
 
     if robust and not keys:
         raise click.UsageError("--robust is for fits: name what to fit with --fit.")
@@ -142,7 +141,7 @@ def compare(
 def _compared(
     scene: Scene, film: Track, keys: tuple[str, ...], *, robust: bool
 ) -> tuple[Residuals, Fit | None]:
-    from chutelab import measured
+    from chutelab.studies import measured
 
     if not keys:
         return measured.residuals(scene, film), None
@@ -154,8 +153,8 @@ def _compared(
 
 
 def _write(found: Residuals, fit: Fit | None, place: Path) -> None:
-    from chutelab.measured.files import as_dict, points_csv
-    from chutelab.plots.measured import measured
+    from chutelab.pictures.plots.measured import measured
+    from chutelab.studies.measured.result import as_dict, points_csv
 
     measured(found, fit, path=place / "compare.png")
     (place / "points.csv").write_text(points_csv(found), encoding="utf-8")
@@ -168,15 +167,15 @@ def _tell(found: Residuals, fit: Fit | None, out: Path | None, *, as_json: bool)
     from chutelab.cli import console
 
     if as_json:
-        from chutelab.measured.files import as_dict
+        from chutelab.studies.measured.result import as_dict
 
         console.show_json(as_dict(found, fit))
         return
     from rich.text import Text
 
-    from chutelab.cli.report import drawn
-    from chutelab.measured.diagnosis import advice
-    from chutelab.sheet import wrapped
+    from chutelab.cli.output import drawn
+    from chutelab.studies.measured.result import advice
+    from chutelab.util.tables import wrapped
 
     head = Text(found.recording.title, style="bold")
     head.append(f"\n{found.track.said()}", style="not bold")

@@ -1,4 +1,7 @@
-"""``lesson``: list, show, build, start, grade and bundle lessons."""
+"""``lesson``: list, show, build, start, grade and bundle lessons.
+
+- ``lesson grade``: returned notebooks, run and marked.
+"""
 
 from __future__ import annotations
 
@@ -8,25 +11,24 @@ from typing import TYPE_CHECKING
 import click
 from click.shell_completion import CompletionItem
 
-from chutelab.cli.grading import grade
+from chutelab.classroom.grading import Grade
+from chutelab.classroom.lessons import Lesson
 from chutelab.cli.parameters import folder
 from chutelab.cli.program import InOrder, RefusedError
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from chutelab.lessons import Lesson
-
 
 def complete_lesson(
     _ctx: click.Context, _parameter: click.Parameter, incomplete: str
 ) -> list[CompletionItem]:
     """Offer the names of shipped lessons that begin so, with or without their number."""
-    from chutelab.lessons import shipped
+    from chutelab.classroom.lessons.reading import shipped_lessons
 
     return [
         CompletionItem(name, help=lesson.title)
-        for lesson in shipped()
+        for lesson in shipped_lessons()
         for name in (lesson.name, lesson.folder.name)
         if name.startswith(incomplete)
     ]
@@ -49,16 +51,16 @@ def lesson() -> None:
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def list_lessons(as_json: bool) -> None:
     """List the lessons: number, name, for whom, how long, and the question of each."""
+    from chutelab.classroom.lessons.reading import shipped_lessons
     from chutelab.cli import console
-    from chutelab.lessons import shipped
 
-    found = shipped()
+    found = shipped_lessons()
     if as_json:
         console.show_json({"format": 1, "lessons": [_plain(one) for one in found]})
         return
     from rich.text import Text
 
-    from chutelab.cli.report import plain_table
+    from chutelab.cli.output import plain_table
 
     table = plain_table(["", "lesson", "level", "minutes", "what it is about"], texts=5)
     for one in found:
@@ -79,8 +81,8 @@ def show(wanted: str, as_json: bool) -> None:
     chutelab lesson show the-bounce
     chutelab lesson show ./my-lesson
     """  # noqa: D301 - click wants the backspace
+    from chutelab.classroom.lessons import find
     from chutelab.cli import console
-    from chutelab.lessons import find
 
     found = find(wanted)
     if as_json:
@@ -108,12 +110,13 @@ def build(wanted: tuple[str, ...], out: Path | None, force: bool, quiet: bool) -
     of chutelab, numpy, pymunk, matplotlib and pillow; the GIF says so in a comment. The same makes
     the same bytes.
     """
+    from chutelab.classroom.lessons import find
+    from chutelab.classroom.lessons.building import build as build_lesson
+    from chutelab.classroom.lessons.reading import shipped_lessons
+    from chutelab.cli.console import progress
     from chutelab.cli.output import writing
-    from chutelab.cli.progress import progress
-    from chutelab.lessons import find, shipped
-    from chutelab.lessons.building import build as build_lesson
 
-    for one in [find(name) for name in wanted] or shipped():
+    for one in [find(name) for name in wanted] or shipped_lessons():
         with (
             writing(instead="another folder: --out DIR"),
             progress(one.name, quiet=quiet) as update,
@@ -144,9 +147,9 @@ def new(name: Path, model: str | None) -> None:
     chutelab lesson new my-lesson
     chutelab lesson new our-bounce --from 3
     """  # noqa: D301 - click wants the backspace
+    from chutelab.classroom.lessons import find
+    from chutelab.classroom.lessons.building import start
     from chutelab.cli.output import writing
-    from chutelab.lessons import find
-    from chutelab.lessons.starting import start
 
     copied = None if model is None else find(model)
     with writing(instead="another place"):
@@ -154,9 +157,6 @@ def new(name: Path, model: str | None) -> None:
     # A name with a folder in front is taken for a folder, even if a shipped lesson has it.
     said = made if len(made.parts) > 1 else f"./{made}"
     click.echo(f"wrote {made}; edit it, and make its picture with: chutelab lesson build {said}")
-
-
-lesson.add_command(grade)
 
 
 @lesson.command(short_help="Bundle the lessons as web pages that need no server.")
@@ -178,14 +178,15 @@ def page(wanted: tuple[str, ...], out: Path, quiet: bool) -> None:
     links are relative: the folder works from a memory stick, from any static web server, and on a
     phone.
     """
+    from chutelab.classroom.lessons import find
+    from chutelab.classroom.lessons.building import bundle
+    from chutelab.classroom.lessons.reading import shipped_lessons
+    from chutelab.cli.console import progress
     from chutelab.cli.output import writing
-    from chutelab.cli.progress import progress
-    from chutelab.lessons import find, shipped
-    from chutelab.lessons.bundle import bundle
-    from chutelab.page import PageError
-    from chutelab.variation import VaryError
+    from chutelab.pictures.live.runs import PageError
+    from chutelab.scene.variants import VaryError
 
-    lessons = [find(name) for name in wanted] or shipped()
+    lessons = [find(name) for name in wanted] or shipped_lessons()
     try:
         with writing(instead="another folder"), progress("making the pages", quiet=quiet) as update:
             made = bundle(lessons, out, update)
@@ -197,7 +198,7 @@ def page(wanted: tuple[str, ...], out: Path, quiet: bool) -> None:
 
 
 def _plain(lesson: Lesson) -> dict[str, object]:
-    from chutelab.lessons.starting import files_of
+    from chutelab.classroom.lessons.building import files_of
 
     return {
         "number": lesson.number,
@@ -212,10 +213,10 @@ def _shown(lesson: Lesson) -> list[RenderableType]:
     from rich.markdown import Markdown
     from rich.text import Text
 
-    from chutelab.cli.report import plain_table, titled
-    from chutelab.lessons import scene_of
-    from chutelab.lessons.reading import unit_in
-    from chutelab.lessons.worksheets import plain_of
+    from chutelab.classroom.lessons import scene_of
+    from chutelab.classroom.lessons.building import plain_of
+    from chutelab.classroom.lessons.reading import unit_in
+    from chutelab.cli.output import plain_table, titled
 
     number = "" if lesson.number is None else f"{lesson.number}  "
     head = Text(f"{number}{lesson.title}", style="bold")
@@ -236,3 +237,91 @@ def _shown(lesson: Lesson) -> list[RenderableType]:
         worksheet = plain_of(lesson.worksheet.read_text(encoding="utf-8"))
         parts.append(Markdown(worksheet, hyperlinks=False))
     return parts
+
+
+LIMIT = 60.0
+"""s that a notebook may run."""
+
+
+@click.command(short_help="Run returned notebooks and mark them.")
+@click.argument(
+    "files",
+    metavar="FILES...",
+    nargs=-1,
+    required=True,
+    type=click.Path(exists=True, path_type=Path),
+)
+@click.option(
+    "--out",
+    metavar="FILE",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Write the marks into this CSV file, a row for each notebook.",
+)
+@click.option(
+    "--time-limit",
+    metavar="S",
+    default=LIMIT,
+    show_default=True,
+    type=click.FloatRange(1.0, 3600.0),
+    help="Seconds that a notebook may run.",
+)
+@click.option("--quiet", "-q", is_flag=True, help="Print no table, and show no progress bar.")
+def grade(files: tuple[Path, ...], out: Path | None, time_limit: float, quiet: bool) -> None:
+    """Run the exercise notebooks that students returned, and mark each question.
+
+    A folder stands for the notebooks in it. What a student checked is judged anew against the
+    numbers that belong to that student's name; what a notebook prints does not count.
+
+    THIS RUNS THE STUDENTS' CODE, with all that you may do on this computer. Grade the notebooks of
+    strangers in a container.
+
+    \b
+    chutelab lesson grade returned/ --out class.csv
+    chutelab lesson grade anna.ipynb ben.ipynb --time-limit 30
+    """  # noqa: D301 - click wants the backspace
+    from chutelab.classroom.grading import grade as grade_notebooks
+    from chutelab.classroom.grading import write_csv
+    from chutelab.cli import console
+    from chutelab.cli.console import progress
+    from chutelab.cli.output import check_file, writing
+
+    notebooks = [path for file in files for path in _notebooks(file)]
+    check_file("--out", out)
+    try:
+        with progress("running the notebooks", quiet=quiet) as update:
+            grades = grade_notebooks(notebooks, time_limit=time_limit, progress=update)
+    except ImportError as error:
+        raise RefusedError(str(error)) from error
+    if not quiet:
+        console.show(_marks(grades))
+    if not any(one.marks for one in grades):
+        raise RefusedError("nothing to mark: none of these is a notebook of a lesson's exercise")
+    if out is not None:
+        with writing(f"--out {out}"):
+            write_csv(grades, out)
+        click.echo(f"wrote {out}")
+
+
+def _notebooks(path: Path) -> list[Path]:
+    if not path.is_dir():
+        return [path]
+    found = sorted(path.glob("*.ipynb"))
+    if not found:
+        raise RefusedError(f"{path}: there is no notebook (*.ipynb) in this folder")
+    return found
+
+
+def _marks(grades: list[Grade]) -> RenderableType:
+    from chutelab.cli.output import plain_table
+
+    table = plain_table(["file", "student", "lesson", "marks", "remarks"], texts=5)
+    table.columns[0].no_wrap = False
+    table.columns[0].overflow = "fold"  # a long path must leave room for the remarks
+    for one in grades:
+        marks = " ".join(str(mark) for mark in one.marks)
+        total = f"{one.total} of {one.out_of} ({marks})" if one.marks else "-"
+        table.add_row(one.file, one.student, one.lesson, total, one.reason)
+    return table
+
+
+lesson.add_command(grade)

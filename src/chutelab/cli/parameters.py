@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
 
 from chutelab.cli.program import RefusedError
+from chutelab.scene import Scene
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from chutelab.scene import Scene
-
-    Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 KINDS = {
     "png": ("overlay.png",),
@@ -157,7 +154,7 @@ def chosen(
         kinds = tuple(kind for kind in KINDS if kind == film or kind in set(kinds) - set(FILMS))
     for kind in kinds:
         if kind in FILMS and kind != "gif":
-            from chutelab.animate import VideoError, need_video
+            from chutelab.pictures.animation import VideoError, need_video
 
             try:
                 need_video(kind)

@@ -82,8 +82,8 @@ def _was_interrupted(error: BaseException | None) -> bool:
 def _is_refusal(error: Exception) -> bool:
     if not isinstance(error, ValueError):
         return False
+    from chutelab.results.storage import RecordingError
     from chutelab.scene import SceneError
-    from chutelab.storage import RecordingError
 
     return isinstance(error, (SceneError, RecordingError))
 

@@ -1,26 +1,30 @@
-"""``run``: from a scene to a summary and its files."""
+"""``run``: from a scene to a summary and its files.
+
+- ``show``: what a saved recording holds, and its pictures once more.
+- ``page``: a scene and its variants as one HTML file.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from pathlib import Path
 
 import click
 
+from chutelab.cli.console import partial_option, salvaged
 from chutelab.cli.parameters import (
+    KINDS,
     chosen,
     complete_scene,
     output_options,
     retitled,
     set_option,
 )
-from chutelab.cli.recordings import tell
-from chutelab.cli.stalling import partial_option, salvaged
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from chutelab.accuracy import Accuracy, Wanted
-    from chutelab.recording import Recording
+from chutelab.cli.program import RefusedError
+from chutelab.pictures.live.page import Written
+from chutelab.results import Recording
+from chutelab.scene.variants import Vary
+from chutelab.studies.accuracy import Accuracy, Wanted
 
 
 class MissedError(click.ClickException):
@@ -38,7 +42,7 @@ class MissedError(click.ClickException):
 def _accuracy(_ctx: click.Context, _parameter: click.Parameter, text: str | None) -> Wanted | None:
     if text is None:
         return None
-    from chutelab.accuracy import AccuracyError, parse
+    from chutelab.studies.accuracy import AccuracyError, parse
 
     try:
         return parse(text)
@@ -83,11 +87,11 @@ def run(
     step that is tried; if the accuracy cannot be reached, everything is printed and written all
     the same, and the exit code is 1.
     """
+    from chutelab.cli.console import progress
     from chutelab.cli.output import destination, files_of, write
-    from chutelab.cli.progress import progress
+    from chutelab.engines.simulation import simulate
     from chutelab.scene import load
     from chutelab.scene.overrides import Setting
-    from chutelab.simulation import simulate
 
     kinds = chosen(out, only, film)
     if partial and out is None:
@@ -104,7 +108,7 @@ def run(
         nonlocal reached
         if accuracy is None:
             return simulate(loaded, progress=update)
-        from chutelab.accuracy import reach
+        from chutelab.studies.accuracy import reach
 
         found, reached = reach(loaded, accuracy, update)
         return found
@@ -119,3 +123,153 @@ def run(
         raise stuck
     if accuracy is not None and reached is not None and not reached.met:
         raise MissedError(accuracy, reached)
+
+
+@click.command(short_help="Print the summary of a recording.npz; make its files again.")
+@click.argument("recording", type=click.Path(path_type=Path))
+@output_options
+def show(
+    recording: Path,
+    out: Path | None,
+    only: tuple[str, ...] | None,
+    film: str | None,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Print the summary of RECORDING, a recording.npz; with --out make its files again."""
+    from chutelab.cli.output import destination, files_of, write
+    from chutelab.results import Recording
+    from chutelab.results.storage import RecordingError
+
+    kinds = chosen(out, only, film)
+    try:
+        loaded = Recording.load(recording)
+    except RecordingError as error:
+        raise RefusedError(f"{error}{_advice(recording)}") from error
+    with destination(out, files_of(kinds)) as folder:
+        if folder is not None:
+            write(loaded, folder, kinds, quiet=quiet)
+    tell(loaded, out, kinds, as_json=as_json, quiet=quiet)
+
+
+def _advice(given: Path) -> str:
+    """Say what was probably meant by what is no recording."""
+    from chutelab.scene import shipped
+
+    inside = given / KINDS["npz"][0]
+    if inside.is_file():
+        return f"; did you mean {inside}?"
+    if given.suffix == ".toml" or str(given) in shipped():
+        return f"; show takes a recording.npz; for a scene: chutelab run {given}"
+    return ""
+
+
+def tell(
+    recording: Recording,
+    out: Path | None,
+    kinds: Sequence[str],
+    *,
+    as_json: bool,
+    quiet: bool,
+    accuracy: Accuracy | None = None,
+) -> None:
+    """Print a recording's summary and what was written, as JSON or as tables."""
+    from chutelab.cli import console
+
+    if as_json:
+        from chutelab.results.summary import summary
+
+        console.show_json(summary(recording, accuracy))
+    elif not quiet:
+        from chutelab.cli.output import report
+
+        console.show(*report(recording, accuracy))
+        if out is not None:
+            names = ", ".join(name for kind in kinds for name in KINDS[kind])
+            click.echo(f"wrote into {out}: {names}")
+
+
+def _varies(
+    _ctx: click.Context, _parameter: click.Parameter, texts: tuple[str, ...]
+) -> tuple[Vary, ...]:
+    from chutelab.scene.variants import VaryError, parse
+
+    try:
+        return tuple(parse(text) for text in texts)
+    except VaryError as error:
+        raise RefusedError(str(error)) from error
+
+
+@click.command(short_help="Write a page with sliders that any browser opens.")
+@click.argument("scene", shell_complete=complete_scene)
+@click.option(
+    "--vary",
+    "varies",
+    metavar="KEY=FROM:TO:COUNT",
+    multiple=True,
+    callback=_varies,
+    help="A slider: a key of the scene and its values, such as plate.angle_deg=-20:70:46 or"
+    " incoming.speed=1,2,4. May be given twice.",
+)
+@set_option
+@click.option(
+    "-o",
+    "--out",
+    "--output",
+    "output",
+    metavar="FILE",
+    type=click.Path(path_type=Path),
+    help="The file to write; default: the scene's name with .html, here.",
+)
+@click.option("--quiet", "-q", is_flag=True, help="Print nothing, and no progress bar.")
+def page(
+    scene: str,
+    varies: tuple[Vary, ...],
+    overrides: tuple[str, ...],
+    output: Path | None,
+    quiet: bool,
+) -> None:
+    """Write one HTML file that plays SCENE, with a slider for each quantity that is varied.
+
+    It holds everything: no network, no server. Every variant is simulated now; those that cannot
+    be run say so on their positions. A file that is there is replaced.
+    """
+    from chutelab.cli.console import progress
+    from chutelab.cli.output import writing
+    from chutelab.pictures.live.page import write
+    from chutelab.pictures.live.runs import PageError
+    from chutelab.scene import load
+    from chutelab.scene.variants import VaryError
+
+    path = _destination(scene, output)
+    loaded = load(scene, overrides)
+    try:
+        with writing(str(path)), progress(f"simulating {scene}", quiet=quiet) as update:
+            written = write(loaded, varies, path, progress=update)
+    except (VaryError, PageError) as error:
+        raise RefusedError(str(error)) from error
+    if not quiet:
+        click.echo(_told(written))
+
+
+def _destination(scene: str, output: Path | None) -> Path:
+    """Return the file to write, before anything runs."""
+    path = Path(f"{Path(scene).name.removesuffix('.toml')}.html") if output is None else output
+    if path.is_dir():
+        raise RefusedError(f"{path} is a folder; give the name of a file, such as {path}/page.html")
+    if not path.parent.is_dir():
+        raise RefusedError(f"{path}: there is no folder {path.parent}")
+    return path
+
+
+def _told(written: Written) -> str:
+    variants = "1 variant" if written.variants == 1 else f"{written.variants} variants"
+    lines = [f"wrote {written.path}, {written.size / 1000:.0f} kB: {variants}"]
+    if written.faults:
+        values, fault = next(iter(written.faults.items()))
+        at = ", ".join(f"{value:g}" for value in values)
+        lines.append(
+            f"{len(written.faults)} of them cannot be run, and the page says why; the first,"
+            f" at {at}: {fault}"
+        )
+    return "\n".join(lines)

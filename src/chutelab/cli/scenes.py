@@ -1,13 +1,26 @@
-"""``scenes``, ``schema`` and ``new``: what one needs to write a scene."""
+"""``scenes``, ``schema`` and ``new``: what one needs to write a scene.
+
+- ``tables``: the paper's tables, printed beside computed.
+- ``figure``: the paper's figures, as printed and corrected side by side.
+"""
 
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING, Literal
 
 import click
 
+from chutelab.cli.parameters import folder
 from chutelab.cli.program import RefusedError
+from chutelab.theory import Table
+from chutelab.theory.figures import PaperFigure
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
 
 STANDARD_OUTPUT = Path("-")
 
@@ -29,7 +42,7 @@ def scenes(as_json: bool) -> None:
         return
     from rich.text import Text
 
-    from chutelab.cli.report import plain_table
+    from chutelab.cli.output import plain_table
 
     table = plain_table(["scene", "what it shows"], texts=2)
     for scene in found:
@@ -53,8 +66,8 @@ def schema() -> None:
 def new(path: Path, force: bool) -> None:
     """Write a complete, commented scene to start from (scene.toml, or PATH; - prints it)."""
     from chutelab.cli.output import writing
-    from chutelab.files import whole
     from chutelab.scene import template
+    from chutelab.util.files import whole
 
     if path == STANDARD_OUTPUT:
         click.echo(template(), nl=False)
@@ -66,3 +79,138 @@ def new(path: Path, force: bool) -> None:
     with writing(str(path)), whole(path) as unfinished:
         unfinished.write_text(template(), encoding="utf-8")
     click.echo(f"wrote {path}; run it with: chutelab run {path}")
+
+
+NUMBERS = (1, 3, 4, 5)
+
+
+@click.command(short_help="Compute the paper's tables anew, beside what is printed.")
+@click.argument(
+    "number", required=False, metavar="[NUMBER]", type=click.Choice([str(n) for n in NUMBERS])
+)
+@click.option(
+    "--as-printed",
+    "rebound",
+    flag_value="as-printed",
+    default=True,
+    help="Compute with Eq. (9) as the paper prints it (the default here).",
+)
+@click.option(
+    "--corrected", "rebound", flag_value="corrected", help="Compute with Eq. (9) put right."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def tables(number: str | None, rebound: Literal["as-printed", "corrected"], as_json: bool) -> None:
+    """Compute Table 1, 3, 4 or 5 of the paper anew (all of them without NUMBER).
+
+    Each cell holds the printed number, then the computed one, marked with * where it differs in a
+    printed digit.
+    """
+    from chutelab.cli import console
+    from chutelab.theory import table
+
+    found = [table(n, rebound) for n in ([int(number)] if number else NUMBERS)]
+    if as_json:
+        console.show_json({"format": 1, "tables": [_plain(t) for t in found]})
+    else:
+        console.show(*(part for t in found for part in _shown(t)))
+
+
+def _plain(table: Table) -> dict[str, object]:
+    return {**asdict(table), "cells": table.cells, "differing": table.differing}
+
+
+def _shown(table: Table) -> list[RenderableType]:
+    from rich.text import Text
+
+    from chutelab.cli.output import plain_table, titled
+
+    sheet = table.sheet()
+    # Broken here, or the terminal breaks some of them elsewhere.
+    columns = [column.replace(" = ", " =\n") for column in sheet.columns]
+    drawn = plain_table(columns, width=max(len(text) for row in sheet.rows for text in row[1:]))
+    for row in sheet.rows:
+        drawn.add_row(*row)
+    return [titled(sheet.title, drawn), Text("\n" + "\n".join(sheet.notes))]
+
+
+@click.command(short_help="Draw the paper's figures anew, printed beside corrected.")
+@click.argument("number", type=int, metavar="NUMBER")
+@click.option(
+    "--out",
+    metavar="DIR",
+    type=click.Path(),
+    callback=folder,
+    help="Write the picture, its numbers and its scenes into this folder.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def figure(number: int, out: Path | None, as_json: bool) -> None:
+    """Compute Figure 6, 7, 8, 9, 11, 12 or 13 of the paper anew.
+
+    Beside each other: what follows from Eq. (9) as the paper prints it, and what follows from it
+    put right; and in words what the misprint does to the figure's conclusion. What the paper's text
+    does not give is said, not guessed.
+
+    \b
+    chutelab figure 6
+    chutelab figure 6 --out out
+    """  # noqa: D301 - click wants the backspace
+    from chutelab.cli import console
+    from chutelab.cli.output import destination
+    from chutelab.theory.figures import FigureError
+    from chutelab.theory.figures import figure as compute
+
+    try:
+        found = compute(number)
+    except FigureError as error:
+        raise RefusedError(str(error)) from error
+    written: list[str] = []
+    with destination(out, _names(found)) as place:
+        if place is not None:
+            _write(found, place)
+            written = sorted(file.name for file in place.iterdir())
+    if as_json:
+        console.show_json(
+            {
+                "format": 1,
+                "figure": found.number,
+                "title": found.title,
+                "meaning": list(found.meaning),
+                "missing": list(found.missing),
+                "columns": {name: column.tolist() for name, column in found.columns.items()},
+            }
+        )
+        return
+    _tell(found)
+    if out is not None:
+        click.echo(f"\nwrote into {out}: {', '.join(written)}")
+        if found.sweep:
+            click.echo(
+                "The corrected side with the engine, where landing.vx and landing.vy are -v3x and"
+                f" -v3y: {found.sweep}"
+            )
+
+
+def _names(found: PaperFigure) -> list[str]:
+    name = f"figure-{found.number}"
+    return [f"{name}.png", f"{name}.csv", *(f"{scene}.toml" for scene in found.scenes)]
+
+
+def _write(found: PaperFigure, place: Path) -> None:
+    from chutelab.pictures.plots.figure import paper_figure
+    from chutelab.studies.design.quantities import to_toml
+
+    picture, table, *scenes = _names(found)
+    paper_figure(found, path=place / picture)
+    (place / table).write_text(found.csv(), encoding="utf-8")
+    for name, scene in zip(scenes, found.scenes.values(), strict=True):
+        (place / name).write_text(to_toml(scene, found.title), encoding="utf-8")
+
+
+def _tell(found: PaperFigure) -> None:
+    from rich.text import Text
+
+    from chutelab.cli import console
+    from chutelab.cli.output import drawn
+
+    sheet = found.sheet()
+    console.show(drawn(sheet), Text(), *(Text(note) for note in sheet.notes))

@@ -1,21 +1,20 @@
-"""``solve``: which value of a key makes a quantity what it should be, or least, or largest."""
+"""``solve``: which value of a key makes a quantity what it should be, or least, or largest.
+
+- What ``sweep --uncertainty`` does: uncertain inputs in, words, numbers and a picture out.
+"""
 
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import click
 
 from chutelab.cli.parameters import complete_scene, folder, retitled, set_option
 from chutelab.cli.program import RefusedError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-    from chutelab.design import Solution
-    from chutelab.scene import Scene
+from chutelab.scene import Scene
+from chutelab.studies.design import Solution, Uncertainty
 
 FILES = ("overlay.png", "scan.png", "solution.toml", "nearest.toml", "solve.json")
 """What ``--out`` may write: scan.png with one key, nearest.toml if there is no solution."""
@@ -99,8 +98,8 @@ def solve(
     is 1 if there is no solution; the nearest thing to one is shown then. It needs
     pip install "chutelab[design]".
     """  # noqa: D301 - click wants the backspace
+    from chutelab.cli.console import progress
     from chutelab.cli.output import destination
-    from chutelab.cli.progress import progress
     from chutelab.scene import load
 
     goals = [goal for goal in (targets, minimize, maximize) if goal]
@@ -135,8 +134,8 @@ def _solved(
     seed: int,
     meter: Callable[[float], None] | None,
 ) -> Solution:
-    from chutelab import design
-    from chutelab.variation import VaryError
+    from chutelab.scene.variants import VaryError
+    from chutelab.studies import design
 
     try:
         if targets:
@@ -150,11 +149,11 @@ def _solved(
 
 
 def _write(found: Solution, place: Path) -> None:
-    from chutelab.design.answers import as_dict
-    from chutelab.design.documents import to_toml
-    from chutelab.plots import overlay
-    from chutelab.plots.design import scan
-    from chutelab.simulation import simulate
+    from chutelab.engines.simulation import simulate
+    from chutelab.pictures.plots import overlay
+    from chutelab.pictures.plots.design import scan
+    from chutelab.studies.design.answers import as_dict
+    from chutelab.studies.design.quantities import to_toml
 
     text = json.dumps(as_dict(found), indent=1, allow_nan=False)
     (place / "solve.json").write_text(text + "\n", encoding="utf-8")
@@ -172,7 +171,7 @@ def _write(found: Solution, place: Path) -> None:
 
 def _tell_json(found: Solution) -> None:
     from chutelab.cli import console
-    from chutelab.design.answers import as_dict
+    from chutelab.studies.design.answers import as_dict
 
     console.show_json(as_dict(found))
 
@@ -181,10 +180,83 @@ def _tell(found: Solution) -> None:
     from rich.text import Text
 
     from chutelab.cli import console
-    from chutelab.cli.report import drawn
+    from chutelab.cli.output import drawn
 
     sheet = found.sheet()
     notes = [Text(f"\n{note}" if i == 0 else note) for i, note in enumerate(sheet.notes)]
     console.show(Text(found.base.title, style="bold"), drawn(sheet), *notes)
     if found.solved:
         console.show(drawn(found.slopes()))
+
+
+def propagate(
+    scene: Scene,
+    given: Sequence[str],
+    *,
+    samples: int | None,
+    seed: int,
+    out: Path | None,
+    plot: Path | None,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Propagate uncertain inputs, write what was asked for, and print the rest.
+
+    Parameters
+    ----------
+    scene : Scene
+        Loaded.
+    given : sequence of str
+        What ``--uncertainty`` was given.
+    samples : int or None
+        Of each set of points; None is the default.
+    out, plot : Path or None
+        A CSV file for all samples, and a picture.
+    """
+    from chutelab.cli import console
+    from chutelab.cli.console import progress
+    from chutelab.cli.output import PICTURES, check_file, writing
+    from chutelab.studies.design.uncertainty import SAMPLES, as_dict
+
+    check_file("--out", out, (".csv",))
+    check_file("--plot", plot, PICTURES)
+    count = SAMPLES if samples is None else samples
+    with progress("propagating", quiet=quiet) as meter:
+        found = _found(scene, given, count, seed, meter)
+    with writing():
+        _write_uncertainty(found, out, plot)
+    if as_json:
+        console.show_json(as_dict(found))
+    elif not quiet:
+        click.echo(str(found))
+        for path in (out, plot):
+            if path is not None:
+                click.echo(f"wrote {path}")
+
+
+def _found(
+    scene: Scene,
+    given: Sequence[str],
+    samples: int,
+    seed: int,
+    meter: Callable[[float], None] | None,
+) -> Uncertainty:
+    from chutelab.scene.variants import VaryError
+    from chutelab.studies.design import DesignError, uncertainty
+
+    try:
+        return uncertainty(scene, given, samples=samples, seed=seed, progress=meter)
+    except (DesignError, VaryError, ImportError) as error:
+        raise RefusedError(str(error)) from error
+
+
+def _write_uncertainty(found: Uncertainty, out: Path | None, plot: Path | None) -> None:
+    if out is not None:
+        from chutelab.util.files import whole
+
+        with whole(out) as unfinished:
+            unfinished.write_text(found.csv(), encoding="utf-8")
+    if plot is not None:
+        from chutelab.pictures.plots.design import spread
+
+        spread(found, path=plot)

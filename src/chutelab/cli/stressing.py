@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 from click.shell_completion import CompletionItem
 
+from chutelab.checks.stress import Result
+from chutelab.checks.stress.harness import Run
 from chutelab.cli.program import RefusedError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from rich.text import Text
 
-    from chutelab.stress import Result
-    from chutelab.stress.table import Run
 
 ENGINES = ("exact", "contact", "pymunk", "fixed")
 
@@ -27,7 +26,7 @@ HEAD = " {:<22} {:<7} {:>6} {:>5} {:>7} {:>7}  {}"
 def _complete_case(
     _ctx: click.Context, _parameter: click.Parameter, incomplete: str
 ) -> list[CompletionItem]:
-    from chutelab.stress import cases
+    from chutelab.checks.stress import cases
 
     names = [case.name for case in cases(full=True)]
     return [CompletionItem(name) for name in names if name.startswith(incomplete)]
@@ -74,11 +73,11 @@ def stress(
 
     Exit code 1 if one is broken.
     """
+    from chutelab.checks.stress import chosen, results
+    from chutelab.checks.stress.harness import plain, write
     from chutelab.cli import console
+    from chutelab.cli.console import progress
     from chutelab.cli.output import check_file, writing
-    from chutelab.cli.progress import progress
-    from chutelab.stress import chosen, results
-    from chutelab.stress.table import plain, write
 
     try:
         cases = chosen(names, full=full)
@@ -118,8 +117,8 @@ def stress(
 def _print(results: Sequence[Result], *, quiet: bool) -> None:
     from rich.text import Text
 
+    from chutelab.checks.stress.harness import runs
     from chutelab.cli import console
-    from chutelab.stress.table import runs
 
     lines: list[Text] = []
     group, case = "", ""

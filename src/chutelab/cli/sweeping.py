@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 from click.shell_completion import CompletionItem
 
 from chutelab.cli.parameters import complete_scene, set_option
 from chutelab.cli.program import RefusedError
-
-if TYPE_CHECKING:
-    from chutelab.sweep import Plan, Sweep
+from chutelab.studies.sweep import Plan, Sweep
 
 
 def _complete_column(
     _ctx: click.Context, _parameter: click.Parameter, incomplete: str
 ) -> list[CompletionItem]:
-    from chutelab.sweep import NUMBERS
+    from chutelab.studies.sweep import NUMBERS
 
     return [
         CompletionItem(name, help=what)
@@ -136,7 +133,8 @@ def sweep(
     from chutelab.cli import console
     from chutelab.scene import load
     from chutelab.scene.overrides import Setting
-    from chutelab.sweep import (
+    from chutelab.scene.variants import VaryError
+    from chutelab.studies.sweep import (
         LostWorkersError,
         PartError,
         SampleError,
@@ -144,7 +142,6 @@ def sweep(
         WorkersError,
         planned,
     )
-    from chutelab.variation import VaryError
 
     if bool(varies) == bool(uncertain):
         raise click.UsageError("Give either --vary, what to vary, or --uncertainty.")
@@ -153,7 +150,7 @@ def sweep(
     if resume and out is None:
         raise click.UsageError("--resume goes on with the file of --out: give --out too.")
     if uncertain:
-        from chutelab.cli.uncertain import propagate
+        from chutelab.cli.solving import propagate
 
         if resume or scheduler is not None or jobs != 1:
             raise click.UsageError("--resume, --jobs and --scheduler go with --vary only.")
@@ -174,7 +171,7 @@ def sweep(
     except LostWorkersError as error:
         raise click.ClickException(_and_resume(str(error), out)) from error
     if plot is not None:
-        from chutelab.plots.sweep import sweep_figure
+        from chutelab.pictures.plots.design import sweep_figure
 
         sweep_figure(found, column, path=plot)
     if as_json:
@@ -189,9 +186,9 @@ def sweep(
 def _carried_out(
     plan: Plan, out: Path | None, resume: bool, jobs: int, scheduler: str | None, *, quiet: bool
 ) -> Sweep:
+    from chutelab.cli.console import progress
     from chutelab.cli.output import writing
-    from chutelab.cli.progress import progress
-    from chutelab.sweep import crew, sweep_to, swept_by
+    from chutelab.studies.sweep import crew, sweep_to, swept_by
 
     what = f"{plan.count:,} variants"
     try:
@@ -208,7 +205,7 @@ def _carried_out(
 
 def _and_resume(said: str, out: Path | None) -> str:
     """Add where the finished rows are, if there are some."""
-    from chutelab.sweep.part import part_of
+    from chutelab.studies.sweep.result import part_of
 
     if out is None or not part_of(out).exists():
         return said
@@ -218,7 +215,7 @@ def _and_resume(said: str, out: Path | None) -> str:
 def _check_plot(plan: Plan, plot: Path | None, column: str) -> None:
     """Refuse, before anything runs, a picture that cannot be drawn."""
     from chutelab.cli.output import PICTURES, check_file
-    from chutelab.sweep import NUMBERS
+    from chutelab.studies.sweep import NUMBERS
 
     if column not in NUMBERS:
         raise RefusedError(f"--of {column}: one of {', '.join(NUMBERS)}")
@@ -234,7 +231,7 @@ def _plain(found: Sweep) -> dict[str, object]:
     """Return all columns as lists, None for what there is not."""
     from math import isfinite
 
-    from chutelab.sweep import REASON
+    from chutelab.studies.sweep import REASON
 
     columns = {
         name: [value if name == REASON or isfinite(value) else None for value in values.tolist()]

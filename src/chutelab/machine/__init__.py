@@ -8,10 +8,8 @@
 - `builder`: `build`, from a validated scene to a machine.
 """
 
-from chutelab.machine.builder import build
-from chutelab.machine.family import RefusedError, members
-from chutelab.machine.frame import moved, origin
-from chutelab.machine.parts import Machine, Pulley, Segments
+from chutelab.machine.builder import RefusedError, build, members
+from chutelab.machine.parts import Machine, Pulley, Segments, moved, origin
 
 __all__ = [
     "Machine",

@@ -2,32 +2,169 @@
 
 That is particle 0: no spread, lowest layer. Where it meets the unbounded line of the plate gives
 the height of the outgoing belt, and that the lower end of the plate.
+
+- Families of machines: which of them cannot be built, and some of them as a family.
+- Releases that overlap a surface: refused, or moved out where it is by rounding only.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
-from math import ceil, cos, inf, radians, sin
-from typing import TYPE_CHECKING
+from math import ceil, cos, hypot, inf, radians, sin
+from sys import float_info
 
 import numpy as np
+from numpy.typing import NDArray
 
-from chutelab.machine.clearance import cleared
-from chutelab.machine.family import RefusedError
+from chutelab.machine.nominal import Discharge, discharge, plate_hit
 from chutelab.machine.parts import Machine, Pulley, Segments
-from chutelab.many import Value, at, each, larger, smaller, some
-from chutelab.nominal import Discharge, discharge, plate_hit
-from chutelab.recording import Particle
-from chutelab.releases import draw
-from chutelab.scene import Fault, SceneError
+from chutelab.machine.releases import ON_BELT, Releases, draw, release_point
+from chutelab.results import Particle
+from chutelab.scene import Fault, Scene, SceneError
+from chutelab.util.many import Value, at, each, larger, of, smaller, some
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+Floats = NDArray[np.float64]
+Row = tuple[Value, ...]
 
-    from numpy.typing import NDArray
 
-    from chutelab.scene import Scene
+class RefusedError(ValueError):
+    """Some scenes of a family that contradict themselves.
+
+    Parameters
+    ----------
+    reasons : mapping of int to str
+        What is wrong, by their numbers; "" if only building one by itself can tell.
+    """
+
+    def __init__(self, reasons: Mapping[int, str]) -> None:
+        super().__init__(f"{len(reasons)} scenes of the family cannot be built")
+        self.reasons = dict(reasons)
+
+
+def members(machine: Machine, places: NDArray[np.int64]) -> Machine:
+    """Return some members of a family of machines, as a family."""
+    segments, start, pulley = machine.segments, machine.releases, machine.pulley
+    own = ("start", "tangent", "length", "speed", "restitution", "friction")
+    particle, wheel = machine.particle, ("radius", "speed", "friction", "restitution")
+    return replace(
+        machine,
+        gravity=of(machine.gravity, places),
+        particle=replace(
+            particle, **{name: of(value, places) for name, value in vars(particle).items()}
+        ),
+        segments=replace(
+            segments, **{name: np.take(getattr(segments, name), places, axis=0) for name in own}
+        ),
+        pulley=pulley
+        and replace(pulley, **{name: of(getattr(pulley, name), places) for name in wheel}),
+        releases=replace(start, **{name: value[places] for name, value in vars(start).items()}),
+        end_time=of(machine.end_time, places),
+    )
+
+
+ROUNDING = 64.0 * float_info.epsilon
+"""Share of the largest coordinate by which a contact may seem to overlap: the engines see to it."""
+
+
+def cleared(
+    scene: Scene,
+    releases: Releases,
+    rows: Sequence[Row],
+    owner: Sequence[int],
+    names: Sequence[str],
+) -> Releases:
+    """Return releases of which none lies in a surface.
+
+    One less than `ON_BELT` inside, as one written with ten digits may be, is moved out.
+
+    Parameters
+    ----------
+    scene : Scene
+        For the radius, the drive pulley and messages.
+    releases : Releases
+        As drawn.
+    rows : sequence of tuple of float
+        Each segment's ends x0, y0, x1, y1, and more; arrays (N,) in a family.
+    owner, names : sequence of int and of str
+        Which surface a segment belongs to, and what surfaces are called.
+
+    Raises
+    ------
+    SceneError
+        If a particle starts further inside a surface.
+    RefusedError
+        If a particle of a family starts near one: each such scene has to be looked at by itself.
+    """
+    r: Value = scene.particle.radius
+    if not some(r > 0.0):
+        return releases
+    # All start in one column, above the release point.
+    x, low = release_point(scene)
+    carried, drawn = bool(releases.carried[0]), releases
+    for n, (x0, y0, x1, y1, *_) in enumerate(rows):
+        if carried and owner[n] == 0:
+            continue
+        near = (larger(x0, x1) > x - r) & (smaller(x0, x1) < x + r) & (larger(y0, y1) > low - r)
+        if some(near):
+            near = near & (smaller(y0, y1) < _highest(scene, drawn, low) + r)
+        if some(near):
+            _one_by_one(scene, near)
+            releases = _out(scene, releases, (x0, y0), (x1, y1), r, names[owner[n]])
+    if scene.incoming is not None and not carried:
+        reach = scene.incoming.pulley_radius + r
+        high = _highest(scene, drawn, low)
+        near = (abs(x) < reach) & (low < reach) & (high > -reach)
+        if some(near):
+            _one_by_one(scene, near)
+            releases = _out(scene, releases, (0.0, 0.0), (0.0, 0.0), reach, "incoming")
+    return releases
+
+
+def _highest(scene: Scene, releases: Releases, low: Value) -> Value:
+    """Return the height of the highest release, m."""
+    return low if scene.members is not None else float(releases.position[:, 1].max())
+
+
+def _one_by_one(scene: Scene, near: Value) -> None:
+    """Refuse to look closer at scenes of a family."""
+    if scene.members is not None:
+        places = np.flatnonzero(np.broadcast_to(near, scene.members))
+        raise RefusedError(dict.fromkeys(places.tolist(), ""))
+
+
+def _out(
+    scene: Scene,
+    releases: Releases,
+    start: tuple[float, float],
+    end: tuple[float, float],
+    reach: float,
+    name: str,
+) -> Releases:
+    """Return releases at least `reach` (m) away from a segment, or from a point."""
+    first, position = np.array(start), releases.position
+    along = np.array(end) - first
+    square = float(along @ along)
+    share = np.clip((position - first) @ along / square, 0.0, 1.0) if square > 0.0 else 0.0
+    away = position - first - np.multiply.outer(share, along)
+    distance = np.hypot(away[:, 0], away[:, 1])
+    depth = reach - distance
+    worst = int(depth.argmax())
+    size = max(map(abs, (*start, *end, *position[worst].tolist())))
+    if depth[worst] <= ROUNDING * size:
+        return releases
+    if depth[worst] > max(ON_BELT, ROUNDING * size):
+        far = hypot(*away[worst].tolist())
+        allowed = (
+            f"at least {reach:g} m from {name}: particle {worst} would start {far:.6g} m from it,"
+            " inside; move stream.at, or the surface"
+        )
+        raise SceneError(scene.source, [Fault("stream.at", scene.stream.at, allowed)])
+    moved = position + (np.maximum(depth, 0.0) / distance)[:, None] * away
+    return Releases(releases.t, moved, releases.velocity, releases.carried)
+
 
 REACH_WITHOUT_BELT = 2.0
 """m of plate below the pivot where there is no outgoing belt to stop short of."""
@@ -45,7 +182,7 @@ def build(scene: Scene) -> Machine:
     Parameters
     ----------
     scene : Scene
-        Of a family (see `chutelab.scene.family`) each is resolved as it would be by itself, to the
+        Of a family (`chutelab.scene.variants`) each is resolved as it would be by itself, to the
         bit; the machine has one particle for each, with surfaces of its own.
 
     Raises

@@ -1,24 +1,80 @@
-"""`Machine` and its parts: what the engines take, and all they take."""
+"""`Machine` and its parts: what the engines take, and all they take.
+
+- Surfaces that cross: allowed, the first contact wins, but rarely what was meant.
+- Where to count positions from: far from the world's origin coordinates have few digits left.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf
-from typing import TYPE_CHECKING, Literal
+from itertools import combinations
+from math import ceil, inf, log2
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from chutelab.machine.crossings import crossings
-from chutelab.many import Value, larger, smaller
+from chutelab.machine.releases import Releases
+from chutelab.results import Particle
+from chutelab.util.many import Value, larger, smaller
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
+Floats = NDArray[np.float64]
 
-    from numpy.typing import NDArray
+FIRST_WINS = "; surfaces may cross, the first contact wins"
 
-    from chutelab.recording import Particle
-    from chutelab.releases import Releases
+
+def crossings(
+    names: Sequence[str], rows: Floats, owner: Sequence[int], pulley: float | None
+) -> list[str]:
+    """Return a sentence for every two surfaces that cross.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the surfaces.
+    rows : ndarray, (S, 4)
+        x and y of the first and of the second end of each segment, m.
+    owner : sequence of int, (S,)
+        Which surface a segment belongs to.
+    pulley : float or None
+        Radius of the drive pulley about the origin, m. The incoming belt, which lies on it, is
+        surface 0 then.
+
+    Notes
+    -----
+    Surfaces that only touch, as two that share an end do, do not cross.
+    """
+    found: dict[tuple[int, int], None] = {}
+    for s, other in combinations(range(len(rows)), 2):
+        if owner[s] != owner[other] and _cross(rows[s], rows[other]):
+            found[owner[s], owner[other]] = None
+    said = [f"{names[b]}: it crosses {names[a]}{FIRST_WINS}" for a, b in found]
+    if pulley is not None:
+        into = {o for row, o in zip(rows, owner, strict=True) if o != 0 and _reach(row) < pulley}
+        said += [f"{names[o]}: it crosses the drive pulley{FIRST_WINS}" for o in sorted(into)]
+    return said
+
+
+def _cross(one: Floats, other: Floats) -> bool:
+    """Tell whether the ends of each lie strictly on two sides of the other."""
+    return _parts(one, other) and _parts(other, one)
+
+
+def _parts(line: Floats, ends: Floats) -> bool:
+    (x0, y0, x1, y1), (u0, v0, u1, v1) = line, ends
+    first = (x1 - x0) * (v0 - y0) - (y1 - y0) * (u0 - x0)
+    second = (x1 - x0) * (v1 - y0) - (y1 - y0) * (u1 - x0)
+    return bool(first * second < 0.0)
+
+
+def _reach(row: Floats) -> float:
+    """Distance (m) of a segment from the origin."""
+    start, along = row[:2], row[2:] - row[:2]
+    share = np.clip(-(start @ along) / (along @ along), 0.0, 1.0)
+    return float(np.hypot(*(start + share * along)))
+
 
 EXIT_MARGIN = 1.0
 """m below the lowest surface, or outside the box of all without gravity, where a track ends."""
@@ -183,3 +239,41 @@ class Machine:
         if np.all(np.greater(self.gravity, 0.0)):
             return -inf, inf, bottom - EXIT_MARGIN, inf
         return left - EXIT_MARGIN, right + EXIT_MARGIN, bottom - EXIT_MARGIN, top + EXIT_MARGIN
+
+
+REMOTE = 8.0
+"""Sizes of a machine that it must be away from the world's origin to be given one of its own."""
+
+
+def origin(machine: Machine) -> tuple[float, float]:
+    """Return the world point that the engine calculates from, m: near the machine.
+
+    It is (0, 0) unless the machine is many times its own size away from there; and so round a
+    number that taking it off a coordinate loses no digit.
+    """
+    start, end = machine.segments.start, machine.segments.end
+    if machine.pulley is not None or not start.size:
+        return 0.0, 0.0
+    low, high = np.minimum(start, end), np.maximum(start, end)
+    axes = tuple(range(low.ndim - 1))
+    low, high = low.min(axis=axes), high.max(axis=axes)
+    extent = float((high - low).max())
+    middle = 0.5 * (low + high)
+    if np.abs(middle).max() <= REMOTE * extent:
+        return 0.0, 0.0
+    unit = 2.0 ** ceil(log2(extent))
+    x, y = (round(float(c) / unit) * unit for c in middle)
+    return x, y
+
+
+def moved(machine: Machine, x: float, y: float) -> Machine:
+    """Return a machine without a pulley, moved by (x, y), m."""
+    if not (x or y):
+        return machine
+    by = np.array([x, y])
+    segments, releases = machine.segments, machine.releases
+    return replace(
+        machine,
+        segments=replace(segments, start=segments.start + by),
+        releases=replace(releases, position=releases.position + by),
+    )

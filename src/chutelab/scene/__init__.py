@@ -16,22 +16,23 @@
 - `library`: the shipped scenes, found by name; the starter scene.
 """
 
-from chutelab.scene.editor import schema
 from chutelab.scene.errors import MISSING, Fault, SceneError, shown
-from chutelab.scene.expectations import Expect
-from chutelab.scene.library import About, about, find, shipped, template
-from chutelab.scene.loading import from_dict, load, overridden, parse, to_dict
-from chutelab.scene.models import (
-    Incoming,
-    Outgoing,
-    Particle,
-    Plate,
-    Run,
-    Scene,
-    Stream,
-    Surface,
+from chutelab.scene.loading import (
+    About,
+    about,
+    find,
+    from_dict,
+    load,
+    overridden,
+    parse,
+    shipped,
+    template,
+    to_dict,
 )
-from chutelab.scene.quantities import RESERVED_NAMES
+from chutelab.scene.overrides import schema
+from chutelab.scene.rules import Expect
+from chutelab.scene.schema import Incoming, Outgoing, Particle, Plate, Run, Scene, Stream, Surface
+from chutelab.scene.units import RESERVED_NAMES
 
 __all__ = [
     "MISSING",

@@ -1,16 +1,122 @@
-"""``KEY=VALUE`` texts, as ``--set plate.angle_deg=20`` takes them, laid over a scene's tables."""
+"""``KEY=VALUE`` texts, as ``--set plate.angle_deg=20`` takes them, laid over a scene's tables.
+
+- The JSON Schema of scene files, for editors that complete and check TOML while one types.
+- What is at the full path of a key, such as ``plate.angle_deg`` or ``stream.at[0]``.
+"""
 
 from __future__ import annotations
 
 import difflib
 import re
 import tomllib
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Any, Final
 
-from chutelab.scene.errors import Fault, joined
+import numpy as np
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
+from pydantic_core import core_schema
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
+from chutelab.scene.errors import MISSING, Fault, joined
+from chutelab.scene.schema import Scene
+
+
+class _TomlSchema(GenerateJsonSchema):
+    """TOML has no null: an optional key is left out, so null is neither offered nor a default."""
+
+    def nullable_schema(self, schema: core_schema.NullableSchema) -> JsonSchemaValue:
+        return self.generate_inner(schema["schema"])
+
+    def default_schema(self, schema: core_schema.WithDefaultSchema) -> JsonSchemaValue:
+        described = super().default_schema(schema)
+        if described.get("default", 0) is None:
+            del described["default"]
+        return described
+
+    def field_title_should_be_set(self, schema: Any) -> bool:
+        # "Pulley Radius" for pulley_radius says nothing that the key does not.
+        return False
+
+
+def schema() -> dict[str, Any]:
+    """Return the JSON Schema (draft 2020-12) of scene files.
+
+    With the Even Better TOML extension or taplo, the first line ``#:schema ./scene.schema.json``
+    of a scene connects the two. Quantities carry their unit as ``x-unit`` too.
+    """
+    described = Scene.model_json_schema(by_alias=True, schema_generator=_TomlSchema)
+    described["title"] = "Chutelab scene"
+    described["dependentRequired"] = {"plate": ["incoming"], "outgoing": ["incoming"]}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **described}
+
+
+def parts_of(path: str) -> list[str | int]:
+    """Return the keys and indices of a path.
+
+    >>> parts_of("surface[0].speed")
+    ['surface', 0, 'speed']
+    """
+    return [int(part) if part.isdecimal() else part for part in re.findall(r"[^.\[\]]+", path)]
+
+
+def value_at(scene: Scene, path: str) -> Any:
+    """Return what a scene has at a path, defaults filled in.
+
+    `MISSING` if there is no such thing; an array for a varied key of a family of scenes.
+    """
+    found: Any = scene
+    for part in parts_of(path):
+        try:
+            found = found[part] if isinstance(part, int) else getattr(found, part)
+        except (AttributeError, IndexError, TypeError):
+            return MISSING
+    return found
+
+
+def rule_at(parts: Sequence[str | int]) -> Mapping[str, Any] | None:
+    """Return what the JSON Schema says of a path; None where it leads nowhere."""
+    rule: Mapping[str, Any] | None = _schema()
+    for part in parts:
+        if rule is None:
+            return None
+        rule = _referred(rule)
+        if isinstance(part, str):
+            rule = rule.get("properties", {}).get(part)
+        elif part < len(rule.get("prefixItems", [])):
+            rule = rule["prefixItems"][part]
+        else:
+            rule = rule.get("items")
+    return None if rule is None else _referred(rule)
+
+
+def limits_of(rule: Mapping[str, Any]) -> tuple[float, float] | None:
+    """Return the least and the largest float that a rule allows; None if it allows none.
+
+    An excluded bound is moved by one float.
+    """
+    kinds = [kind for kind in rule.get("anyOf", [rule]) if kind.get("type") == "number"]
+    if not kinds:
+        return None
+    limits = kinds[0]
+    low, high = limits.get("minimum", -np.inf), limits.get("maximum", np.inf)
+    if "exclusiveMinimum" in limits:
+        low = np.nextafter(limits["exclusiveMinimum"], np.inf)
+    if "exclusiveMaximum" in limits:
+        high = np.nextafter(limits["exclusiveMaximum"], -np.inf)
+    return float(low), float(high)
+
+
+@cache
+def _schema() -> dict[str, Any]:
+    return schema()
+
+
+def _referred(rule: Mapping[str, Any]) -> Mapping[str, Any]:
+    if "$ref" not in rule:
+        return rule
+    found: Mapping[str, Any] = _schema()["$defs"][rule["$ref"].rpartition("/")[2]]
+    return found
+
 
 _SEGMENT: Final = re.compile(r"([^\s.=\[\]\"']+)((?:\[\d{1,9}\])*)")
 _FORM: Final = "must be KEY=VALUE, such as plate.angle_deg=20 or surface[0].speed=1"

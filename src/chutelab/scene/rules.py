@@ -3,16 +3,223 @@
 Every rule is written so that it speaks only when a comparison is *true*. A `Look` answers NaN for
 a key that is itself at fault, and nothing is true of NaN: so the rules can be asked about a
 half-broken scene, and all faults of a file come out in one message.
+
+- What a scene can be expected to show: the names of a run's numbers, and their units.
+- ``[[expect]]``: what a scene is expected to show, for ``chutelab verify`` to look at.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from typing import Any, Final
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from typing import Annotated, Any, Final, Literal
 
-from chutelab.scene.errors import MISSING, Fault
-from chutelab.scene.expectations import expectation_conflicts
+from pydantic import Field
+
+from chutelab.scene.errors import MISSING, Fault, did_you_mean
+from chutelab.scene.units import LARGEST, Number, Table, Text, described, read_size, write_size
+
+SYMBOLS: Final = {
+    "phi1_deg": "degrees", "t2": "s", "x2": "m", "y2": "m", "v2": "m/s", "phi2_deg": "degrees",
+    "phi2r_deg": "degrees", "v2r": "m/s", "t3": "s", "x3": "m", "y3": "m", "v3x": "m/s",
+    "v3y": "m/s", "v3": "m/s", "d3": "m", "dEk": "J", "P": "W", "belt_work": "J",
+    "slip_heat": "J",
+}  # fmt: skip
+"""Particle 0 under the paper's symbols, with units: what the theory has, too."""
+
+_UNITS: Final = {
+    "t": "s", "x": "m", "y": "m", "vx": "m/s", "vy": "m/s", "vx_after": "m/s", "vy_after": "m/s",
+}  # fmt: skip
+STATISTICS: Final = ("mean", "spread", "min", "max")
+ENTRIES: Final = ("belt_work", "restitution_loss", "friction_loss")
+STORED: Final = ("kinetic", "potential")
+TOTALS: Final = (*ENTRIES, "residual", "turned_over")
+ENDINGS: Final = ("time", "landed", "settled", "exit")
+NEEDED: Final = {"separation": "incoming", "impact": "plate", "landing": "outgoing"}
+"""Events, and the table without which there are none; impacts on free surfaces go by name."""
+
+
+_NEAR: Final = 0.6
+"""Likeness of a misspelt quantity and the one that was meant: phi1 is taken for phi1_deg."""
+
+
+def unit_of(name: str, surfaces: Iterable[str]) -> str | None:
+    """Return the unit of a quantity, "" for a number of things; None if the scene has none such.
+
+    Parameters
+    ----------
+    name
+        Such as ``x2``, ``landing.x``, ``landing.x.mean``, ``impact.ramp.t``, ``landing.count``,
+        ``ended.settled``, ``ledger.belt_work``, ``ledger.kinetic.end`` or
+        ``ledger.by_surface.outgoing.belt_work``.
+    surfaces
+        Names of the scene's surfaces: incoming, plate, outgoing and free ones, as far as there.
+
+    Examples
+    --------
+    >>> unit_of("landing.x.mean", ["incoming", "outgoing"]), unit_of("impact.t", [])
+    ('m', None)
+    """
+    known = list(surfaces)
+    match name.split("."):
+        case [symbol] if symbol in SYMBOLS:
+            return SYMBOLS[symbol] if {"incoming", "plate"} <= set(known) else None
+        case ["contacts"]:
+            return ""
+        case ["ended", "t", *statistic]:
+            return _column("t", statistic)
+        case ["ended", ending] if ending in ENDINGS:
+            return ""
+        case ["ledger", total] if total in TOTALS:
+            return "J"
+        case ["ledger", stored, "start" | "end"] if stored in STORED:
+            return "J"
+        case ["ledger", "by_surface", surface, entry] if entry in ENTRIES:
+            return "J" if surface in (*known, "particles") else None
+        case [event, *column] if event in NEEDED:
+            return _event(event, column, known)
+    return None
+
+
+def _event(event: str, column: list[str], surfaces: list[str]) -> str | None:
+    home = NEEDED[event]
+    if event == "impact" and column and column[0] in surfaces and column[0] not in NEEDED.values():
+        home, column = column[0], column[1:]
+    if home not in surfaces or not column:
+        return None
+    if column == ["count"]:
+        return ""
+    if event == "separation" and column[0].endswith("_after"):
+        return None
+    return _column(column[0], column[1:])
+
+
+def _column(column: str, statistic: list[str]) -> str | None:
+    fits = not statistic or (len(statistic) == 1 and statistic[0] in STATISTICS)
+    return _UNITS.get(column) if fits else None
+
+
+def suggestion(name: str, surfaces: Iterable[str]) -> str:
+    """Say which quantity was probably meant, or else which there are."""
+    known = list(surfaces)
+    absent = [table for table in NEEDED.values() if table not in known]
+    for tables in (*([table] for table in absent), absent):
+        if tables and unit_of(name, [*known, *tables]) is not None:
+            return f"it needs {' and '.join(f'[{table}]' for table in tables)}"
+    return did_you_mean(name, _names(known), f"there are {_families(known)}", cutoff=_NEAR)
+
+
+def _names(surfaces: list[str]) -> Iterator[str]:
+    """Yield all quantities of a scene, those of at most 50 surfaces."""
+    some = surfaces[:50]
+    events = [*NEEDED, "ended", *(f"impact.{name}" for name in some)]
+    candidates = [*SYMBOLS, *NEEDED, "contacts", *(f"ended.{ending}" for ending in ENDINGS)]
+    for event in events:
+        columns = [f"{event}.{column}" for column in (*_UNITS, "count")]
+        candidates += columns
+        candidates += [f"{column}.{statistic}" for column in columns for statistic in STATISTICS]
+    candidates += [f"ledger.{name}" for name in TOTALS]
+    candidates += [f"ledger.{name}.{end}" for name in STORED for end in ("start", "end")]
+    for name in (*some, "particles"):
+        candidates += [f"ledger.by_surface.{name}.{entry}" for entry in ENTRIES]
+    return (name for name in candidates if unit_of(name, surfaces) is not None)
+
+
+def _families(surfaces: list[str]) -> str:
+    """Say which quantities a scene has, one of each kind."""
+    some = [f"{event}.x" for event, home in NEEDED.items() if home in surfaces]
+    keys = ", ".join([*some, "contacts", "ledger.belt_work"])
+    theirs = "phi1_deg to slip_heat, " if {"incoming", "plate"} <= set(surfaces) else ""
+    return f"{theirs}{keys} and other keys of `chutelab run --json`"
+
+
+THEORY: Final = "theory"
+UNPROMISED: Final = "none"
+
+Value = Annotated[Number, Field(ge=-(LARGEST**2), le=LARGEST**2)]
+Tolerance = Annotated[Number, Field(ge=0.0, le=1.0)]
+Words = Annotated[Text, Field(max_length=40)]
+
+
+class Expect(Table):
+    """A number that a run of the scene should show, how exactly, and who says so."""
+
+    quantity: Text = described(
+        ...,
+        "What is looked at: a paper's symbol such as x2 or phi1_deg, or a key of the JSON summary "
+        "such as landing.x, landing.x.mean, ledger.by_surface.outgoing.belt_work",
+        max_length=200,
+    )
+    value: Literal["theory"] | Value = described(
+        ...,
+        'What it should be, in its unit (SI; degrees for names in _deg), or "theory": what the '
+        "closed form gives",
+    )
+    tolerance: Tolerance | Words = described(
+        ...,
+        "What it may be off: a number is relative (0.01 is 1 %; of the value, or of what such "
+        'quantities are measured by in the scene if that is more), a string absolute ("0.5 mm")',
+    )
+    tolerance_contact: Tolerance | Words | None = described(
+        None, 'The same for the contact engine, or "none"; default: tolerance'
+    )
+    tolerance_pymunk: Tolerance | Words | None = described(
+        None, 'The same for the pymunk engine, or "none"; default: tolerance'
+    )
+    source: Text = described(
+        ..., "Who says so: an equation or a table of the paper, a closed form", max_length=200
+    )
+
+    def allowed(self, engine: str) -> tuple[float, str] | None:
+        """Return the tolerance for an engine: its size, and its unit ("%" if it is relative).
+
+        None if nothing is promised.
+        """
+        own = {"contact": self.tolerance_contact, "pymunk": self.tolerance_pymunk}.get(engine)
+        tolerance = self.tolerance if own is None else own
+        if tolerance == UNPROMISED:
+            return None
+        return read_size(tolerance) if isinstance(tolerance, str) else (tolerance, "%")
+
+
+def expectation_conflicts(
+    path: str, given: Mapping[str, Any], surfaces: Sequence[str]
+) -> Iterator[Fault]:
+    """Yield what is wrong with one expectation of a scene that has these surfaces."""
+    name = given.get("quantity")
+    if not isinstance(name, str):
+        return
+    unit = unit_of(name, surfaces)
+    if unit is None:
+        text = f"no such quantity here; {suggestion(name, surfaces)}"
+        yield Fault(f"{path}.quantity", name, text)
+        return
+    if given.get("value") == THEORY and name not in SYMBOLS:
+        text = f"a number; the theory has no {name}, only {', '.join(SYMBOLS)}"
+        yield Fault(f"{path}.value", THEORY, text)
+    for key in ("tolerance", "tolerance_contact", "tolerance_pymunk"):
+        tolerance = given.get(key)
+        if not isinstance(tolerance, str) or (key != "tolerance" and tolerance == UNPROMISED):
+            continue
+        if not _fits(tolerance, unit):
+            example = write_size(0.0005, unit) if unit != "degrees" else "0.1 degrees"
+            example = example if unit else "3"
+            none = ' or "none"' if key != "tolerance" else ""
+            text = f'must be a number from 0 to 1 (relative), a string such as "{example}"{none}'
+            yield Fault(f"{path}.{key}", tolerance, f"{text}; {name} is {_measured(unit)}")
+
+
+def _fits(tolerance: str, unit: str) -> bool:
+    try:
+        size, found = read_size(tolerance)
+    except ValueError:
+        return False
+    return size >= 0.0 and found in (unit, "%")
+
+
+def _measured(unit: str) -> str:
+    return f"in {unit}" if unit else "a number of things"
+
 
 ON_BELT: Final = 1e-9
 """How near to the belt's height R + r a release counts as lying on the belt, m."""

@@ -17,10 +17,9 @@ chute with the damping plate", Mech. Sci. 7, 167-177, 2016, doi:10.5194/ms-7-167
 Only NumPy and `chutelab.scene` are imported.
 """
 
-from chutelab.theory.predict import predict, unbounded
-from chutelab.theory.reasons import Reason
-from chutelab.theory.results import STAGES, Transfer
-from chutelab.theory.tables import TABLES, Table, table
+from chutelab.theory.paper import TABLES, Table, table
+from chutelab.theory.prediction import predict, unbounded
+from chutelab.theory.results import STAGES, Reason, Transfer
 from chutelab.theory.transfer import Rebound, transfer
 
 __all__ = [

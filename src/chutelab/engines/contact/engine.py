@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import inf
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chutelab.engines.contact.module import Module, Status, borrow, constants, dtype, give_back
-from chutelab.machine import moved, origin
-from chutelab.recorder import Recorder, StalledError
-from chutelab.recording import EVENT, KNOT
+from chutelab.machine import Machine, moved, origin
+from chutelab.results import EVENT, KNOT, Recording
+from chutelab.results.recorder import Recorder, StalledError
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-    from chutelab.machine import Machine
-    from chutelab.recording import Recording
-
-    Progress = Callable[[float], None]
+Progress = Callable[[float], None]
 
 GREATEST = 1e300
 """Friction without a bound, as a number that can be multiplied by zero."""

@@ -10,13 +10,11 @@ import json
 from enum import IntEnum
 from functools import cache
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import wasmtime
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from numpy.typing import NDArray
 
 PAGE = 65536
 """Bytes of a page of WebAssembly's memory."""

@@ -17,13 +17,13 @@ from chutelab.engines.pymunk.lone import Lone
 from chutelab.engines.pymunk.shared import Shared
 from chutelab.engines.pymunk.world import World
 from chutelab.machine import moved, origin
-from chutelab.recorder import Recorder, StalledError
+from chutelab.results.recorder import Recorder, StalledError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from chutelab.machine import Machine
-    from chutelab.recording import Recording
+    from chutelab.results import Recording
 
 
 def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Recording:

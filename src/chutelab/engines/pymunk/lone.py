@@ -11,9 +11,10 @@ particle lies by 2 √(2 h/g)/(1 - ε) too early, some 1e-6 s.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection
 from math import ceil, inf, sqrt
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pymunk
@@ -29,17 +30,11 @@ from chutelab.engines.pymunk.world import (
     longest,
     time_out,
 )
-from chutelab.recorder import StalledError
-from chutelab.recording import REASONS, Kind
+from chutelab.machine import Machine
+from chutelab.results import REASONS, Kind
+from chutelab.results.recorder import Recorder, StalledError
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection
-
-    from chutelab.machine import Machine
-    from chutelab.recorder import Recorder
-
-    # Of a surface and its normal: its restitution, None where it is to be passed.
-    Law = Callable[[Face, Vec2d], float | None]
+Law = Callable[[Face, Vec2d], float | None]
 
 WEDGED = 1000
 """Iterations of Chipmunk's solver for a disk held by several surfaces, each of which takes off a

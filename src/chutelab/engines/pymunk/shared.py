@@ -14,25 +14,21 @@ off by δ shifts the last push by (6 δ/a)^(1/3): in `slip` it is 21, 12, 5 and 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import ceil, inf, sqrt
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pymunk
+from numpy.typing import NDArray
 from pymunk import Vec2d, batch
 
 from chutelab.engines.pymunk.world import PARTICLE, Carriage, Tracks, World, time_out
-from chutelab.recording import REASONS, Kind
+from chutelab.machine import Machine
+from chutelab.results import REASONS, Kind
+from chutelab.results.recorder import Recorder
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-    from chutelab.machine import Machine
-    from chutelab.recorder import Recorder
-
-    Floats = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 SLOP, BIAS = 1e-3, 1e-97
 """Overlap that Chipmunk leaves alone, as a share of the radius, and the share of what is beyond it

@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import acos, ceil, cos, inf, sin, sqrt
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pymunk
+from numpy.typing import ArrayLike, NDArray
 from pymunk import Vec2d
 
-from chutelab.recording import KNOT
+from chutelab.machine import Machine
+from chutelab.results import KNOT
+from chutelab.results.recorder import Recorder
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import ArrayLike, NDArray
-
-    from chutelab.machine import Machine
-    from chutelab.recorder import Recorder
-
-    Floats = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
 PARTICLE, SURFACE = 1, 2
 """Collision types of disks and of everything they meet."""

@@ -1,0 +1,370 @@
+"""The ``[[expect]]`` of a scene beside what each engine, and the theory, give.
+
+- Particle 0 alone in all answers: each against the theory, and against the first of the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import degrees, inf, isfinite, log, nan, radians
+from typing import Final
+
+import numpy as np
+
+from chutelab.engines import reference
+from chutelab.engines.simulation import simulate
+from chutelab.machine import build
+from chutelab.results import Kind, Recording
+from chutelab.results.comparison import compare, relative_error, scales
+from chutelab.results.ledger import ledger
+from chutelab.results.recorder import StalledError
+from chutelab.results.summary import measure
+from chutelab.scene import Expect, Scene, SceneError
+from chutelab.scene.rules import SYMBOLS, unit_of
+from chutelab.studies.accuracy import apart, changed, each, sizes, stirred
+from chutelab.theory import Transfer, predict
+
+ANSWERS: Final = {
+    "theory": ("closed form, NumPy", "nothing, not even the machine"),
+    "exact": ("the next event, solved", "mechanics, which place the belt too"),
+    "contact": ("impacts, contact dynamics; C", "the machine's arrays"),
+    "pymunk": ("Chipmunk's solver, stepped", "the machine's arrays"),
+    "dop853": ("SciPy's ODE solver, events", "the machine's arrays"),
+}
+"""Who answers: how, and what it has in common with other answers. import-linter holds this."""
+
+BLOWS: Final = {"exact": 1e-12, "dop853": 1e-12, "contact": 1e-10, "pymunk": 1e-9}
+"""Relative error allowed where all contacts are blows, for inputs whose change comes out no larger
+than it went in."""
+
+ORDERS: Final = {"contact": 2.0, "pymunk": 1.0}
+"""Order at which the error of a stepped engine vanishes, at least."""
+
+REFINED: Final = 4.0
+"""Ratio of one step to the next of the three that show an order."""
+
+CHANCE: Final = {"contact": 0.5, "pymunk": 0.5}
+"""By how much the observed order may fall short of `ORDERS`: an error depends on where within a
+step things happen. Over two ratios of 4, half an order is a factor of 4 between the errors."""
+
+STIR: Final = 1e-9
+"""Share by which inputs are changed to see by how much a scene magnifies a change."""
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """One quantity in two answers.
+
+    Attributes
+    ----------
+    pair : str
+        Which two; one, of an answer that is left out.
+    quantity : str
+        What is compared; or why nothing is.
+    difference : float or None
+        Relative difference, or the order at which it vanishes; None if nothing is compared.
+    tolerance : float or None
+        What it must not exceed (with `least`: fall short of); None where nothing is promised.
+    least : bool
+        Whether the tolerance is one from below.
+    """
+
+    pair: str
+    quantity: str
+    difference: float | None
+    tolerance: float | None
+    least: bool = False
+
+    @property
+    def holds(self) -> bool:
+        """Whether the promise, if there is one, is kept."""
+        if self.tolerance is None:
+            return True
+        if self.difference is None:
+            return False
+        return (
+            self.difference >= self.tolerance if self.least else self.difference <= self.tolerance
+        )
+
+
+def agreement(scene: Scene) -> tuple[Agreement, ...]:
+    """Run particle 0 of a scene, alone, with every engine and SciPy; compare all answers.
+
+    Raises
+    ------
+    SceneError
+        If the geometry contradicts itself.
+    """
+    alone = changed(scene, "stream.count=1", "stream.interact=false", "run.engine=auto")
+    build(alone)
+    found: dict[str, Recording] = {}
+    rows: list[Agreement] = []
+    for name in ("exact", "dop853", "contact", "pymunk"):
+        try:
+            found[name] = _run(alone, name)
+        except (SceneError, StalledError, reference.UnableError) as error:
+            why = error.faults[0].allowed if isinstance(error, SceneError) else str(error)
+            rows.append(Agreement(name, f"left out: {why}", None, None))
+    if not found:
+        return tuple(rows)
+    base = next(iter(found))
+    growth = _growth(alone, base, found[base])
+    blows = not _lasts(alone, found[base])
+    for name, recording in found.items():
+        even = name not in ORDERS or (blows and (alone.run.align or name == "contact"))
+        allowed = BLOWS[name] * growth if even and isfinite(growth) else None
+        compared = compare(recording)
+        if compared.max is not None:
+            what = "largest relative error"
+            rows.append(Agreement(f"{name}, theory", what, compared.max, allowed))
+        elif name == base:
+            rows.append(Agreement(f"{name}, theory", compared.reason, None, None))
+        if name != base:
+            rows.append(_with_base(alone, name, recording, found[base], allowed))
+    if not isfinite(growth):
+        rows.append(
+            Agreement(base, f"a change of the inputs by {STIR:g} changes what happens", None, None)
+        )
+    return tuple(rows)
+
+
+def _run(scene: Scene, name: str) -> Recording:
+    return reference.run(build(scene)) if name == "dop853" else simulate(scene, name)
+
+
+def _distance(one: Recording, other: Recording) -> tuple[float, str]:
+    return apart(list(each(one)), list(each(other)), sizes(other), "relative")
+
+
+def _growth(scene: Scene, name: str, found: Recording) -> float:
+    """Return by how much a scene magnifies a change of its inputs, at least 1; inf if it breaks."""
+    return max(1.0, _distance(_run(stirred(scene, STIR), name), found)[0] / STIR)
+
+
+def _lasts(scene: Scene, found: Recording) -> bool:
+    """Tell whether anything but gravity acts between blows, apart from the ride by adhesion."""
+    track = found.track(0)
+    if build(scene).releases.carried[0]:
+        left = found.select(Kind.SEPARATION, surface="incoming")
+        track = track[track["t"] >= (left["t"][0] if len(left) else inf)]
+    time, velocity = np.diff(track["t"]), np.diff(track["velocity"], axis=0)
+    velocity[:, 1] += found.gravity * time
+    speed = float(np.hypot(*track["velocity"].T).max(initial=0.0))
+    return bool((np.abs(velocity[time > 0.0]) > 1e-9 * speed).any())
+
+
+def _with_base(
+    scene: Scene, name: str, recording: Recording, base: Recording, allowed: float | None
+) -> Agreement:
+    pair = f"{name}, {base.engine}"
+    error, which = _distance(recording, base)
+    if allowed is None and error <= BLOWS.get(name, 0.0):
+        allowed = BLOWS[name]  # no worse than where there is no step to go wrong by
+    if allowed is not None or name not in ORDERS:
+        what = "largest relative difference" if isfinite(error) else f"they differ in {which}"
+        return Agreement(pair, what, error if isfinite(error) else None, allowed)
+    errors = [error]
+    for n in (1, 2):
+        finer = changed(scene, f"run.dt={scene.run.dt / REFINED**n!r}")
+        errors.append(_distance(_run(finer, name), base)[0])
+    seen = ", ".join(f"{error:.0e}" for error in errors)
+    least = ORDERS[name] - CHANCE[name]
+    return Agreement(pair, f"order ({seen})", order(errors, REFINED, BLOWS[name]), least, True)
+
+
+def order(errors: list[float], ratio: float, floor: float) -> float:
+    """Return the order at which errors vanish from step to step; inf if all of them are rounding.
+
+    An error may be small by luck, so that counts which is the largest at a step or any finer one.
+    """
+    worst = np.maximum.accumulate(np.array(errors)[::-1])[::-1]
+    if not np.isfinite(worst).all():
+        return nan
+    if worst[0] <= floor:
+        return inf
+    last = max(float(worst[-1]), floor)
+    # What is down to rounding before the last step got there sooner.
+    steps = int(np.argmax(worst <= floor)) if (worst <= floor).any() else len(worst) - 1
+    return log(float(worst[0]) / last) / (steps * log(ratio))
+
+
+ENGINES = ("exact", "contact", "pymunk")
+
+MOST_ALONE = 50
+"""Particles that do not meet get a pymunk space each; beyond this many it takes minutes."""
+
+KINDS = {
+    "m": "length", "m/s": "speed", "s": "time", "degrees": "angle", "J": "energy", "W": "power",
+}  # fmt: skip
+"""Kind of quantity, as `chutelab.results.comparison.scales` has them, by unit."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One expectation of a scene, looked at in one answer.
+
+    Attributes
+    ----------
+    quantity, unit, source : str
+        What was looked at, in what unit, and who says what it should be.
+    engine : str
+        ``exact``, ``contact``, ``pymunk`` or ``theory``.
+    expected, simulated : float
+        In `unit`; NaN where the theory, or the run, has none.
+    error : float
+        Relative (see `chutelab.results.comparison`), or in `unit`; NaN if one of the two is.
+    tolerance : float or None
+        What the error must not exceed; None where nothing is promised.
+    relative : bool
+        Whether error and tolerance are relative.
+    """
+
+    quantity: str
+    unit: str
+    source: str
+    engine: str
+    expected: float
+    simulated: float
+    error: float
+    tolerance: float | None
+    relative: bool
+
+    @property
+    def holds(self) -> bool:
+        """Whether the promise, if there is one, is kept; NaN keeps none."""
+        return self.tolerance is None or self.error <= self.tolerance
+
+
+@dataclass(frozen=True)
+class Verification:
+    """All that `chutelab verify` finds out about a scene.
+
+    Attributes
+    ----------
+    findings : tuple of Finding
+        In the order of the file, each with a row for every answer that has the quantity.
+    agreements : tuple of Agreement
+        Particle 0 alone, in the three answers.
+    skipped : dict of str
+        Engines that did not run the scene, and why.
+    """
+
+    findings: tuple[Finding, ...]
+    agreements: tuple[Agreement, ...]
+    skipped: dict[str, str]
+
+    @property
+    def failures(self) -> int:
+        """How many promises are broken."""
+        rows: tuple[Finding | Agreement, ...] = (*self.findings, *self.agreements)
+        return sum(not row.holds for row in rows)
+
+
+def verify(scene: Scene, progress: Callable[[float], None] | None = None) -> Verification:
+    """Run a scene on every engine that applies; look at what it is expected to show.
+
+    Raises
+    ------
+    SceneError
+        If no engine can run it.
+    """
+    skipped = _skipped(scene) if scene.expect else {}
+    recordings: dict[str, Recording] = {}
+    for engine in ENGINES:
+        if scene.expect and engine not in skipped:
+            try:
+                recordings[engine] = simulate(scene, engine, progress)
+            except SceneError as error:
+                if error.faults[0].key != "run.engine":
+                    raise
+                skipped[engine] = error.faults[0].allowed
+    prediction = predict(scene)
+    findings: list[Finding] = []
+    for expect in scene.expect:
+        findings += [
+            _found(scene, expect, engine, recording, prediction)
+            for engine, recording in recordings.items()
+        ]
+        findings += _by_theory(scene, expect, prediction)
+    return Verification(tuple(findings), agreement(scene), skipped)
+
+
+def _skipped(scene: Scene) -> dict[str, str]:
+    """Return the engines that a scene is not for, with the reason."""
+    stream = scene.stream
+    if stream.interact and stream.count > 1:
+        return {"exact": "particles meet each other"}
+    if scene.particle.radius == 0.0:
+        return dict.fromkeys(("contact", "pymunk"), "it has no mass points")
+    if stream.count > MOST_ALONE:
+        return {"pymunk": f"{stream.count} particles that do not meet would take it minutes"}
+    return {}
+
+
+def _found(
+    scene: Scene, expect: Expect, engine: str, recording: Recording, prediction: Transfer
+) -> Finding:
+    simulated = measure(recording, expect.quantity, scene)
+    scale = None
+    if expect.quantity.startswith("ledger."):
+        # Each entry is measured by itself, but what should be nothing by what was turned over.
+        residual = expect.quantity == "ledger.residual"
+        scale = ledger(recording).turned_over if residual else 0.0
+    return _finding(scene, expect, engine, simulated, prediction, scale)
+
+
+def _by_theory(scene: Scene, expect: Expect, prediction: Transfer) -> list[Finding]:
+    """Return what the theory has to say of an expectation that is not its own."""
+    if expect.value == "theory" or expect.quantity not in SYMBOLS:
+        return []
+    answer = _predicted(prediction, expect.quantity)
+    if not isfinite(answer):
+        return []
+    return [_finding(scene, expect, "theory", answer, prediction, None)]
+
+
+def _predicted(prediction: Transfer, symbol: str) -> float:
+    if symbol.endswith("_deg"):
+        return degrees(float(getattr(prediction, symbol.removesuffix("_deg"))))
+    return float(getattr(prediction, symbol))
+
+
+def _finding(
+    scene: Scene,
+    expect: Expect,
+    engine: str,
+    simulated: float,
+    prediction: Transfer,
+    scale: float | None,
+) -> Finding:
+    unit = unit_of(expect.quantity, scene.surfaces)
+    assert unit is not None
+    expected = (
+        _predicted(prediction, expect.quantity)
+        if isinstance(expect.value, str)
+        else float(expect.value)
+    )
+    allowed = expect.allowed(engine)
+    relative = allowed is None or allowed[1] == "%"
+    if scale is None:
+        scale = scales(scene, prediction)[KINDS[unit]] if unit else 0.0
+    if not isfinite(expected) or not isfinite(simulated):
+        error = nan
+    elif not relative:
+        error = abs(simulated - expected)
+    elif unit == "degrees":
+        error = relative_error(radians(simulated), radians(expected), scale)
+    else:
+        error = relative_error(simulated, expected, scale)
+    return Finding(
+        quantity=expect.quantity,
+        unit=unit,
+        source=expect.source,
+        engine=engine,
+        expected=expected,
+        simulated=simulated,
+        error=error,
+        tolerance=None if allowed is None else allowed[0],
+        relative=relative,
+    )

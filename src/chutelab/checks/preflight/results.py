@@ -1,0 +1,231 @@
+"""What a look at a scene finds.
+
+- What the closed form will and will not cover, in words.
+- What will be built from a scene, and what is skipped because it does not need it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+
+from chutelab.machine import Machine
+from chutelab.results.comparison import QUANTITIES
+from chutelab.scene import Scene
+from chutelab.theory import Reason, predict
+
+
+@dataclass(frozen=True)
+class Part:
+    """Something that is built, or skipped: its name, and how or why in words."""
+
+    name: str
+    what: str
+
+
+@dataclass(frozen=True)
+class Stepping:
+    """What finite steps mean for a scene.
+
+    Attributes
+    ----------
+    dt : float
+        Longest step, s.
+    aligned : bool
+        Whether blows are met at their own instants; then nothing is passed through at any speed.
+    speed : float or None
+        Highest speed seen in the trial run, m/s; None if there was none.
+    way : float or None
+        What a particle covers in a step at that speed, m.
+    bound : float
+        What it must stay below if steps are not aligned: the radius, m.
+    longest : float or None
+        The longest step that would, s.
+    """
+
+    dt: float
+    aligned: bool
+    speed: float | None
+    way: float | None
+    bound: float
+    longest: float | None
+
+    @property
+    def safe(self) -> bool:
+        """Whether no particle can pass through a surface unseen."""
+        return self.aligned or self.way is None or self.way < self.bound
+
+
+@dataclass(frozen=True)
+class Effort:
+    """What a run is expected to cost.
+
+    Attributes
+    ----------
+    contacts : int
+        Impacts and collisions, about.
+    seconds : float
+        Run time here and now, about.
+    at_least : bool
+        True if the trial run was cut off: both are lower bounds then.
+    how : str
+        What the estimate rests on.
+    """
+
+    contacts: int
+    seconds: float
+    at_least: bool
+    how: str
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """What the closed form has to say of a scene.
+
+    Attributes
+    ----------
+    covers, leaves_out : tuple of str
+        The paper's symbols that it gives, and that it does not.
+    reason : str
+        Why it stops, as `chutelab.theory` has it; "" if it does not.
+    words : str
+        The same for people.
+    """
+
+    covers: tuple[str, ...]
+    leaves_out: tuple[str, ...]
+    reason: str
+    words: str
+
+
+@dataclass(frozen=True)
+class Advice:
+    """Something that works but may surprise, and what would change it.
+
+    Attributes
+    ----------
+    warning : str
+        What is the matter.
+    change : str
+        What to do; a setting such as ``outgoing.drop = 0.3`` has been tried and does it.
+    """
+
+    warning: str
+    change: str
+
+
+@dataclass(frozen=True)
+class Preflight:
+    """All that `chutelab check` says of a scene.
+
+    Attributes
+    ----------
+    title : str
+        Of the scene.
+    built, skipped : tuple of Part
+        What the machine consists of, and what it does without.
+    engine, why : str
+        Which engine runs, and for what reason.
+    ends : str
+        When the run is over.
+    stepping : Stepping or None
+        None if the exact engine runs.
+    effort : Effort
+        Contacts and run time.
+    theory : Coverage
+        What the closed form answers.
+    advice : tuple of Advice
+        Warnings.
+    """
+
+    title: str
+    built: tuple[Part, ...]
+    skipped: tuple[Part, ...]
+    engine: str
+    why: str
+    ends: str
+    stepping: Stepping | None
+    effort: Effort
+    theory: Coverage
+    advice: tuple[Advice, ...]
+
+
+WORDS = {
+    Reason.OUTSIDE: "The paper's equations are about another machine",
+    Reason.EARLY: "The equations stop short of a contact they know nothing of",
+    Reason.NO_IMPACT: "The particle flies past the plate, and the equations end with the flight",
+    Reason.SECOND: "After the plate it meets something else before it lands",
+    Reason.MISSES: "It does not come down on the outgoing belt",
+}
+"""What a reason means for somebody who sees the scene for the first time."""
+
+
+def coverage(scene: Scene) -> Coverage:
+    """Ask the theory about a scene; it speaks of particle 0."""
+    found = predict(scene)
+    given = [name for name in QUANTITIES if isfinite(float(getattr(found, name)))]
+    reason = str(found.reason)
+    kind = Reason.of(reason)
+    if kind is None:
+        words = "All of the transfer, belt to belt"
+    else:
+        words = f"{WORDS[kind]}: {reason.partition(': ')[2]}"
+    notes = []
+    if given and scene.stream.count > 1:
+        notes.append("It speaks of particle 0 only.")
+    settled = scene.stream.count == 1 and scene.run.until == "settled"
+    if "belt_work" in given and not settled:
+        alone = " of one particle" if scene.stream.count > 1 else ""
+        notes.append(
+            f"A simulation has belt_work and slip_heat to compare in a run{alone} until settled."
+        )
+    return Coverage(
+        covers=tuple(given),
+        leaves_out=tuple(name for name in QUANTITIES if name not in given),
+        reason=reason,
+        words=" ".join([f"{words}.", *notes]),
+    )
+
+
+def built(machine: Machine) -> Iterator[Part]:
+    """Yield the parts of a machine, world frame."""
+    segments, ends = machine.segments, machine.segments.end
+    for index, surface in enumerate(machine.surfaces):
+        for k in (segments.surface == index).nonzero()[0]:
+            # Rounding leaves 1e-17 where 0 is meant.
+            (x0, y0), (x1, y1) = np.round([segments.start[k], ends[k]], 12) + 0.0
+            moving = f", moving at {segments.speed[k]:.6g} m/s" if segments.speed[k] else ""
+            yield Part(surface, f"from ({x0:.6g}, {y0:.6g}) to ({x1:.6g}, {y1:.6g}) m{moving}")
+        if machine.pulley is not None and machine.pulley.surface == index:
+            yield Part("pulley", f"radius {machine.pulley.radius:.6g} m, axis at (0, 0)")
+    releases, p = machine.releases, machine.particle
+    (x, y), (vx, vy) = releases.position[0], releases.velocity[0]
+    turning = "a free disk" if p.inertia else "not turning"
+    kind = "a mass point" if p.radius == 0.0 else f"radius {p.radius:.6g} m"
+    many = f"{machine.count:,} of them, each " if machine.count > 1 else ""
+    yield Part("particle", f"{many}{kind}, mass {p.mass:.6g} kg, {turning}")
+    last = f", the last at t = {releases.t[-1]:.6g} s" if machine.count > 1 else ""
+    yield Part("release", f"the first from ({x:.6g}, {y:.6g}) m at ({vx:.6g}, {vy:.6g}) m/s{last}")
+
+
+def skipped(scene: Scene, machine: Machine, engine: str) -> Iterator[Part]:
+    """Yield what the scene does without, and why."""
+    for table in ("incoming", "plate", "outgoing", "surface"):
+        if not getattr(scene, table):
+            written = f"[[{table}]]" if table == "surface" else f"[{table}]"
+            name = "surfaces" if table == "surface" else table
+            yield Part(name, f"the scene has no {written}")
+    if machine.particle.inertia == 0.0:
+        yield Part("rotation", "particle.spin = false")
+    if not machine.interact:
+        why = "stream.count = 1" if machine.count == 1 else "stream.interact = false"
+        yield Part("collisions", f"of particles with each other: {why}")
+    if engine == "exact":
+        yield Part("steps", "the next event is solved for, so no flight is stepped")
+    elif engine == "contact" or (machine.align and not machine.interact):
+        yield Part("flights", "only contacts that last are stepped, blows have their own instants")
+    if machine.until == "landed":
+        yield Part("what follows", 'the first touch of the outgoing belt: run.until = "landed"')

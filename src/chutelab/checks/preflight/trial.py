@@ -1,0 +1,228 @@
+"""A trial run of a stream's first particles, cut off after a moment.
+
+- Contacts and run time, estimated from a trial run of the stream's first particles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import sqrt
+from time import perf_counter
+
+import numpy as np
+
+from chutelab import scene as scenes
+from chutelab.checks.preflight.results import Effort
+from chutelab.engines.simulation import simulate
+from chutelab.results import Kind, Recording
+from chutelab.results.recorder import StalledError
+from chutelab.scene import Scene, SceneError
+
+PATIENCE = 0.12
+"""s of trial run at most: the look as a whole is to take less than half a second."""
+
+INDEPENDENT, CROWD, ALONE = 16, 24, 1
+"""Particles of a trial: not colliding, colliding, and one after the other in pymunk."""
+
+WARMING = 0.05
+"""s; a trial shorter than this is run once more, because its first time is mostly warming up."""
+
+
+class _EnoughError(Exception):
+    """The trial has taken its time."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A run of a stream's first particles.
+
+    Attributes
+    ----------
+    count : int
+        How many there were.
+    recording : Recording or None
+        None if it was cut off.
+    seconds : float
+        Time it took once warm, or had taken when it was cut off.
+    rounds : int
+        Rounds of the exact engine, if it was cut off.
+    warming : float
+        s that its first time took longer.
+    landed : bool
+        Whether it ended with the landings, though the scene goes on until all is at rest: coming to
+        rest takes a crowd of any size too long for a trial.
+    lone : Recording or None
+        Particle 0 by itself, to the end and not stepped where that can be had; None if it would
+        take too long, or the trial was not stepped either.
+    trouble : str
+        What stopped it, if the engine did not get on; "" otherwise.
+    """
+
+    count: int
+    recording: Recording | None
+    seconds: float
+    rounds: int = 0
+    warming: float = 0.0
+    landed: bool = False
+    lone: Recording | None = None
+    trouble: str = ""
+
+
+def is_crowd(scene: Scene) -> bool:
+    """Tell whether particles meet each other."""
+    return scene.stream.interact and scene.stream.count > 1
+
+
+def trial(scene: Scene, engine: str) -> Trial:
+    """Run the first particles of a scene until they end, or patience does.
+
+    Raises
+    ------
+    SceneError
+        If the engine that the scene asks for cannot run it.
+    """
+    crowd = is_crowd(scene)
+    most = CROWD if crowd else ALONE if engine == "pymunk" else INDEPENDENT
+    count = min(scene.stream.count, most)
+    landed = crowd and scene.run.until == "settled" and scene.outgoing is not None
+    run = {"until": "landed"} if landed else {}
+    found = _warm(_with(scene, {"count": count}, run))
+    if engine == "exact":
+        return found
+    alone = _with(scene, {"count": 1, "interact": False}, {"engine": "auto"})
+    return replace(found, landed=landed, lone=_lone(alone))
+
+
+def _with(scene: Scene, stream: Mapping[str, object], run: Mapping[str, object]) -> Scene:
+    """Return a scene with other keys of stream and run, without its expectations."""
+    tables = scenes.to_dict(scene)
+    tables.pop("expect", None)
+    tables["stream"] = {**tables.get("stream", {}), **stream}
+    tables["run"] = {**tables.get("run", {}), **run}
+    return scenes.from_dict(tables, scene.source)
+
+
+def _warm(scene: Scene) -> Trial:
+    cold = _timed(scene)
+    if cold.recording is None or cold.seconds > WARMING:
+        return cold
+    warm = _timed(scene)
+    return replace(warm, warming=max(0.0, cold.seconds - warm.seconds))
+
+
+def _timed(scene: Scene) -> Trial:
+    begin, rounds = perf_counter(), 0
+
+    def watch(_share: float) -> None:
+        nonlocal rounds
+        rounds += 1
+        if perf_counter() - begin > PATIENCE:
+            raise _EnoughError
+
+    recording, trouble = None, ""
+    try:
+        recording = simulate(scene, None, watch)
+    except StalledError as stalled:
+        trouble = str(stalled)
+    except _EnoughError:
+        pass
+    seconds = perf_counter() - begin
+    return Trial(scene.stream.count, recording, seconds, rounds, trouble=trouble)
+
+
+def _lone(scene: Scene) -> Recording | None:
+    try:
+        return _timed(scene).recording
+    except SceneError:
+        return None
+
+
+TOGETHER = 400.0
+"""Particles that cost the exact engine as much again as a round costs by itself."""
+
+BODIES = 50.0
+"""The same for a step of an engine with steps."""
+
+IN_THE_JET = 2.5
+"""Contacts of a particle in a crowd up to its landing, where no trial tells."""
+
+TO_REST, NEIGHBOURS = 12.0, 10.0
+"""Contacts from there to rest where they come to lie side by side, and the number of particles of
+which half of those that are to be met are there."""
+
+STEP = 3e-4
+"""s for a step with a few particles, where no trial tells: of Chipmunk, the slower engine."""
+
+ROUNDS = 10
+"""Rounds of the exact engine for a contact, at most about: a slip round the pulley takes the most;
+while it bounces, each round is one."""
+
+
+def effort(scene: Scene, engine: str, tried: Trial) -> Effort:
+    """Scale a trial up to the whole stream."""
+    if is_crowd(scene) and (tried.landed or tried.recording is None):
+        return _crowd(scene, tried)
+    count, some, recording = scene.stream.count, tried.count, tried.recording
+    who = _who(count, some)
+    if recording is None:
+        if tried.lone is not None:
+            contacts = tried.lone.contacts * count
+        else:
+            contacts = max(1, tried.rounds // ROUNDS) * count
+        how = f"a trial run of {who} was cut off after {tried.seconds:.1g} s"
+        return Effort(contacts, tried.seconds * count / some, True, how)
+    collided = int(np.count_nonzero(recording.events["kind"] == Kind.COLLISION))
+    alone, crowding = recording.contacts - collided, sqrt(count / some)
+    contacts = round((alone + collided * crowding) * count / some)
+    growth = count / some
+    if engine == "exact":
+        growth = (TOGETHER + count) / (TOGETHER + some)
+    elif is_crowd(scene):
+        lasted = float(recording.ends()[1]["t"].max(initial=0.0))
+        later = (count - some) / scene.stream.rate
+        growth = (1.0 + later / lasted if lasted > 0.0 else 1.0) * _bodies(count, some)
+    how = "timed in" if some == count else "scaled up from"
+    return Effort(
+        contacts, tried.warming + tried.seconds * growth, False, f"{how} a trial run of {who}"
+    )
+
+
+def _crowd(scene: Scene, tried: Trial) -> Effort:
+    """Estimate a crowd that comes to rest, or whose trial was cut off."""
+    count, some, recording = scene.stream.count, tried.count, tried.recording
+    each, step, what = IN_THE_JET, STEP, "nominal figures"
+    if recording is not None and recording.steps:
+        each = recording.contacts / some
+        step = tried.seconds / recording.steps
+        what = f"a trial run of {_who(count, some)} up to their landing, and nominal figures"
+    life = scene.run.max_time
+    if tried.lone is not None:
+        each = max(each, float(tried.lone.contacts))
+        life = float(np.ptp(tried.lone.knots["t"]))
+    if scene.run.until != "landed":
+        each += TO_REST * _density(scene) * count / (count + NEIGHBOURS)
+    contacts = round(each * count)
+    steps = (count / scene.stream.rate + life) / scene.run.dt + contacts
+    seconds = steps * step * _bodies(count, some)
+    return Effort(contacts, seconds, False, f"roughly, from {what}")
+
+
+def _density(scene: Scene) -> float:
+    """Return the share of the outgoing belt that the particles cover, side by side; at most 1."""
+    if scene.outgoing is None:
+        return 1.0
+    way = abs(scene.outgoing.speed) / scene.stream.rate
+    diameter = 2.0 * scene.particle.radius
+    return diameter / way if way > diameter else 1.0
+
+
+def _bodies(count: int, some: int) -> float:
+    """Return how much longer a step takes with all particles than with a few."""
+    return (BODIES + count) / (BODIES + some)
+
+
+def _who(count: int, some: int) -> str:
+    if some == 1:
+        return "the only particle" if count == 1 else f"the first of {count:,} particles"
+    return f"all {count} particles" if some == count else f"the first {some} of {count:,} particles"

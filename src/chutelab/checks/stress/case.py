@@ -1,0 +1,205 @@
+"""`Case`: a scene that is hard on an engine, and what is asked of it besides the laws for all."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chutelab.checks.stress.evidence import Evidence, Verdict
+from chutelab.results import Recording
+from chutelab.scene import Scene
+
+Tables = Mapping[str, Any]
+Map = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+ENGINES = ("exact", "contact", "pymunk", "fixed")
+"""``fixed`` is pymunk with run.align = false: every step lasts dt."""
+
+LONE, CROWD = ("exact", "contact", "pymunk"), ("contact", "pymunk")
+"""Those that follow particles which do not meet, and which do."""
+
+STEPS = (1e-3, 1.0 / 30.0)
+"""s; the default, and two frames of a game."""
+
+PATIENCE = 20.0
+"""s of wall time that one run may take."""
+
+
+@dataclass(frozen=True)
+class Twin:
+    """The same machine in another place; what happens must be the same.
+
+    Attributes
+    ----------
+    law : str
+        Name of the symmetry.
+    tables : mapping
+        The twin's scene.
+    back : callable
+        Maps the twin's positions (..., 2) to the original's.
+    bound : float or None
+        m; None: what rounding, magnified by contacts, explains.
+    particle : int
+        Which of the twin's particles is compared with particle 0, or -1: each with its like.
+    """
+
+    law: str
+    tables: Tables
+    back: Map
+    bound: float | None = None
+    particle: int = -1
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """Runs at steps halved again and again; the error has to fall with them.
+
+    Attributes
+    ----------
+    steps : tuple of float
+        s, falling.
+    quantity : callable
+        What is observed of a recording.
+    floor : float
+        Error (of the quantity's own unit) that rounding explains: below it halving changes nothing.
+    claimed : float
+        Order of the method.
+    """
+
+    steps: tuple[float, ...]
+    quantity: Callable[[Recording], float]
+    floor: float
+    claimed: float = 1.0
+
+    @property
+    def order(self) -> float:
+        """The least order that may be found: the claimed one, less what chance may do to it.
+
+        What happens at the end of a step happens up to a step late, at a coarse step perhaps a
+        quarter as late as it might: that is two of the halvings.
+        """
+        return self.claimed - 2.0 / (len(self.steps) - 1)
+
+
+@dataclass(frozen=True)
+class Case:
+    """One row of the table's left side.
+
+    Attributes
+    ----------
+    name : str
+        Short, for ``--case``.
+    group : str
+        What is being stressed.
+    tables : mapping
+        The scene, as `chutelab.scene.from_dict` takes it.
+    engines : tuple of str
+        Which of `ENGINES` it is run on.
+    steps : tuple of float
+        Steps of the stepped ones, s.
+    formula : callable or None
+        A law of its own: a closed formula.
+    refusals : mapping of str to str
+        Engines that must refuse the scene, and the key that they have to name.
+    may_refuse : mapping of str to str
+        Engines that may do so instead of keeping the laws.
+    unpromised : mapping of str to str
+        Engines that do not promise to keep the laws here, and why: they are not run.
+    ends : tuple of str
+        How particles may end, empty: in any way.
+    inside : tuple of float or None
+        Left, right, bottom and top (m) that no centre may leave.
+    at_rest : bool
+        Whether everything must lie still, not sunk in, at the end.
+    twin, ladder
+        See there.
+    full : bool
+        Whether it takes too long for the quick set.
+    patience : float
+        s of wall time that one run may take.
+    """
+
+    name: str
+    group: str
+    tables: Tables
+    engines: tuple[str, ...] = LONE
+    steps: tuple[float, ...] = STEPS
+    formula: Callable[[Evidence], Verdict | None] | None = None
+    refusals: Mapping[str, str] = field(default_factory=dict)
+    may_refuse: Mapping[str, str] = field(default_factory=dict)
+    unpromised: Mapping[str, str] = field(default_factory=dict)
+    ends: tuple[str, ...] = ()
+    inside: tuple[float, float, float, float] | None = None
+    at_rest: bool = False
+    twin: Twin | None = None
+    ladder: Ladder | None = None
+    full: bool = False
+    patience: float = PATIENCE
+
+    def but(self, **changes: Any) -> Case:
+        """Return the case with some attributes changed."""
+        return replace(self, **changes)
+
+
+def by_name(engine: str) -> str:
+    """Return what run.engine calls one of `ENGINES`."""
+    return "pymunk" if engine == "fixed" else engine
+
+
+def scene_of(tables: Tables, name: str, engine: str, dt: float | None) -> Scene:
+    """Validate a scene for an engine and a step."""
+    from chutelab.scene import from_dict
+
+    run = {**tables.get("run", {})}
+    run["engine"] = by_name(engine)
+    if dt is not None:
+        run["dt"] = dt
+    if engine == "fixed":
+        run["align"] = False
+    return from_dict({"title": name, **tables, "run": run}, name)
+
+
+def merged(*tables: Tables) -> dict[str, Any]:
+    """Lay tables over each other, key by key; lists and numbers of the later ones win."""
+    out: dict[str, Any] = {}
+    for layer in tables:
+        for key, value in layer.items():
+            old = out.get(key)
+            out[key] = {**old, **value} if isinstance(old, dict) else value
+    return out
+
+
+def surface(
+    name: str,
+    *points: tuple[float, float],
+    restitution: float = 0.5,
+    friction: float = 0.3,
+    speed: float = 0.0,
+) -> dict[str, Any]:
+    """Return the table of a free surface."""
+    return {
+        "name": name,
+        "points": [list(point) for point in points],
+        "restitution": restitution,
+        "friction": friction,
+        "speed": speed,
+    }
+
+
+def thrown(
+    at: tuple[float, float], velocity: tuple[float, float], **stream: Any
+) -> dict[str, dict[str, Any]]:
+    """Return the table of a stream released at a point."""
+    return {"stream": {"at": list(at), "velocity": list(velocity), **stream}}
+
+
+TRANSFER: Tables = {
+    "incoming": {"speed": 2.0, "pulley_radius": 0.1},
+    "plate": {"distance": 0.5, "restitution": 0.5},
+    "outgoing": {"drop": 0.5, "drop_from": "top"},
+}
+"""Belt, plate, belt: the machine that all of this is about."""

@@ -1,0 +1,268 @@
+"""All cases, and how they are chosen.
+
+- Cases run twice: the machine far away, the machine in a mirror; and at ever smaller steps.
+- Machines drawn at random: a particle thrown into surfaces that cross, fold, move and grip.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from difflib import get_close_matches
+from fnmatch import fnmatch
+from typing import Any
+
+import numpy as np
+
+from chutelab.checks.stress import extremes, geometry
+from chutelab.checks.stress.case import LONE, TRANSFER, Case, Ladder, Twin, merged, surface, thrown
+from chutelab.results import Kind, Recording
+
+FAR = 1e6
+"""m that machines are moved by; a double's ulp there is 1.2e-10 m."""
+
+FAR_BOUND = 1e-9
+"""m: eight ulps at `FAR`."""
+
+
+def moved(tables: dict[str, Any], dx: float, dy: float) -> dict[str, Any]:
+    """Return a scene of free surfaces with everything moved by (dx, dy) m."""
+    return _mapped(tables, lambda x, y: [x + dx, y + dy], 1.0)
+
+
+def mirrored(tables: dict[str, Any]) -> dict[str, Any]:
+    """Return a scene of free surfaces with x and -x exchanged."""
+    return _mapped(tables, lambda x, y: [-x, y], -1.0)
+
+
+def _mapped(tables: dict[str, Any], to: Any, turn: float) -> dict[str, Any]:
+    stream = tables["stream"]
+    vx, vy = stream["velocity"]
+    surfaces = [{**s, "points": [to(*p) for p in s["points"]]} for s in tables["surface"]]
+    return merged(
+        tables,
+        {"surface": surfaces, "stream": {"at": to(*stream["at"]), "velocity": [turn * vx, vy]}},
+    )
+
+
+def _machines() -> dict[str, dict[str, Any]]:
+    """Machines within 4 m left of and below the origin, at places that doubles hold exactly.
+
+    So they can be moved by `FAR` in either direction without moving their parts against each other.
+    """
+    wall = surface("wall", (-1.0, -3.5), (-1.0, -1.0), friction=0.25)
+    ramp = surface("ramp", (-3.5, -1.5), (-2.25, -2.0), restitution=0.25, friction=0.125)
+    floor = surface("floor", (-3.75, -3.0), (-1.0, -3.0), restitution=0.5)
+    belt = surface("belt", (-1.25, -3.0), (-3.75, -3.0), speed=1.5, restitution=0.25)
+    slide = surface("slide", (-3.0, -2.5), (-2.0, -3.0), (-1.25, -3.0), friction=0.0)
+    throw = thrown((-3.0, -1.0), (1.5, 0.0))
+    disk = {"particle": {"radius": 1.0 / 64.0, "spin": True}, "run": {"until": 1.5}}
+    still = merged(disk, {"particle": {"spin": False}})
+    return {
+        "flight": merged(still, throw, {"surface": [wall], "run": {"until": 0.5}}),
+        "wall": merged(disk, throw, {"surface": [wall, floor], "stream": {"velocity": [4.0, 1.0]}}),
+        "ramp": merged(disk, throw, {"surface": [ramp, floor, wall]}),
+        "belt": merged(still, throw, {"surface": [belt]}),
+        "slide": merged(still, {"surface": [slide], **thrown((-2.75, -2.5), (0.0, 0.0))}),
+        "lying": merged(disk, {"surface": [floor], **thrown((-2.0, -3.0 + 1 / 64), (1.0, 0.0))}),
+        "edge": merged(disk, {"surface": [floor], **thrown((-1.25, -3.0 + 1 / 64), (0.5, 0.0))}),
+        "weightless": merged(
+            disk, throw, {"surface": [wall, floor], "gravity": 0.0, "stream": {"velocity": [3, -2]}}
+        ),
+    }
+
+
+def _twins() -> list[Case]:
+    out = []
+    for name, tables in _machines().items():
+        for axis, shift in (("x", (FAR, 0.0)), ("y", (0.0, FAR)), ("xy", (-FAR + 4.0, FAR))):
+            there = moved(tables, *shift)
+            back = _shifted_back(shift)
+            twin = Twin("shift symmetry", there, back, FAR_BOUND)
+            out.append(
+                Case(f"shift-{name}-{axis}", "shifted by 10^6 m", tables, steps=(1e-3,), twin=twin)
+            )
+        twin = Twin("mirror symmetry", mirrored(tables), lambda p: p * [-1.0, 1.0])
+        out.append(Case(f"mirror-{name}", "mirrored", tables, twin=twin))
+    return out
+
+
+def _shifted_back(shift: tuple[float, float]) -> Any:
+    return lambda p: p - np.array(shift)
+
+
+COARSE = tuple(1.0 / 60.0 / 2**n for n in range(6))
+"""s; from a frame of a game to half a millisecond, for steps that end at contacts."""
+
+FINE = tuple(2e-3 / 2**n for n in range(5))
+"""s; for what touches. Where steps are all alike the first is left out: at 2 ms what falls on the
+belt goes farther than its radius in a step."""
+
+
+def _left_at(recording: Recording) -> float:
+    """Angle at which the pulley is left, rad."""
+    left = recording.select(Kind.SEPARATION)
+    return float(np.arctan2(*left["position"][0])) if len(left) else np.nan
+
+
+def _landed_at(recording: Recording) -> float:
+    landing = recording.select(Kind.LANDING)
+    return float(landing["position"][0, 0]) if len(landing) else np.nan
+
+
+def _end_at(recording: Recording) -> float:
+    return float(recording.track(0)["position"][-1, 0])
+
+
+def _ladders() -> list[Case]:
+    belt = {"speed": 2.0, "pulley_radius": 0.5, "friction": 0.5, "length": 0.1}
+    grip = {"incoming": belt, "run": {"until": 0.6}}
+    floor = surface("floor", (-1.0, 0.0), (9.0, 0.0), friction=0.3)
+    slides = {"surface": [floor], **thrown((0.0, 0.004), (1.0, 0.0)), "run": {"until": 0.5}}
+    rolls = merged(slides, {"particle": {"spin": True}})
+    hops = {"surface": [floor], **thrown((0.0, 0.1), (1.0, 0.0)), "run": {"until": 0.4}}
+    whole = merged(TRANSFER, {"incoming": {"length": 0.1}, "plate": {"angle_deg": 20.0}})
+    carried = merged(whole, {"run": {"until": 0.8}})
+    # Chipmunk's arithmetic leaves some 1e-10 m where it resolves a contact.
+    floor_of = 1e-9
+    out = []
+    for name, tables, quantity in (
+        ("pulley", grip, _left_at),
+        ("slide", slides, _end_at),
+        ("roll", rolls, _end_at),
+        ("bounce", hops, _end_at),
+        ("belt", carried, _end_at),
+        ("transfer", whole, _landed_at),
+    ):
+        for engine in ("contact", "pymunk", "fixed"):
+            # Impacts alone are exact at any step; what touches is stepped no coarser than this.
+            blows = engine != "fixed" and name in {"bounce", "transfer"}
+            claimed = 2.0 if engine == "contact" else 1.0
+            fine = FINE[1:] if engine == "fixed" else FINE
+            ladder = Ladder(COARSE if blows else fine, quantity, floor_of, claimed)
+            suffix = "" if engine == "pymunk" else f"-{engine}"
+            out.append(
+                Case(
+                    f"order-{name}{suffix}",
+                    "steps halved until rounding takes over",
+                    tables,
+                    (engine,),
+                    ladder=ladder,
+                )
+            )
+    return out
+
+
+def symmetric_cases() -> tuple[Case, ...]:
+    """Return the cases."""
+    return (*_twins(), *_ladders())
+
+
+QUICK, MANY = 20, 500
+"""Machines in the quick set, and in all."""
+
+RESOLVED = 1e-3
+"""m; smaller disks than this are left to the exact engine here: `extremes` has them for all."""
+
+SHORTEST = 0.05
+"""m; shortest segment drawn."""
+
+
+def machine(seed: int) -> dict[str, Any]:
+    """Return the scene of a seed."""
+    rng = np.random.default_rng(seed)
+    surfaces = [found for n in range(rng.integers(1, 6)) if (found := _surface(rng, f"s{n}"))]
+    spin = bool(rng.integers(2))
+    radius = _one_of(rng, [1e-6 if spin else 0.0, 1e-3, 0.004, 0.03, 0.125])
+    speed = _one_of(rng, [0.5, 2.0, 20.0])
+    return {
+        "gravity": _one_of(rng, [9.81, 9.81, 1.6, 0.0]),
+        "particle": {"radius": radius, "spin": spin, "mass": _one_of(rng, [1e-9, 0.2, 1e6])},
+        "surface": surfaces,
+        # Above all surfaces, whatever the radius.
+        **thrown((_place(rng), 1.25), (speed * _place(rng), speed * _place(rng))),
+        "run": {"until": 1.5},
+    }
+
+
+def _surface(rng: np.random.Generator, name: str) -> dict[str, Any] | None:
+    points = [(_place(rng), _place(rng))]
+    for _ in range(rng.integers(1, 4)):
+        following = (_place(rng), _place(rng))
+        if np.hypot(*np.subtract(following, points[-1])) > SHORTEST:
+            points.append(following)
+    materials = {
+        "restitution": _one_of(rng, [0.0, 0.3, 0.8, 0.999, 1.0]),
+        "friction": _one_of(rng, [0.0, 0.1, 0.6, 5.0, 1e6]),
+        "speed": _one_of(rng, [0.0, 0.0, 0.0, 1.5, -0.7, 100.0]),
+    }
+    return surface(name, *points, **materials) if len(points) > 1 else None
+
+
+def _place(rng: np.random.Generator) -> float:
+    """Draw a coordinate within 1 m; half of them from a grid, so that things fall together."""
+    return float(rng.integers(-8, 9)) / 8.0 if rng.integers(2) else float(rng.uniform(-1.0, 1.0))
+
+
+def _one_of(rng: np.random.Generator, values: Sequence[float]) -> float:
+    return values[int(rng.integers(len(values)))]
+
+
+def drawn_cases() -> tuple[Case, ...]:
+    """Return the cases."""
+    out = []
+    for seed in range(MANY):
+        tables = machine(seed)
+        resolved = tables["particle"]["radius"] >= RESOLVED
+        out.append(
+            Case(
+                f"drawn-{seed}",
+                "drawn at random",
+                tables,
+                engines=LONE if resolved else ("exact",),
+                steps=(1e-3,),
+                # A spinning disk held between a moving surface and another.
+                may_refuse={"exact": "run.engine"},
+                full=seed >= QUICK,
+            )
+        )
+    return tuple(out)
+
+
+def cases(*, full: bool = False) -> tuple[Case, ...]:
+    """Return the quick set, or all."""
+    found = (
+        *extremes.CASES,
+        *geometry.CASES,
+        *extremes.cases(),
+        *symmetric_cases(),
+        *drawn_cases(),
+    )
+    return found if full else tuple(case for case in found if not case.full)
+
+
+def chosen(names: Collection[str], *, full: bool = False) -> tuple[Case, ...]:
+    """Return the cases whose names match one of some patterns (``*`` for anything).
+
+    A case that is named is run, whether it is one of the quick set or not.
+
+    Raises
+    ------
+    ValueError
+        If a pattern matches nothing.
+    """
+    if not names:
+        return cases(full=full)
+    known = cases(full=True)
+    for pattern in names:
+        if not any(_matches(case, pattern) for case in known):
+            near = get_close_matches(pattern, [case.name for case in known], n=3)
+            advice = f"did you mean {' or '.join(near)}? " if near else ""
+            raise ValueError(
+                f"no case is called {pattern!r}; {advice}chutelab stress --full --list"
+                f" names all {len(known)}, and * stands for anything"
+            )
+    return tuple(c for c in known if any(_matches(c, pattern) for pattern in names))
+
+
+def _matches(case: Case, pattern: str) -> bool:
+    return case.name == pattern or fnmatch(case.name, pattern)

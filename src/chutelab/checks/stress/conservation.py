@@ -1,0 +1,181 @@
+"""Laws on what is conserved: energy, the ledger, momentum."""
+
+from __future__ import annotations
+
+from math import ceil
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chutelab.checks.stress.barriers import overlap
+from chutelab.checks.stress.evidence import EPS, ROUNDINGS, Evidence, Verdict
+from chutelab.results.ledger import ledger
+
+A_CONTACT = 2.0
+"""eps that one contact may move an energy by: half an ulp for each of two velocity components, a
+height and a sum."""
+
+BOOKED = 1e-9
+"""Share of the energy turned over that the contact engine may misbook in a crowd: its promise."""
+
+ROUGH = 1e-4
+"""Share of the radius by which a track of the pymunk engine may be off between two knots."""
+
+HAIR = 1e-10
+"""Share of the radius by which the pymunk engine's disks are larger, and so their levers."""
+
+BALANCES = 2000
+"""Times at which the energy of a crowd is summed."""
+
+
+def energy(e: Evidence) -> Verdict | None:
+    """Kinetic and potential energy never rise but by a belt's work.
+
+    The figure is the largest rise above any earlier value, as a share of the energy in play (for a
+    crowd: turned over).
+    """
+    if not e.energy:
+        return None
+    if e.crowd:
+        return _energy_of_crowd(e)
+    knots, offsets = e.recording.knots, e.recording.offsets
+    total = np.sum(e.recording.energies(knots), axis=0) - knots["entries"][:, 0]
+    worst, where = 0.0, ""
+    for i in range(e.recording.count):
+        own = total[offsets[i] : offsets[i + 1]]
+        if len(own):
+            rise = own - np.minimum.accumulate(own)
+            at = int(np.argmax(rise))
+            if rise[at] > worst:
+                worst = float(rise[at])
+                where = f", particle {i} at t = {e.recording.track(i)['t'][at]:.6g} s"
+    # A knot in contact holds the mean velocity of a step, half a step's pull off its books.
+    known = e.speed * e.machine.gravity * (e.dt or 0.0) * e.machine.particle.mass / e.energy
+    return Verdict(worst / e.energy, _energy_bound(e) + known, f"of {e.energy:.3g} J{where}")
+
+
+def _energy_of_crowd(e: Evidence) -> Verdict:
+    knots = e.recording.knots
+    times = np.unique(knots["t"])
+    if e.alike:
+        # Chipmunk knows velocities at steps only; in between a track turns as a cubic does.
+        span = e.machine.end_time - e.machine.releases.t[0]
+        share = (times - e.machine.releases.t[0]) / span * ceil(span / e.dt - 1e-9)
+        times = times[np.abs(share - np.rint(share)) < 1e-6]
+    if len(times) > BALANCES:
+        times = times[np.linspace(0, len(times) - 1, BALANCES).astype(int)]
+    books = e.recording.energy_at(times)
+    first, _ = e.recording.ends()
+    brought = np.sum(e.recording.energies(first), axis=0)[np.argsort(first["t"], kind="stable")]
+    entered = np.searchsorted(np.sort(first["t"]), times, side="right")
+    start = np.concatenate([[0.0], np.cumsum(brought)])[entered]
+    gain = books["kinetic"] + books["potential"] - start - books["belt_work"]
+    rise = gain - np.minimum.accumulate(gain)
+    at, scale = int(np.argmax(rise)), ledger(e.recording).turned_over
+    where = f"of {scale:.3g} J, at t = {times[at]:.6g} s"
+    # An overlap that is parted lifts a disk by no more than it was deep.
+    lifted = e.recording.count * e.machine.particle.mass * e.machine.gravity * e.late
+    allowed = _energy_bound(e) + (lifted + _thinned(e)) / scale
+    return Verdict(float(rise[at]) / scale, allowed, where)
+
+
+def _thinned(e: Evidence) -> float:
+    """Bound the energy (J) that a touch of two may seem to change where it left no knot.
+
+    The pymunk engine leaves out what moves a track by less than `ROUGH` of the radius. A cubic
+    whose end velocity is off by w is off by 4/27 w τ in place, and τ is a step or more.
+    """
+    if not e.alike or e.dt is None:
+        return 0.0
+    p = e.machine.particle
+    off = 27.0 / 4.0 * ROUGH * p.radius / e.dt
+    return 2.0 * p.mass * e.speed * off
+
+
+def residual(e: Evidence) -> Verdict | None:
+    """Ledgers close; the figure is a share of the energy in play (crowd: turned over)."""
+    books = ledger(e.recording)
+    scale = books.turned_over if e.crowd else e.energy
+    if not scale:
+        return None
+    return Verdict(abs(books.residual) / scale, _energy_bound(e), f"of {scale:.3g} J")
+
+
+def _energy_bound(e: Evidence) -> float:
+    """Bound what numbers may do to the energy, as a share of the energy in play.
+
+    Contacts round it. In a stepped engine a lone particle's is moved, besides, where an overlap is
+    parted: each contact by the weight times `Evidence.late`, as impulses are booked to the last
+    bit.
+    """
+    rounding = EPS * (ROUNDINGS + A_CONTACT * e.recording.contacts)
+    if e.dt is None:
+        return rounding
+    if e.crowd and e.engine == "contact":
+        return BOOKED
+    m, steps = e.machine, EPS * A_CONTACT * e.recording.steps
+    touched = max(1, e.recording.contacts)
+    scale = ledger(e.recording).turned_over if e.crowd else e.energy
+    if e.engine != "contact":
+        steps += touched * HAIR
+    return rounding + steps + touched * m.particle.mass * m.gravity * e.late / scale
+
+
+def momentum(e: Evidence) -> Verdict | None:
+    """Where nothing is but particles, their contacts leave the momentum of all as it is.
+
+    Without surfaces gravity alone changes it, also of one that has left for good; on frictionless
+    surfaces with one normal, the part along them stays. The figure is a share of the sum of all
+    sizes m |v|.
+    """
+    m = e.machine
+    if not e.crowd or m.pulley is not None:
+        return None
+    along = np.eye(2)
+    if len(m.segments.length):
+        if (e.recording.ended != 0).any():
+            return None
+        tangent = m.segments.tangent[0]
+        turned = np.abs(m.segments.tangent @ [-tangent[1], tangent[0]])
+        if (turned > EPS).any() or (m.segments.friction > 0.0).any():
+            return None
+        along = tangent[None]
+    first, last = e.recording.ends()
+    fall = np.zeros((len(first), 2))
+    fall[:, 1] = -m.gravity * (last["t"] - first["t"])
+    change = ((last["velocity"] - first["velocity"] - fall) @ along.T).sum(axis=0)
+    size = np.hypot(*first["velocity"].T).sum() + np.hypot(*fall.T).sum()
+    figure = float(np.abs(change).max() / size)
+    rounding = EPS * (ROUNDINGS + A_CONTACT * max(e.recording.contacts, e.recording.steps))
+    return Verdict(figure, rounding, "of the sum of m |v|")
+
+
+def spin(e: Evidence) -> Verdict | None:
+    """Without surfaces and gravity contacts leave the angular momentum of all as it is.
+
+    Two disks that overlap by δ feel the impulse at arms that differ from r by δ/2: so the figure, a
+    share of the sum of all sizes m (|x - x0| + r) |v|, may be as large as the deepest overlap that
+    was found is of the radius.
+    """
+    m = e.machine
+    if not e.crowd or m.pulley is not None or len(m.segments.length) or m.gravity > 0.0:
+        return None
+    first, last = e.recording.ends()
+    middle = last["position"].mean(axis=0)
+    p, inertia = m.particle, m.particle.inertia
+    if inertia == 0.0:
+        return None
+
+    def total(knots: NDArray[Any]) -> float:
+        x, v = knots["position"] - middle, knots["velocity"]
+        turning = p.mass * (x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0])
+        return float((turning + inertia * knots["omega"]).sum())
+
+    arms = np.hypot(*(last["position"] - middle).T) + p.radius
+    size = float((p.mass * arms * np.hypot(*last["velocity"].T)).sum())
+    sunk = overlap(e)
+    assert sunk is not None
+    rounding = EPS * (ROUNDINGS + A_CONTACT * e.recording.steps)
+    bound = rounding + sunk.figure / p.radius
+    return Verdict(abs(total(last) - total(first)) / size, bound, "of the sum of m |x| |v|")

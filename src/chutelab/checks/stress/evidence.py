@@ -1,0 +1,203 @@
+"""What a law looks at, a run and the numbers in play, and how it answers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chutelab.machine import Machine
+from chutelab.results import Recording
+from chutelab.results.recording import Cells, hermite
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+EPS = float(np.finfo(np.float64).eps)
+
+PRESSED = 0.05
+"""Share of the radius by which disks of a crowd may be pressed into each other or into a surface:
+what the contact engine promises. A solver that iterates leaves some."""
+
+SLOP = 1e-3
+"""The same that Chipmunk is told to leave alone."""
+
+ROUNDINGS = 500.0
+"""Roundings that one number may have gone through between two contacts: some ten operations, each
+on numbers up to some ten times as large as what comes out."""
+
+PIECES = 16
+"""Parts into which an interval between two knots is cut to look for what happens inside."""
+
+MOST_SAMPLES = 2_000_000
+"""Samples beyond which intervals are cut into fewer parts, to bound the memory (some 100 MB)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Places on all tracks, one after the other, each track in the order of time, arrays (M, ...).
+
+    Attributes
+    ----------
+    particle : ndarray, (M,)
+        Whose place.
+    t : ndarray, (M,)
+        s.
+    position : ndarray, (M, 2)
+        m.
+    left, share : ndarray, (M,)
+        Knot before it, and the part of the interval to the next one that has passed.
+    """
+
+    particle: Ints
+    t: Floats
+    position: Floats
+    left: Ints
+    share: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """One run.
+
+    Attributes
+    ----------
+    machine : Machine
+        The scene, resolved.
+    recording : Recording
+        What an engine made of it.
+    engine : str
+        One of `chutelab.checks.stress.case.ENGINES`.
+    dt : float or None
+        The step, s; None for the exact engine.
+    """
+
+    machine: Machine
+    recording: Recording
+    engine: str
+    dt: float | None
+
+    @property
+    def stepped(self) -> bool:
+        """Whether it was made in steps, at least where contacts last."""
+        return self.dt is not None
+
+    @property
+    def crowd(self) -> bool:
+        """Whether particles meet each other."""
+        return self.machine.interact
+
+    @property
+    def alike(self) -> bool:
+        """Whether all is left to Chipmunk, in steps that are all alike."""
+        return self.engine == "fixed" or (self.crowd and self.engine == "pymunk")
+
+    @cached_property
+    def samples(self) -> Samples:
+        """Every knot, and places between: what happens in between is no shorter than a piece."""
+        knots, offsets = self.recording.knots, self.recording.offsets
+        owner = np.repeat(np.arange(self.recording.count), np.diff(offsets))
+        left = np.flatnonzero(owner[1:] == owner[:-1])
+        pieces = int(np.clip(MOST_SAMPLES // max(1, len(left)), 1, PIECES))
+        shares = np.linspace(0.0, 1.0, pieces + 1)
+        index = np.repeat(left, len(shares))
+        share = np.tile(shares, len(left))
+        h = knots["t"][index + 1] - knots["t"][index]
+        position = self.between(index, share)
+        return Samples(owner[index], knots["t"][index] + share * h, position, index, share)
+
+    def between(self, left: Ints, share: Floats) -> Floats:
+        """Return positions (c, 2) between knots `left` (c,) and the ones that follow them, m."""
+        knots = self.recording.knots
+        h = knots["t"][left + 1] - knots["t"][left]
+        cells = Cells(np.zeros_like(left), np.zeros_like(left), left, h, share)
+        return np.stack([hermite(knots, cells, axis)[0] for axis in (0, 1)], axis=-1)
+
+    @cached_property
+    def speed(self) -> float:
+        """Largest speed of anything that moves, belts included, m/s."""
+        moving = np.abs(self.machine.segments.speed).max(initial=0.0)
+        velocity = self.recording.knots["velocity"]
+        if len(velocity):
+            moving = max(moving, np.hypot(velocity[:, 0], velocity[:, 1]).max())
+        return float(moving)
+
+    @cached_property
+    def length(self) -> float:
+        """Largest length in play, m: coordinates, radii, and the way made while the clock ran.
+
+        The clock's own rounding moves a particle: half an ulp of t, times its speed.
+        """
+        m = self.machine
+        ends = np.concatenate([m.segments.start, m.segments.end]).ravel()
+        size = max(np.abs(ends).max(initial=0.0), m.particle.radius)
+        if m.pulley is not None:
+            size = max(size, m.pulley.radius + m.particle.radius)
+        if len(self.samples.t):
+            size = max(size, np.abs(self.samples.position).max())
+            size = max(size, self.speed * np.abs(self.samples.t).max())
+        return float(size)
+
+    @cached_property
+    def energy(self) -> float:
+        """Energy in play, J: what every particle had at most, and what was booked on it."""
+        if not len(self.recording.knots):
+            return 0.0
+        kinetic, potential = self.recording.energies(self.recording.knots)
+        height = kinetic + np.abs(potential) + np.abs(self.recording.knots["entries"]).sum(axis=1)
+        offsets = self.recording.offsets
+        starts = offsets[:-1][offsets[1:] > offsets[:-1]]
+        return float(np.maximum.reduceat(height, starts).sum())
+
+    @property
+    def rounding(self) -> float:
+        """What rounding may do to a length, m."""
+        return ROUNDINGS * EPS * self.length
+
+    @property
+    def late(self) -> float:
+        """How far beyond a surface a step may take a disk, m; 0 for the exact engine.
+
+        Where steps are all alike a contact is seen up to a step late, so by the way of a step, and
+        Chipmunk leaves its slop. A
+        lone particle's blows are found at their own instants; where it stays in contact a step goes
+        straight on, off by less than a dt². On a straight surface a is the weight, on a rim it is
+        v²/ρ besides, which is no more than g where it does not lift off. In a crowd of the contact
+        engine disks are pressed, by what `PRESSED` says.
+        """
+        if self.dt is None:
+            return 0.0
+        if self.alike:
+            return self.speed * self.dt + SLOP * self.machine.particle.radius
+        if self.crowd:
+            return PRESSED * self.machine.particle.radius
+        return 2.0 * self.machine.gravity * self.dt**2
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a law found.
+
+    Attributes
+    ----------
+    figure : float
+        The worst there was.
+    bound : float
+        What it must not exceed; with `least`, what it must reach.
+    detail : str
+        Unit, and where it was.
+    least : bool
+        Whether the bound is one from below.
+    """
+
+    figure: float
+    bound: float
+    detail: str = ""
+    least: bool = False
+
+    @property
+    def holds(self) -> bool:
+        """Whether the law is kept; it never is by a figure that is no number."""
+        return self.figure >= self.bound if self.least else self.figure <= self.bound

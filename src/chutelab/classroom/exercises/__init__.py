@@ -1,0 +1,41 @@
+"""Exercises that answer back: a student's own numbers, and replies that name the mistake.
+
+>>> from chutelab.classroom.exercises import lesson
+>>> task = lesson("the-bounce", student="any name")
+>>> task.check(1, "quickly")
+? Question 1: not a number. That is text (“quickly”). Give a number, without quotes.
+
+- `catalogue`: `lesson` hands out a task; all exercises by name.
+- `task`: `Task`, with `question`, `check`, `hint`, `reveal` and `progress`.
+- `exercise`: what an exercise is made of: parameters, questions, known mistakes.
+- `general`: mistakes that every question knows: sign, power of ten, radians, ½.
+- `drawing`: parameters from a name, redrawn until every mistake can be told from the others.
+- `reading`: a number out of what a student hands over, or a kind word.
+- `judging`: right, a known mistake, or how far off.
+- `replies`, `html`, `values`: how it all is shown.
+- `the_parabola` … `trust`: the eight lessons, a module each.
+
+Answers are computed from `chutelab.theory` for the parameters drawn; none is stored.
+"""
+
+from chutelab.classroom.exercises.catalogue import EXERCISES, ExerciseError, Task, find, lesson
+from chutelab.classroom.exercises.exercise import Exercise, Mistake, Parameter, Question, Values
+from chutelab.classroom.exercises.judging import Passage, Progress, Reply, Standing, Verdict
+
+__all__ = [
+    "EXERCISES",
+    "Exercise",
+    "ExerciseError",
+    "Mistake",
+    "Parameter",
+    "Passage",
+    "Progress",
+    "Question",
+    "Reply",
+    "Standing",
+    "Task",
+    "Values",
+    "Verdict",
+    "find",
+    "lesson",
+]

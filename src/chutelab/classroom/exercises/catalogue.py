@@ -1,0 +1,306 @@
+"""The exercises by lesson, and `lesson`, which hands one out.
+
+- `Task`: the exercise of one lesson for one student, and what it answers.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections import deque
+from dataclasses import dataclass
+
+from chutelab.classroom.exercises import (
+    a_stream,
+    grip_or_slip,
+    judging,
+    landing,
+    letting_go,
+    the_bounce,
+    the_parabola,
+    trust,
+    turning_the_plate,
+)
+from chutelab.classroom.exercises.exercise import Case, Exercise, Values, draw, shown
+from chutelab.classroom.exercises.judging import (
+    Passage,
+    Progress,
+    Reply,
+    Standing,
+    Unreadable,
+    Verdict,
+    blank,
+    filled,
+    judge,
+    number_of,
+    unread,
+)
+
+OPENED: deque[Task] = deque(maxlen=64)
+"""The tasks of this process, the last one last: where grading looks for what was answered."""
+
+UNNAMED = "your name"
+"""What stands in a notebook in place of the student's name."""
+
+
+@dataclass
+class _State:
+    """What happened to one question so far."""
+
+    reply: Reply
+    answer: float | None = None
+    tries: int = 0
+    hints: int = 0
+    revealed: bool = False
+
+
+class Task:
+    """One lesson's exercise with a student's own numbers.
+
+    Made by `lesson`. None of its methods raises an error for what a student
+    hands over; they answer in words.
+
+    Parameters
+    ----------
+    exercise : Exercise
+        The lesson's.
+    student : str
+        Any name: the same name has the same numbers everywhere.
+
+    Attributes
+    ----------
+    given : Values
+        The student's parameters, as attributes.
+    answers : dict of float
+        Last number checked, by question.
+    """
+
+    def __init__(self, exercise: Exercise, student: str) -> None:
+        self.exercise = exercise
+        self.student = student
+        self.given: Values
+        self._cases: tuple[Case, ...]
+        self.given, self._cases = draw(exercise, student)
+        self._states = [_State(blank(i + 1)) for i in range(len(self._cases))]
+        OPENED.append(self)
+
+    @property
+    def questions(self) -> tuple[Passage, ...]:
+        """All questions, with this student's numbers."""
+        return tuple(self._asked(index) for index in range(len(self._cases)))
+
+    @property
+    def answers(self) -> dict[int, float]:
+        """The last number that was checked, by question."""
+        return {
+            index + 1: state.answer
+            for index, state in enumerate(self._states)
+            if state.answer is not None
+        }
+
+    @property
+    def revealed(self) -> tuple[int, ...]:
+        """Questions whose working was shown."""
+        return tuple(index + 1 for index, state in enumerate(self._states) if state.revealed)
+
+    def question(self, number: object = None) -> Passage | Reply:
+        """Show a question with this student's numbers."""
+        index = self._index(number)
+        return self._unknown(number) if index is None else self._asked(index)
+
+    def check(self, number: object = None, answer: object = None) -> Reply:
+        """Say what becomes of an answer.
+
+        Parameters
+        ----------
+        number : int
+            Which question, from 1 on.
+        answer : object
+            The student's number, or whatever stands in its place.
+        """
+        index = self._index(number)
+        if index is None:
+            return self._unknown(number)
+        state = self._states[index]
+        try:
+            value = number_of(answer)
+        except Unreadable as problem:
+            state.reply = unread(index + 1, str(problem))
+            state.tries += 1
+            return state.reply
+        if value is None:
+            return blank(index + 1)
+        state.answer = value
+        state.tries += 1
+        state.reply = judge(index + 1, self._cases[index], value)
+        return state.reply
+
+    def hint(self, number: object = None) -> Passage | Reply:
+        """Give the next hint to a question; the last one again when there are no more."""
+        index = self._index(number)
+        if index is None:
+            return self._unknown(number)
+        case, state = self._cases[index], self._states[index]
+        hints = case.question.hints
+        state.hints = min(state.hints + 1, len(hints))
+        title = f"Hint {state.hints} of {len(hints)} to question {index + 1}"
+        text = case.values.text(hints[state.hints - 1])
+        if state.hints == len(hints):
+            text += f"\nThat was the last one. task.reveal({index + 1}) shows the working."
+        return Passage(index + 1, title, text)
+
+    def reveal(self, number: object = None) -> Passage | Reply:
+        """Show the working of a question, with the answer. It is noted that you asked."""
+        index = self._index(number)
+        if index is None:
+            return self._unknown(number)
+        case = self._cases[index]
+        self._states[index].revealed = True
+        right = f"{shown(case.right)} {case.question.unit}".strip()
+        text = f"{case.values.text(case.question.working)}\nAnswer: {right}"
+        text += f"\nSource: {case.question.source}"
+        return Passage(index + 1, f"Working of question {index + 1}", text, case.question.unit)
+
+    def progress(self) -> Progress:
+        """Draw what is done."""
+        rows = tuple(
+            Standing(
+                number=index + 1,
+                title=case.question.title,
+                verdict=state.reply.verdict,
+                tries=state.tries,
+                hints=state.hints,
+                revealed=state.revealed,
+            )
+            for index, (case, state) in enumerate(zip(self._cases, self._states, strict=True))
+        )
+        return Progress(f"{self.exercise.title}, {self.student}", rows)
+
+    def _index(self, number: object) -> int | None:
+        """Return a question's index, None if there is no such question."""
+        try:
+            wanted = number_of(number)
+        except Unreadable:
+            wanted = float(number) if isinstance(number, str) and number.isdecimal() else None
+        if wanted is None or wanted != int(wanted) or not 1 <= wanted <= len(self._cases):
+            return None
+        return int(wanted) - 1
+
+    def _unknown(self, number: object) -> Reply:
+        count = len(self._cases)
+        text = (
+            f"This lesson has questions 1 to {count}; ask for one of them, as in task.check(1, …)."
+        )
+        return Reply(0, Verdict.UNKNOWN, text)
+
+    def _asked(self, index: int) -> Passage:
+        case = self._cases[index]
+        question = case.question
+        unit = question.unit or "a pure number"
+        within = f"{100 * question.tolerance:g} %"
+        text = f"{self.given.text(question.text)}\nAnswer in: {unit}, to within {within}."
+        return Passage(index + 1, f"Question {index + 1}: {question.title}", text, question.unit)
+
+    def _rows(self) -> list[tuple[str, str, str]]:
+        return [
+            (parameter.symbol, f"{shown(self.given[parameter.name])} {parameter.unit}".strip(),
+             parameter.meaning)
+            for parameter in self.exercise.parameters
+        ]  # fmt: skip
+
+    def __repr__(self) -> str:
+        rows = self._rows()
+        left, middle = (max(len(row[i]) for row in rows) for i in (0, 1))
+        lines = [f"  {s:<{left}} = {value:<{middle}}  {meaning}" for s, value, meaning in rows]
+        head = f"Lesson {self.exercise.number}: {self.exercise.title}\nNumbers of {self.student}:"
+        questions = [f"  {i + 1} {case.question.title}" for i, case in enumerate(self._cases)]
+        story = filled(self.given.text(self.exercise.story))
+        return "\n".join([head, *lines, story, "Questions:", *questions])
+
+    def _repr_html_(self) -> str:
+        head = f"Lesson {self.exercise.number}: {self.exercise.title}, numbers of {self.student}"
+        rows = [(f"{s} = {value}", meaning) for s, value, meaning in self._rows()]
+        story = judging.box(judging.INFO, head, self.given.text(self.exercise.story))
+        return f"{story}{judging.table(rows)}"
+
+
+def report() -> list[dict[str, object]]:
+    """Return lesson, student, answers and shown workings of all tasks of this process, as JSON."""
+    return [
+        {
+            "lesson": task.exercise.name,
+            "student": task.student,
+            "answers": {str(number): answer for number, answer in task.answers.items()},
+            "revealed": list(task.revealed),
+        }
+        for task in OPENED
+    ]
+
+
+EXERCISES: dict[str, Exercise] = {
+    module.EXERCISE.name: module.EXERCISE
+    for module in (
+        the_parabola,
+        letting_go,
+        the_bounce,
+        turning_the_plate,
+        landing,
+        grip_or_slip,
+        a_stream,
+        trust,
+    )
+}
+"""All exercises by name, in the order of the lessons."""
+
+
+class ExerciseError(LookupError):
+    """There is no exercise of such a lesson."""
+
+
+def find(name: str | int) -> Exercise:
+    """Return an exercise by number or name: 3, "3", "the-bounce" or "03-the-bounce".
+
+    Raises
+    ------
+    ExerciseError
+        If there is none; the message lists them.
+    """
+    wanted = str(name).strip().casefold().replace("_", "-").replace(" ", "-")
+    for exercise in EXERCISES.values():
+        number = str(exercise.number)
+        names = (exercise.name, number, f"0{number}", f"0{number}-{exercise.name}")
+        if wanted in names:
+            return exercise
+    near = difflib.get_close_matches(wanted, EXERCISES, n=1)
+    hint = f" Did you mean {near[0]!r}?" if near else ""
+    listed = ", ".join(f"{exercise.number} {name}" for name, exercise in EXERCISES.items())
+    raise ExerciseError(f"no lesson {str(name)[:40]!r}.{hint} There are: {listed}")
+
+
+def lesson(name: str | int, student: object = "") -> Task:
+    """Hand out a lesson's exercise with a student's own numbers.
+
+    Parameters
+    ----------
+    name : str or int
+        The lesson, by name or number.
+    student : object
+        Any name; its text counts. The same name gives the same numbers on every machine; capitals
+        and spaces do not matter.
+
+    Returns
+    -------
+    Task
+        With `question`, `check`, `hint`, `reveal` and `progress`.
+
+    Raises
+    ------
+    ExerciseError
+        If there is no such lesson.
+
+    Examples
+    --------
+    >>> task = lesson("the-bounce", student="any name")
+    >>> task.check(1).verdict
+    <Verdict.BLANK: 'not attempted'>
+    """
+    return Task(find(name), str(student).strip() or "anybody")

@@ -1,0 +1,459 @@
+"""``lesson.gif``: made anew only if what it is made from has changed.
+
+- What a picture was made from, kept in a comment of the GIF itself: no further file to lose.
+- Worksheets in Markdown as HTML.
+- A new lesson, from the template or as a copy of another: it validates and builds at once.
+- All lessons as a folder of web pages: no server, no network, every link relative.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import shutil
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from errno import ENOTDIR
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+from typing import Final, Self
+
+from markdown_it import MarkdownIt
+from markdown_it.token import Token
+
+from chutelab.classroom.lessons.reading import Lesson, LessonError, read, scene_of
+from chutelab.engines.simulation import simulate
+from chutelab.scene import Fault, Scene, to_dict
+from chutelab.util.files import whole
+from chutelab.util.versions import version_of
+
+HEAD: Final = "chutelab lesson"
+TRAILER: Final = b"\x3b"
+"""Last byte of every GIF."""
+
+_COMMENT: Final = b"\x21\xfe"
+"""Begin of a comment extension; sub-blocks of at most 255 bytes follow, then an empty one."""
+
+_FORM: Final = re.compile(rf"{HEAD}; inputs ([0-9a-f]{{32}}); (.+)")
+
+
+@dataclass(frozen=True)
+class Stamp:
+    """What determines every byte of a picture.
+
+    Parameters
+    ----------
+    inputs : str
+        Hash of the validated scene and the picture's settings, 32 hexadecimal digits.
+    versions : str
+        Of chutelab and of the libraries that simulate and draw, ``name version`` with commas.
+    """
+
+    inputs: str
+    versions: str
+
+    @property
+    def block(self) -> bytes:
+        """The comment extension that holds it."""
+        text = f"{HEAD}; inputs {self.inputs}; {self.versions}".encode("ascii", "replace")[:255]
+        return _COMMENT + bytes([len(text)]) + text + b"\0"
+
+    def on(self, gif: bytes) -> bytes:
+        """Return a GIF with the stamp as its last block.
+
+        Raises
+        ------
+        ValueError
+            If the bytes are no GIF.
+        """
+        if not gif.startswith(b"GIF8") or not gif.endswith(TRAILER):
+            raise ValueError("only a GIF can be stamped")
+        return gif[:-1] + self.block + TRAILER
+
+    @classmethod
+    def of(cls, gif: bytes) -> Self | None:
+        """Return the stamp that ends a GIF; None if there is none, or something else there."""
+        begin = gif.rfind(_COMMENT, max(0, len(gif) - 300))
+        if begin < 0 or gif[-2:] != b"\0" + TRAILER:
+            return None
+        text = gif[begin + 3 : -2].decode("ascii", "replace")
+        match = _FORM.fullmatch(text)
+        return cls(match[1], match[2]) if match else None
+
+
+PAGE: Final = "index.html"
+"""What a link to another lesson's worksheet becomes."""
+
+_WORKSHEET: Final = re.compile(r"(^|/)README\.md(?=$|#)")
+
+
+def html_of(markdown: str) -> str:
+    """Return the HTML of a worksheet, without its title and its picture, which the page has.
+
+    Raw HTML is shown, not obeyed. Links to worksheets become links to pages.
+    """
+    parser = MarkdownIt("commonmark", {"html": False}).enable("table")
+    tokens = _body(parser.parse(markdown))
+    for token in tokens:
+        for inner in token.children or ():
+            target = inner.attrGet("href")
+            if isinstance(target, str):
+                inner.attrSet("href", _WORKSHEET.sub(rf"\g<1>{PAGE}", target))
+    made = str(parser.renderer.render(tokens, parser.options, {}))
+    # What is too wide for a phone scrolls by itself, and with the keyboard.
+    return re.sub("<(pre|table)>", r'<\1 tabindex="0">', made)
+
+
+def plain_of(markdown: str) -> str:
+    r"""Return a worksheet for a terminal, which shows no pictures, under a title of its own.
+
+    >>> plain_of("# Title\n\n![x](x.gif)\n\nSee [it](it.ipynb), [doi](https://doi.org/1).\n")
+    'See it, [doi](https://doi.org/1).\n'
+    """
+    text = re.sub(r"\A# .*\n+|^!\[[^\]]*\]\([^)]*\)\n+", "", markdown, flags=re.MULTILINE)
+    return re.sub(r"(?<!!)\[([^\]]+)\]\((?!https?:)[^)]*\)", r"\1", text)
+
+
+def pictures_of(markdown: str) -> dict[str, str]:
+    """Return the words that stand for each picture of a worksheet, by the picture's address."""
+    found = MarkdownIt("commonmark").parse(markdown)
+    images = [i for token in found for i in token.children or () if i.type == "image"]
+    return {str(image.attrGet("src")): image.content for image in images}
+
+
+def _body(tokens: list[Token]) -> list[Token]:
+    """Leave out the first heading of level 1, and paragraphs that hold nothing but a picture."""
+    kept: list[Token] = []
+    skipping = ""
+    for i, token in enumerate(tokens):
+        if not skipping and token.level == 0:
+            inner = tokens[i + 1].children or [] if i + 1 < len(tokens) else []
+            alone = [one.type for one in inner] == ["image"]
+            if token.type == "paragraph_open" and alone:
+                skipping = "paragraph_close"
+            elif token.type == "heading_open" and token.tag == "h1":
+                skipping = "heading_close"
+        if not skipping:
+            kept.append(token)
+        elif token.type == skipping:
+            skipping = ""
+    return kept
+
+
+_TEMPLATE: Final = ("lesson.toml", "README.md", "scene.toml")
+_NAME: Final = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
+_MOST: Final = 60
+
+
+def start(path: str | Path, model: Lesson | None = None) -> Path:
+    """Make the folder of a new lesson, whole or not at all.
+
+    Parameters
+    ----------
+    path
+        The folder; its name is the lesson's: lower-case letters, digits and hyphens.
+    model
+        A lesson to copy with all its files; by default there is a template.
+
+    Raises
+    ------
+    LessonError
+        If the name will not do, or something is there already: nothing is overwritten.
+    OSError
+        If it cannot be written.
+    """
+    path = Path(path)
+    if not _NAME.fullmatch(path.name) or len(path.name) > _MOST:
+        text = (
+            f"must be 1 to {_MOST} lower-case letters, digits and hyphens, such as my-lesson"
+            " or 09-my-lesson"
+        )
+        raise LessonError(str(path), [Fault("name", path.name, text)])
+    if path.exists() or path.is_symlink():
+        raise LessonError(str(path), [Fault("", None, "is there already; choose another name")])
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=f".{path.name}-", dir=path.parent) as made:
+        unfinished = Path(made) / path.name
+        unfinished.mkdir()
+        if model is None:
+            _fill_in(unfinished)
+        else:
+            for file in files_of(model):
+                shutil.copyfile(file, unfinished / file.name)
+        read(unfinished)
+        unfinished.rename(path)
+    return path
+
+
+def files_of(lesson: Lesson) -> list[Path]:
+    """Return the files of a lesson in alphabetical order, hidden ones left out."""
+    found = lesson.folder.iterdir()
+    return sorted(path for path in found if path.is_file() and not path.name.startswith("."))
+
+
+def _fill_in(folder: Path) -> None:
+    title = re.sub(r"^\d+-", "", folder.name).replace("-", " ").capitalize()
+    for name in _TEMPLATE:
+        text = (Path(__file__).parent / "template" / name).read_text(encoding="utf-8")
+        quoted = json.dumps(title) if name.endswith(".toml") else title
+        (folder / name).write_text(text.replace("TITLE", quoted), encoding="utf-8")
+
+
+LIVE: Final = "page.html"
+STILL: Final = "still.png"
+INDEX: Final = "index.html"
+_SHARED: Final = ("style.css", "picture.js")
+
+
+def bundle(
+    lessons: Sequence[Lesson],
+    folder: str | Path,
+    progress: Callable[[float], None] | None = None,
+) -> list[Path]:
+    """Write pages of lessons into a folder: an index, and a folder with a page for each lesson.
+
+    Everything is made aside first; files that are there already are replaced, others stay.
+
+    Parameters
+    ----------
+    lessons : sequence of Lesson
+        In the order of the index.
+    folder : path
+        Made if need be.
+    progress : callable, optional
+        Called with the share that is done, 0 to 1.
+
+    Returns
+    -------
+    list of Path
+        The files written.
+
+    Raises
+    ------
+    SceneError, VaryError, PageError
+        If a lesson's scene cannot be run or varied.
+    OSError
+        If it cannot be written.
+    """
+    folder = Path(folder)
+    if folder.exists() and not folder.is_dir():
+        raise NotADirectoryError(ENOTDIR, "it is a file, not a folder", str(folder))
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".chutelab-", dir=folder.parent) as unfinished:
+        made = Path(unfinished)
+        cards = []
+        for i, lesson in enumerate(lessons):
+            around = (lessons[i - 1] if i else None, (*lessons, None)[i + 1])
+            size = _lesson(lesson, made / lesson.folder.name, around, _part(progress, i, lessons))
+            cards.append(_filled("card.html", lesson, size))
+        many = "One lesson" if len(lessons) == 1 else f"{len(lessons)} lessons"
+        index = _page("index.html", cards="".join(cards), count=many)
+        (made / INDEX).write_text(index, encoding="utf-8")
+        for name in _SHARED:
+            (made / name).write_text(_asset(name), encoding="utf-8")
+        return _moved(made, folder)
+
+
+def _lesson(
+    lesson: Lesson,
+    folder: Path,
+    around: tuple[Lesson | None, Lesson | None],
+    progress: Callable[[float], None] | None,
+) -> tuple[int, int]:
+    """Make the folder of one lesson; return the size of its picture, pixels."""
+    folder.mkdir()
+    for file in files_of(lesson):
+        shutil.copyfile(file, folder / file.name)
+    if not is_current(lesson):
+        build(lesson, folder, force=True)
+    size = _still(folder / PICTURE, folder / STILL)
+    _live(lesson, folder, progress)
+    markdown = lesson.worksheet.read_text(encoding="utf-8") if lesson.worksheet.is_file() else ""
+    page = _filled(
+        "lesson.html",
+        lesson,
+        size,
+        alt=escape(pictures_of(markdown).get(PICTURE, lesson.title)),
+        worksheet=html_of(markdown),
+        doors="\n".join(_doors(lesson, folder)),
+        before=_link(around[0], "prev", "← {}"),
+        after=_link(around[1], "next", "{} →"),
+    )
+    (folder / INDEX).write_text(page, encoding="utf-8")
+    return size
+
+
+def _live(lesson: Lesson, folder: Path, progress: Callable[[float], None] | None) -> None:
+    from chutelab.pictures.live.page import write
+
+    if lesson.page is not None:
+        scene = scene_of(lesson, lesson.page.scene, lesson.page.set)
+        home = (f"Back to the lesson: {lesson.title}", INDEX)
+        write(scene, lesson.page.vary, folder / LIVE, home=home, progress=progress)
+
+
+def _still(gif: Path, png: Path) -> tuple[int, int]:
+    """Write the last frame of a picture, on which everything has happened."""
+    from PIL.GifImagePlugin import GifImageFile
+
+    with GifImageFile(gif) as film:
+        film.seek(film.n_frames - 1)
+        film.convert("RGB").quantize(255).save(png, optimize=True)
+        return film.size
+
+
+def _doors(lesson: Lesson, folder: Path) -> list[str]:
+    """Return the ways on from a lesson's page: what there is to play with, and to take along."""
+    doors = []
+    if (folder / LIVE).is_file():
+        doors.append(f'<li><a class="main" href="{LIVE}">Try it: change the machine</a></li>')
+    if (folder / "exercise.ipynb").is_file():
+        doors.append('<li><a href="exercise.ipynb" download>Exercise (Jupyter notebook)</a></li>')
+    own = [name for name in lesson.scenes if (folder / name).is_file()]
+    said = [escape(name) for name in own]
+    return [*doors, *(f'<li><a href="{name}" download>Scene {name}</a></li>' for name in said)]
+
+
+def _link(lesson: Lesson | None, relation: str, form: str) -> str:
+    if lesson is None:
+        return ""
+    number = "" if lesson.number is None else f"{lesson.number}. "
+    text = form.format(number + escape(lesson.title))
+    return f'<a rel="{relation}" href="../{lesson.folder.name}/{INDEX}">{text}</a>'
+
+
+def _filled(name: str, lesson: Lesson, size: tuple[int, int], **more: str) -> str:
+    """Fill an asset with what is known of a lesson."""
+    return _page(
+        name,
+        folder=lesson.folder.name,
+        number="" if lesson.number is None else f"{lesson.number}. ",
+        title=escape(lesson.title),
+        question=escape(lesson.question),
+        level=lesson.level,
+        minutes=str(lesson.minutes),
+        width=str(size[0]),
+        height=str(size[1]),
+        **more,
+    )
+
+
+def _page(name: str, **values: str) -> str:
+    import chutelab
+
+    return Template(_asset(name)).substitute(version=escape(chutelab.__version__), **values)
+
+
+def _asset(name: str) -> str:
+    return (files("chutelab.classroom.lessons") / "assets" / name).read_text(encoding="utf-8")
+
+
+def _part(
+    progress: Callable[[float], None] | None, done: int, lessons: Sequence[Lesson]
+) -> Callable[[float], None] | None:
+    """Return a progress of one lesson's share of all."""
+    if progress is None:
+        return None
+    return lambda share: progress((done + share) / len(lessons))
+
+
+def _moved(made: Path, folder: Path) -> list[Path]:
+    """Move all files of a tree into a folder, replacing those of the same name."""
+    written = []
+    for file in sorted(path for path in made.rglob("*") if path.is_file()):
+        target = folder / file.relative_to(made)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        file.replace(target)
+        written.append(target)
+    return written
+
+
+PICTURE: Final = "lesson.gif"
+LIBRARIES: Final = ("chutelab", "numpy", "pymunk", "matplotlib", "pillow")
+"""What decides on the bytes of a picture, besides its inputs."""
+
+
+@dataclass(frozen=True)
+class Built:
+    """A lesson's picture after `build`: where it is, its size, and whether it had to be made."""
+
+    path: Path
+    size: int
+    made: bool
+
+
+def build(
+    lesson: Lesson,
+    folder: Path | None = None,
+    *,
+    force: bool = False,
+    progress: Callable[[float], None] | None = None,
+) -> Built:
+    """Make the picture of a lesson, unless it is there already, made from the same.
+
+    The same lesson and versions give the same bytes.
+
+    Parameters
+    ----------
+    lesson : Lesson
+        From `chutelab.classroom.lessons.find`.
+    folder : Path, optional
+        Where to write it (made if need be); default: the lesson's own folder.
+    force : bool
+        Make it even so.
+    progress : callable, optional
+        Called with the share of the simulation that is done, 0 to 1.
+
+    Raises
+    ------
+    SceneError
+        If the scene cannot be run.
+    OSError
+        If the file cannot be written.
+    """
+    path = (lesson.folder if folder is None else folder) / PICTURE
+    scene = scene_of(lesson, lesson.picture.scene, lesson.picture.set)
+    wanted = stamp_of(lesson, scene)
+    if not force and path.is_file() and Stamp.of(path.read_bytes()) == wanted:
+        return Built(path, path.stat().st_size, made=False)
+    from chutelab.pictures.animation import animate
+
+    settings = lesson.picture
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with whole(path) as unfinished:
+        animate(
+            simulate(scene, progress=progress),
+            unfinished,
+            fps=settings.fps,
+            width=settings.width,
+            height=settings.height,
+            slow=settings.slow,
+            question=lesson.question,
+        )
+        unfinished.write_bytes(wanted.on(unfinished.read_bytes()))
+    return Built(path, path.stat().st_size, made=True)
+
+
+def is_current(lesson: Lesson) -> bool:
+    """Tell whether a lesson's picture shows what the lesson says, with whatever versions made."""
+    path = lesson.folder / PICTURE
+    if not path.is_file():
+        return False
+    scene = scene_of(lesson, lesson.picture.scene, lesson.picture.set)
+    found = Stamp.of(path.read_bytes())
+    return found is not None and found.inputs == stamp_of(lesson, scene).inputs
+
+
+def stamp_of(lesson: Lesson, scene: Scene) -> Stamp:
+    """Return what the picture of a lesson is made from, `scene` being the one that is filmed."""
+    # Defaults belong to the version, and what a scene promises does not show in its picture.
+    document = {key: value for key, value in to_dict(scene).items() if key != "expect"}
+    settings = lesson.picture.model_dump(exclude_unset=True, exclude={"scene", "set"})
+    inputs = {"scene": document, "picture": settings, "question": lesson.question}
+    text = json.dumps(inputs, sort_keys=True, ensure_ascii=True)
+    digest = hashlib.sha256(text.encode("ascii")).hexdigest()[:32]
+    return Stamp(digest, ", ".join(f"{name} {version_of(name) or 'unknown'}" for name in LIBRARIES))

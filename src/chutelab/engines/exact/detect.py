@@ -1,0 +1,506 @@
+"""When and what a particle in flight (or sliding straight) meets next: solved, not stepped.
+
+- Particles on their way: what detection has to know about them.
+- The first circle met: a segment's end, or the pulley.
+- Where a ride round a circle is stopped by something else: angles, in closed form.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chutelab.engines.exact.obstacles import (
+    NONE,
+    Floats,
+    Ints,
+    Obstacles,
+    bare,
+    dot,
+    length_of,
+    pick,
+    rows_of,
+)
+from chutelab.mechanics.ballistics import descent, first_descent
+from chutelab.util.many import Value, of
+from chutelab.util.many import of as some_of
+
+Bools = NDArray[np.bool_]
+
+PARALLEL = 1e-14
+"""Share of a speed or an acceleration along a surface below which it has no part towards it."""
+
+
+@dataclass(slots=True, eq=False)
+class Past:
+    """What tells the side of a segment that points touch; arrays (k,) and (2, k).
+
+    Attributes
+    ----------
+    obstacle, side : ndarray, (k,)
+        What they touched before what they touch or leave now, and its face; -1 for nothing.
+    place : ndarray, (2, k)
+        Where they were when they last were away from what they touch now, m.
+    """
+
+    obstacle: Ints
+    side: Floats
+    place: Floats
+
+    def of(self, who: Ints) -> Past:
+        """Return that of some particles."""
+        return Past(self.obstacle[who], self.side[who], self.place.take(who, axis=1))
+
+
+@dataclass(slots=True, eq=False)
+class Motion:
+    """Particles that move with constant acceleration until something happens, arrays (k, ...).
+
+    Attributes
+    ----------
+    rows : ndarray, (k,)
+        Which particles they are.
+    position, velocity : ndarray, (2, k)
+        SI units.
+    acceleration : ndarray, (2, k) or (2, 1)
+        m/s².
+    left, left_side, order : ndarray, (k,)
+        Obstacle (and face of it) in contact now that is being left, or -1; how many of the leading
+        coefficients of the gap to it are zero: 1 after a rebound, 2 when leaving tangentially, 3
+        when lifting off a circle. They are exactly zero, so they are divided out.
+    on : ndarray, (k,), or None
+        Segment the particles slide on, which they cannot meet.
+    never : ndarray of bool, (S + C,), or None
+        Obstacles that none of them can meet.
+    past : Past or None
+        Of points: on which side of what they touch they are. A disk that touches a face cannot be
+        on its other side, a point could.
+    """
+
+    rows: Ints
+    position: Floats
+    velocity: Floats
+    acceleration: Floats
+    left: Ints
+    left_side: Floats
+    order: Ints
+    on: Ints | None = None
+    never: Bools | None = None
+    past: Past | None = None
+    _known: tuple[Floats, Floats] | None = None
+
+    def after(self, t: Floats) -> Floats:
+        """Return where they are after times (k,), (2, k), m; of the same array it is known."""
+        if self._known is None or self._known[0] is not t:
+            mean = self.velocity + bare(0.5 * t) * self.acceleration
+            place = self.position + bare(t) * mean
+            self._known = t, place
+        return self._known[1]
+
+
+GLANCING = 1e-3
+"""Share of the speed towards a circle below which a Newton step would not improve the contact."""
+
+FROM_CURVE = 2
+"""Least `Motion.order` with which a circle is left for good, unless the pull turns a path back."""
+
+
+def touched(
+    places: tuple[Floats, Floats], motion: Motion, obstacles: Obstacles, circles: Ints
+) -> Bools:
+    """Which circles' boxes the box of a path touches, (C, k)."""
+    low, high = obstacles.low[:, obstacles.segments :], obstacles.high[:, obstacles.segments :]
+    if len(circles) < low.shape[1]:
+        low, high = low.take(circles, axis=1), high.take(circles, axis=1)
+    near = places[0][:, None] < rows_of(high, motion.rows)
+    near &= places[1][:, None] > rows_of(low, motion.rows)
+    return np.asarray(near[0] & near[1])
+
+
+def first_circle(
+    motion: Motion, obstacles: Obstacles, until: Floats, circles: Ints, pairs: Bools
+) -> tuple[Floats, Ints]:
+    """Time to the first circle met, and its number, (k,); time inf if there is none.
+
+    Of the given circles (C,), those that `pairs` (C, k) tells for each particle.
+    """
+    time = np.full(len(motion.rows), np.inf)
+    nearest = np.zeros(len(motion.rows), dtype=np.int64)
+    which, who = pairs.nonzero()
+    circle = circles[which]
+    rows = motion.rows[who]
+    v = motion.velocity[:, who]
+    a = np.broadcast_to(motion.acceleration, motion.velocity.shape)[:, who]
+    d = motion.position[:, who] - pick(obstacles.center, rows, circle)
+    rho = pick(obstacles.rho, rows, circle)
+    distance = np.hypot(d[0], d[1])
+    # |d + v t + a t²/2|² - ρ², as a polynomial of t.
+    gap = np.empty((5, len(who)))
+    gap[0] = (distance - rho) * (distance + rho)
+    gap[1] = 2.0 * dot(d, v)
+    gap[2] = dot(v, v) + dot(d, a)
+    gap[3] = dot(v, a)
+    gap[4] = 0.25 * dot(a, a)
+    leaving = motion.left[who] == circle + obstacles.segments
+    touch = of(obstacles.touch, rows)
+    touching = np.abs(distance - rho) <= touch
+    # The direction from the centre is as uncertain as the places are, over ρ.
+    uncertain = 2.0 * (PARALLEL * rho + touch) * length_of(v)
+    grazing = touching & (np.abs(gap[1]) <= uncertain)
+    gap[1] = np.where(grazing & ~leaving, 0.0, gap[1])
+    order = np.where(leaving, motion.order[who], np.where(touching & (gap[1] >= 0.0), 1, 0))
+    now = touching & ~leaving & (gap[1] < 0.0)
+    for n in range(1, 4):
+        shift = order >= n
+        gap[:-1, shift] = gap[1:, shift]
+        gap[-1, shift] = 0.0
+    # Inside already (overlapping), or nothing ever pulls it in: no contact to find.
+    open_ = (~now & (gap[0] >= 0.0) & (gap < 0.0).any(axis=0)).nonzero()[0]
+    t = np.where(now, 0.0, np.inf)
+    if len(open_):
+        found = first_descent(gap[:, open_], until[who[open_]])
+        t[open_] = _polished(
+            found, d[:, open_], v[:, open_], a[:, open_], rho[open_], order[open_] == 0
+        )
+    # The soonest is written last; of those met at once, the one with the lowest number.
+    best = np.argsort(t, kind="stable")[::-1]
+    time[who[best]], nearest[who[best]] = t[best], circle[best]
+    return time, nearest
+
+
+def _polished(t: Floats, d: Floats, v: Floats, a: Floats, rho: Floats, apart: Bools) -> Floats:
+    """Improve contact times by one Newton step on the distance itself.
+
+    Its rounding does not grow with the flight, as the polynomial's does; but of a contact that is
+    being left (not `apart` before) the polynomial, divided by t, is better on ways below ρ.
+    """
+    time = np.where(np.isfinite(t), t, 0.0)
+    there, pace = d + time * (v + 0.5 * time * a), v + time * a
+    distance = np.hypot(there[0], there[1])
+    rate = dot(there, pace) / distance
+    steep = np.isfinite(t) & (rate < -GLANCING * length_of(pace))
+    better = steep & (apart | (-rate * time > rho))
+    correction = (distance - rho) / np.where(better, rate, 1.0)
+    return np.where(better, np.maximum(t - correction, 0.0), t)
+
+
+def hidden(motion: Motion, obstacles: Obstacles, circles: Ints) -> Bools:
+    """Which of the circles a particle cannot meet, from where it is or comes from, (C, k)."""
+    segments, left = obstacles.segments, motion.left
+    out = np.zeros((len(circles), len(left)), dtype=bool)
+    curved = motion.order >= FROM_CURVE
+    if np.count_nonzero(curved):
+        # Left tangentially with the speed not falling, all terms of the gap to a circle grow.
+        curved &= dot(motion.velocity, motion.acceleration) >= 0.0
+        out |= curved & (left == (circles + segments)[:, None])
+    # A face that is left with the pull away from it hides its own two ends, as does one slid on.
+    flat = (left >= 0) & (left < segments)
+    if np.count_nonzero(flat):
+        normal = motion.left_side * pick(obstacles.normal, motion.rows, left)
+        flat &= dot(motion.acceleration, normal) >= 0.0
+        out |= obstacles.owns[circles][:, np.where(flat, left, 0)] & flat
+    if motion.on is not None:
+        out |= obstacles.owns[circles][:, motion.on]
+    return out
+
+
+SIDES = np.array([[1.0], [-1.0]])
+"""The two faces of a segment."""
+
+FEW = 4
+"""Segments up to which looking at all takes no longer than finding out which to look at."""
+
+
+def first_contact(
+    motion: Motion, obstacles: Obstacles, radius: Value, until: Floats
+) -> tuple[Floats, Bools, Ints, Floats]:
+    """Return until when particles go on, who meets something then, and its number and side, (k,).
+
+    Finds: faces within a segment's length, ends of segments (for a disk), the pulley. Misses, by
+    design: a point against the end of a segment, and anything the particle overlaps already.
+
+    Parameters
+    ----------
+    motion : Motion
+        k particles.
+    obstacles : Obstacles
+        What they can meet.
+    radius : float, or ndarray, (k,)
+        r, m.
+    until : ndarray, (k,)
+        Finite time after which nothing matters, s.
+
+    Returns
+    -------
+    time, hits, obstacle, side
+        Time from now, not longer than `until`: a contact at that very time comes first. The last
+        two are any numbers where there is none; side is +1 or -1 for a face, 0 for a circle.
+    """
+    segments, count = obstacles.segments, len(until)
+    held = motion.never is not None or motion.on is not None
+    places = _box(motion, until) if held or segments > FEW else None
+    faces, circles = _reached(motion, obstacles, places)
+    if len(faces):
+        time, obstacle, side = _faces(motion, obstacles, radius, until, faces)
+        hits = time <= until
+        until = np.minimum(time, until)
+        places = None
+    else:
+        hits, side = np.zeros(count, dtype=bool), np.zeros(count)
+        obstacle = np.zeros(count, dtype=np.int64)
+    if not len(circles):
+        return until, hits, obstacle, side
+    if places is None:
+        places = _box(motion, until)
+    pairs = touched(places, motion, obstacles, circles)
+    if np.count_nonzero(pairs):
+        pairs &= ~hidden(motion, obstacles, circles)
+    if np.count_nonzero(pairs):
+        t, circle = first_circle(motion, obstacles, until, circles, pairs)
+        # Before a face that is met then, and at the latest at the end.
+        sooner = (t < until) | (~hits & (t == until))
+        until = np.where(sooner, t, until)
+        hits |= sooner
+        obstacle = np.where(sooner, circle + segments, obstacle)
+        side = np.where(sooner, 0, side)
+    return until, hits, obstacle, side
+
+
+def _box(motion: Motion, until: Floats) -> tuple[Floats, Floats]:
+    """Lowest and highest coordinates of each path up to `until`, (2, k)."""
+    p, v, a = motion.position, motion.velocity, motion.acceleration
+    end = motion.after(until)
+    low, high = np.minimum(p, end), np.maximum(p, end)
+    turn = -v / a
+    turns = (turn > 0.0) & (turn < until)
+    if np.count_nonzero(turns):
+        turn = np.where(turns, turn, 0.0)
+        top = p + turn * (v + (0.5 * turn) * a)
+        low, high = np.minimum(low, top), np.maximum(high, top)
+    return low, high
+
+
+def _reached(
+    motion: Motion, obstacles: Obstacles, places: tuple[Floats, Floats] | None
+) -> tuple[Ints, Ints]:
+    """Return segments and circles that any of the paths may touch: a cheap way to skip most.
+
+    `places` are the boxes of the paths; without them all may.
+    """
+    if places is None:
+        return obstacles.numbers
+    low, high = places
+    if low.shape[1] > 1:
+        low = np.minimum.reduce(low, axis=1, keepdims=True)
+        high = np.maximum.reduce(high, axis=1, keepdims=True)
+    each = (low < obstacles.bound_high) & (high > obstacles.bound_low)
+    near = each[0] & each[1]
+    if motion.never is not None:
+        near &= ~motion.never
+    faces = near[: obstacles.segments].nonzero()[0]
+    if motion.on is not None and len(faces):
+        # Along a face nobody meets the other one either.
+        faces = faces[(motion.on != faces[:, None]).any(axis=1)]
+    return faces, near[obstacles.segments :].nonzero()[0]
+
+
+def _faces(
+    motion: Motion, obstacles: Obstacles, radius: Value, until: Floats, segments: Ints
+) -> tuple[Floats, Ints, Floats]:
+    """Return time, segment and side of the first face met up to `until`, (k,); time inf if none.
+
+    Of the given segments; works on arrays of shape (S, F, k), where F is 1 if nobody turns back
+    from a segment before `until` and can so meet one of its faces only, else 2.
+    """
+    some = len(segments) < obstacles.segments
+    faces = obstacles.faces.take(segments, axis=2) if some else obstacles.faces
+    faces = rows_of(faces, motion.rows)
+    frame = faces[:, :2]
+    # Components along the normals and the tangents of the segments.
+    rise, pace = dot(motion.velocity[:, None, None, None], frame)
+    pull, push = dot(motion.acceleration[:, None, None, None], frame)
+    height, foot = dot(motion.position[:, None, None, None] - faces[:, 2:3], frame)
+    last = rise + pull * until
+    turns = np.count_nonzero(rise * last < 0.0)
+    sides = SIDES if turns else np.where(rise + last > 0.0, -1.0, 1.0)
+    gap, rate, fall = sides * height - radius, sides * rise, sides * pull
+
+    leaving = motion.left == segments[:, None, None]
+    same = leaving & (motion.left_side == sides)
+    touching = np.abs(gap) <= some_of(obstacles.touch, motion.rows)
+    touching |= same
+    grazing: Bools | None = None
+    if np.count_nonzero(touching):
+        gap[touching] = 0.0
+        grazing = touching & (np.abs(rate) <= PARALLEL * length_of(motion.velocity))
+        if np.count_nonzero(grazing):
+            rate[grazing > same] = 0.0
+            unpressed = grazing & (np.abs(fall) <= PARALLEL * length_of(motion.acceleration))
+            if np.count_nonzero(unpressed):
+                fall = np.where(unpressed, 0.0, fall)
+        else:
+            grazing = None
+    time = descent(gap, rate, fall)
+    valid = (time >= 0.0) & (time <= until)
+    if np.count_nonzero(leaving):
+        valid &= ~leaving | (same & (motion.order <= 1))
+    if motion.on is not None:
+        valid &= motion.on != segments[:, None, None]
+
+    if motion.past is not None and np.count_nonzero(touching):
+        past = motion.past
+        height_then = dot(past.place[:, None, None] - faces[:, 2], frame[:, 0])
+        known = past.obstacle == segments[:, None, None]
+        behind = sides * np.where(known, past.side, height_then) < 0.0
+        valid &= ~(touching & ~same & behind & (time == 0.0))
+
+    # How far along the segment the contact is.
+    foot = foot + time * (pace + (0.5 * time) * push)
+    low, high = faces[:, 3]
+    valid &= (foot >= low) & (foot <= high)
+    if grazing is not None:
+        length = rows_of(obstacles.length[segments], motion.rows)[:, None]
+        reach = -low
+        # Grazing the end on the way out is not lying on the face.
+        outward = ((foot <= reach) & (pace < 0.0)) | ((foot >= length - reach) & (pace > 0.0))
+        valid &= ~(grazing & outward)
+    time[~valid] = np.inf
+    flat = time.reshape(-1, time.shape[-1])
+    nearest, column = flat.argmin(axis=0), np.arange(flat.shape[1])
+    first = flat[nearest, column]
+    # Rows go by segments, then by faces.
+    segment = nearest // 2 if turns else nearest
+    side = 1.0 - 2.0 * (nearest % 2) if turns else sides[segment, 0, column]
+    return first, segments[segment], side
+
+
+NOW = 1e-12
+"""rad; an obstacle this close to the present angle is met now."""
+
+GRAZING = 1e-9
+"""Sine of the angle between path and surface below which a ride only touches, and goes on."""
+
+
+@dataclass(eq=False)
+class Bounds:
+    """Nearest angles (rad) below and above where a ride ends, and what is there; arrays (k,).
+
+    ∓inf and obstacle -1 where the way is free. `handover` marks where something takes over without
+    a blow: at an end of the circle a face of its segment, at the tip of a moving one, where the rim
+    changes its direction, the other half of the circle.
+    """
+
+    low: Floats
+    low_obstacle: Ints
+    low_side: Floats
+    low_handover: NDArray[np.bool_]
+    high: Floats
+    high_obstacle: Ints
+    high_side: Floats
+    high_handover: NDArray[np.bool_]
+
+    @classmethod
+    def free(cls, count: int) -> Self:
+        """No obstacle in any direction."""
+
+        def nothing(limit: float) -> tuple[Floats, Ints, Floats, NDArray[np.bool_]]:
+            return (
+                np.full(count, limit),
+                np.full(count, NONE, dtype=np.int64),
+                np.zeros(count),
+                np.zeros(count, dtype=bool),
+            )
+
+        return cls(*nothing(-np.inf), *nothing(np.inf))
+
+    def narrow(
+        self, phi: Floats, angle: Floats, closing: Floats, met: NDArray[np.bool_],
+        obstacle: Ints | int, side: Floats | int, handover: bool = False,
+    ) -> None:  # fmt: skip
+        """Take in one more obstacle, whose gap falls with φ at the rate `closing` at `angle`."""
+        turn = 2.0 * np.pi
+        ahead = phi + np.maximum(np.mod(angle - phi + NOW, turn) - NOW, 0.0)
+        behind = phi - np.maximum(np.mod(phi - angle + NOW, turn) - NOW, 0.0)
+        nearer = met & (closing > GRAZING) & (ahead < self.high)
+        self.high = np.where(nearer, ahead, self.high)
+        self.high_obstacle = np.where(nearer, obstacle, self.high_obstacle)
+        self.high_side = np.where(nearer, side, self.high_side)
+        self.high_handover = np.where(nearer, handover, self.high_handover)
+        nearer = met & (closing < -GRAZING) & (behind > self.low)
+        self.low = np.where(nearer, behind, self.low)
+        self.low_obstacle = np.where(nearer, obstacle, self.low_obstacle)
+        self.low_side = np.where(nearer, side, self.low_side)
+        self.low_handover = np.where(nearer, handover, self.low_handover)
+
+
+def bounds(
+    obstacles: Obstacles, rows: Ints, circle: Ints, side: Floats, rho: Floats, phi: Floats,
+    radius: Value,
+) -> Bounds:  # fmt: skip
+    """Find what stops rides round circles in both directions.
+
+    Parameters
+    ----------
+    obstacles : Obstacles
+        All of them.
+    rows, circle : ndarray, (k,)
+        Particles, and the circles (obstacle number less S) they ride.
+    side : ndarray, (k,)
+        On which half of it, see `Obstacles.rim_side`.
+    rho, phi : ndarray, (k,)
+        Radius of the centre's path (m) and angle now, from the top, clockwise (rad).
+    radius : float, or ndarray, (k,)
+        r, m.
+    """
+    found = Bounds.free(len(rows))
+    center = pick(obstacles.center, rows, circle)
+    on_pulley = circle + obstacles.segments == obstacles.pulley
+    for segment in range(obstacles.segments):
+        start = rows_of(obstacles.start[:, segment], rows)
+        tangent = rows_of(obstacles.tangent[:, segment], rows)
+        normal = rows_of(obstacles.normal[:, segment], rows)
+        length = rows_of(obstacles.length[segment], rows)
+        owned = obstacles.owns[circle, segment] | (on_pulley & (segment == 0))
+        for face in (1, -1):
+            # The gap to a face is ρ (cos(φ - tilt) - level).
+            tilt = np.arctan2(face * normal[0], face * normal[1])
+            level = (face * dot(start - center, normal) + radius) / rho
+            half = np.arccos(np.clip(level, -1.0, 1.0))
+            met = (np.abs(level) <= 1.0) & ~(owned & (~on_pulley | (face == 1)))
+            for angle in (tilt - half, tilt + half):
+                foot = dot(center + rho * _up(angle) - start, tangent)
+                there = met & (foot >= 0.0) & (foot <= length)
+                found.narrow(phi, angle, np.sin(angle - tilt), there, segment, face)
+        # The circle belongs to a segment on the outer side of that segment's end.
+        middle = start + 0.5 * length * tangent
+        outward = np.where(dot(center - middle, tangent) > 0.0, 1.0, -1.0) * tangent
+        tilt = np.arctan2(outward[0], outward[1])
+        for angle in (tilt - 0.5 * np.pi, tilt + 0.5 * np.pi):
+            side_there = np.where(dot(_up(angle), normal) > 0.0, 1, -1)
+            found.narrow(phi, angle, np.sin(angle - tilt), owned, segment, side_there, True)
+    crown, here = pick(obstacles.crown, rows, circle), circle + obstacles.segments
+    tilt = np.arctan2(crown[0], crown[1])
+    moves = ~on_pulley & (pick(obstacles.material, rows, here)[0] != 0.0)
+    for angle in (tilt - 0.5 * np.pi, tilt + 0.5 * np.pi):
+        found.narrow(phi, angle, side * np.sin(angle - tilt), moves, here, -side, True)
+    for other in range(obstacles.center.shape[1]):
+        # The gap to a circle grows with -cos(φ - tilt).
+        apart = rows_of(obstacles.center[:, other], rows) - center
+        distance = np.hypot(apart[0], apart[1])
+        distinct = (circle != other) & (distance > of(obstacles.touch, rows))
+        reach = rows_of(obstacles.rho[other], rows)
+        level = (rho**2 + distance**2 - reach**2) / np.where(distinct, 2.0 * rho * distance, 1.0)
+        met = distinct & (np.abs(level) < 1.0)
+        half = np.arccos(np.clip(level, -1.0, 1.0))
+        tilt = np.arctan2(apart[0], apart[1])
+        for angle in (tilt - half, tilt + half):
+            closing = -np.sin(angle - tilt)
+            found.narrow(phi, angle, closing, met, other + obstacles.segments, 0)
+    return found
+
+
+def _up(angle: Floats) -> Floats:
+    return np.stack([np.sin(angle), np.cos(angle)])

@@ -1,0 +1,260 @@
+"""Rounds of the event-driven engine, block by block.
+
+- Which machines of a family can run together: those whose surfaces join in the same way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import combinations
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chutelab.engines.exact.motion import carry, fly, ride, slide
+from chutelab.engines.exact.obstacles import (
+    FOLDED,
+    JOINT,
+    NONE,
+    Floats,
+    Ints,
+    corners_of,
+    size_of,
+    spots_of,
+    touch_of,
+)
+from chutelab.engines.exact.particle_state import Mode, Swarm, World
+from chutelab.machine import Machine
+from chutelab.results import Kind, Recording
+from chutelab.results.recorder import Recorder, StalledError
+from chutelab.util.many import at
+
+Bools = NDArray[np.bool_]
+Progress = Callable[[float], None]
+
+MOST_KINDS = 16
+"""Kinds that are looked for; what is left over runs by itself."""
+
+
+def kinds(machine: Machine) -> list[Ints]:
+    """Return the members of a family by what the engine reads off the first one only.
+
+    That is: how segments join, and whether there are points, points that may lie in a surface,
+    gravity, and a belt at rest.
+
+    Parameters
+    ----------
+    machine : Machine
+        A family, see `Machine`.
+
+    Returns
+    -------
+    list of ndarray
+        Numbers of members that are alike; each member is in one of them.
+    """
+    left = np.arange(machine.count)
+    found: list[Ints] = []
+    while len(left) and len(found) < MOST_KINDS:
+        same = _like(machine, left)
+        if not same[0]:
+            # Ends so near each other that a joins b and b joins c, but a does not join c.
+            same = np.arange(len(left)) == 0
+        found.append(left[same])
+        left = left[~same]
+    return found + [np.array([member]) for member in left.tolist()]
+
+
+def _like(machine: Machine, members: Ints) -> Bools:
+    """Tell which of the members are like the first of them."""
+    every = np.zeros(machine.count)
+    radius, gravity = machine.particle.radius + every, machine.gravity + every
+    corners = corners_of(machine)
+    size = size_of(corners, machine.releases.position) + every
+    signs = [radius > 0.0, radius <= touch_of(size), gravity > 0.0]
+    if machine.pulley is not None:
+        signs.append(machine.pulley.speed + every == 0.0)
+    table = np.stack(signs)[:, members]
+    same = np.asarray((table == table[:, :1]).all(axis=0))
+    corners, reach = corners[..., members], JOINT * size[members]
+    spots = [spot for pair in spots_of(corners[..., 0], float(reach[0])) for spot in pair]
+    # Ends that stay where they are: a wider tolerance must not join more of them.
+    wide = [spot for pair in spots_of(corners[..., 0], float(reach.max())) for spot in pair]
+    if _partition(wide) != _partition(spots):
+        same &= reach == reach[0]
+    count = corners.shape[1] // 2
+    # Ends are numbered as `corners` are: all first ones, then all second ones.
+    number = np.array(spots[0::2] + spots[1::2])
+    moving = np.flatnonzero((corners != corners[..., :1]).any(axis=(0, 2)))
+    for end in moving.tolist():
+        apart = np.abs(corners - corners[:, end : end + 1])
+        close = (apart <= reach).all(axis=0)
+        same &= (close == (number == number[end])[:, None]).all(axis=0)
+    for end, other in _joined(number):
+        same &= (np.abs(corners[:, end] - corners[:, other]) <= reach).all(axis=0)
+        if end % count != other % count:
+            folds = _folds(machine, members, (end, other))
+            same &= folds == folds[0]
+    return np.asarray(same)
+
+
+def _partition(spots: list[int]) -> list[int]:
+    """Name the places by the first end that is there."""
+    return [spots.index(spot) for spot in spots]
+
+
+def _joined(number: Ints) -> list[tuple[int, int]]:
+    """Return the pairs of ends that are at one place."""
+    order = np.argsort(number, kind="stable")
+    groups = np.split(order, np.flatnonzero(np.diff(number[order])) + 1)
+    return [pair for group in groups for pair in combinations(group.tolist(), 2)]
+
+
+def _folds(machine: Machine, members: Ints, ends: tuple[int, int]) -> Bools:
+    """Tell whether two segments that meet at these ends lie on each other, (k,)."""
+    tangent = machine.segments.tangent
+    count = tangent.shape[-2]
+    out: list[Floats] = [
+        tangent[members, end % count] * (1.0 if end >= count else -1.0) for end in ends
+    ]
+    return np.asarray(np.abs(out[0] - out[1]).max(axis=1) <= FOLDED)
+
+
+MOVE = {Mode.FLIGHT: fly, Mode.CARRIED: carry, Mode.FACE: slide, Mode.ARC: ride}
+"""What takes particles to their next event."""
+
+CELLS = 2**15
+"""Particles times obstacles in one block: some thirty arrays of that size stay near the cache."""
+
+FEWEST, MOST = 64, 4096
+"""Particles in a block: bounds."""
+
+ROUNDS = 500_000
+"""Most rounds of a block. A particle at ε = 0.999 comes to rest within some 20,000, at 0.9999
+within 200,000; one that rattles at 7 ms a period for the default max_time needs 10,000."""
+
+WINDOW = 10_000
+"""Rounds after which it is asked whether everybody gets on."""
+
+TICK = 1e-12
+"""s; mean time between events below which nobody gets on: the last bounces before rest, at 1e-9
+m/s, are 200 times as far apart."""
+
+
+def run(
+    machine: Machine,
+    progress: Progress | None = None,
+    began: float | None = None,
+    *,
+    apart: bool = False,
+) -> Recording:
+    """Run a machine whose particles do not interact.
+
+    Parameters
+    ----------
+    machine : Machine
+        From `chutelab.machine.build`.
+    progress : callable, optional
+        Called with the share of particles that have ended, after every round.
+    began : float, optional
+        Reading of `time.perf_counter` from which `Recording.seconds` counts; now by default.
+    apart : bool
+        Keep the books of the particles apart: `Recording.by_surface` is (N, S, 3) then. For a
+        family of machines, alike in what `chutelab.engines.exact.kinds` tells apart.
+
+    Returns
+    -------
+    Recording
+        Events to rounding error; bit-identical for the same machine.
+
+    Raises
+    ------
+    ValueError
+        If the particles interact.
+    CornerError
+        If a spinning disk is held between surfaces of which one moves.
+    StalledError
+        If a particle goes on without getting on; with what was recorded until then.
+    """
+    if machine.interact:
+        raise ValueError("the exact engine has no contacts between particles")
+    begin = perf_counter() if began is None else began
+    recorder = Recorder(machine.count, machine.surfaces, apart=apart)
+    rounds = 0
+
+    def recording() -> Recording:
+        return recorder.finish(
+            scene=machine.text,
+            title=machine.title,
+            engine="exact",
+            particle=machine.particle,
+            gravity=machine.gravity,
+            steps=rounds,
+            seconds=perf_counter() - begin,
+        )
+
+    world = World.of(machine)
+    size = _block(len(world.obstacles.surface))
+    # Roots that do not exist come out as inf or NaN, and are looked for as such.
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for first in range(0, machine.count, size):
+            s = Swarm(world, first, min(first + size, machine.count))
+            try:
+                _to_the_end(s, progress)
+            except StalledError as stalled:
+                rounds = max(rounds, s.rounds)
+                s.hand_over(recorder)
+                stalled.recording = recording()
+                raise
+            rounds = max(rounds, s.rounds)
+            s.hand_over(recorder)
+    return recording()
+
+
+def _block(obstacles: int) -> int:
+    """Return how many particles run together; what they do does not depend on it."""
+    return max(FEWEST, min(MOST, CELLS // max(1, obstacles)))
+
+
+def _to_the_end(s: Swarm, progress: Progress | None) -> None:
+    """Run a block of particles until all have ended."""
+    _release(s)
+    then = s.age.copy()
+    while parties := s.parties():
+        if s.rounds >= ROUNDS:
+            reason = f"{ROUNDS} events, and no end of them; lower run.max_time"
+            raise s.stalled(int(s.mode.argmax()), reason)
+        if s.rounds and s.rounds % WINDOW == 0:
+            _look_for_rattling(s, s.age - then)
+            then = s.age.copy()
+        s.rounds += 1
+        for mode, who in parties:
+            MOVE[mode](s, who)
+        if progress is not None:
+            ended = s.first + len(s.mode) - int(np.count_nonzero(s.mode))
+            progress(ended / s.machine.count)
+
+
+def _look_for_rattling(s: Swarm, passed: Floats) -> None:
+    """Raise if a particle hardly got on in the time (k,), s, that a window of rounds took it."""
+    stuck = ((s.mode != Mode.DONE) & (passed < WINDOW * TICK)).nonzero()[0]
+    if len(stuck):
+        reason = (
+            f"{WINDOW} events took {passed[stuck[0]]:.2g} s: it is driven to and fro in a narrow"
+            " place; move the surfaces there apart, or lower their restitution"
+        )
+        raise s.stalled(int(stuck[0]), reason)
+
+
+def _release(s: Swarm) -> None:
+    """Start every particle whose time comes before the end of the run."""
+    who = (s.stop > 0.0).nonzero()[0]
+    if len(who) < len(s.stop):
+        s.finish((s.stop <= 0.0).nonzero()[0], "time")
+    state = s.now(who)
+    s.journal.knots(who, state)
+    s.journal.events(int(Kind.RELEASE), who, NONE, state)
+    if s.machine.until == "settled" and s.machine.pulley and at(s.machine.pulley.speed, 0) == 0.0:
+        rests = who[s.mode[who] == Mode.CARRIED]
+        s.event(int(Kind.SETTLE), rests, s.machine.pulley.surface)
+        s.finish(rests, "settled")

@@ -1,0 +1,162 @@
+"""What a block of particles leaves behind while it runs: knots, events, bookings.
+
+Everything is kept in the order in which it came, and put into the order of the particles once, when
+the block is through. So nothing depends on which particles share a block.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chutelab.engines.exact.obstacles import Floats, Ints
+from chutelab.results import EVENT, KNOT
+from chutelab.results.recorder import Recorder
+
+STATE = 9
+"""Rows of a state: the columns of a knot, namely time, position, velocity, ω, ledger entries."""
+
+NUMBERS = np.dtype([("head", f"V{EVENT.itemsize - 80}"), ("numbers", "f8", 10)])
+"""What `EVENT` holds from the position on, in one piece: position, velocity before and after, ω
+before and after, normal and tangential impulse."""
+
+OF_STATE = np.array([1, 2, 3, 4, 3, 4, 5, 5, 0, 0])
+"""Rows of a state that these numbers are where nothing changes; without impulse, see below."""
+
+MANY = 1000
+"""Chunks that are joined into one: a long run of one particle consists of small ones."""
+
+
+class Journal:
+    """Grows by chunks, whose last axis is the particles.
+
+    Parameters
+    ----------
+    first, count : int
+        The block's particles: numbered from 0 here, from `first` on in the recording.
+    """
+
+    def __init__(self, first: int, count: int) -> None:
+        self.first, self.count = first, count
+        self.contacts = 0
+        self._knots: list[tuple[Ints, Floats]] = []
+        self._events: list[tuple[Ints, int | Ints, int | Ints, Floats, Floats]] = []
+        self._books: list[tuple[Ints, Floats, Ints]] = []
+        # The same, joined.
+        self._old_knots: list[tuple[Ints, Floats]] = []
+        self._old_events: list[NDArray[Any]] = []
+        self._old_books: list[tuple[Ints, Floats, Ints]] = []
+
+    def knots(self, who: Ints, state: Floats) -> None:
+        """Add a knot for each of the particles; `state` (9, k) is kept, not copied."""
+        self._knots.append((who, state))
+        if len(self._knots) >= MANY:
+            self._old_knots.append((_joined(self._knots, 0), _joined(self._knots, 1)))
+            self._knots.clear()
+
+    def events(
+        self,
+        kind: int | Ints,
+        who: Ints,
+        surface: int | Ints,
+        state: Floats,
+        *,
+        velocity: Floats | None = None,
+        omega: Floats | None = None,
+        normal: ArrayLike = 0.0,
+        tangential: ArrayLike = 0.0,
+    ) -> None:
+        """Add an event for each of the particles, with velocity (2, k) and ω before it.
+
+        Where they are left out nothing changes.
+        """
+        if not len(who):
+            return
+        numbers = state.take(OF_STATE, axis=0)
+        if velocity is not None:
+            numbers[2:4], numbers[6] = velocity, omega
+        numbers[8], numbers[9] = normal, tangential
+        self._events.append((who, kind, surface, state[0], numbers))
+        if len(self._events) >= MANY:
+            self._old_events.append(self._laid_out())
+            self._events.clear()
+
+    def book(self, who: Ints, surface: Ints, entries: Floats) -> None:
+        """Note ledger entries (3, k), J, on surfaces."""
+        self._books.append((who, entries, surface))
+        if len(self._books) >= MANY:
+            who, entries, surface = (_joined(self._books, n) for n in range(3))
+            self._old_books.append((who, entries, surface))
+            self._books.clear()
+
+    def close(self, recorder: Recorder) -> None:
+        """Hand everything over."""
+        recorder.contacts += self.contacts
+        knots, books = self._old_knots + self._knots, self._old_books + self._books
+        if knots:
+            rows, sizes = self._tracks(knots)
+            recorder.tracks(self.first, sizes, rows.view(KNOT)[:, 0])
+        for events in self._old_events:
+            recorder.tell(events)
+        if self._events:
+            recorder.tell(self._laid_out())
+        if books:
+            owner, entries, surface = (_joined(books, n) for n in range(3))
+            if self.count > 1:
+                order = _by_particle(owner)
+                owner, surface, entries = owner[order], surface[order], entries[:, order]
+            place = (owner + self.first, surface) if recorder.apart else surface
+            for column, row in enumerate(entries):
+                # One after the other, not pairwise: the sum does not depend on the blocks.
+                np.add.at(recorder.by_surface[..., column], place, row)
+
+    def _laid_out(self) -> NDArray[Any]:
+        """Return the events, chunk by chunk, (E,)."""
+        events, begin = np.empty(sum(len(chunk[0]) for chunk in self._events), dtype=EVENT), 0
+        events["other"] = -1
+        names = ("particle", "kind", "surface", "t")
+        particles, kinds, surfaces, times = (events[name] for name in names)
+        rows = events.view(NUMBERS)["numbers"]
+        for who, kind, surface, t, numbers in self._events:
+            chunk = slice(begin, begin + len(who))
+            particles[chunk], kinds[chunk], surfaces[chunk] = who, kind, surface
+            times[chunk], rows[chunk] = t, numbers.T
+            begin += len(who)
+        particles += self.first
+        return events
+
+    def _tracks(self, knots: list[tuple[Ints, Floats]]) -> tuple[Floats, Ints]:
+        """Return knots, particle by particle, (K, 9), and how many each has, (count,)."""
+        each, count = len(knots), self.count
+        if count == 1:
+            rows = np.concatenate([state for _, state in knots], axis=1).T.copy()
+            return rows, np.array([len(rows)])
+        if not self._old_knots and all(len(who) == count for who, _ in knots):
+            # Everybody in every chunk.
+            rows = np.empty((count, each, STATE))
+            for n, (_, state) in enumerate(knots):
+                rows[:, n] = state.T
+            return rows.reshape(-1, STATE), np.full(count, each)
+        owner = _joined(knots, 0)
+        order = _by_particle(owner)
+        place = np.empty_like(order)
+        place[order] = np.arange(len(order))
+        rows, begin = np.empty((len(owner), STATE)), 0
+        for who, state in knots:
+            rows[place[begin : begin + len(who)]] = state.T
+            begin += len(who)
+        return rows, np.bincount(owner, minlength=count)
+
+
+def _joined(chunks: Sequence[tuple[Any, ...]], part: int) -> NDArray[Any]:
+    """Join one part of each chunk along the particles."""
+    return np.concatenate([chunk[part] for chunk in chunks], axis=-1)
+
+
+def _by_particle(owner: Ints) -> Ints:
+    """Return the order of the particles, and for each one that in which its entries came."""
+    # 16-bit integers are sorted by radix, in linear time.
+    return np.argsort(owner.astype(np.int16), kind="stable")

@@ -1,0 +1,456 @@
+"""The machine as the exact engine sees it: faces to meet, circles to meet, and how they join.
+
+A disk of radius r touches a segment's face when its centre is r away, and its end when the centre
+is on a circle of radius r about it. The pulley is one more circle, of radius R + r. Obstacles are
+numbered: segments first, then circles.
+
+Arrays have the particles last, and the two components of vectors first, so that what one operation
+reads lies together.
+
+- From a machine to obstacles: which faces and circles there are, and how they join.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from sys import float_info
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chutelab.machine import Machine, Segments
+from chutelab.util.many import Value, at, of
+
+FOOT = 1e-12
+"""Share of a segment's length by which its face reaches past its ends, so that no particle slips
+through the joint of two segments by rounding."""
+
+JOINT = 1e-12
+"""Share of the scene's size within which two ends are one joint."""
+
+TOUCH_ULPS = 256.0
+"""Rounding of a coordinate, in units of the last place of the scene's size: closer is touching."""
+
+GIVEN_ULPS = 1.0
+"""The same of a coordinate in the scene file, for one far from the origin."""
+
+BOX_TOUCHES = 64.0
+"""Width, in `Obstacles.touch`, by which the boxes of faces are larger than they need be."""
+
+
+def obstacles(machine: Machine, origin: tuple[float, float] = (0.0, 0.0)) -> Obstacles:
+    """Resolve a machine's surfaces into obstacles, in coordinates from an origin.
+
+    How segments join, and whether particles are points, is read off the first row where each
+    particle has its own: see `chutelab.engines.exact.kinds`. Of segments that
+    lie on each other the first one counts, as it does when two are met at once.
+    """
+    seg, r, wheel = machine.segments, machine.particle.radius, machine.pulley
+    tangent, length = _vectors(seg.tangent), _scalars(seg.length)
+    far = max(map(abs, origin))
+    corners, places = corners_of(machine), machine.releases.position
+    if far > 0.0:
+        start = _vectors(seg.start) - np.reshape(origin, (2, 1, 1))
+        corners = np.concatenate([start, start + length * tangent], axis=1)
+        places = places - origin
+    size = size_of(corners, places)
+    touch = touch_of(size, far)
+    spots = spots_of(corners[..., 0], JOINT * at(size, 0))
+    kept = _distinct(spots)
+    if len(kept) < len(spots):
+        corners = corners[:, [*kept, *(s + len(spots) for s in kept)]]
+        spots, tangent, length = [spots[s] for s in kept], tangent[:, kept], length[kept]
+
+    # Segments, then their ends, then the pulley.
+    flat = len(length)
+    disks = at(r, 0) > 0.0
+    ends, end_circle = _ends(spots, wheel is not None) if disks else _points(flat)
+    where = [s + e * flat for s, e in ends]
+    owner = kept + [kept[s] for s, _ in ends]
+    if wheel is not None:
+        end_circle[0][1] = flat + len(ends)
+        # It stands in for an end of the first segment until its own values are put in.
+        where.append(0)
+        owner.append(0)
+    center = corners.take(np.array(where, dtype=np.int64), axis=1)
+    rho = np.empty(center.shape[1:])
+    rho[:] = r
+    material, surface = _material(seg, owner)
+    pulley = NONE
+    if wheel is not None:
+        pulley = flat + len(ends)
+        center[:, -1], rho[-1], surface[-1] = 0.0, wheel.radius + r, wheel.surface
+        for row, value in enumerate((wheel.speed, wheel.restitution, wheel.friction)):
+            material[row, -1] = value
+    first, second = corners[:, :flat], corners[:, flat:]
+    # A circle's box is smaller: what only touches it does not meet it.
+    reach, inner = r + BOX_TOUCHES * touch, rho - touch
+    return Obstacles(
+        faces=_faces(first, tangent, length),
+        length=length,
+        center=center,
+        rho=rho,
+        material=material,
+        low=np.concatenate([np.minimum(first, second) - reach, center - inner], axis=1),
+        high=np.concatenate([np.maximum(first, second) + reach, center + inner], axis=1),
+        surface=surface,
+        spots=tuple(spots),
+        end_circle=np.array(end_circle, dtype=np.int64).reshape(-1, 2),
+        pulley=pulley,
+        touch=touch,
+    )
+
+
+def corners_of(machine: Machine) -> Floats:
+    """Return all first ends of the segments, then all second ones, (2, 2 S, n), m."""
+    start = _vectors(machine.segments.start)
+    along = _scalars(machine.segments.length) * _vectors(machine.segments.tangent)
+    return np.concatenate([start, start + along], axis=1)
+
+
+def touch_of(size: Value, far: float = 0.0) -> Value:
+    """Return `Obstacles.touch` of a scene of a size, counted from a point that far away, m."""
+    # Far away the scene's own numbers are rounded, each by half a last place.
+    return float_info.epsilon * (TOUCH_ULPS * size + GIVEN_ULPS * far)
+
+
+def size_of(corners: Floats, places: Floats) -> Value:
+    """Return the largest coordinate, m; for each particle, (N,), where each has its own corners."""
+    if corners.shape[-1] == 1:
+        # Not their methods, which take twice as long.
+        sizes = (np.maximum.reduce(np.abs(x), axis=None, initial=0.0) for x in (corners, places))
+        return float(max(sizes))
+    return np.maximum(np.abs(corners).max(axis=(0, 1), initial=0.0), np.abs(places).max(axis=1))
+
+
+def _faces(start: Floats, tangent: Floats, length: Floats) -> Floats:
+    """Return `Obstacles.faces`."""
+    faces = np.empty((2, 4, len(length), 1, length.shape[1]))
+    normal, along, first, feet = faces[:, :, :, 0].swapaxes(0, 1)
+    normal[0], normal[1], along[:], first[:] = -tangent[1], tangent[0], tangent, start
+    over = FOOT * length
+    feet[0], feet[1] = -over, over + length
+    return faces
+
+
+def _material(segments: Segments, owner: list[int]) -> tuple[Floats, Ints]:
+    """Return `Obstacles.material` and `Obstacles.surface` of obstacles that belong to segments."""
+    each = (segments.speed, segments.restitution, segments.friction)
+    material = np.stack([_scalars(values) for values in each])
+    which = np.array(owner, dtype=np.int64)
+    return material.take(which, axis=1), segments.surface.take(which)
+
+
+def _vectors(array: Floats) -> Floats:
+    """(S, 2) or (N, S, 2) to (2, S, n)."""
+    return array.T[..., None] if array.ndim == 2 else array.transpose(2, 1, 0).copy()
+
+
+def _scalars(array: Floats) -> Floats:
+    """(S,) or (N, S) to (S, n)."""
+    return array[:, None] if array.ndim == 1 else array.T.copy()
+
+
+def spots_of(ends: Floats, tolerance: float) -> list[tuple[int, int]]:
+    """Return numbers of the places where segments begin and end; within the tolerance one place.
+
+    `ends` is (2, 2 S): all the first ones, then all the second ones.
+    """
+    x, y = ends.tolist()
+    count = len(x) // 2
+    number = list(range(2 * count))
+    window: list[int] = []
+    for n in sorted(number, key=x.__getitem__):
+        while window and x[n] - x[window[0]] > tolerance:
+            del window[0]
+        for m in window:
+            if abs(y[n] - y[m]) <= tolerance:
+                number[n] = number[m]
+                break
+        window.append(n)
+    return list(zip(number[:count], number[count:], strict=True))
+
+
+def _distinct(spots: list[tuple[int, int]]) -> list[int]:
+    """Return the segments that do not lie on an earlier one."""
+    seen: dict[frozenset[int], int] = {}
+    for s, pair in enumerate(spots):
+        seen.setdefault(frozenset(pair), s)
+    return list(seen.values())
+
+
+def _points(count: int) -> tuple[list[tuple[int, int]], list[list[int]]]:
+    """No circles: a point meets the end of a segment with probability zero."""
+    return [], [[NONE, NONE] for _ in range(count)]
+
+
+def _ends(
+    spots: list[tuple[int, int]], pulley: bool
+) -> tuple[list[tuple[int, int]], list[list[int]]]:
+    """Give each distinct end of the segments a circle; the pulley stands for the first one's end.
+
+    Returns
+    -------
+    ends : list of (segment, end)
+        Where each of them is, first come.
+    circles : list of (int, int), (S,)
+        Obstacle number of the circle at each end of each segment, -1 for the one left out.
+    """
+    known: dict[int, int] = {}
+    ends, circles = _points(len(spots))
+    for s, pair in enumerate(spots):
+        for e, spot in enumerate(pair):
+            if pulley and s == 0 and e == 1:
+                continue
+            if spot not in known:
+                known[spot] = len(spots) + len(ends)
+                ends.append((s, e))
+            circles[s][e] = known[spot]
+    return ends, circles
+
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+NONE = -1
+
+FOLDED = 1e-9
+"""Difference of two directions below which one segment lies on the other."""
+
+PER_PARTICLE = (
+    "faces", "length", "center", "rho", "material", "low", "high",
+)  # fmt: skip
+"""Arrays of `Obstacles` whose last axis may be the particles."""
+
+
+@dataclass(frozen=True, eq=False)
+class Obstacles:
+    """Faces, shape (S, n), and circles, (C, n), where n is 1 or the number of particles.
+
+    Attributes
+    ----------
+    faces : ndarray, (2, 4, S, 1, n)
+        Of the segments, components first: unit normal, unit tangent to the right of it, first end
+        (m), and from where to where along a segment a place counts as beside it (m).
+    length : ndarray, (S, n)
+        m.
+    center : ndarray, (2, C, n)
+        Centres of the circles: segment ends, then the pulley.
+    rho : ndarray, (C, n)
+        Distance of a particle's centre from the circle's at contact, m.
+    material : ndarray, (3, S + C, n)
+        Speed of the surface, of segments and their ends along the segment, of the pulley clockwise
+        (m/s), and the pair values: restitution, friction.
+    low, high : ndarray, (2, S + C, n)
+        Box that a particle's centre is in when it touches, m.
+    surface : ndarray, (S + C,)
+        Index into `Machine.surfaces`.
+    spots : tuple of (int, int), (S,)
+        Numbers of the places where a segment begins and ends; the same where they are joined.
+    end_circle : ndarray, (S, 2)
+        Obstacle number of the circle at a segment's first and second end, or -1 for a point.
+    pulley : int
+        Obstacle number of the pulley, or -1.
+    touch : float, or ndarray, (n,)
+        m; gaps smaller than this are rounding.
+    """
+
+    faces: Floats
+    length: Floats
+    center: Floats
+    rho: Floats
+    material: Floats
+    low: Floats
+    high: Floats
+    surface: Ints
+    spots: tuple[tuple[int, int], ...]
+    end_circle: Ints
+    pulley: int
+    touch: Value
+
+    @property
+    def segments(self) -> int:
+        """Number of segments S."""
+        return int(self.length.shape[0])
+
+    @property
+    def normal(self) -> Floats:
+        """Unit vectors to the left of the segments, (2, S, n)."""
+        return self.faces[:, 0, :, 0]
+
+    @property
+    def tangent(self) -> Floats:
+        """Unit vectors along the segments, (2, S, n)."""
+        return self.faces[:, 1, :, 0]
+
+    @property
+    def start(self) -> Floats:
+        """First ends of the segments, (2, S, n), m."""
+        return self.faces[:, 2, :, 0]
+
+    @cached_property
+    def owns(self) -> NDArray[np.bool_]:
+        """Tell of which segments a circle is an end, (C, S)."""
+        circle = np.arange(self.segments, len(self.surface))[:, None]
+        owns = (self.end_circle[:, 0] == circle) | (self.end_circle[:, 1] == circle)
+        # The pulley only stands for one.
+        return np.asarray(owns & (circle != self.pulley))
+
+    @cached_property
+    def bound_low(self) -> Floats:
+        """Lower sides of boxes that hold `low` for all particles, (2, S + C)."""
+        return np.asarray(self.low[..., 0] if self.low.shape[-1] == 1 else self.low.min(axis=-1))
+
+    @cached_property
+    def bound_high(self) -> Floats:
+        """Upper sides of the same boxes."""
+        return np.asarray(self.high[..., 0] if self.high.shape[-1] == 1 else self.high.max(axis=-1))
+
+    @cached_property
+    def numbers(self) -> tuple[Ints, Ints]:
+        """Return the numbers of all segments, (S,), and of all circles, (C,), from 0 each."""
+        return np.arange(self.segments), np.arange(len(self.rho))
+
+    @cached_property
+    def under_belt(self) -> NDArray[np.bool_]:
+        """Return what particles held on the incoming belt cannot meet at any height, (S + C,)."""
+        held = np.zeros(len(self.surface), dtype=bool)
+        held[0] = held[self.pulley] = True
+        held[self.end_circle[0]] = True
+        return held
+
+    @cached_property
+    def follow(self) -> Ints:
+        """Return which segment goes on where another ends, (S, 2), -1 if none; the first one wins.
+
+        Segments that fold back onto each other do not go on from each other.
+        """
+        follow = np.full((self.segments, 2), NONE, dtype=np.int64)
+        meeting: dict[int, list[tuple[int, int]]] = {}
+        for segment, pair in enumerate(self.spots):
+            for end, spot in enumerate(pair):
+                meeting.setdefault(spot, []).append((segment, end))
+        along = self.tangent[:, :, 0]
+        for ends in meeting.values():
+            for n, (s, e) in enumerate(ends):
+                for other, f in ends[n + 1 :]:
+                    if other == s or follow[s, e] != NONE or follow[other, f] != NONE:
+                        continue
+                    outward = along[:, s] if e else -along[:, s]
+                    there = along[:, other] if f else -along[:, other]
+                    if np.abs(outward - there).max() > FOLDED:
+                        follow[s, e], follow[other, f] = other, s
+        return follow
+
+    @cached_property
+    def crown(self) -> Floats:
+        """Vectors, (2, C, n), to the middle of the half that joins the left face of a segment.
+
+        At an end that is the segment's left normal, at a joint the sum of both. The pulley, which
+        turns clockwise all round, has 0.
+        """
+        crown = np.zeros((2, len(self.rho), self.length.shape[-1]))
+        for segment, end in reversed(list(np.ndindex(self.end_circle.shape))):
+            circle, joined = self.end_circle[segment, end], self.follow[segment, end]
+            if circle in (NONE, self.pulley):
+                continue
+            crown[:, circle - self.segments] = self.normal[:, segment]
+            if joined != NONE:
+                goes_on = self.end_circle[joined, 1 - end] == circle
+                crown[:, circle - self.segments] += (1 if goes_on else -1) * self.normal[:, joined]
+        return crown
+
+    def of(self, first: int, last: int) -> Obstacles:
+        """Return the obstacles of the particles from `first` up to `last`."""
+        if self.length.shape[-1] == 1:
+            return self
+        assert {f.name for f in fields(self)}.issuperset(PER_PARTICLE)
+        return replace(
+            self,
+            **{name: getattr(self, name)[..., first:last] for name in PER_PARTICLE},
+            touch=of(self.touch, slice(first, last)),
+        )
+
+    def normal_at(self, rows: Ints, obstacle: Ints, side: Floats, position: Floats) -> Floats:
+        """Contact normals, (2, k), of particles touching an obstacle, pointing at the particle.
+
+        `position` (2, n) is that of all particles.
+        """
+        normal = bare(side) * pick(self.normal, rows, obstacle)
+        round_ = (obstacle >= self.segments).nonzero()[0]
+        if len(round_):
+            circle = obstacle[round_] - self.segments
+            away = position[:, rows[round_]] - pick(self.center, rows[round_], circle)
+            normal[:, round_] = away / np.hypot(away[0], away[1])
+        return np.asarray(normal)
+
+    def rim_side(self, rows: Ints, obstacle: Ints, normal: Floats) -> Floats:
+        """Return which half of circles (k,) normals (2, k) are on: 1, or -1 away from the crown.
+
+        Round the end of a segment of speed v the surface moves with ±v along (n_y, -n_x), which is
+        v along the segment on both its faces.
+        """
+        crown = pick(self.crown, rows, obstacle - self.segments)
+        return np.where(dot(normal, crown) >= 0.0, 1.0, -1.0)
+
+    def snapped(
+        self, rows: Ints, obstacle: Ints, side: Floats, position: Floats, r: Value
+    ) -> tuple[Floats, Floats]:
+        """Positions put exactly at contact distance, so that rounding cannot add up, and normals.
+
+        `position` (2, n) is that of all particles; of those that touch both are (2, k).
+        """
+        normal, _, start, _ = pick(self.faces[:, :, :, 0], rows, obstacle).swapaxes(0, 1)
+        normal = bare(side) * normal
+        out = position.take(rows, axis=1)
+        out = out - bare(dot(out - start, normal) - r) * normal
+        round_ = (obstacle >= self.segments).nonzero()[0]
+        if len(round_):
+            circle = obstacle[round_] - self.segments
+            center = pick(self.center, rows[round_], circle)
+            away = position[:, rows[round_]] - center
+            distance = np.hypot(away[0], away[1])
+            there = center + (pick(self.rho, rows[round_], circle) / distance) * away
+            away = there - center
+            out[:, round_], normal[:, round_] = there, away / np.hypot(away[0], away[1])
+        return out, normal
+
+
+def bare(values: Floats) -> Floats:
+    """Values (k,) to meet vectors (2, k): a lone one without axes, which NumPy is quicker with."""
+    return values.reshape(()) if values.shape == (1,) else values
+
+
+def dot(a: Floats, b: Floats) -> Floats:
+    """Scalar product along the first axis; exact zeros stay exact."""
+    product: Floats = a * b
+    return np.asarray(product[0] + product[1])
+
+
+def along(normal: Floats) -> Floats:
+    """Tangential direction (n_y, -n_x) of a contact: clockwise round a circle."""
+    out = np.empty_like(normal)
+    out[0] = normal[1]
+    np.negative(normal[0], out=out[1])
+    return out
+
+
+def length_of(vector: Floats) -> Floats:
+    """Length of vectors, (2, k) to (k,), without care for overflow."""
+    return np.sqrt(dot(vector, vector))
+
+
+def rows_of(array: Floats, rows: Ints) -> Floats:
+    """Columns of a per-particle array, or the one column that all particles share.
+
+    `rows` ascend: as many as there are columns are all of them.
+    """
+    return array if array.shape[-1] in (1, len(rows)) else array.take(rows, axis=-1)
+
+
+def pick(array: Floats, rows: Ints, which: Ints) -> Floats:
+    """Obstacle `which` for each particle, shape (..., k); numbers too large mean the last one."""
+    if array.shape[-1] == 1:
+        return array[..., 0].take(which, axis=-1, mode="clip")
+    return np.asarray(array[..., np.minimum(which, array.shape[-2] - 1), rows])

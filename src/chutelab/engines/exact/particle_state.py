@@ -1,0 +1,332 @@
+"""The state of a block of particles of an exact run, and the way it is written down.
+
+- What all blocks of an exact run share: the machine, and where it is counted from.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from sys import float_info
+from typing import NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chutelab.engines.exact.detect import Bounds, Past
+from chutelab.engines.exact.event_log import STATE, Journal
+from chutelab.engines.exact.obstacles import NONE, Floats, Ints, Obstacles, along, obstacles, pick
+from chutelab.machine import Machine, origin
+from chutelab.mechanics.impact import DISK_SHARE
+from chutelab.results import REASONS, Kind
+from chutelab.results.recorder import Recorder, StalledError
+from chutelab.util.many import Value, at, of
+
+
+@dataclass(eq=False)
+class World:
+    """What all blocks share.
+
+    Attributes
+    ----------
+    machine : Machine
+        What is run.
+    origin : tuple of float
+        World point from which the engine counts positions, m.
+    obstacles : Obstacles
+        Its surfaces, from there.
+    """
+
+    machine: Machine
+    origin: tuple[float, float]
+    obstacles: Obstacles
+
+    @classmethod
+    def of(cls, machine: Machine) -> Self:
+        """Resolve a machine."""
+        place = origin(machine)
+        return cls(machine, place, obstacles(machine, place))
+
+    @cached_property
+    def exit_box(self) -> tuple[Value, Value, Value, Value]:
+        """Left, right, bottom and top of `Machine.exit_box`, from the origin, m."""
+        left, right, bottom, top = self.machine.exit_box
+        x, y = self.origin
+        return left - x, right - x, bottom - y, top - y
+
+
+class Mode:
+    """How a particle moves now; from `FACE` on it touches something. Plain numbers, for speed."""
+
+    DONE = 0
+    FLIGHT = 1
+    CARRIED = 2
+    FACE = 3
+    ARC = 4
+
+
+class Contact(NamedTuple):
+    """A contact seen from the particles, arrays (k,) and (2, k).
+
+    Attributes
+    ----------
+    normal, tangent : ndarray, (2, k)
+        Unit vectors: from the obstacle to the particle, and (n_y, -n_x).
+    belt, friction, restitution : ndarray, (k,)
+        Speed of the surface along the tangent (m/s), pair values.
+    surface : ndarray, (k,)
+        Index of the surface.
+    """
+
+    normal: Floats
+    tangent: Floats
+    belt: Floats
+    friction: Floats
+    restitution: Floats
+    surface: Ints
+
+
+class Swarm:
+    """State arrays of the particles from `first` up to `last`; age counts from their release.
+
+    Attributes
+    ----------
+    state : ndarray, (9, k)
+        Age (s), position (m), velocity and r ω (m/s), ledger entries (J): a knot, but for the time.
+    age, p, v, z, entries : ndarray, (k,), (2, k) or (3, k)
+        Views of it.
+    radius, mass, gravity : float, or ndarray, (k,)
+        m, kg, m/s²; arrays in a family of machines.
+    falls, spins, staggered : bool
+        Whether there is gravity, whether the particles are free disks, and whether they are
+        released at other times than 0.
+    past : Past or None
+        See `detect.Motion`.
+    mode : ndarray, (k,)
+        See `Mode`.
+    on, side, slip : ndarray, (k,)
+        Obstacle touched while sliding or riding and its face (±1; see `Obstacles.rim_side` for
+        circles), 0 in flight; sign of the slip, 0 without (and 1 in flight, where there is nothing
+        to grip).
+    left, left_side, order : ndarray, (k,)
+        See `detect.Motion`.
+    everyone : ndarray, (k,)
+        Their numbers.
+    stop : ndarray, (k,)
+        Age at which the run is over.
+    idle, crawls : ndarray, (k,)
+        Events in a row that took no time, and that went slowly to and fro between two obstacles.
+    rounds : int
+        Rounds so far.
+    ended : ndarray, (k,)
+        Why each ended, an index into `REASONS`.
+    """
+
+    def __init__(self, world: World, first: int, last: int) -> None:
+        machine, count = world.machine, last - first
+        self.world, self.machine = world, machine
+        self.obstacles = world.obstacles.of(first, last)
+        self.origin = np.reshape(world.origin, (2, 1)) if any(world.origin) else None
+        self.journal = Journal(first, count)
+        mine, particle = slice(first, last), machine.particle
+        self.radius, self.mass = of(particle.radius, mine), of(particle.mass, mine)
+        self.gravity = of(machine.gravity, mine)
+        self.fall = np.zeros((2, np.size(self.gravity)))
+        self.fall[1] = -self.gravity
+        self.falls, self.spins = at(self.gravity, 0) != 0.0, at(particle.inertia, 0) > 0.0
+        self.share = DISK_SHARE if self.spins else 1.0
+        start = machine.releases
+        self.released = start.t[first:last]
+        self.staggered = np.count_nonzero(self.released) > 0
+        self.state = np.zeros((STATE, count))
+        self.age, self.p, self.v = self.state[0], self.state[1:3], self.state[3:5]
+        self.z, self.entries = self.state[5], self.state[6:]
+        self.everyone = np.arange(count)
+        self.p[:], self.v[:] = start.position[first:last].T, start.velocity[first:last].T
+        if self.origin is not None:
+            self.p -= self.origin
+        self.mode, self.ended = np.zeros((2, count), dtype=np.int8)
+        self.mode[:] = Mode.FLIGHT
+        self.mode[start.carried[first:last]] = Mode.CARRIED
+        integers = np.zeros((5, count), dtype=np.int64)
+        integers[3:] = NONE
+        self.order, self.idle, self.crawls, self.on, self.left = integers
+        self.side, self.left_side, self.slip = np.zeros((3, count))
+        self.slip[:] = 1.0
+        self.stop = of(machine.end_time, mine) - self.released
+        self.landed = np.zeros(count, dtype=bool)
+        self.past: Past | None = None
+        if at(self.radius, 0) <= at(self.obstacles.touch, 0):
+            self.past = Past(np.full(count, NONE), np.zeros(count), self.p.copy())
+        self.idling = self.crawling = False
+        self.first, self.rounds = first, 0
+
+    @cached_property
+    def exit_box(self) -> tuple[Value, Value, Value, Value]:
+        """Left, right, bottom and top beyond which each particle has left the scene, m."""
+        left, right, bottom, top = (
+            of(side, slice(self.first, self.first + len(self.mode))) for side in self.world.exit_box
+        )
+        return left, right, bottom, top
+
+    @cached_property
+    def bounds(self) -> Bounds:
+        """Where rides round circles end."""
+        return Bounds.free(len(self.mode))
+
+    def hand_over(self, recorder: Recorder) -> None:
+        """Give all that was written down to the recorder."""
+        recorder.ended[self.first : self.first + len(self.ended)] = self.ended
+        self.journal.close(recorder)
+
+    def count_idle(self, who: Ints, dt: Floats) -> None:
+        """Count events in a row that take no time, and raise rather than hang if they never end."""
+        moved = dt > ROUNDING * self.age[who]
+        still = int(np.count_nonzero(moved)) < len(who)
+        self.idling = still or (self.idling and bool(self.idle.any()))
+        if not self.idling:
+            return
+        self.idle[who] = np.where(moved, 0, self.idle[who] + 1)
+        if self.idle[who].max() > 2 * COLLAPSE:
+            reason = (
+                f"{2 * COLLAPSE} events in a row took no time; look for surfaces that nearly"
+                " touch where it is, and join their ends or move them apart"
+            )
+            raise self.stalled(int(who[np.argmax(self.idle[who])]), reason)
+
+    def stalled(self, particle: int, reason: str) -> StalledError:
+        """Say that a particle, numbered within the block, does not get on."""
+        t, x, y = self.now(np.array([particle]))[:3, 0].tolist()
+        return StalledError(self.first + particle, t, (x, y), reason)
+
+    def parties(self) -> list[tuple[int, Ints]]:
+        """Return the modes (but `DONE`) that particles are in now, and who is in each."""
+        count, mode = len(self.mode), int(self.mode[0])
+        if count == 1 or np.count_nonzero(self.mode == mode) == count:
+            return [(mode, self.everyone)] if mode != Mode.DONE else []
+        counts = np.bincount(self.mode).tolist()
+        return [
+            (mode, (self.mode == mode).nonzero()[0])
+            for mode, count in enumerate(counts)
+            if count and mode != Mode.DONE
+        ]
+
+    def omega(self, who: Ints) -> Floats:
+        """Angular velocities, rad/s."""
+        return self.z[who] / of(self.radius, who) if self.spins else np.zeros(len(who))
+
+    def contact(
+        self, who: Ints, obstacle: Ints, side: Floats, normal: Floats | None = None
+    ) -> Contact:
+        """Return what a contact with an obstacle is like where the particles are now.
+
+        The side of a circle may be left open, 0: it is that where they are.
+        """
+        o = self.obstacles
+        if normal is None:
+            normal = o.normal_at(who, obstacle, side, self.p)
+        tangent, material = along(normal), pick(o.material, who, obstacle)
+        open_ = (side == 0.0).nonzero()[0]
+        if len(open_):
+            side = side.copy()
+            side[open_] = o.rim_side(who[open_], obstacle[open_], normal[:, open_])
+        speed, restitution, friction = material
+        return Contact(normal, tangent, side * speed, friction, restitution, o.surface[obstacle])
+
+    def at(self, who: Ints) -> Ints | slice:
+        """Return what to assign by: a slice is several times as fast where it is everyone."""
+        return slice(None) if len(who) == len(self.mode) else who
+
+    def now(self, who: Ints) -> Floats:
+        """Return the particles as rows of a knot, (9, k)."""
+        everyone = len(who) == len(self.mode)
+        state = self.state.copy() if everyone else self.state.take(who, axis=1)
+        if self.staggered:
+            state[0] += self.released if everyone else self.released[who]
+        if self.origin is not None:
+            state[1:3] += self.origin
+        if self.spins:
+            state[5] /= self.radius if everyone else of(self.radius, who)
+        return state
+
+    def knots(self, who: Ints) -> None:
+        """Write a knot for each of the particles as they are now."""
+        if len(who):
+            self.journal.knots(who, self.now(who))
+
+    def event(self, kind: int | Ints, who: Ints, surface: int | Ints = NONE) -> None:
+        """Write an event for each of the particles as they are now, without an impulse."""
+        if len(who):
+            state = self.now(who)
+            self.journal.events(kind, who, surface, state)
+
+    def book(
+        self,
+        who: Ints,
+        surface: Ints,
+        belt_work: ArrayLike = 0.0,
+        restitution_loss: ArrayLike = 0.0,
+        friction_loss: ArrayLike = 0.0,
+    ) -> None:
+        """Book ledger entries (J) on particles (k,), each once, and on the surfaces they met."""
+        if not len(who):
+            return
+        rows = np.empty((3, len(who)))
+        rows[0], rows[1], rows[2] = belt_work, restitution_loss, friction_loss
+        self.entries[:, self.at(who)] += rows
+        self.journal.book(who, surface, rows)
+
+    def finish(self, who: Ints, reason: str) -> None:
+        """End the tracks of the particles."""
+        if not len(who):
+            return
+        self.mode[who] = Mode.DONE
+        self.ended[who] = REASONS.index(reason)
+
+    def fly(self, who: Ints, left: ArrayLike, side: ArrayLike, order: ArrayLike) -> None:
+        """Let the particles go, away from the obstacle they touched."""
+        at = self.at(who)
+        self.mode[at] = Mode.FLIGHT
+        self.on[at], self.side[at], self.slip[at] = NONE, 0.0, 1.0
+        self.left[at], self.left_side[at], self.order[at] = left, side, order
+
+    def part(self, who: Ints, surface: int | Ints) -> None:
+        """Tell that particles leave a surface."""
+        self.event(int(Kind.SEPARATION), who, surface)
+
+    def weight_on(self, who: Ints, normal: Floats) -> Floats:
+        """Component of gravity into a surface of that normal, m/s²."""
+        return np.asarray(of(self.gravity, who) * normal[1])
+
+    def weight_along(self, who: Ints, normal: Floats) -> Floats:
+        """Component of gravity along (n_y, -n_x), m/s²."""
+        return np.asarray(of(self.gravity, who) * normal[0])
+
+    def slip_of(self, who: Ints, contact: Contact, w: Floats) -> Floats:
+        """Slip of the contact point against the surface at a pace w, (k,), m/s.
+
+        Exactly 0 below rounding.
+        """
+        slip, scale = w - contact.belt, np.abs(w) + np.abs(contact.belt)
+        if self.spins:
+            z = self.z[who]
+            slip, scale = w + z - contact.belt, scale + np.abs(z)
+        slip[np.abs(slip) <= NO_SLIP * scale] = 0.0
+        return slip
+
+
+COLLAPSE = 200
+"""Contacts in a row that take no time after which a particle has come to rest in its corner. An
+elastic particle leaves a wedge of angle β after π/β of them."""
+
+ROUNDING = 4.0 * float_info.epsilon
+"""Share of its age that an event of a particle must take to count as progress."""
+
+NO_SLIP = 1e-13
+"""Share of the speeds involved below which a slip is rounding."""
+
+
+def below(limit: Floats, friction: Floats, load: Floats) -> NDArray[np.bool_]:
+    """Tell whether a force is within Coulomb's limit; friction may be inf."""
+    finite = np.where(np.isinf(friction), 0.0, friction)
+    return np.isinf(friction) | (limit <= finite * load)

@@ -1,0 +1,637 @@
+"""A lone particle as an ordinary differential equation: an answer that shares no formula with ours.
+
+SciPy's DOP853 integrates flight, adhesion ride, sliding and rolling, one phase after the other. A
+phase ends where a gap closes or a force changes its sign: each step's dense output is sampled, and
+the root is found between two samples by Brent's method. What happens there (Newton restitution,
+Coulomb friction) is written out here once more. Of Chutelab it takes the machine's arrays, and
+hands back a `Recording`; needs SciPy.
+
+What it can miss: a contact that begins and ends between two samples, less than `PIECE` apart; what
+it cannot follow (rest in a corner, more than `MOST_PHASES` contacts) is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from math import hypot, inf, sqrt
+from typing import Any
+
+import numpy as np
+
+from chutelab.machine import Machine
+from chutelab.results import Floats, Kind, Recording
+from chutelab.results.recorder import Recorder
+
+Guard = Callable[[Floats], Floats]
+
+RTOL, ATOL = 1e-13, 1e-15
+"""Relative and absolute (SI) tolerance of a step: a little above what DOP853 accepts."""
+
+PIECES = 16
+"""Samples of a step, in which gaps are looked at."""
+
+PIECE = 0.003
+"""m between two samples, or the radius where that is more."""
+
+ARC = 0.05
+"""rad; longest step round a circle, so that the dense output of order 7 is good to 1e-15."""
+
+TOUCH = 1e-12
+"""m; surfaces this near are touched. Positions are good to some 1e-15 m."""
+
+REST = 1e-12
+"""m/s; a rebound slower than this is none. What is left of the bounces then lasts some 1e-13 s."""
+
+SLIP = 1e-10
+"""m/s; less is no slip: the integrator keeps a slip of 0 to some 1e-13 of the speed."""
+
+MOST_PHASES = 3000
+"""Phases of a run: at ε = 0.99 a bouncing particle comes to rest after some 2,400."""
+
+# Rows of the state: way from where the phase began, velocity, spin, belt work and slip heat.
+X, V, OMEGA, WORK, HEAT = slice(0, 2), slice(2, 4), 4, 5, 6
+
+
+class UnableError(RuntimeError):
+    """The reference cannot follow this particle; says why."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Line:
+    """A segment: both faces, without its ends."""
+
+    start: Floats
+    tangent: Floats
+    left: Floats
+    length: float
+    speed: float
+    restitution: float
+    friction: float
+    surface: int
+
+    def distance(self, place: Floats) -> Floats:
+        """Distance of places (2, k) from the line, left positive, m."""
+        return np.asarray(self.left @ (place - self.start[:, None]))
+
+    def foot(self, place: Floats) -> Floats:
+        """How far along the segment the nearest point is, m."""
+        return np.asarray(self.tangent @ (place - self.start[:, None]))
+
+    def within(self, place: Floats) -> bool:
+        """Whether a place (2, 1) lies beside the segment."""
+        return bool(-TOUCH <= self.foot(place)[0] <= self.length + TOUCH)
+
+
+@dataclass(frozen=True, eq=False)
+class _Circle:
+    """The pulley, the end of a segment, or the way round the pulley in a bed; `reach` includes r.
+
+    `left` points to the middle of the half that goes on as left faces: the sum of the left normals
+    of the segments that end here; None on the pulley. `joined` holds the segments that touch the
+    circle: which, where, and the direction from there along it.
+    """
+
+    center: Floats
+    reach: float
+    left: Floats | None
+    joined: tuple[tuple[int, Floats, Floats], ...]
+    speed: float
+    restitution: float
+    friction: float
+    surface: int
+
+
+@dataclass(frozen=True)
+class _Lasting:
+    """A contact that lasts: with what, the sign of the slip (0: none), the surface's speed."""
+
+    index: int
+    normal: Floats | None  # of a face; None round a circle
+    slip: int
+    belt: float
+    carried: bool
+
+
+def run(machine: Machine) -> Recording:
+    """Integrate the only particle of a machine.
+
+    Returns
+    -------
+    Recording
+        With engine ``"dop853"``.
+
+    Raises
+    ------
+    UnableError
+        If it is not alone, SciPy is missing, or it gets where the equations here do not reach.
+    """
+    if machine.count > 1:
+        raise UnableError("it integrates one particle")
+    try:
+        from scipy.integrate import DOP853
+        from scipy.optimize import brentq
+    except ImportError:
+        raise UnableError('SciPy is missing: pip install "chutelab[bench]"') from None
+    return _Run(machine, DOP853, brentq).result()
+
+
+class _Run:
+    """One particle on its way; `base` is where the phase began, `t0` when."""
+
+    def __init__(self, machine: Machine, solver: Any, root: Any) -> None:
+        self.machine, self.solver, self.root = machine, solver, root
+        p, releases = machine.particle, machine.releases
+        self.r, self.g = p.radius, np.array([0.0, -machine.gravity])
+        # Spin that a tangential impulse gives at the rim, and its way back on the slip.
+        self.lever = p.mass * p.radius**2 / p.inertia if p.inertia else 0.0
+        self.t0, self.base = float(releases.t[0]), releases.position[0].copy()
+        self.state = np.zeros(7)
+        self.state[V] = releases.velocity[0]
+        self.log = Recorder(1, machine.surfaces)
+        self.things = _obstacles(machine)
+        # Face of each segment that was struck last: of a point on a line there is no telling.
+        self.sides: dict[int, float] = {}
+        self.steps, self.landed, self.reason = 0, False, ""
+
+    def result(self) -> Recording:
+        m = self.machine
+        self.tell(Kind.RELEASE, -1)
+        self.knot()
+        lasting = self.first()
+        for _ in range(MOST_PHASES):
+            if self.reason:
+                break
+            lasting = self.phase(lasting)
+        else:
+            raise UnableError(f"more than {MOST_PHASES} phases")
+        self.log.ended[0] = ("time", "landed", "settled", "exit").index(self.reason)
+        return self.log.finish(
+            scene=m.text, title=m.title, engine="dop853", particle=m.particle, gravity=m.gravity,
+            steps=self.steps, seconds=0.0,
+        )  # fmt: skip
+
+    # What touches.
+
+    def first(self) -> _Lasting | None:
+        """Return the contact that a particle is released into."""
+        if not self.machine.releases.carried[0]:
+            return self.contact()
+        belt = self.things[0]
+        return _Lasting(0, np.array([0.0, 1.0]), 0, belt.speed, carried=True)
+
+    def normal(self, index: int, place: Floats) -> Floats:
+        """Return the unit normals (2, k) from a thing to places beside it."""
+        thing = self.things[index]
+        if isinstance(thing, _Line):
+            aside = np.where(thing.distance(place) >= 0.0, 1.0, -1.0)
+            return np.outer(thing.left, aside if self.r > 0.0 else self.sides.get(index, 1.0))
+        away = place - thing.center[:, None]
+        return np.asarray(away / np.hypot(*away))
+
+    def belt(self, index: int, normal: Floats) -> float:
+        """Return the surface's speed along (n_y, -n_x), m/s."""
+        thing = self.things[index]
+        if thing.left is None:
+            return thing.speed
+        return thing.speed if normal @ thing.left >= 0.0 else -thing.speed
+
+    def touching(self) -> list[int]:
+        """Return what the particle touches; ends of what it touches do not count besides."""
+        place = self.base[:, None]
+        found: list[int] = []
+        for k, thing in enumerate(self.things):
+            if isinstance(thing, _Line):
+                if abs(abs(thing.distance(place)[0]) - self.r) < TOUCH and thing.within(place):
+                    found.append(k)
+            elif abs(hypot(*(self.base - thing.center)) - thing.reach) < TOUCH and not any(
+                j in found for j, _, _ in thing.joined
+            ):
+                found.append(k)
+        return found
+
+    def contact(self) -> _Lasting | None:
+        """Resolve blows until nothing touched is approached; return the contact that lasts then."""
+        v = self.state[V]
+        touched = {k: self.normal(k, self.base[:, None])[:, 0] for k in self.touching()}
+        for _ in range(MOST_PHASES):
+            hit = next((k for k, n in touched.items() if v @ n < -REST), None)
+            if hit is None:
+                break
+            self.blow(hit, touched[hit])
+            if self.reason:
+                return None
+        else:
+            raise UnableError("it rattles in a corner")
+        pressed = []
+        for k, n in touched.items():
+            if v @ n < REST and self.load(k, n, v) > 0.0:
+                v -= (v @ n) * n
+                pressed.append(k)
+        if len(pressed) > 1:
+            raise UnableError("it lies in a corner")
+        return self.law(pressed[0], touched, begins=True) if pressed else None
+
+    def load(self, index: int, n: Floats, v: Floats) -> float:
+        """Return the normal force per mass, m/s²: the weight, less what bends the path."""
+        thing = self.things[index]
+        pressing = -float(self.g @ n)
+        if isinstance(thing, _Circle):
+            pressing -= float(v @ [n[1], -n[0]]) ** 2 / thing.reach
+        return pressing
+
+    def law(
+        self, index: int, touched: dict[int, Floats], *, begins: bool = False
+    ) -> _Lasting | None:
+        """Choose between slip and none on what the particle lies on."""
+        thing, n, v = self.things[index], touched[index], self.state[V]
+        along = np.array([n[1], -n[0]])
+        belt, pull, load = self.belt(index, n), float(self.g @ along), self.load(index, n, v)
+        slip = float(v @ along) + self.r * self.state[OMEGA] - belt
+        need = -pull / (1.0 + self.lever)
+        sign = 0
+        if abs(slip) > SLIP and thing.friction == inf:
+            raise UnableError("a belt that grips drives it into something")
+        if abs(slip) > SLIP:
+            sign = 1 if slip > 0.0 else -1
+        else:
+            if self.lever:
+                self.state[OMEGA] -= slip / self.r
+            else:
+                v -= slip * along
+            if abs(need) > thing.friction * load:
+                sign = 1 if need < 0.0 else -1
+        if sign == 0:
+            if begins:
+                self.tell(Kind.STICK, thing.surface)
+            steady = (pull == 0.0 or not self.lever) and (isinstance(thing, _Line) or not v.any())
+            rests = belt == 0.0 or thing.surface == self.machine.landing
+            if self.machine.until == "settled" and steady and rests:
+                self.tell(Kind.SETTLE, thing.surface)
+                self.reason = "settled"
+                return None
+        face = n if isinstance(thing, _Line) else None
+        found = _Lasting(index, face, sign, belt, carried=False)
+        push = self.rates(found, self.state)[V]
+        for k, m in touched.items():
+            if k != index and v @ m < REST and push @ m < -1e-9:
+                raise UnableError("it is held between two surfaces")
+        return found
+
+    # Forces, and what they do.
+
+    def forces(self, on: _Lasting, y: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
+        """Return normal, load, friction, slip and what would hold (per mass) at states (7, k)."""
+        thing = self.things[on.index]
+        if on.normal is not None:
+            n = on.normal[:, None] + np.zeros_like(y[X])
+            bend = 0.0
+        else:
+            assert isinstance(thing, _Circle)
+            n = y[X] + (self.base - thing.center)[:, None]
+            n = n / np.hypot(*n)
+            bend = (y[2] * n[1] - y[3] * n[0]) ** 2 / thing.reach
+        load = -(self.g @ n) - bend
+        pull = self.g[0] * n[1] - self.g[1] * n[0]
+        slip = y[2] * n[1] - y[3] * n[0] + self.r * y[OMEGA] - on.belt
+        need = -pull / (1.0 + (0.0 if on.carried else self.lever))
+        force = need if on.slip == 0 else -on.slip * thing.friction * load
+        return n, load, force, slip, need
+
+    def rates(self, on: _Lasting | None, y: Floats) -> Floats:
+        """Return the time derivative of a state (7,)."""
+        out = np.zeros(7)
+        out[X], out[V] = y[V], self.g
+        if on is not None:
+            n, load, force, slip, _ = (part[..., 0] for part in self.forces(on, y[:, None]))
+            out[V] += load * n + force * np.array([n[1], -n[0]])
+            if not on.carried and self.lever:
+                out[OMEGA] = self.lever * force / self.r
+            out[WORK] = force * on.belt
+            out[HEAT] = -force * slip if on.slip else 0.0
+        return out
+
+    def blow(self, index: int, n: Floats) -> None:
+        """Strike a thing: Newton's restitution, Coulomb's friction."""
+        thing, mass, v = self.things[index], self.machine.particle.mass, self.state[V]
+        before, spin = v.copy(), float(self.state[OMEGA])
+        along, belt, closing = np.array([n[1], -n[0]]), self.belt(index, n), -float(v @ n)
+        slip = float(v @ along) + self.r * spin - belt
+        normal = (1.0 + thing.restitution) * closing
+        bound = inf if thing.friction == inf else thing.friction * normal
+        tangential = min(max(-slip / (1.0 + self.lever), -bound), bound)
+        v += normal * n + tangential * along
+        if self.lever:
+            self.state[OMEGA] += self.lever * tangential / self.r
+        after = slip + (1.0 + self.lever) * tangential
+        loss = 0.5 * mass * (1.0 - thing.restitution**2) * closing**2
+        self.log.book(0, thing.surface, mass * tangential * belt, loss,
+                      -0.5 * mass * tangential * (slip + after))  # fmt: skip
+        self.log.contacts += 1
+        lands = thing.surface == self.machine.landing and not self.landed
+        self.landed |= lands
+        self.tell(
+            Kind.LANDING if lands else Kind.IMPACT, thing.surface, before, spin,
+            mass * normal, mass * tangential,
+        )  # fmt: skip
+        self.knot()
+        if lands and self.machine.until == "landed":
+            self.reason = "landed"
+
+    # Phases.
+
+    def phase(self, on: _Lasting | None) -> _Lasting | None:
+        """Integrate until something happens, and resolve it."""
+        self.state[X] = self.state[WORK] = self.state[HEAT] = 0.0
+        touched = self.touching()
+        guards = list(self.meetings(on))
+        guards += list(self.changes(on) if on is not None else self.exits())
+        left, first = self.machine.end_time - self.t0, None
+        if on is None:
+            for k in touched:
+                n = self.normal(k, self.base[:, None])[:, 0]
+                away, fall = float(self.state[V] @ n), -float(self.g @ n)
+                if away >= REST and fall > 0.0:
+                    first = min(first or inf, 0.5 * away / fall)
+        what = self.integrate(on, guards, left, first)
+        if on is not None:
+            surface = self.things[on.index].surface
+            mass = self.machine.particle.mass
+            self.log.book(0, surface, mass * self.state[WORK], 0.0, mass * self.state[HEAT])
+        self.base = self.base + self.state[X]
+        self.state[X] = 0.0
+        self.knot()
+        return self.next(on, what)
+
+    def integrate(
+        self, on: _Lasting | None, guards: list[tuple[str, int, Guard]], left: float,
+        first: float | None,
+    ) -> tuple[str, int]:  # fmt: skip
+        """Step until the first guard falls to 0; leave state and time there, and say which."""
+        if left <= 0.0:
+            return "time", -1
+        reach = PIECES * max(PIECE, self.r)
+        if on is not None and on.normal is None:
+            thing = self.things[on.index]
+            assert isinstance(thing, _Circle)
+            reach = min(reach, ARC * thing.reach)
+
+        def longest(y: Floats) -> float:
+            # The way of a step at this speed, and under the weight, is at most `reach`.
+            pace = hypot(*y[V]) + sqrt(2.0 * self.machine.gravity * reach)
+            return reach / pace if pace > 0.0 else left
+
+        step = self.solver(
+            lambda _t, y: self.rates(on, y), 0.0, self.state, left, rtol=RTOL, atol=ATOL,
+            first_step=min(first or left, longest(self.state), left),
+        )  # fmt: skip
+        values = [guard(self.state[:, None])[0] for _, _, guard in guards]
+        while step.status == "running":
+            step.max_step = longest(step.y)
+            with np.errstate(over="ignore", invalid="ignore"):
+                step.step()  # which may try a step that is far too long, and take it back
+            self.steps += 1
+            if step.status == "failed":
+                raise UnableError("DOP853 needs a step shorter than rounding")
+            dense = step.dense_output()
+            times = np.linspace(step.t_old, step.t, PIECES + 1)[1:]
+            found = np.hstack([dense(times[:-1]), step.y[:, None]])
+            earliest, which = inf, -1
+            for k, (_, _, guard) in enumerate(guards):
+                seen = np.concatenate([[values[k]], guard(found)])
+                values[k] = seen[-1]
+                for at in np.flatnonzero((seen[:-1] > 0.0) & (seen[1:] <= 0.0)).tolist():
+                    low = step.t_old if at == 0 else times[at - 1]
+                    t = self.moment(dense, guard, low, times[at])
+                    if t < earliest and self.met(guards[k], dense(t)):
+                        earliest, which = t, k
+            if which >= 0:
+                self.state, self.t0 = dense(earliest), self.t0 + earliest
+                return guards[which][:2]
+            if on is not None:
+                self.knot(step.t, step.y)
+        self.state, self.t0 = step.y.copy(), self.machine.end_time
+        return "time", -1
+
+    def met(self, guard: tuple[str, int, Guard], y: Floats) -> bool:
+        """Whether the gap to a line that closes is that to the segment."""
+        name, k, _ = guard
+        thing = self.things[k]
+        return name not in ("left", "right") or (
+            isinstance(thing, _Line) and thing.within((self.base + y[X])[:, None])
+        )
+
+    def moment(self, dense: Any, guard: Guard, low: float, high: float) -> float:
+        """Return when a guard falls to 0 between two times."""
+
+        def value(t: float) -> float:
+            return float(guard(dense(t)[:, None])[0])
+
+        if value(high) >= 0.0 or value(low) <= 0.0:
+            return high  # the sample is the root, to rounding
+        return float(self.root(value, low, high, xtol=1e-300, rtol=8.9e-16))
+
+    def meetings(self, on: _Lasting | None) -> Iterator[tuple[str, int, Guard]]:
+        """Yield the gaps to all but what the particle lies on, and what that goes over into."""
+        aside: set[int] = set()
+        if on is not None:
+            lies = self.things[on.index]
+            aside = {on.index}
+            aside |= {
+                k for k, thing in enumerate(self.things)
+                if (isinstance(thing, _Circle) and on.index in [j for j, _, _ in thing.joined])
+                or (on.carried and thing.surface == lies.surface)
+            }  # fmt: skip
+        for k, thing in enumerate(self.things):
+            if k in aside:
+                continue
+            if isinstance(thing, _Circle):
+                yield "meets", k, self.to_circle(thing)
+                continue
+            yield "left", k, self.to_line(thing, 1.0)
+            yield "right", k, self.to_line(thing, -1.0)
+
+    def to_line(self, thing: _Line, side: float) -> Guard:
+        """Return the gap to a face; of one that is touched it starts as 0, to the last bit."""
+        gap = side * float(thing.distance(self.base[:, None])[0]) - self.r
+        gap = 0.0 if abs(gap) < TOUCH else gap
+        return lambda y: gap + side * (thing.left @ y[X])
+
+    def to_circle(self, thing: _Circle) -> Guard:
+        """Return the gap to a circle, likewise."""
+        away = self.base - thing.center
+        far = hypot(*away)
+        ahead = 0.0 if abs(far - thing.reach) < TOUCH else far - thing.reach
+
+        def left(y: Floats) -> Floats:
+            d = y[X]
+            now = np.hypot(away[0] + d[0], away[1] + d[1])
+            # |a + d| - |a|, without cancellation.
+            return np.asarray(ahead + (2.0 * (away @ d) + (d * d).sum(axis=0)) / (now + far))
+
+        return left
+
+    def exits(self) -> Iterator[tuple[str, int, Guard]]:
+        if self.machine.until == "time":
+            return
+        left, right, bottom, top = (float(side) for side in self.machine.exit_box)
+        x, y0 = self.base
+        yield "exit", -1, lambda y: y0 + y[1] - bottom
+        yield "exit", -1, lambda y: top - y0 - y[1]
+        yield "exit", -1, lambda y: x + y[0] - left
+        yield "exit", -1, lambda y: right - x - y[0]
+
+    def changes(self, on: _Lasting) -> Iterator[tuple[str, int, Guard]]:
+        """Yield what ends a contact: no load, no slip, too little friction, the end of a face."""
+        thing = self.things[on.index]
+        if on.normal is None or not on.carried:
+            yield "lifts", on.index, lambda y: self.forces(on, y)[1]
+        if on.slip:
+            yield "grips", on.index, lambda y: on.slip * self.forces(on, y)[3]
+        elif not on.carried and thing.friction != inf:
+
+            def spare(y: Floats) -> Floats:
+                _, load, _, _, need = self.forces(on, y)
+                return np.asarray(thing.friction * load - np.abs(need))
+
+            yield "slips", on.index, spare
+        if isinstance(thing, _Line):
+            along = float(thing.foot(self.base[:, None])[0])
+            yield "ends", 0, lambda y: along + thing.tangent @ y[X]
+            yield "ends", 1, lambda y: thing.length - along - thing.tangent @ y[X]
+            return
+        for k, point, inward in thing.joined:
+            # Beside the end of a segment: there its face goes on, if it lies that way.
+            line = self.things[k]
+            assert isinstance(line, _Line)
+            from_end = self.base - point
+
+            def outside(y: Floats, a: Floats = from_end, i: Floats = inward) -> Floats:
+                place = a[:, None] + y[X]
+                near = np.hypot(*place) < 1.5 * self.r
+                return np.where(near, -(i @ place), np.nan)
+
+            yield "joins", k, outside
+        if thing.left is not None:
+            side = 1.0 if (self.base - thing.center) @ thing.left >= 0.0 else -1.0
+            tip = self.base - thing.center
+            yield "lasts", on.index, lambda y: side * (thing.left @ (tip[:, None] + y[X]))
+
+    def next(self, on: _Lasting | None, what: tuple[str, int]) -> _Lasting | None:
+        """Resolve what ended a phase; return the contact that lasts now, if one does."""
+        name, k = what
+        if name == "time":
+            self.reason = "time"
+        elif name == "exit":
+            self.tell(Kind.EXIT, -1)
+            self.reason = "exit"
+        elif name in ("left", "right", "meets"):
+            if on is not None and on.carried:
+                raise UnableError("something is in the way of the ride")
+            self.sides[k] = -1.0 if name == "right" else 1.0
+            self.blow(k, self.normal(k, self.base[:, None])[:, 0])
+            lasting = None if self.reason else self.contact()
+            if on is not None and (lasting is None or lasting.index != on.index):
+                self.tell(Kind.SEPARATION, self.things[on.index].surface)
+            return lasting
+        elif name == "lifts":
+            assert on is not None
+            self.tell(Kind.SEPARATION, self.things[on.index].surface)
+        elif name == "grips":
+            assert on is not None
+            return self.law(k, self.around(on), begins=True)
+        elif name == "slips":
+            assert on is not None
+            self.tell(Kind.SLIP, self.things[k].surface)
+            need = float(self.forces(on, self.state[:, None])[4][0])
+            return _Lasting(on.index, on.normal, -1 if need > 0.0 else 1, on.belt, carried=False)
+        elif name == "ends":
+            assert on is not None
+            return self.round_the_end(on, k)
+        else:
+            assert on is not None
+            return self.law(k, {k: self.normal(k, self.base[:, None])[:, 0]})
+        return None
+
+    def around(self, on: _Lasting) -> dict[int, Floats]:
+        """Return all that is touched, with its normal."""
+        found = {k: self.normal(k, self.base[:, None])[:, 0] for k in self.touching()}
+        found[on.index] = self.forces(on, self.state[:, None])[0][:, 0]
+        return found
+
+    def round_the_end(self, on: _Lasting, end: int) -> _Lasting | None:
+        """Go on at the end of a face: round the pulley, round the end, or in flight."""
+        face = self.things[on.index]
+        assert isinstance(face, _Line)
+        point = face.start + (face.length if end else 0.0) * face.tangent
+        for k, thing in enumerate(self.things):
+            if isinstance(thing, _Line):
+                continue
+            if any(
+                j == on.index and np.allclose(at, point, atol=TOUCH) for j, at, _ in thing.joined
+            ):
+                n = self.normal(k, self.base[:, None])[:, 0]
+                if on.carried:
+                    reach = float(hypot(*self.base))
+                    self.things.append(
+                        _Circle(thing.center, reach, None, (), thing.speed, 0.0, inf, thing.surface)
+                    )
+                    ride = _Lasting(len(self.things) - 1, None, 0, on.belt, carried=True)
+                    if self.load(ride.index, n, self.state[V]) > 0.0:
+                        return ride
+                elif self.load(k, n, self.state[V]) > 0.0:
+                    return self.law(k, {k: n})
+                break
+        self.tell(Kind.SEPARATION, face.surface)
+        return None
+
+    # What is written down.
+
+    def knot(self, later: float = 0.0, y: Floats | None = None) -> None:
+        y = self.state if y is None else y
+        self.log.knots(0, self.t0 + later, self.base + y[X], y[V], y[OMEGA])
+
+    def tell(
+        self, kind: Kind, surface: int, before: Floats | None = None, spin: float | None = None,
+        normal: float = 0.0, tangential: float = 0.0,
+    ) -> None:  # fmt: skip
+        self.log.events(
+            kind, 0, self.t0, self.base, self.state[V].copy(), self.state[OMEGA],
+            velocity_before=before, omega_before=spin, surface=surface,
+            normal_impulse=normal, tangential_impulse=tangential,
+        )  # fmt: skip
+
+
+def _obstacles(machine: Machine) -> list[_Line | _Circle]:
+    """Return segments, then the pulley, then free ends of segments."""
+    s, r, pulley = machine.segments, machine.particle.radius, machine.pulley
+    lines: list[_Line | _Circle] = []
+    ends: list[tuple[int, Floats, Floats]] = []
+    for k in range(len(s.length)):
+        tangent = s.tangent[k]
+        left = np.array([-tangent[1], tangent[0]])
+        lines.append(
+            _Line(s.start[k], tangent, left, float(s.length[k]), float(s.speed[k]),
+                  float(s.restitution[k]), float(s.friction[k]), int(s.surface[k]))
+        )  # fmt: skip
+        ends += [(k, s.start[k], tangent), (k, s.end[k], -tangent)]
+    circles: list[_Line | _Circle] = []
+    if pulley is not None:
+        on_it = tuple(end for end in ends if abs(hypot(*end[1]) - pulley.radius) <= TOUCH)
+        circles.append(
+            _Circle(np.zeros(2), pulley.radius + r, None, on_it, pulley.speed, pulley.restitution,
+                    pulley.friction, pulley.surface)
+        )  # fmt: skip
+        ends = [end for end in ends if hypot(*end[1]) > pulley.radius + TOUCH]
+    for k, point, _ in ends if r > 0.0 else []:
+        line = lines[k]
+        assert isinstance(line, _Line)
+        joined = tuple(end for end in ends if np.abs(end[1] - point).max() <= TOUCH)
+        if joined[0][0] == k:  # of several that end here, the first
+            same = [lines[j] for j, _, _ in joined if s.surface[j] == line.surface]
+            crown = sum((other.left for other in same if isinstance(other, _Line)), np.zeros(2))
+            circles.append(
+                _Circle(point, r, crown, joined, line.speed, line.restitution, line.friction,
+                        line.surface)
+            )  # fmt: skip
+    return lines + circles

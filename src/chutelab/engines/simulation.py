@@ -1,0 +1,94 @@
+"""From a scene to a recording: choosing the engine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from time import perf_counter
+
+from chutelab.machine import Machine, build
+from chutelab.results import Recording
+from chutelab.scene import Fault, Scene, SceneError
+
+Progress = Callable[[float], None]
+
+ENGINES = ("auto", "exact", "contact", "pymunk")
+
+
+def choose(machine: Machine, engine: str | None = None) -> str:
+    """Return the engine that runs first: exact, unless particles interact or another is asked for.
+
+    Parameters
+    ----------
+    machine : Machine
+        The scene, resolved.
+    engine : {"auto", "exact", "contact", "pymunk"}, optional
+        Overrides the scene's ``run.engine``.
+
+    Raises
+    ------
+    ValueError
+        If there is no engine of that name.
+    """
+    wanted = machine.engine if engine is None else engine
+    if wanted not in ENGINES:
+        raise ValueError(f"engine = {wanted!r}: one of {', '.join(ENGINES)}")
+    if wanted != "auto":
+        return wanted
+    return "contact" if machine.interact else "exact"
+
+
+def simulate(
+    scene: Scene,
+    engine: str | None = None,
+    progress: Progress | None = None,
+) -> Recording:
+    """Run a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        From `chutelab.load`.
+    engine : {"auto", "exact", "contact", "pymunk"}, optional
+        Overrides the scene's ``run.engine``. With auto, what the exact engine cannot follow (a
+        spinning disk between a moving surface and another) goes to contact.
+    progress : callable, optional
+        Called now and then with the share of the run that is done, 0 to 1.
+
+    Returns
+    -------
+    Recording
+        The same scene, seed and engine give the same numbers to the last bit; only `seconds`, the
+        wall time from the validated scene to the recording, differs.
+
+    Raises
+    ------
+    SceneError
+        If the geometry contradicts itself, or the engine cannot run the scene.
+    """
+    began = perf_counter()
+    machine = build(scene)
+    name = choose(machine, engine)
+    if name == "exact":
+        if machine.interact:
+            allowed = "contact or pymunk, because stream.interact = true"
+            raise _refused(scene, "run.engine", "exact", allowed)
+        from chutelab.engines.exact import CornerError, run
+
+        try:
+            return run(machine, progress, began)
+        except CornerError as error:
+            if "exact" in (engine, scene.run.engine):
+                raise _refused(scene, "run.engine", "exact", str(error)) from error
+            name = "contact"
+    if machine.particle.radius == 0.0:
+        raise _refused(scene, "particle.radius", 0.0, f'more than 0 with run.engine = "{name}"')
+    if name == "contact":
+        from chutelab.engines.contact import run as follow
+    else:
+        from chutelab.engines.pymunk import run as follow
+    return replace(follow(machine, progress), seconds=perf_counter() - began)
+
+
+def _refused(scene: Scene, key: str, value: object, allowed: str) -> SceneError:
+    return SceneError(scene.source, [Fault(key, value, allowed)])

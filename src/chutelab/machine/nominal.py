@@ -1,0 +1,152 @@
+"""The nominal particle up to the plate's line: what the machine's geometry is measured from.
+
+Of a family of scenes, the nominal particles of all: numbers are arrays (N,) then.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import cos, inf, nan, radians, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chutelab.machine.releases import on_belt, release_point, release_velocity
+from chutelab.mechanics.ballistics import closing_time, crossing, descent
+from chutelab.mechanics.ride import Circle, Outcome, advance, grip_slip, normal_force
+from chutelab.scene import Scene
+from chutelab.util.many import Value, each, ratio, root, smaller, where
+
+Floats = NDArray[np.float64]
+
+STEPS = 100_000
+"""Knots of a ride after which it counts as one without an end; a quarter turn takes 65, the slowest
+fall off the very top 2,000."""
+
+
+@dataclass(frozen=True)
+class Discharge:
+    """Where free flight begins: position (m) and velocity (m/s), two numbers each.
+
+    NaN if the particle never leaves forwards (a belt at rest, or one that throws it off backwards).
+    """
+
+    position: tuple[Value, Value]
+    velocity: tuple[Value, Value]
+
+
+def discharge(scene: Scene) -> Discharge:
+    """Follow the nominal particle along belt and pulley until it flies."""
+    position, velocity = release_point(scene), release_velocity(scene)
+    if scene.incoming is None or not on_belt(scene) or velocity[1] != 0.0:
+        return Discharge(position, velocity)
+    rho = scene.incoming.pulley_radius + scene.particle.radius
+    if isinstance(scene.incoming.friction, str):
+        return _let_go(scene, rho)
+    return _slip_round(scene, rho, velocity[0], -position[0])
+
+
+def _let_go(scene: Scene, rho: Value) -> Discharge:
+    """Leave by adhesion where cos φ1 = v²/(g ρ), at the top if that is 1 or more (Eq. (2))."""
+    assert scene.incoming is not None
+    speed: Value = scene.incoming.speed
+    grip = where(speed > 0.0, smaller(ratio(speed * speed, scene.gravity * rho), 1.0), nan)
+    sine = root((1.0 - grip) * (1.0 + grip))
+    return Discharge((rho * sine, rho * grip), (speed * grip, 0.0 - speed * sine))
+
+
+def _slip_round(scene: Scene, rho: Value, speed: Value, distance: Value) -> Discharge:
+    """Go along belt and pulley with Coulomb friction."""
+    assert scene.incoming is not None
+    given = (
+        rho, speed, distance, scene.gravity, scene.incoming.friction, scene.incoming.speed,
+    )  # fmt: skip
+    rho, speed, distance, gravity, friction, belt = (
+        array.copy() for array in np.broadcast_arrays(*map(np.atleast_1d, given))
+    )
+    turns = np.full(len(rho), scene.particle.spin)
+    w, z = _along_belt(speed, distance, friction * gravity, belt, turns)
+    nothing = np.zeros(len(rho))
+    circle = Circle(
+        phi=nothing, w=w, z=z, rho=rho, gravity=gravity, friction=friction, belt=belt,
+        slip=nothing, turns=turns, low=nothing - 1e-9, high=nothing + inf,
+    )  # fmt: skip
+    slip = w + z - belt
+    circle = replace(circle, slip=np.where(slip == 0.0, grip_slip(circle), np.sign(slip)))
+    phi, w = _round_pulley(circle)
+    sine, cosine = each(sin, phi), each(cos, phi)
+    found = (rho * sine, rho * cosine), (w * cosine, -w * sine)
+    if scene.members is None:
+        found = tuple((float(x[0]), float(y[0])) for x, y in found)  # type: ignore[assignment]
+    return Discharge(*found)
+
+
+def _along_belt(
+    w: Floats, distance: Floats, drag: Floats, belt: Floats, turns: NDArray[np.bool_]
+) -> tuple[Floats, Floats]:
+    """Return speed and r ω at the top of the pulley after slipping along the belt, NaN if never."""
+    slip = w - belt
+    slips = (slip != 0.0) & (drag > 0.0)
+    pull = np.where(slip > 0.0, -drag, drag)
+    lever = np.where(turns, 3.0, 1.0)
+    until_grip = np.where(slips, np.abs(slip) / np.where(slips, drag * lever, 1.0), 0.0)
+    reach = closing_time(distance, -w, -pull)
+    t = np.minimum(until_grip, reach)
+    pace = np.where(slips, w + pull * t, w)
+    z = np.where(slips & turns, 2.0 * pull * t, 0.0)
+    arrives = np.where(slips & (reach <= until_grip), True, pace > 0.0)
+    return np.where(arrives, pace, nan), z
+
+
+def _round_pulley(circle: Circle) -> tuple[Floats, Floats]:
+    """Return angle from the top and speed where particles lift off the pulley, NaN if never."""
+    phi, w = np.full((2, len(circle.phi)), nan)
+    who = np.flatnonzero(np.isfinite(circle.w))
+    circle = _some(circle, who)
+    for _ in range(STEPS):
+        lifts = normal_force(circle) <= 0.0
+        phi[who[lifts]], w[who[lifts]] = circle.phi[lifts], circle.w[lifts]
+        if lifts.any():
+            who, circle = who[~lifts], _some(circle, ~lifts)
+        if not len(who):
+            break
+        step = advance(circle, np.full(len(who), inf))
+        gone = step.outcome == Outcome.LIFT
+        phi[who[gone]], w[who[gone]] = step.phi[gone], step.w[gone]
+        goes_on = ~gone & np.isfinite(step.dt) & (step.outcome != Outcome.LOW)
+        circle = replace(circle, phi=step.phi, w=step.w, z=step.z)
+        onset = np.sign(np.sin(circle.phi))
+        slip = np.where(step.outcome == Outcome.GRIP, grip_slip(circle), circle.slip)
+        circle = replace(circle, slip=np.where(step.outcome == Outcome.ONSET, onset, slip))
+        if not goes_on.all():
+            who, circle = who[goes_on], _some(circle, goes_on)
+    return phi, w
+
+
+def _some(circle: Circle, which: NDArray[np.int64] | NDArray[np.bool_]) -> Circle:
+    return Circle(**{name: array[which] for name, array in vars(circle).items()})
+
+
+def plate_hit(scene: Scene, start: Discharge) -> tuple[Value, Value]:
+    """Return the centre (m) as it meets the struck face of the unbounded plate; NaN if never.
+
+    The face's normal is (-cos α, -sin α); contact is when the centre is r in front of it.
+    """
+    if scene.plate is None or scene.incoming is None:
+        return nan, nan
+    alpha = each(radians, scene.plate.angle_deg)
+    nx, ny = -each(cos, alpha), -each(sin, alpha)
+    pivot_x = scene.incoming.pulley_radius + scene.plate.distance
+    pivot_y: Value = scene.plate.pivot_height
+    (x, y), (vx, vy) = start.position, start.velocity
+    gap = (x - pivot_x) * nx + (y - pivot_y) * ny - scene.particle.radius
+    pace, pull = vx * nx + vy * ny, -scene.gravity * ny
+    t: Value
+    if scene.members is None:
+        t = crossing(gap, pace, pull)
+    else:
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            t = descent(np.asarray(gap), np.asarray(pace), pull)
+    moves = (vx != 0.0) | (vy != 0.0) | (scene.gravity != 0.0)
+    t = where((gap >= 0.0) & (t >= 0.0) & (t < inf) & moves, t, nan)
+    return x + vx * t, y + vy * t - 0.5 * scene.gravity * t * t

@@ -1,0 +1,257 @@
+"""Where, when and how fast each particle of the stream starts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chutelab.results import Kind, Recording
+from chutelab.scene import Scene
+from chutelab.util.many import Value
+
+ON_BELT = 1e-9
+"""m; a release point this close to the riding height counts as on the belt."""
+
+TRIES = 1000
+"""Draws of a height that may overlap an earlier particle before it has to wait for its place."""
+
+DEEP = 0.01
+"""Share of the radius. Riders of one layer that touch, 2 r of arc apart, are by r³/(3 ρ²) nearer on
+the chord: by less than this where r < ρ/6."""
+
+
+@dataclass(frozen=True, eq=False)
+class Releases:
+    """Start of each particle, read-only arrays.
+
+    Attributes
+    ----------
+    t : ndarray, (N,)
+        s, ascending.
+    position, velocity : ndarray, (N, 2)
+        m, m/s.
+    carried : ndarray of bool, (N,)
+        Rides the incoming belt by adhesion, at radius R + r + h round the pulley, until separation.
+    """
+
+    t: NDArray[np.float64]
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    carried: NDArray[np.bool_]
+
+    def __post_init__(self) -> None:
+        for array in vars(self).values():
+            array.flags.writeable = False
+
+
+def release_point(scene: Scene) -> tuple[float, float]:
+    """Return the nominal release point, m; on the belt exactly at the riding height."""
+    belt = scene.incoming
+    if belt is None:
+        assert scene.stream.at is not None
+        return scene.stream.at
+    riding = belt.pulley_radius + scene.particle.radius
+    if scene.stream.at is None:
+        return -belt.length, riding
+    x, y = scene.stream.at
+    return (x, riding) if abs(y - riding) <= ON_BELT and -belt.length <= x <= 0.0 else (x, y)
+
+
+def release_velocity(scene: Scene) -> tuple[float, float]:
+    """Return the nominal release velocity, m/s."""
+    if scene.stream.velocity is not None:
+        return scene.stream.velocity
+    assert scene.incoming is not None
+    return scene.incoming.speed, 0.0
+
+
+def on_belt(scene: Scene) -> bool:
+    """Tell whether the stream is released on the incoming belt."""
+    if scene.incoming is None:
+        return False
+    if scene.stream.at is None:
+        return True
+    x, y = release_point(scene)
+    riding = scene.incoming.pulley_radius + scene.particle.radius
+    return y == riding and -scene.incoming.length <= x <= 0.0
+
+
+def schedule(scene: Scene) -> NDArray[np.float64]:
+    """Return when each particle is due, s (N,); of a family each scene has one, at 0 s."""
+    if scene.members is not None:
+        return np.zeros(scene.members)
+    return np.arange(scene.stream.count) / scene.stream.rate
+
+
+@dataclass(frozen=True)
+class Waits:
+    """Particles that were released late because their place was taken.
+
+    Attributes
+    ----------
+    particles : int
+        How many waited and were released.
+    longest, mean : float
+        How long these waited, s; 0 if none did.
+    never : int
+        How many were due, and found no place until the end of the run.
+    """
+
+    particles: int
+    longest: float
+    mean: float
+    never: int
+
+
+def waits(scene: Scene, recording: Recording) -> Waits | None:
+    """Return who waited for its place in a run of a scene; None if nobody did."""
+    due = schedule(scene)[: recording.count]
+    # The pymunk engine releases at the beginning of a step: up to a step late is not waiting.
+    least = (1.0 + 1e-6) * scene.run.dt if recording.engine == "pymunk" else 1e-9
+    released = recording.select(Kind.RELEASE)
+    late = released["t"] - due[released["particle"]]
+    late = late[late > least]
+    missing = np.diff(recording.offsets) == 0
+    end = recording.knots["t"].max(initial=0.0)
+    never = int(np.count_nonzero(due[missing] < end - scene.run.dt))
+    if not len(late) and not never:
+        return None
+    longest, mean = (float(late.max()), float(late.mean())) if len(late) else (0.0, 0.0)
+    return Waits(len(late), longest, mean, never)
+
+
+@dataclass(frozen=True)
+class Squeeze:
+    """Riders by adhesion that get into each other round the pulley.
+
+    All layers of a bed have the belt's speed, the lower ones on smaller circles: where the pulley
+    does not throw them off at its top, they turn ahead, into what rides above them.
+
+    Attributes
+    ----------
+    particles : int
+        How many are in another by more than `DEEP`.
+    deepest : float
+        Overlap of the worst two, m.
+    grip : float
+        v²/(g ρ) of the highest rider: it stays on the pulley until cos φ is this.
+    """
+
+    particles: int
+    deepest: float
+    grip: float
+
+
+def squeeze(scene: Scene, t: NDArray[np.float64], position: NDArray[np.float64]) -> Squeeze | None:
+    """Return who rides into others; None if nobody does.
+
+    A ride that something ends early counts as if it went on. Two that would be in each other on the
+    belt already do not count: one of them waits.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is released, and where.
+    t, position : ndarray, (N,) and (N, 2)
+        When and where particles are released, s and m: planned, or of a run.
+    """
+    belt, radius = scene.incoming, scene.particle.radius
+    if belt is None or not isinstance(belt.friction, str) or not on_belt(scene):
+        return None
+    if not scene.stream.interact or belt.speed == 0.0 or scene.gravity == 0.0:
+        return None
+    x, rho = position.T
+    top = t - x / belt.speed
+    grip = belt.speed**2 / (scene.gravity * rho)
+    order = np.argsort(top)
+    top, rho = top[order], rho[order]
+    leaves = top + rho * np.arccos(np.minimum(grip[order], 1.0)) / belt.speed
+    depth = np.zeros(len(top))
+    for lag in range(1, len(top)):
+        # The later one is on the pulley from its own top, both are until one leaves.
+        begin, end = top[lag:], np.minimum(leaves[:-lag], leaves[lag:])
+        if (begin >= leaves[:-lag]).all():
+            break
+        mine, its = rho[:-lag], rho[lag:]
+        waits_for = np.hypot(belt.speed * (begin - top[:-lag]), mine - its) < 2.0 * radius
+        angle = belt.speed * np.array(
+            [(now - top[:-lag]) / mine - (now - begin) / its for now in (begin, end)]
+        )
+        angle = np.where(angle[1] > 0.0, angle.min(axis=0), 0.0)
+        apart = np.hypot(mine - its, 2.0 * np.sqrt(mine * its) * np.sin(0.5 * angle))
+        found = np.where((begin < end) & ~waits_for, 2.0 * radius - apart, 0.0)
+        depth[:-lag] = np.maximum(depth[:-lag], found)
+        depth[lag:] = np.maximum(depth[lag:], found)
+    particles = int(np.count_nonzero(depth > DEEP * radius))
+    return Squeeze(particles, float(depth.max()), float(grip.min())) if particles else None
+
+
+def draw(scene: Scene) -> Releases:
+    """Draw the releases of a scene; the same scene and seed give the same numbers.
+
+    Of a family each scene has one particle. Particles that meet start where no other is, as far as
+    the bed has room: an engine lets the others wait until their place is free.
+    """
+    stream, t = scene.stream, schedule(scene)
+    crowded, count = stream.interact and stream.count > 1, len(t)
+    position, velocity = np.empty((2, count, 2))
+    velocity[:, 0], velocity[:, 1] = release_velocity(scene)
+    height: Value = 0.0
+    # The first one has no spread. Making a generator takes as long as all other preparations.
+    if stream.count > 1 and (stream.bed_height > 0.0 or stream.speed_spread > 0.0 or crowded):
+        rng = np.random.default_rng(stream.seed)
+        height = stream.bed_height * rng.random(count)
+        height[0] = 0.0
+        spread = stream.speed_spread * rng.uniform(-1.0, 1.0, count)
+        spread[0] = 0.0
+        x, y = release_velocity(scene)
+        speed = float(np.hypot(x, y))
+        velocity += spread[:, None] * ((x / speed, y / speed) if speed > 0.0 else (1.0, 0.0))
+    rides = on_belt(scene)
+    adheres = rides and scene.incoming is not None and isinstance(scene.incoming.friction, str)
+    if crowded:
+        fall = 0.0 if adheres else 0.5 * scene.gravity
+        floor = 0.0 if rides else -inf
+        _spread_apart(scene, t, height, velocity, fall, floor, rng)
+    position[:, 0], low = release_point(scene)
+    position[:, 1] = low + height
+    carried = np.zeros(count, dtype=bool)
+    carried[:] = adheres
+    return Releases(t, position, velocity, carried)
+
+
+def _spread_apart(
+    scene: Scene,
+    t: NDArray[np.float64],
+    height: NDArray[np.float64],
+    velocity: NDArray[np.float64],
+    fall: float,
+    floor: float,
+    rng: np.random.Generator,
+) -> None:
+    """Redraw heights, in place, so that no particle starts inside one released before it.
+
+    One that finds no free place in the bed keeps what was drawn last, and waits when it is due.
+
+    Earlier particles are taken to have moved on at their release velocity, and to have fallen by
+    ``fall`` (m/s²) times their age squared, but not below ``floor`` (m above the lowest layer).
+    """
+    stream, diameter = scene.stream, 2.0 * scene.particle.radius
+    # Who may still be in the way: whoever has moved on by a diameter, or has fallen below the bed
+    # by one, stays away for good.
+    close = np.zeros(0, dtype=np.int64)
+    for i in range(1, stream.count):
+        close = np.append(close, i - 1)
+        age = t[i] - t[close]
+        dx = velocity[close, 0] * age
+        dy = height[close] + velocity[close, 1] * age - fall * age**2
+        sinks = velocity[close, 1] <= 2.0 * fall * age
+        near = (np.abs(dx) < diameter) & ~(sinks & (np.maximum(dy, floor) <= -diameter))
+        close, dx, dy = close[near], dx[near], np.maximum(dy[near], floor)
+        for _ in range(TRIES if stream.bed_height > 0.0 else 0):
+            if np.all(dx**2 + (dy - height[i]) ** 2 >= diameter**2):
+                break
+            height[i] = stream.bed_height * rng.random()

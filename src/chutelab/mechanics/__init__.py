@@ -1,0 +1,1 @@
+"""Kinematics, impact and the ride round a pulley: numbers or arrays in, the same out."""

@@ -1,0 +1,217 @@
+"""Contact with a turning circle: rolling, gripping or slipping round a pulley or a surface's end.
+
+The centre of the particle moves on a circle of radius ρ; φ is measured from the top, clockwise.
+With w the speed along the circle, z = r ω, N the normal and F the tangential force per mass,
+
+    φ' = w/ρ,   w' = g sin φ + F,   z' = 2 F (free disk) or 0,   N = g cos φ - w²/ρ,
+
+and F = stick · g sin φ + load · N: gripping without turning is stick = -1, rolling -1/3, with
+I = m r²/2; slipping is load = -σ µ, with σ the sign of the slip u = w + z - belt. Everything is
+expanded in a Taylor series in time, which holds for any mixture of turning back, spinning and
+slipping; a step is as long as a knot may be, so the series costs no extra steps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chutelab.mechanics.ballistics import polynomial
+
+Floats = NDArray[np.float64]
+
+ORDER = 14
+"""Degree of the series: with the steps below the first term left out is under 1e-16."""
+
+STEP_ANGLE = 0.0244
+"""rad; a Hermite curve through knots this far apart is off by ρ Δφ⁴/384 < 1e-9 ρ."""
+
+STEP_GROWTH = 0.5
+"""Largest 2 µ Δφ of a step: slip grows like exp(2 µ φ)."""
+
+STEP_FALL = 0.4
+"""Longest step in units of sqrt(ρ/g), in which the fall from the top grows e-fold."""
+
+HALVINGS = 64
+"""Bisections of a step for the time of an event, past the last bit."""
+
+
+class Outcome(IntEnum):
+    """What ends a step on the circle."""
+
+    NOTHING = 0
+    LIFT = 1
+    ONSET = 2
+    GRIP = 3
+    LOW = 4
+    HIGH = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Circle:
+    """Particles in contact with circles; every array has shape (k,).
+
+    Attributes
+    ----------
+    phi, w, z : ndarray
+        Angle from the top, clockwise (rad); speed along the circle, r ω (m/s).
+    rho, gravity, friction, belt : ndarray
+        Radius of the centre's path (m), g (m/s²), µ, speed of the circle's surface (m/s).
+    slip : ndarray
+        Sign σ of the slip; 0 while gripping or rolling.
+    turns : ndarray of bool
+        Whether the particle is a free disk.
+    low, high : ndarray
+        Angles where the circle ends or something is met, rad.
+    """
+
+    phi: Floats
+    w: Floats
+    z: Floats
+    rho: Floats
+    gravity: Floats
+    friction: Floats
+    belt: Floats
+    slip: Floats
+    turns: NDArray[np.bool_]
+    low: Floats
+    high: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """State at the end of a step, and what the contact did; arrays (k,).
+
+    `work` is ∫F dt (m/s): times mass and belt speed it is the belt's work. `heat` is -∫F u dt
+    (m²/s²): times mass it is the friction loss.
+    """
+
+    dt: Floats
+    outcome: NDArray[np.int8]
+    phi: Floats
+    w: Floats
+    z: Floats
+    work: Floats
+    heat: Floats
+
+
+def normal_force(circle: Circle) -> Floats:
+    """N per mass, m/s²; contact lasts while it is positive."""
+    return np.asarray(circle.gravity * np.cos(circle.phi) - circle.w**2 / circle.rho)
+
+
+def grip_slip(circle: Circle) -> Floats:
+    """Return the slip sign of a contact without slip now: 0 if friction can hold it.
+
+    Otherwise the particle starts to slip the way gravity pulls.
+    """
+    share = np.where(circle.turns, 1.0 / 3.0, 1.0)
+    pull = circle.gravity * np.sin(circle.phi)
+    with np.errstate(invalid="ignore"):
+        limit = np.where(np.isinf(circle.friction), np.inf, circle.friction * normal_force(circle))
+    return np.where(share * np.abs(pull) <= limit, 0.0, np.sign(pull))
+
+
+def advance(circle: Circle, longest: Floats) -> Step:
+    """Move on by one step, or to the first event within it.
+
+    Parameters
+    ----------
+    circle : Circle
+        N must be positive.
+    longest : ndarray, (k,)
+        s; upper bound of the step.
+    """
+    dt = np.minimum(_step_length(circle), longest)
+    series = _series(circle)
+    gauges = _gauges(circle, series)
+    passed = polynomial(gauges, dt) < 0.0
+    hit = np.flatnonzero(passed.any(axis=0))
+    outcome = np.zeros(len(dt), dtype=np.int8)
+    if len(hit):
+        at = _first_negative(gauges[:, :, hit], dt[hit], passed[:, hit])
+        which = np.argmin(at, axis=0)
+        dt[hit] = at[which, np.arange(len(hit))]
+        outcome[hit] = np.array(
+            [Outcome.LIFT, Outcome.ONSET, Outcome.ONSET, Outcome.GRIP, Outcome.LOW, Outcome.HIGH]
+        )[which]
+    phi, w, z, work, heat = polynomial(series[:, :5], dt)
+    phi = np.where(outcome == Outcome.LOW, circle.low, phi)
+    phi = np.where(outcome == Outcome.HIGH, circle.high, phi)
+    return Step(dt, outcome, phi, w, z, work, heat)
+
+
+def _step_length(c: Circle) -> Floats:
+    """Time for at most `STEP_ANGLE`, less where slip grows fast; inf at rest."""
+    finite = np.where(np.isinf(c.friction) | (c.slip == 0.0), 0.0, c.friction)
+    angle = np.minimum(STEP_ANGLE, STEP_GROWTH / np.maximum(2.0 * finite, 1e-300))
+    held = (c.slip == 0.0) & ~c.turns
+    pull = np.where(held, 0.0, c.gravity * (np.abs(np.sin(c.phi)) + finite))
+    pace = np.abs(c.w) + np.sqrt(2.0 * angle * c.rho * pull)
+    with np.errstate(divide="ignore"):
+        time = np.where(pace > 0.0, angle * c.rho / np.where(pace > 0.0, pace, 1.0), np.inf)
+        # Near the top the pull grows with the angle, as exp(t sqrt(g/ρ)).
+        falling = STEP_FALL * np.sqrt(c.rho / c.gravity)
+    return np.where(pull > 0.0, np.minimum(time, falling), time)
+
+
+def _series(c: Circle) -> Floats:
+    """Taylor coefficients in time, (ORDER + 1, 7, k): φ, w, z, ∫F, -∫F u, N, F."""
+    k = len(c.phi)
+    out = np.zeros((ORDER + 1, 7, k))
+    phi, w, z, work, heat, normal, force = (out[:, i] for i in range(7))
+    sine, cosine, slip = np.zeros((3, ORDER + 1, k))
+    phi[0], w[0], z[0] = c.phi, c.w, c.z
+    sine[0], cosine[0] = np.sin(c.phi), np.cos(c.phi)
+    slip[0] = c.w + c.z - c.belt
+    gripping = c.slip == 0.0
+    stick = np.where(gripping, np.where(c.turns, -1.0 / 3.0, -1.0), 0.0)
+    load = np.where(gripping, 0.0, -c.slip * np.where(gripping, 0.0, c.friction))
+    slip[0] = np.where(gripping, 0.0, slip[0])
+    spin = np.where(c.turns, 2.0, 0.0)
+    for n in range(ORDER + 1):
+        normal[n] = c.gravity * cosine[n] - np.einsum("ik,ik->k", w[: n + 1], w[n::-1]) / c.rho
+        force[n] = stick * c.gravity * sine[n] + load * normal[n]
+        if n == ORDER:
+            break
+        w[n + 1] = (c.gravity * sine[n] + force[n]) / (n + 1)
+        z[n + 1] = spin * force[n] / (n + 1)
+        phi[n + 1] = w[n] / c.rho / (n + 1)
+        rates = np.arange(1, n + 2)[:, None] * phi[1 : n + 2]
+        sine[n + 1] = np.einsum("ik,ik->k", rates, cosine[n::-1]) / (n + 1)
+        cosine[n + 1] = -np.einsum("ik,ik->k", rates, sine[n::-1]) / (n + 1)
+        work[n + 1] = force[n] / (n + 1)
+        heat[n + 1] = -np.einsum("ik,ik->k", force[: n + 1], slip[n::-1]) / (n + 1)
+        slip[n + 1] = np.where(gripping, 0.0, w[n + 1] + z[n + 1])
+    return out
+
+
+def _gauges(c: Circle, series: Floats) -> Floats:
+    """Series that turn negative at an event, (ORDER + 1, 6, k): lift, onset twice, grip, bounds."""
+    phi, w, z, _, _, normal, force = (series[:, i] for i in range(7))
+    gauges = np.zeros((ORDER + 1, 6, len(c.phi)))
+    gauges[:, 0] = normal
+    limited = (c.slip == 0.0) & np.isfinite(c.friction)
+    grip = np.where(limited, c.friction, 0.0) * normal
+    gauges[:, 1] = np.where(limited, grip - force, 0.0)
+    gauges[:, 2] = np.where(limited, grip + force, 0.0)
+    gauges[:, 3] = c.slip * (w + z)
+    gauges[0, 3] -= c.slip * c.belt
+    gauges[:, 4] = phi
+    gauges[:, 5] = -phi
+    gauges[0, 4] -= np.where(np.isfinite(c.low), c.low, -1e3)
+    gauges[0, 5] += np.where(np.isfinite(c.high), c.high, 1e3)
+    return gauges
+
+
+def _first_negative(gauges: Floats, dt: Floats, passed: NDArray[np.bool_]) -> Floats:
+    """Bisect each gauge that is negative at dt for its change of sign, (6, k); inf for the rest."""
+    low, high = np.zeros(passed.shape), np.broadcast_to(dt, passed.shape).copy()
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        above = polynomial(gauges, middle) >= 0.0
+        low, high = np.where(above, middle, low), np.where(above, high, middle)
+    return np.where(passed, high, np.inf)

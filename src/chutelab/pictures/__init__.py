@@ -1,0 +1,1 @@
+"""What is looked at: plots, films, pages, the live picture."""

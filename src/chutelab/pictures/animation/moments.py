@@ -1,0 +1,351 @@
+"""Which moments of a recording the film shows, and for how long each.
+
+- What happened to particle 0, in words.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from math import atan2, degrees, floor, hypot, log10
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chutelab.machine import Machine
+from chutelab.pictures.plots import Window, machine_of
+from chutelab.pictures.plots.scenery import STRUCK, action, subset
+from chutelab.pictures.plots.style import quantity
+from chutelab.results import PARTICLES, Kind, Recording
+
+
+def surface_words(name: str) -> str:
+    """Return how a surface is spoken of."""
+    return {
+        "incoming": "the incoming belt",
+        "outgoing": "the outgoing belt",
+        "plate": "the plate",
+        PARTICLES: "other particles",
+    }.get(name, f"“{name}”")
+
+
+@lru_cache(maxsize=1)
+def _machine(recording: Recording) -> Machine:
+    return machine_of(recording)
+
+
+def contact_normal(machine: Machine, event: Any) -> NDArray[np.float64]:
+    """Return the unit normal of an impact, away from the surface, (2,).
+
+    From where the particle is: a fixed step's velocities have gravity in them, too.
+    """
+    position, segments = event["position"], machine.segments
+    mine = segments.surface == event["surface"]
+    start, tangent = segments.start[mine], segments.tangent[mine]
+    along = np.einsum("sd,sd->s", position - start, tangent)
+    foot = start + np.clip(along, 0.0, segments.length[mine])[:, None] * tangent
+    away = position - foot
+    gap = np.hypot(*away.T)
+    pulley, name = machine.pulley, machine.surfaces[event["surface"]]
+    if pulley is not None and name == "incoming":
+        rim = np.hypot(*position)
+        if abs(rim - pulley.radius) < gap.min():
+            return np.asarray(position / rim)
+    nearest = int(np.argmin(gap))
+    beyond = not 0.0 <= along[nearest] <= segments.length[mine][nearest]
+    if beyond and gap[nearest] > 0.5 * machine.particle.radius > 0.0:
+        return np.asarray(away[nearest] / gap[nearest])
+    normal = np.array([-tangent[nearest][1], tangent[nearest][0]])
+    return normal if normal @ event["velocity_before"] < 0.0 else -normal
+
+
+def losses(recording: Recording, event: Any) -> NDArray[np.float64]:
+    """Return what an impact booked on particle 0, J: belt work, restitution and friction loss."""
+    track = recording.track(0)
+    now = np.flatnonzero(track["t"] == event["t"])
+    if not len(now):
+        return np.zeros(3)
+    return np.asarray(track["entries"][now[-1]] - track["entries"][now[0]])
+
+
+def sentence(recording: Recording, event: Any) -> str:
+    """Return one or two lines on an event of particle 0."""
+    kind = Kind(int(event["kind"]))
+    name = recording.surfaces[event["surface"]] if event["surface"] >= 0 else PARTICLES
+    speed = hypot(*event["velocity_after"])
+    if kind in STRUCK:
+        return _impact(recording, event, kind, name)
+    on = surface_words(name)
+    if kind is Kind.SEPARATION and name != "incoming":
+        return f"leaves {on} at {speed:.3g} m/s"
+    if kind is Kind.SEPARATION:
+        angle = degrees(atan2(*event["position"]))
+        where = "at the top" if angle < 5e-4 else f"{angle:.1f}° past the top"
+        return f"leaves the drive pulley {where}, at {speed:.3g} m/s"
+    return {
+        Kind.RELEASE: "is released",
+        Kind.SLIP: f"begins to slip on {on}",
+        Kind.STICK: f"no longer slips on {on}",
+        Kind.SETTLE: f"has settled on {on}",
+        Kind.EXIT: "has left the scene",
+    }[kind]
+
+
+def _impact(recording: Recording, event: Any, kind: Kind, name: str) -> str:
+    before = hypot(*event["velocity_before"])
+    if kind is Kind.COLLISION:
+        # The event keeps the velocity of its `particle` only.
+        if event["particle"] != 0:
+            return f"is hit by particle {int(event['particle'])}"
+        return f"hits particle {int(event['other'])} at {before:.3g} m/s"
+    verb = "lands on" if kind is Kind.LANDING else "strikes"
+    text = f"{verb} {surface_words(name)} at {before:.3g} m/s"
+    normal = contact_normal(_machine(recording), event)
+    into, off = (abs(float(event[v] @ normal)) for v in ("velocity_before", "velocity_after"))
+    if into > 0.0:
+        text += f", ε = {round(off / into, 3):g}"
+    belt, restitution, friction = losses(recording, event)
+    said = [
+        f"{'+' if value > 0.0 else ''}{quantity(value, 'J')} {what}"
+        for value, what in (
+            (-float(restitution), "in the rebound"),
+            (-float(friction), "to slip heat"),
+            (float(belt), "from the belt"),
+        )
+        if abs(value) > 1e-15
+    ]
+    return f"{text}\n{', '.join(said) or 'no energy lost'}"
+
+
+def going_on(recording: Recording, event: Any, *, flying: bool, still: bool = False) -> str:
+    """Return what particle 0 does some time after an event: `flying`, `still`, or in contact."""
+    kind = Kind(int(event["kind"]))
+    if flying:
+        return "in flight"
+    if kind in (Kind.RELEASE, Kind.COLLISION) or event["surface"] < 0:
+        return ""
+    verb = "lies" if still else "slides" if kind in (*STRUCK, Kind.SLIP) else "rides"
+    return f"{verb} on {surface_words(recording.surfaces[event['surface']])}"
+
+
+def in_flight(recording: Recording, times: NDArray[np.float64], near: float) -> NDArray[np.bool_]:
+    """Tell at which times (T,) particle 0 moves as gravity alone would have it.
+
+    Just before a time or just after it, within `near` seconds: an impact is in flight too.
+    """
+    moments = times[:, None] + np.array([-near, 0.0, near])
+    velocity = subset(recording, [0]).at(moments.ravel())[1].reshape(*moments.shape, 2)
+    pulled = np.diff(velocity, axis=1) / near + np.array([0.0, recording.gravity])
+    least = 1e-6 * max(recording.gravity, float(np.abs(pulled[np.isfinite(pulled)]).max(initial=0)))
+    return np.asarray((np.hypot(*np.moveaxis(pulled, 2, 0)) <= least).any(axis=1))
+
+
+RUNNING = 4.2
+"""s; the longest the motion of a film takes on the screen by default, holds not counted."""
+
+LIVES = 3.0
+"""A stream is filmed for at most this many times what particle 0 takes."""
+
+HOLDS = 4
+"""Impacts that the film stops at, the hardest; more would be a slide show."""
+
+WORTH = 0.05
+"""Share of the largest impulse that an impact needs for the film to stop at it."""
+
+HOLD_TOTAL, HOLD_LONGEST = 300, 130
+"""Hundredths of a second: all holds together at most, and one of them."""
+
+EDGE = 0.012
+"""Share of the window's larger side that particle 0 is inside it as the film begins: all of it."""
+
+TOLD = 1.2
+"""s on the screen, holds not counted, for which the caption tells what happened."""
+
+TAIL = 120
+"""Hundredths of a second that the last picture stays."""
+
+
+@dataclass(frozen=True)
+class Moment:
+    """One picture of the film.
+
+    Attributes
+    ----------
+    t : float
+        s, the recording's time.
+    delay : int
+        Hundredths of a second that the picture stays.
+    words : str
+        What happened last, and when.
+    """
+
+    t: float
+    delay: int
+    words: str
+
+
+def film(
+    recording: Recording, begin: float, end: float, *, fps: int, slow: float
+) -> tuple[Moment, ...]:
+    """Return the moments from `begin` to `end`: even steps, and a hold at each impact worth it.
+
+    Parameters
+    ----------
+    begin, end : float
+        s.
+    fps : int
+        Pictures a second, see `frame_delay`.
+    slow : float
+        Seconds on the screen for one second of the recording.
+
+    Raises
+    ------
+    ValueError
+        If `fps` is no divisor of 100 up to 50, or `slow` is not positive and finite.
+    """
+    delay = frame_delay(fps)
+    if not 0.0 < slow < float("inf"):
+        raise ValueError(f"slow = {slow!r}: allowed is a positive number")
+    step = 0.01 * delay / slow
+    mine = _events_of_nominal(recording, begin, end)
+    held = _held(mine)
+    stops = mine["t"][held]
+    times = np.linspace(begin, end, max(2, round((end - begin) / step) + 1))
+    if len(stops):
+        # A step that almost coincides with a stop would be a stumble.
+        times = times[np.abs(times[:, None] - stops).min(axis=1) > 0.5 * step]
+    times = np.unique(np.concatenate([[begin], times, stops, [end]]))
+    hold = min(HOLD_TOTAL // max(len(stops), 1), HOLD_LONGEST)
+    delays = np.where(np.isin(times, stops), hold, delay)
+    delays[-1] = max(delays[-1], TAIL)
+    words = _words(recording, mine, held, times, slow)
+    return tuple(Moment(float(t), int(d), w) for t, d, w in zip(times, delays, words, strict=True))
+
+
+def frame_delay(fps: int) -> int:
+    """Return the delay (hundredths of a second) between pictures.
+
+    Raises
+    ------
+    ValueError
+        If it is not whole, or under 2, which browsers take for 10.
+    """
+    if not 0 < fps <= 50 or 100 % fps:
+        raise ValueError(
+            f"fps = {fps!r}: GIF delays are whole hundredths of a second; allowed are"
+            " 1, 2, 4, 5, 10, 20, 25 and 50"
+        )
+    return 100 // fps
+
+
+def span(recording: Recording, shown: Window) -> tuple[float, float]:
+    """Return the times (s) between which to film.
+
+    From when particle 0 comes into the window to the end of the recording, but of a stream for no
+    longer than `LIVES` times particle 0 takes.
+    """
+    track = recording.track(0)
+    first, last = float(track["t"][0]), float(track["t"][-1])
+    times = np.linspace(first, max(action(recording)[0], first), 400)
+    inset = max(EDGE, recording.particle.radius / max(shown.width, shown.height))
+    all_of_it = shown.padded(*[-inset] * 4)
+    inside = all_of_it.holds(subset(recording, [0]).at(times)[0][:, 0])
+    begin = float(times[np.argmax(inside)]) if inside.any() else first
+    end = float(recording.knots["t"].max())
+    return begin, min(end, begin + LIVES * (last - begin)) if last > begin else end
+
+
+def slowness(length: float) -> float:
+    """Return the round factor that shows `length` seconds in at most `RUNNING`, but not by much.
+
+    >>> slowness(0.6), slowness(2.5), slowness(40.0)
+    (6.0, 1.5, 0.1)
+    """
+    if length <= 0.0:
+        return 1.0
+    exact = RUNNING / length * (1.0 + 1e-9)
+    power = floor(log10(exact))
+    mantissa = exact / 10.0**power
+    return float(f"{max(m for m in (1, 1.5, 2, 3, 4, 5, 6, 8) if m <= mantissa)}e{power}")
+
+
+def _events_of_nominal(recording: Recording, begin: float, end: float) -> NDArray[Any]:
+    events = recording.events
+    mine = (events["particle"] == 0) | (events["other"] == 0)
+    return np.asarray(events[mine & (events["t"] >= begin) & (events["t"] <= end)])
+
+
+def _held(mine: NDArray[Any]) -> NDArray[np.int64]:
+    """Return the indices of the hardest impacts worth a hold, in order, one for each time."""
+    struck = np.flatnonzero(np.isin(mine["kind"], [int(kind) for kind in STRUCK]))
+    if not len(struck):
+        return struck
+    impulse = np.abs(mine["normal_impulse"][struck])
+    struck = struck[impulse >= WORTH * impulse.max()]
+    _, first = np.unique(mine["t"][struck], return_index=True)
+    struck = struck[first]
+    hardest = np.argsort(-np.abs(mine["normal_impulse"][struck]), kind="stable")[:HOLDS]
+    return np.asarray(struck[np.sort(hardest)])
+
+
+def _words(
+    recording: Recording,
+    mine: NDArray[Any],
+    held: NDArray[np.int64],
+    times: NDArray[np.float64],
+    slow: float,
+) -> list[str]:
+    """Return the caption at each time: for a while what happened last, then what goes on.
+
+    What is told: the impacts that the film holds at, and events that are no impacts.
+    """
+    told = ~np.isin(mine["kind"], [int(kind) for kind in (*STRUCK, Kind.RELEASE)])
+    if list(mine["kind"][:2]) == [Kind.RELEASE, Kind.STICK]:
+        # Released at the belt's speed, it never slipped.
+        released, rode = mine["velocity_after"][:2]
+        told[1] = not np.allclose(rode, released, rtol=1e-3, atol=1e-6)
+    told[held] = True
+    stories = np.flatnonzero(told)
+    lines = [f"t = {mine['t'][i]:.3f} s: {sentence(recording, mine[i])}" for i in stories]
+    carried = "rides the incoming belt" if _is_carried(recording, mine) else ""
+    gone = float(recording.track(0)["t"][-1])
+    near = 0.25 * float(np.diff(times).min(initial=np.inf))
+    flying = in_flight(recording, times, near)
+    still: NDArray[np.bool_] = ~np.any(subset(recording, [0]).at(times)[1], axis=(1, 2))
+    captions = []
+    for t, flies, lies in zip(times, flying.tolist(), np.asarray(still).tolist(), strict=True):
+        story = int(np.searchsorted(mine["t"][stories], t, side="right")) - 1
+        if story >= 0 and _still_told(mine[stories[story]], t, slow, flying=flies):
+            captions.append(lines[story])
+        elif story < 0 and carried:
+            captions.append(carried)
+        else:
+            latest = int(np.searchsorted(mine["t"], t, side="right")) - 1
+            known = latest >= 0 and t <= gone
+            event = mine[latest]
+            captions.append(going_on(recording, event, flying=flies, still=lies) if known else "")
+    for i in held:
+        # What else happens in the same instant has to wait for the next picture.
+        at = int(np.searchsorted(times, mine["t"][i]))
+        captions[at] = lines[int(np.searchsorted(stories, i))]
+    return captions
+
+
+def _is_carried(recording: Recording, mine: NDArray[Any]) -> bool:
+    """Tell whether particle 0 comes on the incoming belt: that is the first it leaves."""
+    struck = np.isin(mine["kind"], [int(kind) for kind in STRUCK])
+    leaves = np.flatnonzero(struck | (mine["kind"] == Kind.SEPARATION))
+    incoming = recording.surface_index("incoming")
+    return bool(len(leaves)) and not struck[leaves[0]] and mine["surface"][leaves[0]] == incoming
+
+
+def _still_told(event: Any, t: float, slow: float, *, flying: bool) -> bool:
+    """Tell whether an event is news at time t, or the beginning of what still goes on.
+
+    An impact is no news any more once the particle slides.
+    """
+    kind = Kind(int(event["kind"]))
+    if kind in (Kind.STICK, Kind.SETTLE, Kind.EXIT):
+        return True
+    return slow * (t - float(event["t"])) <= TOLD and (flying or kind not in STRUCK)

@@ -1,0 +1,376 @@
+"""The picture of the film: a background drawn once, and what moves on it.
+
+- Where everything is in the picture, and which part of the world it shows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from textwrap import shorten
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from chutelab.machine import Machine
+from chutelab.pictures.animation.actors import LONGEST, Bars, Crowd, Drives, Nominal
+from chutelab.pictures.animation.moments import Moment, span
+from chutelab.pictures.animation.palette import Label, Lettering, Pixels, canvas_of, pixels_of
+from chutelab.pictures.plots import Window, analytic_of, draw_analytic, draw_scene, style, window_of
+from chutelab.pictures.plots.scenery import around, energies, round_step, subset, track_times
+from chutelab.results import Recording
+from chutelab.theory import Transfer
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.lines import Line2D
+    from matplotlib.text import Text
+
+Floats = NDArray[np.float64]
+Box = tuple[float, float, float, float]
+
+SHOWS = ("parabola", "trails", "strobe", "velocity", "energy")
+"""What a picture can show besides the machine and the particles."""
+
+INCHES = (8.0, 4.5)
+"""Width and height of the picture at least: text keeps its share of it at any pixel size."""
+
+LEAST = (320, 180)
+"""Pixels below which text cannot be read."""
+
+TRAIL = 0.07
+"""Share of the window's width that the trail of the fastest particle is long."""
+
+NAME = 0.21
+"""Share of the window's width for the incoming belt's name, which stands left of the pulley."""
+
+LETTER_ROOM = 0.015
+"""Share of the window's width between its edges and what moves."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where everything is; boxes are left, bottom, width and height as shares of the picture.
+
+    Attributes
+    ----------
+    width, height : int
+        Pixels.
+    title, question : str
+        What stands above the scene; the question may be empty.
+    shows : frozenset of str
+        Some of `SHOWS`.
+    window : Window
+        What of the world is shown, of the shape of `view`.
+    fastest : float
+        m/s; particle 0's highest speed while it is in the window.
+    """
+
+    width: int
+    height: int
+    title: str
+    question: str
+    shows: frozenset[str]
+    window: Window
+    fastest: float
+
+    @property
+    def arrow(self) -> float:
+        """Length of the arrow of the velocity for 1 m/s, m; 0: there is none."""
+        return self._reach(LONGEST) if "velocity" in self.shows else 0.0
+
+    @property
+    def trail(self) -> float:
+        """Time that trails reach back, s; 0: there are none."""
+        return self._reach(TRAIL) if "trails" in self.shows else 0.0
+
+    def _reach(self, share: float) -> float:
+        return share * self.window.width / self.fastest if self.fastest > 0.0 else 0.0
+
+    @property
+    def dpi(self) -> float:
+        """Pixels to the inch."""
+        return min(self.width / INCHES[0], self.height / INCHES[1])
+
+    @property
+    def view(self) -> Box:
+        """The scene."""
+        return _view(self.shows, self.question)
+
+    @property
+    def bars(self) -> Box:
+        """The energy bars; above them is room for their title, and the clock."""
+        _, bottom, _, height = self.view
+        return (0.765, 0.43, 0.225, bottom + height - 0.06 - 0.43)
+
+    @property
+    def table(self) -> Box:
+        """The names and figures of the bars."""
+        return (0.73, 0.125, 0.26, 0.245)
+
+
+def _view(shows: frozenset[str], question: str) -> Box:
+    return (0.015, 0.135, 0.675 if "energy" in shows else 0.97, 0.65 if question else 0.71)
+
+
+def lay_out(
+    recording: Recording,
+    machine: Machine,
+    *,
+    width: int,
+    height: int,
+    title: str | None = None,
+    question: str = "",
+    shows: frozenset[str] = frozenset(SHOWS),
+) -> Layout:
+    """Choose the window such that everything that moves, arrows included, is in the picture.
+
+    Raises
+    ------
+    ValueError
+        If the picture is too small, or `shows` has an unknown name.
+    """
+    if width < LEAST[0] or height < LEAST[1]:
+        raise ValueError(f"{width} x {height} pixels: allowed are at least {LEAST[0]} x {LEAST[1]}")
+    if unknown := sorted(shows - set(SHOWS)):
+        raise ValueError(f"show = {unknown[0]!r}: allowed are {', '.join(SHOWS)}")
+    view = _view(shows, question)
+    aspect = view[2] * width / (view[3] * height)
+    window = window_of(recording, machine).fitted(aspect)
+    position, velocity = _seen(recording, window)
+    fastest = float(np.hypot(*velocity.T).max(initial=0.0))
+    said = recording.title if title is None else title
+    tight = Layout(width, height, said, question, shows, window, fastest)
+    corners = [(window.left, window.bottom), (window.right, window.top)]
+    if machine.pulley is not None:
+        corners.append((-machine.pulley.radius - NAME * window.width, 0.0))
+    room = LETTER_ROOM * window.width
+    tips = position + tight.arrow * velocity
+    grown = around(np.concatenate([corners, tips - room, tips + room]))
+    return replace(tight, window=grown.fitted(aspect))
+
+
+def _seen(recording: Recording, window: Window) -> tuple[Floats, Floats]:
+    """Return positions and velocities of particle 0, (P, 2), while it is filmed in the window.
+
+    What has left it for good shall not make all else small.
+    """
+    begin, end = span(recording, window)
+    times = track_times(recording, begin, min(end, float(recording.track(0)["t"][-1])))
+    position, velocity = (values[:, 0] for values in subset(recording, [0]).at(times))
+    inside = window.holds(position)
+    return position[inside], velocity[inside]
+
+
+TITLE = 0.942
+"""Height of the line that the title stands on, as a share of the picture's."""
+
+LINE = 0.065
+"""Share of the picture's height that a line below the title takes."""
+
+RIGHT = 0.99
+"""Where text ends, as a share of the picture's width."""
+
+CAPTION = 0.125
+"""Share of the picture's height, at the bottom, that the caption has to itself."""
+
+
+class Stage:
+    """Draws the moments of a film.
+
+    Parameters
+    ----------
+    recording : Recording
+        From either engine.
+    machine : Machine
+        The one it was made on.
+    prediction : Transfer
+        For the analytic parabola.
+    layout : Layout
+        Where everything is, and which part of the world is shown.
+    moments : tuple of Moment
+        The film.
+    slow : float
+        Seconds on the screen for one second of the recording.
+    """
+
+    def __init__(
+        self,
+        recording: Recording,
+        machine: Machine,
+        prediction: Transfer,
+        layout: Layout,
+        moments: tuple[Moment, ...],
+        *,
+        slow: float,
+    ) -> None:
+        self.moments = moments
+        times = np.array([moment.t for moment in moments])
+        # A hundredth of a pixel more: the canvas rounds down.
+        inches = (layout.width + 0.01) / layout.dpi, (layout.height + 0.01) / layout.dpi
+        self.figure = Figure(figsize=inches, dpi=layout.dpi)
+        self.canvas = canvas_of(self.figure)
+        self.view = self.figure.add_axes(layout.view)
+        shows = layout.shows
+        _draw_background(self.view, machine, layout.window)
+        if "parabola" in shows:
+            draw_analytic(self.view, analytic_of(recording, prediction)[0])
+        self.drives = Drives(self.view, machine)
+        self.crowd = Crowd(self.view, recording, times, trail=layout.trail)
+        self.nominal = Nominal(
+            self.view,
+            recording,
+            times,
+            trail=layout.trail,
+            arrow=layout.arrow,
+            strobe="strobe" in shows,
+        )
+        self.bars = None
+        if "energy" in shows:
+            axes, table = (self.figure.add_axes(box) for box in (layout.bars, layout.table))
+            self.bars = Bars(axes, table, energies(recording, times))
+        self._add_legend()
+        self._add_text(layout, pace_words(slow))
+        self.canvas.draw()
+        self.pixels = pixels_of(self.canvas)
+        self._background = self.pixels.copy()
+        self._captions: dict[str, Pixels] = {}
+
+    def show(self, index: int) -> None:
+        """Move everything to one moment."""
+        moment = self.moments[index]
+        self.drives.show(moment.t)
+        self.crowd.show(index)
+        self.nominal.show(index)
+        self.clock.text = f"t = {moment.t:.3f} s"
+        self.words.set_text(moment.words)
+        if self.bars is not None:
+            self.bars.show(index)
+
+    def paint(self, index: int) -> Pixels:
+        """Return the picture of one moment, (height, width), to be read before the next."""
+        self.show(index)
+        self.pixels[:] = self._background
+        renderer = self.canvas.get_renderer()
+        for actor in (self.drives, self.crowd, self.nominal):
+            for artist in actor.artists:
+                artist.draw(renderer)
+        if self.bars is not None:
+            self.bars.paint(self.pixels)
+        self.clock.paint(self.pixels)
+        self._write_words(renderer)
+        return self.pixels
+
+    def frame(self, index: int) -> NDArray[np.uint8]:
+        """Return the picture of one moment, (height, width, 3)."""
+        height, width = self.pixels.shape
+        return self.paint(index).view(np.uint8).reshape(height, width, 4)[..., :3].copy()
+
+    def _write_words(self, renderer: Any) -> None:
+        """Draw the caption, or paste it: it stays the same for many frames."""
+        said = self.words.get_text()
+        below = self.pixels[self._caption_top :]
+        if said not in self._captions:
+            self.words.draw(renderer)
+            self._captions[said] = below.copy()
+        below[:] = self._captions[said]
+
+    def _add_legend(self) -> None:
+        """Name what is drawn above the scene; the components of the velocity by their colours."""
+        first, *rest = self.nominal.legend(self.view)
+        parabola: list[Line2D] = []
+        if any(line.get_gid() == "analytic" for line in self.view.lines):
+            # Two dashes; the line's own would not fit.
+            parabola = self.view.plot([], [], color=style.ANALYTIC, label="analytic")
+            parabola[0].set(linewidth=3.0, linestyle=(0, (1.5, 0.85)))
+        legend = self.view.legend(
+            handles=[first, *self.crowd.legend(self.view), *parabola, *rest],
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.0),
+            ncols=6,
+            fontsize=style.SMALL,
+            frameon=False,
+            borderaxespad=0.1,
+            borderpad=0.3,
+            handlelength=1.5,
+            columnspacing=0.8,
+            handletextpad=0.3,
+        )
+        if self.nominal.arrows.scale:
+            for place, (name, colour) in enumerate(style.VELOCITY.items()):
+                self.view.annotate(
+                    f"$v_{name[1]}$",
+                    (1.0, 0.5),
+                    xycoords=legend.get_texts()[-1],
+                    xytext=(4.0 + 16.0 * place, 0.0),
+                    textcoords="offset points",
+                    fontsize=style.NORMAL,
+                    color=colour,
+                    va="center",
+                    # Placed beside what the legend has placed before.
+                    zorder=legend.get_zorder() + 1.0,
+                )
+
+    def _add_text(self, layout: Layout, pace: str) -> None:
+        text = self.figure.text
+        title = text(0.02, TITLE, layout.title, fontsize=style.LARGE, fontweight="bold")
+        _shorten(title, RIGHT * layout.width)
+        if layout.question:
+            asked = text(0.02, TITLE - LINE, layout.question, fontsize=style.NORMAL)
+            _shorten(asked, RIGHT * layout.width)
+        # Near what moves: the rectangle around all of it is what a frame of the file costs.
+        above = layout.view[1] + layout.view[3] + 0.02
+        slowed = text(RIGHT, above, pace, fontsize=style.NORMAL, ha="right")
+        lettering = Lettering(style.NORMAL, layout.dpi)
+        right = slowed.get_window_extent().x0 - 2.5 * lettering.widths[" "]
+        self.clock = Label(lettering, right, layout.height * (1.0 - above))
+        self.words = text(0.02, 0.055, "", fontsize=style.NORMAL, va="center", linespacing=1.25)
+        self.words.set_animated(True)
+        self._caption_top = round(layout.height * (1.0 - CAPTION))
+
+
+def _shorten(text: Text, right: float) -> None:
+    """Cut a text off at the end of a word such that it ends before a column of pixels."""
+    whole = text.get_text()
+    length = len(whole)
+    while text.get_window_extent().x1 > right and length > 1:
+        length -= 1
+        text.set_text(shorten(whole, length, placeholder=" …"))
+
+
+def pace_words(slow: float) -> str:
+    """Return how the film's clock runs.
+
+    >>> pace_words(10.0), pace_words(1.0), pace_words(0.5)
+    ('10× slower', 'real time', '2× faster')
+    """
+    if slow == 1.0:
+        return "real time"
+    return f"{slow:.3g}× slower" if slow > 1.0 else f"{1.0 / slow:.3g}× faster"
+
+
+def _draw_background(ax: Axes, machine: Machine, window: Window) -> None:
+    draw_scene(ax, machine, window)
+    ax.set_xticks([])
+    ax.set_yticks([])
+    for spine in ax.spines.values():
+        spine.set_color(style.STEEL_LIGHT)
+    _draw_scale(ax)
+
+
+def _draw_scale(ax: Axes) -> None:
+    """Draw a bar of round length in the upper left corner: the picture has no ticks."""
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    length = round_step(right - left, 6)
+    x, y = left + 0.015 * (right - left), top - 0.08 * (top - bottom)
+    ax.plot([x, x + length], [y, y], color=style.MUTED, linewidth=2.0, solid_capstyle="butt")
+    ax.text(
+        x + 0.5 * length,
+        y + 0.012 * (top - bottom),
+        f"{length:g} m",
+        fontsize=style.SMALL,
+        color=style.MUTED,
+        ha="center",
+        va="bottom",
+    )

@@ -1,0 +1,56 @@
+"""Sliders over the exact engine, for notebooks.
+
+>>> from chutelab.pictures.live import sliders
+>>> sliders("perpendicular")  # doctest: +SKIP
+
+- `controls`: which quantities of a scene get a slider, and a scene with other values for them.
+- `picture`: a run as SVG and a table; drawn as text, since that takes a few milliseconds.
+- `board`: the sliders and the picture together; the only module that needs ipywidgets.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    import ipywidgets
+
+    from chutelab.scene import Scene
+
+
+def sliders(scene: Scene | str | Path, overrides: Sequence[str] = ()) -> ipywidgets.VBox:
+    """Show a scene with a slider for each quantity it has: angle, speeds, ε, µ.
+
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        A scene, a file, or the name of a shipped scene.
+    overrides : sequence of str
+        ``KEY=VALUE`` each, laid over a file or shipped scene.
+
+    Returns
+    -------
+    ipywidgets.VBox
+        Put it last in a cell to see it.
+
+    Raises
+    ------
+    SceneError
+        If the scene cannot be used. What a slider makes impossible is said in words instead.
+    ImportError
+        Without ipywidgets.
+    """
+    from chutelab.scene import Scene, load
+
+    try:
+        from chutelab.pictures.live.board import Board
+    except ModuleNotFoundError as error:
+        message = 'live sliders need ipywidgets: python -m pip install "chutelab[notebook]"'
+        raise ImportError(message) from error
+    return Board(scene if isinstance(scene, Scene) else load(scene, overrides)).box
+
+
+__all__ = ["sliders"]

@@ -1,0 +1,433 @@
+"""Pictures of a search over one key, and of how uncertain inputs spread.
+
+- Pictures of sweeps: lines over one varied key, a heat map over two, dots for samples.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from textwrap import fill, shorten
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+from numpy.typing import NDArray
+
+from chutelab.pictures.plots import style
+from chutelab.pictures.plots.style import DPI, Picture
+from chutelab.scene.units import symbol, with_unit
+from chutelab.studies.design import Solution, Uncertainty
+from chutelab.studies.sweep import NUMBERS, REASON, Sweep
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Floats = NDArray[np.float64]
+
+SIZE = (9.0, 5.6)
+BARS = (style.TRACK, style.STREAM)
+
+
+def scan(solution: Solution, *, path: str | Path | None = None) -> Figure:
+    """Draw what a search over one key looked at: the quantity, its target, answers and jumps.
+
+    Parameters
+    ----------
+    solution : Solution
+        Of one key.
+    path : path, optional
+        Also write the figure there, whole or not at all; the suffix says the format.
+
+    Raises
+    ------
+    ValueError
+        If several keys were varied.
+    OSError
+        If the file cannot be written.
+    """
+    figure = _figure(SIZE)
+    ax = figure.add_axes((0.105, 0.115, 0.865, 0.66))
+    draw_scan(ax, solution)
+    _titles(figure, solution.base.title, solution.asked)
+    style.legend_above(ax, 4)
+    figure.write(path)
+    return figure
+
+
+def draw_scan(ax: Axes, solution: Solution) -> Axes:
+    """Draw the scan of one key: each smooth piece a line, so that jumps are gaps."""
+    found = solution.scan
+    if found is None:
+        raise ValueError("several keys were varied: there is no line to draw")
+    key, (name, *_), (unit, *_) = solution.ranges[0], solution.quantities, solution.units
+    finite = np.abs(found.values[np.isfinite(found.values)])
+    factor, said = _scaled(float(finite.max()) if len(finite) else 0.0, unit)
+    style.dress(ax, with_unit(key.key, key.unit), with_unit(name, said))
+    label = name
+    for piece in found.pieces:
+        ax.plot(
+            piece.x, factor * piece.values[:, 0],
+            color=style.TRACK, linewidth=1.8, zorder=4.0, label=label, gid="quantity",
+        )  # fmt: skip
+        label = ""
+    if solution.goal == "solve":
+        ax.plot(
+            found.x, factor * found.values[:, 1],
+            color=style.ANALYTIC, linewidth=1.6, linestyle="--", zorder=3.0, label="target",
+            gid="target",
+        )  # fmt: skip
+    for i, change in enumerate(solution.changes):
+        ax.axvline(
+            change.at, color=style.MUTED, linewidth=1.0, linestyle=":", zorder=1.0,
+            label="" if i else "the particle's way changes",
+        )  # fmt: skip
+    for low, high in solution.everywhere:
+        ax.axvspan(low, high, color=style.STEEL_LIGHT, zorder=0.5, label="all solve it")
+    for jump in solution.jumps:
+        ax.plot(
+            [jump.at] * 2, [factor * jump.before, factor * jump.after],
+            color=style.STRIKE, linewidth=1.2, linestyle=":", zorder=2.0,
+        )  # fmt: skip
+    _mark(ax, solution, factor)
+    return ax
+
+
+def _mark(ax: Axes, solution: Solution, factor: float) -> None:
+    """Mark the answers, and write the key's value beside each."""
+    shown = solution.answers or ((solution.nearest,) if solution.nearest else ())
+    words = {"solve": "solution", "minimize": "least", "maximize": "most"}[solution.goal]
+    for i, answer in enumerate(shown):
+        x, y = answer.values[0], factor * answer.found[0]
+        first = solution.goal == "solve" or i == 0
+        text = words if solution.solved else "nearest"
+        ax.plot(
+            x, y,
+            marker="o" if solution.solved else "X", markersize=9.0 if first else 6.0,
+            linestyle="none", color=style.STRIKE, zorder=6.0,
+            markerfacecolor=style.STRIKE if first else "white",
+            label=text if i == 0 else "", gid=text, clip_on=False,
+        )  # fmt: skip
+        if first:
+            left = x > 0.5 * sum(ax.get_xlim())
+            ax.annotate(
+                f"{x:.6g}", (x, y), xytext=(-9 if left else 9, 8), textcoords="offset points",
+                fontsize=style.NORMAL, horizontalalignment="right" if left else "left", zorder=7.0,
+                bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
+            )  # fmt: skip
+
+
+def spread(found: Uncertainty, *, path: str | Path | None = None) -> Figure:
+    """Draw how uncertain inputs spread: distribution, strongest input, and each one's share.
+
+    Parameters
+    ----------
+    found : Uncertainty
+        From `chutelab.studies.design.uncertainty`.
+    path : path, optional
+        Also write the figure there, whole or not at all; the suffix says the format.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    rows = len(found.quantities)
+    figure = _figure((13.0, 1.4 + 3.1 * rows))
+    height = 1.4 + 3.1 * rows
+    grid = figure.add_gridspec(
+        rows, 3, left=0.06, right=0.985, top=1.0 - 1.15 / height, bottom=0.55 / height,
+        hspace=0.42, wspace=0.36, width_ratios=(1.0, 1.0, 1.0),
+    )  # fmt: skip
+    for row in range(rows):
+        draw_distribution(figure.add_subplot(grid[row, 0]), found, row)
+        draw_strongest(figure.add_subplot(grid[row, 1]), found, row)
+        ax = draw_shares(figure.add_subplot(grid[row, 2]), found, row)
+        if row < rows - 1:
+            ax.set_xlabel("")
+    given = ", ".join(
+        f"{one.key} = {one.mean:g} ± {one.spread:.3g} {symbol(one.unit)}".rstrip()
+        for one in found.spreads
+    )
+    _titles(figure, found.scene, given, wide=150)
+    figure.write(path)
+    return figure
+
+
+def draw_distribution(ax: Axes, found: Uncertainty, row: int) -> Axes:
+    """Draw the distribution of a quantity, its mean and its 95 % interval."""
+    values = found.outputs[:, row]
+    values = values[np.isfinite(values)]
+    factor, unit = _scaled(float(np.abs(values).max()) if len(values) else 0.0, found.units[row])
+    name = found.quantities[row]
+    style.dress(ax, with_unit(name, unit), "samples", name)
+    if not len(values):
+        return ax
+    low, high = factor * found.interval[row]
+    ax.hist(
+        factor * values, bins=40, color=style.STREAM, edgecolor="white", linewidth=0.3, zorder=3.0
+    )
+    ax.axvspan(low, high, color=style.STEEL_LIGHT, zorder=0.5)
+    ax.axvline(factor * found.mean[row], color=style.INK, linewidth=1.4, zorder=4.0)
+    ax.set_title(
+        f"95 %: {low:.4g} to {high:.4g}", fontsize=style.SMALL, loc="right", color=style.MUTED
+    )
+    return ax
+
+
+def draw_strongest(ax: Axes, found: Uncertainty, row: int) -> Axes:
+    """Draw a quantity against the input that explains most of it."""
+    first = np.nan_to_num(found.indices[row].first)
+    k = int(np.argmax(first))
+    one = found.spreads[k]
+    values = found.outputs[:, row]
+    finite = np.abs(values[np.isfinite(values)])
+    factor, unit = _scaled(float(finite.max()) if len(finite) else 0.0, found.units[row])
+    style.dress(
+        ax,
+        with_unit(one.key, one.unit),
+        with_unit(found.quantities[row], unit),
+        f"against {one.key}",
+    )
+    ax.plot(
+        found.inputs[:, k], factor * values,
+        linestyle="none", marker=".", markersize=3.0, color=style.TRACK, alpha=0.5, zorder=3.0,
+    )  # fmt: skip
+    return ax
+
+
+def draw_shares(ax: Axes, found: Uncertainty, row: int) -> Axes:
+    """Draw the share of the variance that each input explains, alone and with its interactions."""
+    indices = found.indices[row]
+    name = found.quantities[row]
+    style.dress(ax, "share of the variance, %", "", f"{name}: who is to blame")
+    places = np.arange(len(found.spreads), dtype=np.float64)
+    for offset, label, values, spans, colour in (
+        (-0.19, "alone", indices.first, indices.first_interval, BARS[0]),
+        (0.19, "with interactions", indices.total, indices.total_interval, BARS[1]),
+    ):
+        shown = 100.0 * np.clip(np.nan_to_num(values), 0.0, None)
+        reach = 100.0 * np.clip(np.nan_to_num(spans.T), 0.0, None)
+        errors = np.clip(np.stack([shown - reach[0], reach[1] - shown]), 0.0, None)
+        ax.barh(
+            places + offset, shown, height=0.36, color=colour, zorder=3.0, label=label,
+            xerr=errors, error_kw={"ecolor": style.INK, "elinewidth": 1.0, "capsize": 2.5},
+        )  # fmt: skip
+    ax.set_yticks(places, [fill(one.key, 18, break_long_words=False) for one in found.spreads])
+    ax.invert_yaxis()
+    ax.set_xlim(0.0, max(105.0, ax.get_xlim()[1]))
+    ax.grid(visible=False, axis="y")
+    if row == 0:
+        room = max(0.45, 0.14 * len(places))
+        ax.set_ylim(len(places) - 0.5 + room, -0.5)  # below the last bar, for the legend
+        ax.legend(loc="lower center", ncols=2, fontsize=style.SMALL, frameon=False)
+    return ax
+
+
+def _figure(size: tuple[float, float]) -> Picture:
+    return Picture(figsize=size, dpi=DPI)
+
+
+def _titles(figure: Picture, title: str, text: str, wide: int = 95) -> None:
+    """Write a title, and a line below it."""
+    height = float(figure.get_figheight())
+    figure.headline(0.02, 1.0 - 0.28 / height, title, 70)
+    figure.text(
+        0.02, 1.0 - 0.47 / height, fill(text, wide),
+        fontsize=style.NORMAL, color=style.MUTED, verticalalignment="top",
+    )  # fmt: skip
+
+
+def _scaled(largest: float, unit: str) -> tuple[float, str]:
+    """Return a factor and the prefixed unit, for units that take prefixes."""
+    if unit in ("J", "W", "m") and largest:
+        return style.scaled(largest, unit)
+    return 1.0, unit
+
+
+SWEEP_SIZE = (8.6, 5.4)
+"""Width and height of the figure, inches."""
+
+MOST_LINES = 8
+"""Values of a second key up to which each has a line; more make a heat map."""
+
+DOTS = 60
+"""Values up to which a line shows where they are."""
+
+COLORS = "viridis"
+"""From dark to light with growing values, also for colour-blind readers and in print."""
+
+LIGHTEST = 0.88
+"""Share of the colours that is used for lines: what follows is too light on white."""
+
+
+def sweep_figure(swept: Sweep, column: str, *, path: str | Path | None = None) -> Figure:
+    """Draw one column of a sweep over its varied keys.
+
+    Parameters
+    ----------
+    swept : Sweep
+        With one or two keys of more than one value.
+    column : str
+        Name of a column of numbers.
+    path : path, optional
+        Also write the figure there, whole or not at all; the suffix says the format.
+
+    Raises
+    ------
+    ValueError
+        If more than two keys vary, or there is no such column.
+    """
+    if column not in NUMBERS:
+        raise ValueError(f"{column}: one of {', '.join(NUMBERS)}")
+    figure = Picture(figsize=SWEEP_SIZE, dpi=DPI)
+    ax = figure.add_subplot()
+    axes = varied(swept)
+    if swept.shape is None:
+        draw_samples(ax, swept, column)
+    elif len(axes) == 2 and min(len(np.unique(swept.columns[key])) for key in axes) > MOST_LINES:
+        draw_heat(ax, swept, column)
+    else:
+        draw_lines(ax, swept, column)
+    figure.subplots_adjust(left=0.115, right=0.97, top=0.86, bottom=0.18)
+    figure.headline(0.03, 0.955, swept.title)
+    figure.text(
+        0.03, 0.03, _missing(swept, column), fontsize=style.SMALL, color=style.MUTED, va="center"
+    )
+    figure.write(path)
+    return figure
+
+
+def varied(swept: Sweep) -> list[str]:
+    """Return the keys that have more than one value; the first key if none has.
+
+    Raises
+    ------
+    ValueError
+        If more than two have.
+    """
+    keys = [key for key in swept.quantities if len(np.unique(swept.columns[key])) > 1]
+    if len(keys) > 2:
+        raise ValueError(f"a picture shows one or two varied keys, not {len(keys)}")
+    return keys or list(swept.quantities)[:1]
+
+
+def draw_lines(ax: Axes, swept: Sweep, column: str) -> Axes:
+    """Draw a line over the key with the most values, one for each value of the other key."""
+    keys = sorted(varied(swept), key=lambda key: -len(np.unique(swept.columns[key])))
+    scale, label = _axis(swept, column)
+    x, y = swept.columns[keys[0]], swept.columns[column] * scale
+    others = swept.columns[keys[1]] if len(keys) > 1 else np.zeros(len(x))
+    values = np.unique(others)
+    shades = mpl.colormaps[COLORS](np.linspace(0.0, LIGHTEST, len(values)))
+    for value, shade in zip(values.tolist(), shades, strict=True):
+        mine = np.flatnonzero(others == value)
+        mine = mine[np.argsort(x[mine], kind="stable")]
+        ax.plot(
+            x[mine], y[mine], color=shade if len(values) > 1 else style.TRACK, linewidth=1.8,
+            marker="o" if len(mine) <= DOTS else "", markersize=4.0, label=f"{value:g}",
+        )  # fmt: skip
+    _span(ax, x)
+    style.dress(ax, _label(swept, keys[0]), label)
+    if len(values) > 1:
+        ax.legend(
+            title=_label(swept, keys[1]), loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=8,
+            frameon=False, fontsize=style.SMALL, title_fontsize=style.SMALL, columnspacing=1.2,
+            handlelength=1.4, borderaxespad=0.2, alignment="right",
+        )  # fmt: skip
+    return ax
+
+
+def draw_heat(ax: Axes, swept: Sweep, column: str) -> Axes:
+    """Draw a heat map over two keys; grey where there is nothing to tell."""
+    first, second = varied(swept)
+    (x, across), (y, up) = (
+        np.unique(swept.columns[key], return_inverse=True) for key in (first, second)
+    )
+    scale, label = _axis(swept, column)
+    field = np.full((len(y), len(x)), np.nan)
+    field[up, across] = swept.columns[column] * scale
+    ax.set_facecolor(style.STEEL_LIGHT)
+    diverges = np.nanmin(field, initial=0.0) < 0.0 < np.nanmax(field, initial=0.0)
+    reach = float(np.nanmax(np.abs(field), initial=0.0))
+    limits: dict[str, Any] = {"cmap": COLORS}
+    if diverges:
+        # White where the sign changes: that is often what is looked for.
+        limits = {"cmap": "RdBu_r", "vmin": -reach, "vmax": reach}
+    mesh = ax.pcolormesh(_edges(x), _edges(y), field, rasterized=True, **limits)
+    style.dress(ax, _label(swept, first), _label(swept, second))
+    ax.grid(visible=False)
+    if np.isfinite(field).any():
+        _bar(ax, mesh, label)
+    return ax
+
+
+def draw_samples(ax: Axes, swept: Sweep, column: str) -> Axes:
+    """Draw a dot for each sample, over one key, or over two with its value as the colour."""
+    keys = varied(swept)
+    scale, label = _axis(swept, column)
+    z = swept.columns[column] * scale
+    if len(keys) == 1:
+        ax.plot(swept.columns[keys[0]], z, "o", markersize=3.5, color=style.TRACK, alpha=0.7)
+        _span(ax, swept.columns[keys[0]])
+        return style.dress(ax, _label(swept, keys[0]), label)
+    x, y = (swept.columns[key] for key in keys)
+    known = np.isfinite(z)
+    ax.plot(x[~known], y[~known], "x", markersize=4.0, color=style.STEEL)
+    dots = ax.scatter(x[known], y[known], c=z[known], cmap=COLORS, s=16.0)
+    style.dress(ax, _label(swept, keys[0]), _label(swept, keys[1]))
+    if known.any():
+        _bar(ax, dots, label)
+    return ax
+
+
+def _span(ax: Axes, x: Floats) -> None:
+    """Show the whole range, also where there are no rows."""
+    low, high = float(x.min()), float(x.max())
+    if low < high:
+        margin = 0.03 * (high - low)
+        ax.set_xlim(low - margin, high + margin)
+
+
+def _bar(ax: Axes, painted: Any, label: str) -> None:
+    """Add the scale of colours."""
+    bar = ax.figure.colorbar(painted, ax=ax, pad=0.02)
+    bar.set_label(label, fontsize=style.NORMAL)
+    bar.ax.tick_params(labelsize=style.SMALL)
+
+
+def _label(swept: Sweep, key: str) -> str:
+    return with_unit(key, swept.unit(key))
+
+
+def _axis(swept: Sweep, column: str) -> tuple[float, str]:
+    """Return the factor that makes a column easy to read, and its label."""
+    what, unit = NUMBERS[column][0].split(",")[0], swept.unit(column)
+    what = what if what.startswith(("x ", "y ")) else what[0].upper() + what[1:]
+    if column.endswith("_spread"):
+        what = f"Standard deviation of {column.removesuffix('_spread')}"
+    values = swept.columns[column]
+    known = np.abs(values[np.isfinite(values)])
+    if not unit or not len(known):
+        return 1.0, what
+    factor, name = style.scaled(float(known.max()), unit)
+    return factor, f"{what}, {name}"
+
+
+def _edges(values: Floats) -> Floats:
+    """Return the borders between values, and beyond the first and the last one."""
+    middle = 0.5 * (values[1:] + values[:-1])
+    return np.concatenate(
+        [[values[0] - (middle[0] - values[0])], middle, [values[-1] + (values[-1] - middle[-1])]]
+    )
+
+
+def _missing(swept: Sweep, column: str) -> str:
+    """Say how many variants are not in the picture, and the commonest reason."""
+    gone = np.flatnonzero(~np.isfinite(swept.columns[column]))
+    if not len(gone):
+        return ""
+    reasons = Counter(reason for reason in swept.columns[REASON][gone].tolist() if reason)
+    why = "".join(f", most: {reason}" for reason, _ in reasons.most_common(1))
+    return shorten(f"{len(gone):,} of {len(swept):,} have none{why}", 118, placeholder=" …")

@@ -1,0 +1,216 @@
+"""The overlay: one figure that shows a recording on top of its analytic parabola.
+
+- The paper's figures, computed anew: as printed on the left, corrected on the right.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from textwrap import fill
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chutelab.pictures.plots import style
+from chutelab.pictures.plots.panels import (
+    STREAM_TRACKS,
+    Arc,
+    analytic_of,
+    draw_analytic,
+    draw_ledger,
+    draw_residual,
+    draw_tracks,
+    draw_velocity,
+)
+from chutelab.pictures.plots.scenery import draw_scene, machine_of, window_of
+from chutelab.pictures.plots.style import DPI, Picture
+from chutelab.results import Recording
+from chutelab.results.comparison import scene_of
+from chutelab.theory import Transfer, predict
+from chutelab.theory.figures import Line, Panel, PaperFigure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+SIZE = (13.0, 7.6)
+"""Width and height of the figure, inches."""
+
+
+def overlay(
+    recording: Recording, prediction: Transfer | None = None, *, path: str | Path | None = None
+) -> Figure:
+    """Draw a recording over its analytic parabola.
+
+    Parameters
+    ----------
+    recording : Recording
+        From either engine.
+    prediction : Transfer, optional
+        By default `chutelab.theory.prediction` of the recording's scene.
+    path : path, optional
+        Also write the figure there, whole or not at all; the suffix says the format.
+
+    Returns
+    -------
+    Figure
+        Scene with tracks, residual beneath it, velocity and energy ledger beside it.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    if prediction is None:
+        prediction = predict(scene_of(recording))
+    figure = Picture(figsize=SIZE, dpi=DPI)
+    grid = figure.add_gridspec(
+        2, 1, height_ratios=(4.2, 1.0), left=0.06, right=0.56, top=0.88, bottom=0.08, hspace=0.28
+    )
+    side = figure.add_gridspec(2, 1, left=0.63, right=0.985, top=0.88, bottom=0.155, hspace=0.34)
+    parts, start = analytic_of(recording, prediction)
+    view = figure.add_subplot(grid[0])
+    draw_view(view, recording, parts)
+    draw_residual(figure.add_subplot(grid[1]), recording, parts, start, str(prediction.reason))
+    draw_velocity(figure.add_subplot(side[0]), recording, parts, start)
+    books = draw_ledger(figure.add_subplot(side[1]), recording)
+    figure.legend(
+        *books.get_legend_handles_labels(),
+        loc="lower center",
+        bbox_to_anchor=(0.8075, 0.005),
+        ncols=3,
+        fontsize=style.SMALL,
+        frameon=False,
+        handlelength=1.4,
+        columnspacing=1.0,
+    )
+    figure.headline(0.06, 0.965, recording.title)
+    engine = figure.text(0.985, 0.965, _said(recording), fontsize=style.NORMAL, color=style.MUTED)
+    engine.set(horizontalalignment="right", verticalalignment="center")
+    figure.write(path)
+    return figure
+
+
+def draw_view(ax: Axes, recording: Recording, parts: tuple[Arc, ...]) -> Axes:
+    """Draw the scene to scale with tracks, strobe dots and the analytic parabola, and a legend."""
+    machine = machine_of(recording)
+    style.dress(ax, "x, m", "y, m")
+    draw_scene(ax, machine, window_of(recording, machine))
+    draw_tracks(draw_analytic(ax, parts), recording)
+    style.legend_above(ax, 4)
+    return ax
+
+
+def _said(recording: Recording) -> str:
+    if recording.count == 1:
+        return f"engine {recording.engine}, one particle"
+    said = f"engine {recording.engine}, {recording.count:,} particles"
+    if recording.count > STREAM_TRACKS:
+        said += f", {STREAM_TRACKS} tracks drawn"
+    return said
+
+
+WIDE = 185
+"""Characters of a line of text below the panels."""
+
+COLOURS = {
+    "first": style.TRACK, "second": style.STRIKE, "third": style.BELT, "fourth": style.ANALYTIC,
+    "plate": style.INK, "belt": style.BELT,
+}  # fmt: skip
+DASHES = {"second": (0, (5, 2)), "third": (0, (2, 1.4)), "fourth": (0, (6, 1.5, 1.2, 1.5))}
+"""So that lines are told apart without colour, too."""
+
+MARGIN = 0.06
+"""Of the range of what is drawn, on each side."""
+
+TEXT = 0.215
+"""Height of a line of text, inches."""
+
+
+def paper_figure(found: PaperFigure, *, path: str | Path | None = None) -> Figure:
+    """Draw a figure of the paper: panels side by side, and in words what the misprint does.
+
+    Parameters
+    ----------
+    found : PaperFigure
+        From `chutelab.theory.figures.figure`.
+    path : path, optional
+        Also write the figure there, whole or not at all; the suffix says the format.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    texts = [fill(text, WIDE) for text in found.meaning]
+    texts += [fill(f"Not in the paper's text: {text}", WIDE) for text in found.missing]
+    lines = sum(text.count("\n") + 1 for text in texts)
+    panels = [panel for pair in found.panels for panel in pair]
+    below = TEXT * lines + 0.85
+    height = 1.0 + 4.1 + below
+    figure = Picture(figsize=(13.0, height), dpi=DPI)
+    grid = figure.add_gridspec(
+        1, len(panels), left=0.06, right=0.985, top=1.0 - 1.0 / height, bottom=below / height,
+        wspace=0.16 if len(panels) == 2 else 0.3,
+    )  # fmt: skip
+    axes = [draw_panel(figure.add_subplot(grid[i]), panel) for i, panel in enumerate(panels)]
+    for i in range(0, len(panels), 2):
+        _alike(axes[i], axes[i + 1])
+    if panels[0].to_scale:
+        figure.legend(
+            *axes[0].get_legend_handles_labels(), loc="upper right",
+            bbox_to_anchor=(0.985, 1.0 - 0.12 / height), ncols=4, fontsize=style.SMALL,
+            frameon=False,
+        )  # fmt: skip
+    title = f"Figure {found.number}: {found.title}"
+    figure.headline(0.02, 1.0 - 0.3 / height, title, 150)
+    y = below - 0.65
+    for i, text in enumerate(texts):
+        figure.text(
+            0.02, y / height, text, fontsize=style.SMALL, verticalalignment="top",
+            color=style.INK if i < len(found.meaning) else style.MUTED,
+        )  # fmt: skip
+        y -= TEXT * (text.count("\n") + 1)
+    figure.write(path)
+    return figure
+
+
+def draw_panel(ax: Axes, panel: Panel) -> Axes:
+    """Draw one panel."""
+    style.dress(ax, panel.x_label, panel.y_label, panel.title)
+    for line in panel.lines:
+        _draw(ax, line)
+    if panel.to_scale:
+        ax.set_aspect("equal", adjustable="box")
+    else:
+        ax.legend(loc="best", fontsize=style.SMALL, framealpha=0.85, edgecolor="none")
+    return ax
+
+
+def _draw(ax: Axes, line: Line) -> None:
+    solid = line.role in ("plate", "belt")
+    ax.plot(
+        line.x, line.y,
+        color=COLOURS[line.role], linewidth=3.0 if solid else 1.8,
+        linestyle=DASHES.get(line.role, "-"), label=line.label, zorder=3.0 if solid else 4.0,
+        gid=line.role,
+    )  # fmt: skip
+    if line.marks is not None:
+        ax.plot(
+            line.marks[:, 0], line.marks[:, 1],
+            linestyle="none", marker="o", markersize=4.5, color=COLOURS[line.role],
+            markerfacecolor="white", zorder=5.0,
+        )  # fmt: skip
+
+
+def _alike(left: Axes, right: Axes) -> None:
+    """Give two panels the same axes: the eye compares heights."""
+    corners = np.concatenate([ax.dataLim.get_points() for ax in (left, right)])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    margin = MARGIN * (high - low)
+    for ax in (left, right):
+        ax.set_xlim(low[0] - margin[0], high[0] + margin[0])
+        ax.set_ylim(low[1] - margin[1], high[1] + margin[1])
+        if low[1] > 2.0 * margin[1]:
+            ax.set_title("axis not from 0", fontsize=style.SMALL, loc="right", color=style.MUTED)

@@ -1,0 +1,181 @@
+"""Measured points over simulation and parabola, and what is left between them over time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from chutelab.pictures.plots import style
+from chutelab.pictures.plots.figure import SIZE
+from chutelab.pictures.plots.panels import analytic_of, draw_analytic
+from chutelab.pictures.plots.scenery import (
+    FAR,
+    around,
+    draw_scene,
+    machine_of,
+    struck_by_nominal,
+    subset,
+    track_times,
+    window_of,
+)
+from chutelab.pictures.plots.style import DPI, Picture
+from chutelab.results import Kind, Recording
+from chutelab.results.comparison import scene_of
+from chutelab.scene.units import write_size
+from chutelab.studies.measured import Fit, Residuals
+from chutelab.studies.measured.result import plus_minus
+from chutelab.studies.measured.track import counted
+from chutelab.theory import predict
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+PARAMETERS = 6
+"""Fitted parameters that are written into the figure."""
+
+AXES = ("x", "y")
+
+
+def measured(found: Residuals, fit: Fit | None = None, *, path: str | Path | None = None) -> Figure:
+    """Draw a measured track over the simulation and its analytic parabola, and the residuals.
+
+    Parameters
+    ----------
+    found : Residuals
+        From `chutelab.studies.measured.residuals`; of a fit, its `after`.
+    fit : Fit, optional
+        Also draw the track before the fit, and write the fitted values.
+    path : path, optional
+        Also write the figure there, whole or not at all; the suffix says the format.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    figure = Picture(figsize=SIZE, dpi=DPI)
+    lines = 0 if fit is None else min(len(fit.parameters), PARAMETERS)
+    top = 0.88 - 0.032 * max(0, lines - 1)
+    view = figure.add_subplot(
+        figure.add_gridspec(1, 1, left=0.06, right=0.56, top=0.88, bottom=0.08)[0]
+    )
+    draw_measured(view, found, None if fit is None else fit.before.recording)
+    grid = figure.add_gridspec(2, 1, left=0.64, right=0.985, top=top, bottom=0.08, hspace=0.3)
+    upper = figure.add_subplot(grid[0])
+    draw_residuals(upper, found, 0)
+    upper.set_xlabel("")
+    draw_residuals(figure.add_subplot(grid[1]), found, 1)
+    figure.headline(0.06, 0.965, found.recording.title, 60)
+    said = [] if fit is None else _said(fit)
+    for i, text in enumerate(said or [f"{len(found.track)} measured points, nothing fitted"]):
+        figure.text(
+            0.985, 0.965 - 0.032 * i, text, fontsize=style.NORMAL, color=style.MUTED,
+            horizontalalignment="right", verticalalignment="center",
+        )  # fmt: skip
+    figure.write(path)
+    return figure
+
+
+def draw_measured(ax: Axes, found: Residuals, before: Recording | None = None) -> Axes:
+    """Draw the machine, the simulated track, the analytic parabola, and the measured points.
+
+    Parameters
+    ----------
+    before : Recording, optional
+        A run to show dotted: the one that a fit started from.
+    """
+    recording, position = found.recording, found.track.position
+    machine = machine_of(recording)
+    window = window_of(recording, machine)
+    far = window.padded(*[FAR] * 4)
+    corners = np.array([[window.left, window.bottom], [window.right, window.top]])
+    style.dress(ax, "x, m", "y, m")
+    shown = far.holds(position)
+    draw_scene(ax, machine, around(np.concatenate([corners, position[shown]])))
+    parts, _ = analytic_of(recording, predict(scene_of(recording)))
+    draw_analytic(ax, parts)
+    if before is not None:
+        ax.plot(
+            *_path(before).T,
+            color=style.MUTED, linewidth=1.4, linestyle=":", zorder=4.8, gid="before",
+            label="before the fit",
+        )  # fmt: skip
+    ax.plot(
+        *_path(recording).T,
+        color=style.TRACK, linewidth=1.6, zorder=5.0, gid="track", label="simulation",
+    )  # fmt: skip
+    for chosen, colour, label in (
+        (found.used, style.STRIKE, "measured"),
+        (~found.used, style.STEEL, "measured, left out"),
+    ):
+        if chosen.any():
+            ax.plot(
+                *position[chosen].T,
+                linestyle="none", marker="+", markersize=7.0, markeredgewidth=1.3, color=colour,
+                zorder=8.0, gid=label, label=label,
+            )  # fmt: skip
+    if not shown.all():
+        ax.text(
+            0.5, 0.97, f"{counted(int((~shown).sum()), 'point')} outside the picture",
+            transform=ax.transAxes, fontsize=style.NORMAL, color=style.STRIKE,
+            horizontalalignment="center", verticalalignment="top",
+        )  # fmt: skip
+    style.legend_above(ax, 3)
+    return ax
+
+
+def draw_residuals(ax: Axes, found: Residuals, axis: int) -> Axes:
+    """Draw measured minus simulated x (axis 0) or y (axis 1) over time, with the impacts."""
+    used = found.used
+    times, values = found.track.t[used], found.values[used, axis]
+    factor, unit = style.scaled(float(np.abs(values).max()), "m")
+    name, rms = AXES[axis], found.rms[axis]
+    style.dress(
+        ax,
+        "time, s",
+        f"residual in {name}, {unit}",
+        f"Measured − simulated {name}: RMS {write_size(rms, 'm')}",
+    )
+    ax.axhspan(-factor * rms, factor * rms, color=style.STEEL_LIGHT, zorder=0.5, gid="rms")
+    ax.axhline(0.0, color=style.TRACK, linewidth=1.6, zorder=2.0)
+    ax.plot(
+        times, factor * values,
+        linestyle="none", marker="+", markersize=7.0, markeredgewidth=1.3, color=style.STRIKE,
+        zorder=3.0, gid=f"residual {name}",
+    )  # fmt: skip
+    bottom, top = ax.get_ylim()
+    ax.set_ylim(bottom, top + 0.12 * (top - bottom))
+    ax.set_title("grey: ± RMS", fontsize=style.SMALL, loc="right", color=style.MUTED)
+    low, high = float(times[0]), float(times[-1])
+    margin = 0.03 * (high - low)
+    ax.set_xlim(low - margin, high + margin)
+    for event in struck_by_nominal(found.recording)[:10]:
+        if low - margin <= event["t"] <= high + margin:
+            ax.axvline(event["t"], color=style.MUTED, linewidth=1.0, linestyle=":", zorder=1.0)
+            ax.annotate(
+                Kind(event["kind"]).name.lower(),
+                (event["t"], 1.0), xycoords=("data", "axes fraction"), xytext=(-3, -3),
+                textcoords="offset points", fontsize=style.SMALL, color=style.MUTED,
+                horizontalalignment="right", verticalalignment="top",
+            )  # fmt: skip
+    return ax
+
+
+def _path(recording: Recording) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    """Return the track of particle 0 as points (T, 2), m."""
+    clock = recording.track(0)["t"]
+    times = track_times(recording, float(clock[0]), float(clock[-1]))
+    return subset(recording, [0]).at(times)[0][:, 0]
+
+
+def _said(fit: Fit) -> list[str]:
+    return [
+        f"{parameter.key} = {plus_minus(value, error)} {parameter.unit}".rstrip()
+        for parameter, value, error in zip(
+            fit.parameters[:PARAMETERS], fit.values, fit.errors, strict=False
+        )
+    ]

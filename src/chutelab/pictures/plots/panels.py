@@ -1,0 +1,391 @@
+"""The panels of the overlay; each function takes axes, draws one thing and returns the axes.
+
+- The analytic parabola of a transfer, as arcs that can be drawn and compared with.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil, cos, isfinite, log10, sin, sqrt
+from textwrap import fill, shorten
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.collections import LineCollection
+from numpy.typing import ArrayLike, NDArray
+
+from chutelab.machine.releases import on_belt, release_velocity
+from chutelab.pictures.plots import style
+from chutelab.pictures.plots.scenery import (
+    action,
+    energies,
+    round_times,
+    shown_particles,
+    strobe_step,
+    struck_by_nominal,
+    subset,
+    track_times,
+    upright,
+)
+from chutelab.results import Kind, Recording
+from chutelab.results.comparison import scene_of
+from chutelab.scene import Incoming, Scene
+from chutelab.theory import Transfer
+from chutelab.theory.separation import separation
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Arc:
+    """Free flight between two times, SI units, world frame.
+
+    Attributes
+    ----------
+    begin, end : float
+        s, on the clock that starts at separation.
+    position, velocity : tuple of float
+        m and m/s, at `begin`.
+    gravity : float
+        m/s², pointing down.
+    """
+
+    begin: float
+    end: float
+    position: tuple[float, float]
+    velocity: tuple[float, float]
+    gravity: float
+
+    def at(self, times: ArrayLike) -> tuple[Floats, Floats]:
+        """Return positions and velocities, (T, 2) each, at times (T,) since separation."""
+        t = np.asarray(times, dtype=np.float64)[:, None] - self.begin
+        pull = np.array([0.0, -self.gravity])
+        velocity = np.array(self.velocity)
+        return np.array(self.position) + t * (velocity + 0.5 * pull * t), velocity + pull * t
+
+
+def arcs(prediction: Transfer, scene: Scene) -> tuple[Arc, ...]:
+    """Return the flight to the plate and the one from the plate to the belt, as far as known.
+
+    Parameters
+    ----------
+    prediction : Transfer
+        Of the scene, see `chutelab.theory.prediction`; what is NaN in it is left out.
+    scene : Scene
+        For the radius R + r of the separation point, and for gravity.
+    """
+    phi1 = float(prediction.phi1)
+    if scene.incoming is not None and scene.plate is None:
+        return _thrown(scene, scene.incoming)
+    if scene.incoming is None or not isfinite(phi1):
+        return ()
+    riding = scene.incoming.pulley_radius + scene.particle.radius
+    point, begin = (riding * sin(phi1), riding * cos(phi1)), 0.0
+    found = []
+    # The paper counts x3 back from the plate, and both y downwards.
+    for forward, down, duration in (
+        (float(prediction.x2), float(prediction.y2), float(prediction.t2)),
+        (-float(prediction.x3), float(prediction.y3), float(prediction.t3)),
+    ):
+        if not (isfinite(forward) and isfinite(down) and 0.0 < duration < float("inf")):
+            break
+        velocity = (forward / duration, 0.5 * scene.gravity * duration - down / duration)
+        found.append(Arc(begin, begin + duration, point, velocity, scene.gravity))
+        point, begin = (point[0] + forward, point[1] - down), begin + duration
+    return tuple(found)
+
+
+def _thrown(scene: Scene, belt: Incoming) -> tuple[Arc, ...]:
+    """Return the flight from the pulley down to the outgoing belt, where nothing is in the way."""
+    out, g, r = scene.outgoing, scene.gravity, scene.particle.radius
+    if out is None or scene.surface or not g:
+        return ()
+    carried = on_belt(scene) and release_velocity(scene) == (belt.speed, 0.0) and belt.speed > 0.0
+    if not carried or (scene.stream.interact and scene.stream.count > 1):
+        return ()
+    riding = belt.pulley_radius + r
+    left = separation(
+        speed=np.array([belt.speed]),
+        ride_radius=np.array([riding]),
+        gravity=np.array([g]),
+        friction=np.array([np.inf if belt.friction == "adhesion" else float(belt.friction)]),
+        spin=np.array([scene.particle.spin]),
+    )
+    sine, cosine, speed = (float(part[0]) for part in (left.sin, left.cos, left.v1))
+    point, velocity = (riding * sine, riding * cosine), (speed * cosine, -speed * sine)
+    fall = point[1] - (belt.pulley_radius - out.drop + r)
+    if not fall > 0.0:
+        return ()
+    duration = (velocity[1] + sqrt(velocity[1] ** 2 + 2.0 * g * fall)) / g
+    landing = point[0] + velocity[0] * duration
+    if not out.start <= landing <= out.start + out.length:
+        return ()
+    return (Arc(0.0, duration, point, velocity, g),)
+
+
+def flight(parts: tuple[Arc, ...], times: ArrayLike) -> tuple[Floats, Floats]:
+    """Return positions and velocities, (T, 2), NaN off the arcs; at an impact, the state after."""
+    times = np.asarray(times, dtype=np.float64)
+    position, velocity = np.full((2, len(times), 2), np.nan)
+    for arc in parts:
+        inside = (times >= arc.begin) & (times <= arc.end)
+        position[inside], velocity[inside] = arc.at(times[inside])
+    return position, velocity
+
+
+STREAM_TRACKS = 60
+"""Tracks of a stream that are drawn; more would be one blot."""
+
+ROUNDING = 2.0**-52
+"""m; the spacing of floating-point numbers at 1 m."""
+
+FLOOR = 1e-17
+"""m; the lower end of the residual's axis, where an exact zero is drawn."""
+
+
+def analytic_of(recording: Recording, prediction: Transfer) -> tuple[tuple[Arc, ...], float]:
+    """Return the arcs known analytically, and the time (s) of the recording at which they begin."""
+    parts = arcs(prediction, scene_of(recording))
+    separated = recording.select(Kind.SEPARATION, surface="incoming")
+    if not np.any(separated["particle"] == 0):
+        return (), 0.0
+    return parts, action(recording)[0]
+
+
+def draw_tracks(ax: Axes, recording: Recording) -> Axes:
+    """Draw particle 0's track, strobe dots at round times and impact markers, over the stream's.
+
+    Of a stream, up to `STREAM_TRACKS` tracks are drawn, thin and translucent.
+    """
+    if recording.count > 1:
+        _draw_stream(ax, recording)
+    nominal = subset(recording, [0])
+    track = recording.track(0)
+    begin, end = float(track["t"][0]), float(track["t"][-1])
+    position, _ = nominal.at(track_times(recording, begin, end))
+    ax.plot(
+        *position[:, 0].T, color=style.TRACK, linewidth=1.6, zorder=5.0, gid="track", label="track"
+    )
+    step = strobe_step(recording)
+    dots, _ = nominal.at(round_times(begin, end, step))
+    ax.plot(
+        *dots[:, 0].T,
+        linestyle="none",
+        marker="o",
+        markersize=5.0,
+        markerfacecolor="white",
+        markeredgecolor=style.TRACK,
+        zorder=6.0,
+        gid="strobe",
+        label=f"every {step:g} s",
+    )
+    struck = struck_by_nominal(recording)
+    if len(struck):
+        where, _ = nominal.at(np.clip(struck["t"], begin, end))
+        ax.plot(
+            *where[:, 0].T,
+            linestyle="none",
+            marker="x",
+            markersize=8.0,
+            markeredgewidth=2.0,
+            color=style.STRIKE,
+            zorder=7.0,
+            gid="impacts",
+            label="impact",
+        )
+    return ax
+
+
+def _draw_stream(ax: Axes, recording: Recording) -> None:
+    chosen = shown_particles(recording, STREAM_TRACKS)
+    chosen = chosen[chosen != 0]
+    if not len(chosen):
+        return
+    some = subset(recording, chosen)
+    lines = []
+    for i in range(len(chosen)):
+        one = subset(some, [i])
+        knots = np.unique(one.knots["t"])
+        times = np.union1d(np.linspace(knots[0], knots[-1], 200), knots[:: len(knots) // 200 + 1])
+        lines.append(one.at(times)[0][:, 0])
+    ax.add_collection(
+        LineCollection(
+            lines, colors=style.STREAM, linewidths=0.8, alpha=0.35, zorder=3.0, gid="stream"
+        ),
+        autolim=False,
+    )
+
+
+def draw_analytic(ax: Axes, parts: tuple[Arc, ...]) -> Axes:
+    """Draw the analytic parabola, dashed; draw the track over it."""
+    if not parts:
+        return ax
+    position, _ = flight(parts, _times_of(parts))
+    ax.plot(
+        *position.T,
+        color=style.ANALYTIC,
+        linewidth=4.0,
+        linestyle=(0, (2.2, 1.1)),
+        zorder=4.5,
+        gid="analytic",
+        label="analytic parabola",
+    )
+    return ax
+
+
+def _times_of(parts: tuple[Arc, ...], each: int = 120) -> NDArray[np.float64]:
+    return np.unique(np.concatenate([np.linspace(arc.begin, arc.end, each) for arc in parts]))
+
+
+def draw_residual(
+    ax: Axes, recording: Recording, parts: tuple[Arc, ...], start: float, reason: str = ""
+) -> Axes:
+    """Draw the distance between simulated and analytic positions of particle 0, on a log scale.
+
+    Parameters
+    ----------
+    parts, start : tuple of Arc, float
+        See `analytic_of`; without arcs the panel says so, and why.
+    reason : str, optional
+        Why there is no analytic parabola, or none to the end.
+    """
+    note = shorten(f"; then {reason}", 95, placeholder=" …") if reason else ""
+    style.dress(ax, f"time since separation, s{note}", "distance, m", "Simulated − analytic")
+    if not parts:
+        ax.set_axis_off()
+        why = reason or "particle 0 does not separate from a pulley"
+        ax.text(
+            0.5,
+            0.5,
+            fill(f"no analytic parabola; {why}", 60),
+            transform=ax.transAxes,
+            fontsize=style.NORMAL,
+            color=style.MUTED,
+            horizontalalignment="center",
+            verticalalignment="center",
+        )
+        return ax
+    times = _times_of(parts)
+    known, _ = flight(parts, times)
+    clock, end = start + times, float(recording.track(0)["t"][-1])
+    # A sum may pass the end by rounding, where there is no position any more.
+    clock = np.where(np.isclose(clock, end, rtol=1e-12, atol=0.0), end, clock)
+    position, _ = subset(recording, [0]).at(clock)
+    distance = np.hypot(*(position[:, 0] - known).T)
+    flying = np.isfinite(distance)
+    times, distance = times[flying], distance[flying]
+    largest = float(distance.max(initial=0.0))
+    ax.set_yscale("log")
+    ax.axhline(ROUNDING, color=style.MUTED, linewidth=1.0, linestyle=":")
+    ax.plot(
+        times,
+        np.maximum(distance, FLOOR),
+        color=style.TRACK,
+        linestyle="none",
+        marker=".",
+        markersize=4.0,
+        gid="residual",
+    )
+    top = max(-14, ceil(log10(30.0 * largest))) if largest > 0.0 else -14
+    bottom = round(log10(FLOOR))
+    ax.set_ylim(FLOOR, 10.0**top)
+    ax.set_yticks([10.0**k for k in range(bottom, top + 1, (top - bottom + 3) // 4)])
+    ax.minorticks_off()
+    ax.set_xlim(0.0, parts[-1].end)
+    ax.set_title(
+        f"Simulated − analytic: at most {style.scientific(largest, 'm')}",
+        fontsize=style.NORMAL,
+        loc="left",
+        fontweight="bold",
+    )
+    ax.set_title(
+        "dotted: spacing of doubles at 1 m", fontsize=style.SMALL, loc="right", color=style.MUTED
+    )
+    return ax
+
+
+def draw_velocity(
+    ax: Axes, recording: Recording, parts: tuple[Arc, ...] = (), start: float = 0.0
+) -> Axes:
+    """Draw both velocity components of particle 0 over time, over the analytic ones, dashed."""
+    style.dress(ax, "time, s", "velocity, m/s", "Velocity of particle 0")
+    track = recording.track(0)
+    times = track_times(recording, float(track["t"][0]), float(track["t"][-1]))
+    _, velocity = subset(recording, [0]).at(times)
+    clock = _times_of(parts) if parts else np.empty(0)
+    if parts:
+        clock = np.unique(np.concatenate([clock, np.nextafter([arc.end for arc in parts], 0.0)]))
+    _, known = flight(parts, clock)
+    for axis, (name, label) in enumerate((("vx", "forward"), ("vy", "up"))):
+        if parts:
+            ax.plot(
+                start + clock,
+                known[:, axis],
+                color=style.ANALYTIC,
+                linewidth=4.0,
+                linestyle=(0, (2.2, 1.1)),
+                gid=f"analytic {name}",
+            )
+        ax.plot(
+            times,
+            velocity[:, 0, axis],
+            color=style.VELOCITY[name],
+            linewidth=1.6,
+            label=f"$v_{name[1]}$, {label}",
+            gid=name,
+        )
+    ax.set_xlim(times[0], _beyond(times))
+    ax.legend(fontsize=style.SMALL, loc="best", framealpha=0.85)
+    return ax
+
+
+def _beyond(times: NDArray[np.float64]) -> float:
+    """Return a time a little after the end, so that a jump at the end can be seen."""
+    return float(times[-1] + (0.04 * (times[-1] - times[0]) or 1e-3))
+
+
+def draw_ledger(ax: Axes, recording: Recording, count: int = 240) -> Axes:
+    """Draw the energy ledger of all particles over time.
+
+    Kinetic and potential energy and both losses are stacked; energy at release plus belt work is a
+    line. The line runs along the top of the stack but for the residual, which the title states.
+    """
+    t = recording.knots["t"]
+    times = np.linspace(t.min(), t.max(), count)
+    if len(recording.events) <= count:
+        times = upright(times, recording.events["t"])
+    times = np.append(times, _beyond(times))
+    books = energies(recording, times)
+    supplied = books["start"] + books["belt_work"]
+    factor, unit = style.scaled(float(np.abs(supplied).max()), "J")
+    names = ("kinetic", "potential", "restitution_loss", "friction_loss")
+    ax.stackplot(
+        times,
+        [factor * books[name] for name in names],
+        colors=[style.ENERGY[name] for name in names],
+        labels=[style.ENERGY_LABEL[name] for name in names],
+        linewidth=0.0,
+    )
+    ax.plot(
+        times,
+        factor * supplied,
+        color=style.INK,
+        linewidth=1.6,
+        linestyle=(0, (4, 1.5)),
+        label="at release + belt work",
+        gid="supplied",
+    )
+    residual = float(books["residual"][-1])
+    style.dress(
+        ax,
+        "time, s",
+        f"energy, {unit}",
+        f"Energy ledger: residual {style.scientific(residual, 'J')}",
+    )
+    ax.set_xlim(times[0], times[-1])
+    ax.set_ylim(bottom=min(0.0, factor * float(supplied.min())))
+    return ax

@@ -1,0 +1,438 @@
+"""The machine drawn to scale: pulley, belts, plate and free surfaces, with their names.
+
+- Times and parts of a recording that are worth drawing.
+- The part of the world that is shown: where something happens.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import floor, log10
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.patches import Circle
+from matplotlib.patheffects import withStroke
+from numpy.typing import ArrayLike, NDArray
+
+from chutelab.machine import Machine, build
+from chutelab.pictures.plots import style
+from chutelab.results import REASONS, Kind, Recording
+from chutelab.results.comparison import scene_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.text import Annotation
+
+
+Floats = NDArray[np.float64]
+
+STRUCK = (Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
+"""Kinds of event in which something is hit."""
+
+STROBES = 10
+"""Strobe dots aimed at from separation to the last impact."""
+
+
+def subset(recording: Recording, particles: Sequence[int] | NDArray[np.int64]) -> Recording:
+    """Return the recording of some particles only; its events are left out."""
+    tracks = [recording.track(int(i)) for i in particles]
+    offsets = np.concatenate([[0], np.cumsum([len(track) for track in tracks])]).astype(np.int64)
+    return replace(
+        recording,
+        knots=np.concatenate(tracks) if tracks else recording.knots[:0],
+        offsets=offsets,
+        ended=recording.ended[np.asarray(particles, dtype=np.int64)],
+        events=recording.events[:0],
+    )
+
+
+def spread(count: int, at_most: int) -> NDArray[np.int64]:
+    """Return up to `at_most` particle indices, evenly spread, particle 0 among them."""
+    return np.unique(np.linspace(0, count - 1, min(count, at_most)).astype(np.int64))
+
+
+def round_step(span: float, wanted: int) -> float:
+    """Return the step of 1, 2 or 5 times a power of ten that divides a span into about `wanted`.
+
+    >>> round_step(0.6, 10), round_step(3.0, 10)
+    (0.05, 0.2)
+    """
+    exact = span / wanted
+    power = floor(log10(exact))
+    mantissa = exact / 10.0**power
+    # Geometric means are the borders between 1, 2, 5 and 10.
+    borders = ((1, 2**0.5), (2, 10**0.5), (5, 50**0.5), (10, 10.0))
+    factor = next(factor for factor, border in borders if mantissa <= border)
+    return float(f"{factor}e{power}")
+
+
+def round_times(begin: float, end: float, step: float) -> Floats:
+    """Return the multiples of a step from `begin` to `end`, s."""
+    slack = 1e-9 * step
+    return step * np.arange(np.ceil((begin - slack) / step), np.floor((end + slack) / step) + 1.0)
+
+
+def action(recording: Recording) -> tuple[float, float]:
+    """Return when particle 0 begins to do something, and when it ends, s.
+
+    It begins at its separation from the incoming belt, or at its release if it is not carried to
+    one.
+    """
+    track = recording.track(0)
+    separation = recording.select(Kind.SEPARATION, surface="incoming")
+    separation = separation[separation["particle"] == 0]
+    begin = separation["t"][0] if len(separation) else track["t"][0]
+    return float(begin), float(track["t"][-1])
+
+
+def struck_by_nominal(recording: Recording) -> NDArray[Any]:
+    """Return the events in which particle 0 hits something or is hit."""
+    struck = recording.select(*STRUCK)
+    return np.asarray(struck[(struck["particle"] == 0) | (struck["other"] == 0)])
+
+
+def strobe_step(recording: Recording) -> float:
+    """Return the round time between strobe dots, s, made for the time until the last impact."""
+    begin, end = action(recording)
+    struck = struck_by_nominal(recording)["t"]
+    last = float(struck[-1]) if len(struck) and struck[-1] > begin else end
+    return round_step(max(last - begin, 1e-3), STROBES)
+
+
+def track_times(recording: Recording, begin: float, end: float, count: int = 400) -> Floats:
+    """Return even times, joined by the knots of particle 0 and the moments just before them.
+
+    So a jump at an impact is drawn upright, not slanted.
+    """
+    knots = recording.track(0)["t"]
+    if len(knots) > count:
+        knots = recording.events["t"][recording.events["particle"] == 0][:count]
+    return upright(np.linspace(begin, end, count), knots)
+
+
+def upright(times: Floats, jumps: Floats) -> Floats:
+    """Return ascending times joined by jumps between the first and last, and just before each."""
+    jumps = jumps[(jumps >= times[0]) & (jumps <= times[-1])]
+    before = np.nextafter(jumps, -np.inf)
+    return np.unique(np.concatenate([times, jumps, before[before >= times[0]]]))
+
+
+def energies(recording: Recording, times: ArrayLike) -> dict[str, Floats]:
+    """Return `Recording.energy_at` with the energy at release, all potential energy above 0.
+
+    Returns
+    -------
+    dict of ndarray, shape (T,)
+        What `energy_at` gives, and ``start``, kinetic and potential energy at the release of all
+        particles released so far; J. Potential energy is counted from the lowest point of the
+        particles that stay in the scene (of all, if it is negative otherwise): it can be stacked.
+    """
+    times = np.atleast_1d(np.asarray(times, dtype=np.float64))
+    books = recording.energy_at(times)
+    first, _ = recording.ends()
+    order = np.argsort(first["t"], kind="stable")
+    at_release = np.concatenate([[0.0], np.cumsum(sum(recording.energies(first[order])))])
+    released = np.searchsorted(first["t"][order], times, side="right")
+    weight = released * recording.particle.mass * recording.gravity
+    for zero in _lowest(recording):
+        lifted = books["potential"] - weight * zero
+        if (lifted >= 0.0).all():
+            break
+    books["potential"] = np.maximum(lifted, 0.0)
+    books["start"] = at_release[released] - weight * zero
+    return books
+
+
+def _lowest(recording: Recording) -> tuple[float, float]:
+    """Return the lowest knots (m) of the particles that stay in the scene, and of all."""
+    heights = recording.knots["position"][:, 1]
+    stays = recording.ended != REASONS.index("exit")
+    staying = heights[np.repeat(stays, np.diff(recording.offsets))]
+    lowest = float(heights.min(initial=np.inf))
+    return float(staying.min()) if len(staying) else lowest, lowest
+
+
+MANY = 60
+"""Particles from which on some may stray out of the window."""
+
+NEARBY = 0.35
+"""Share of the action's size around it within which the ends of surfaces are shown."""
+
+FAR = 1.0
+"""Share of the action's size around it within which what happens later is shown."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """The part of the world that is shown, m."""
+
+    left: float
+    right: float
+    bottom: float
+    top: float
+
+    @property
+    def width(self) -> float:
+        """Extent in x, m."""
+        return self.right - self.left
+
+    @property
+    def height(self) -> float:
+        """Extent in y, m."""
+        return self.top - self.bottom
+
+    def padded(self, left: float, right: float, bottom: float, top: float) -> Window:
+        """Return a window larger by shares of its own larger side."""
+        size = max(self.width, self.height)
+        return Window(
+            self.left - left * size,
+            self.right + right * size,
+            self.bottom - bottom * size,
+            self.top + top * size,
+        )
+
+    def fitted(self, aspect: float) -> Window:
+        """Return the smallest window of that width / height which holds this one, centred."""
+        width = max(self.width, aspect * self.height)
+        height = max(self.height, self.width / aspect)
+        x, y = 0.5 * (self.left + self.right), 0.5 * (self.bottom + self.top)
+        return Window(x - width / 2, x + width / 2, y - height / 2, y + height / 2)
+
+    def holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Tell which points, (..., 2), lie inside."""
+        x, y = points[..., 0], points[..., 1]
+        return np.asarray(
+            (x >= self.left) & (x <= self.right) & (y >= self.bottom) & (y <= self.top)
+        )
+
+    def clip(
+        self, start: NDArray[np.float64], end: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Return the ends of the part of a straight line inside, None if it stays outside."""
+        along = end - start
+        low, high = 0.0, 1.0
+        for axis, (lower, upper) in enumerate(((self.left, self.right), (self.bottom, self.top))):
+            if along[axis] == 0.0:
+                if not lower <= start[axis] <= upper:
+                    return None
+                continue
+            shares = sorted((bound - start[axis]) / along[axis] for bound in (lower, upper))
+            low, high = max(low, shares[0]), min(high, shares[1])
+        return (start + low * along, start + high * along) if low < high else None
+
+
+def window_of(recording: Recording, machine: Machine) -> Window:
+    """Return the window in which something happens, with room for labels.
+
+    It holds particle 0 from separation (or release, without one) to its landing (or last impact),
+    the pulley, and ends of surfaces that are near; of what comes later, and of nearly all impacts
+    of the other particles, as much as does not make all else small.
+    """
+    path, tail = _path(recording)
+    points = [path]
+    if machine.pulley is not None:
+        corner = np.full(2, machine.pulley.radius)
+        points.append(np.array([-corner, corner]))
+    core = around(np.concatenate(points))
+    far = core.padded(*[FAR] * 4)
+    later = np.concatenate([tail, _crowd(recording)])
+    points.append(np.clip(later, (far.left, far.bottom), (far.right, far.top)))
+    near = around(np.concatenate(points)).padded(*[NEARBY] * 4)
+    # The incoming belt, segment 0, may be cut off anywhere.
+    free = slice(0 if machine.pulley is None else 1, None)
+    ends = np.concatenate([machine.segments.start[free], machine.segments.end[free]])
+    points.append(ends[near.holds(ends)])
+    # Names stand left of the pulley and behind the plate.
+    left = 0.06 if machine.pulley is None else 0.24
+    right = 0.22 if "plate" in machine.surfaces else 0.06
+    return around(np.concatenate(points)).padded(left, right, 0.10, 0.12)
+
+
+def _path(recording: Recording) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return particle 0's positions up to landing or last impact, and from there to its end."""
+    begin, end = action(recording)
+    mine = recording.events[recording.events["particle"] == 0]
+    gone = mine["kind"] == Kind.EXIT
+    mine = mine[~gone & (mine["t"] > begin)]
+    # Of what leaves the scene nobody needs to see the fall after its last event.
+    if gone.any() and len(mine):
+        end = float(mine["t"][-1])
+    struck = struck_by_nominal(recording)
+    # What it struck before, on the way to the end of a ramp, is not where it goes.
+    struck = struck[struck["t"] > begin]
+    landed = struck["t"][struck["kind"] == Kind.LANDING]
+    last = landed[0] if len(landed) else struck["t"][-1] if len(struck) else end
+    times = track_times(recording, begin, end)
+    position = subset(recording, [0]).at(times)[0][:, 0]
+    return position[times <= last], position[times > last]
+
+
+def _crowd(recording: Recording) -> NDArray[np.float64]:
+    """Corners of the box around where the others strike something, or the middle 96 % of many.
+
+    Where they are released counts too if no belt carries them from there.
+    """
+    events = recording.events
+    carried = np.isin(events["particle"], recording.select(Kind.SEPARATION)["particle"])
+    counts = np.isin(events["kind"], [int(kind) for kind in STRUCK])
+    counts |= ~carried & (events["kind"] == Kind.RELEASE)
+    others = events[counts & (events["particle"] != 0)]
+    if not len(others):
+        return np.empty((0, 2))
+    strays = 0.02 if recording.count > MANY else 0.0
+    return np.asarray(np.quantile(others["position"], [strays, 1.0 - strays], axis=0))
+
+
+def around(points: NDArray[np.float64]) -> Window:
+    """Return the smallest window that holds points, (P, 2), and is not without extent."""
+    (left, bottom), (right, top) = points.min(axis=0), points.max(axis=0)
+    least = 0.01 * max(right - left, top - bottom) or 0.1
+    return Window(left, max(right, left + least), bottom, max(top, bottom + least))
+
+
+HALO = [withStroke(linewidth=3.0, foreground="white")]
+"""Keeps text readable where a line runs behind it."""
+
+TWO_LINES = 32.0
+"""pt; height of two lines of small text."""
+
+
+def machine_of(recording: Recording) -> Machine:
+    """Return the machine that a recording was made on, resolved again from its scene."""
+    return build(scene_of(recording))
+
+
+def show_window(ax: Axes, window: Window) -> Window:
+    """Set limits that hold a window at equal scales and fill the axes; return what is shown."""
+    box = ax.get_window_extent()
+    shown = window.fitted(box.width / box.height)
+    ax.set_xlim(shown.left, shown.right)
+    ax.set_ylim(shown.bottom, shown.top)
+    ax.set_aspect("equal", adjustable="box")
+    return shown
+
+
+def draw_scene(ax: Axes, machine: Machine, window: Window | None = None) -> Axes:
+    """Draw the machine's surfaces to scale, with their names.
+
+    Parameters
+    ----------
+    ax : Axes
+        Its limits are set to hold the window at equal scales.
+    machine : Machine
+        With one set of surfaces for all particles, segments (S,).
+    window : Window, optional
+        What to show, see `window_of`; by default all surfaces.
+    """
+    if window is None:
+        ends = np.concatenate([machine.segments.start, machine.segments.end])
+        if machine.pulley is not None:
+            ends = np.concatenate([ends, [[machine.pulley.radius, -machine.pulley.radius]]])
+        window = around(ends).padded(0.1, 0.22, 0.1, 0.12)
+    shown = show_window(ax, window)
+    if machine.pulley is not None:
+        _draw_pulley(ax, machine.pulley.radius)
+    labelled: set[int] = set()
+    for i, surface in enumerate(machine.segments.surface):
+        start, end = machine.segments.start[i], machine.segments.end[i]
+        name = machine.surfaces[surface]
+        speed = float(machine.segments.speed[i])
+        belt = name in ("incoming", "outgoing") or speed != 0.0
+        ax.plot(
+            *np.array([start, end]).T,
+            color=style.BELT if belt else style.INK,
+            linewidth=2.6,
+            solid_capstyle="butt",
+            zorder=2.0,
+            gid=f"surface {name}",
+        )
+        part = shown.clip(start, end)
+        if part is not None and surface not in labelled:
+            labelled.add(int(surface))
+            _label(ax, machine, i, part, shown)
+    return ax
+
+
+def _draw_pulley(ax: Axes, radius: float) -> None:
+    ax.add_patch(
+        Circle((0.0, 0.0), radius, facecolor=style.STEEL_LIGHT, edgecolor=style.BELT, linewidth=2.0)
+    )
+    ax.plot([0.0], [0.0], marker="+", color=style.STEEL, markersize=7.0, zorder=1.5)
+
+
+def _label(
+    ax: Axes,
+    machine: Machine,
+    segment: int,
+    part: tuple[NDArray[np.float64], NDArray[np.float64]],
+    shown: Window,
+) -> Annotation:
+    """Name a surface at its part that is shown, on the side where no particle is expected."""
+    name = machine.surfaces[machine.segments.surface[segment]]
+    speed = float(machine.segments.speed[segment])
+    tangent = machine.segments.tangent[segment]
+    low, high = sorted(part, key=lambda point: (point[1], point[0]))
+    gap = 7.0
+    if name == "plate":
+        angle = float(np.degrees(np.arctan2(-tangent[0], tangent[1]))) + 0.0  # no -0
+        text = f"plate, {angle:.3g}°\nε = {machine.segments.restitution[segment]:.3g}"
+        where, offset = high, (gap, 0.0)
+        # Two lines need room above where they begin.
+        room = TWO_LINES * ax.figure.dpi / 72.0 * shown.height / ax.get_window_extent().height
+        if angle > 0.0 and high[1] > shown.top - room:
+            where = low + (high - low) * max(0.0, shown.top - room - low[1]) / (high[1] - low[1])
+        across, along = "left", "top" if angle <= 0.0 else "bottom"
+    elif name == "incoming":
+        text = f"incoming belt\n{_motion(speed)}"
+        where, offset = np.array([shown.left, part[0][1]]), (4.0, -gap)
+        across, along = "left", "top"
+    elif name == "outgoing":
+        text = f"outgoing belt, {_motion(speed)}"
+        where, offset = np.array([max(part[0][0], part[1][0]), part[0][1]]), (-6.0, -gap)
+        across, along = "right", "top"
+    else:
+        text = name if speed == 0.0 else f"{name}, {_motion(speed)}"
+        down = np.array([tangent[1], -tangent[0]])
+        down *= -1.0 if down[1] > 0.0 or (down[1] == 0.0 and down[0] < 0.0) else 1.0
+        where, offset = 0.5 * (low + high), (gap * down[0], gap * down[1])
+        across = "center" if abs(down[0]) < 0.2 else "right" if down[0] < 0.0 else "left"
+        along = "top" if down[1] < -0.2 else "center"
+    label = ax.annotate(
+        text.replace("-", "−"),
+        (float(where[0]), float(where[1])),
+        xytext=offset,
+        textcoords="offset points",
+        fontsize=style.SMALL,
+        color=style.BELT if name in ("incoming", "outgoing") or speed != 0.0 else style.INK,
+        horizontalalignment=across,
+        verticalalignment=along,
+        path_effects=HALO,
+        zorder=4.0,
+    )
+    _keep_inside(ax, label)
+    return label
+
+
+def _keep_inside(ax: Axes, label: Annotation) -> None:
+    """Shift a name back over the edges of the axes."""
+    box, frame = label.get_window_extent(), ax.get_window_extent()
+    margin = 3.0
+    right = max(frame.x0 + margin - box.x0, 0.0) + min(frame.x1 - margin - box.x1, 0.0)
+    up = max(frame.y0 + margin - box.y0, 0.0) + min(frame.y1 - margin - box.y1, 0.0)
+    x, y = label.xyann
+    points = 72.0 / ax.figure.dpi
+    label.xyann = (x + right * points, y + up * points)
+
+
+def _motion(speed: float) -> str:
+    arrow = "→" if speed > 0.0 else "←"
+    return f"{abs(speed):.3g} m/s {arrow}" if speed != 0.0 else "at rest"
+
+
+def shown_particles(recording: Recording, at_most: int) -> NDArray[np.int64]:
+    """Return the particles to draw: up to `at_most` released ones, particle 0 among them."""
+    chosen = spread(recording.count, at_most)
+    released = recording.offsets[1:] > recording.offsets[:-1]
+    return chosen[released[chosen]]

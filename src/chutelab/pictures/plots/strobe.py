@@ -1,0 +1,171 @@
+"""A still for print: the scene with particle 0 at round times, like a stroboscopic photograph."""
+
+from __future__ import annotations
+
+from math import floor, log10
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.transforms import Bbox
+
+from chutelab.pictures.plots import style
+from chutelab.pictures.plots.figure import draw_view
+from chutelab.pictures.plots.panels import analytic_of
+from chutelab.pictures.plots.scenery import HALO, round_times, strobe_step, subset
+from chutelab.pictures.plots.style import Picture
+from chutelab.results import Floats, Recording
+from chutelab.results.comparison import scene_of
+from chutelab.theory import Transfer, predict
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.path import Path as MplPath
+    from matplotlib.text import Annotation
+
+
+SIZE = (9.0, 5.6)
+"""Width and height of the figure, inches."""
+
+DPI = 300
+
+AWAY = 9.0
+"""pt from the middle of a dot to the text beside it."""
+
+GAP = 1.5
+"""pt that stay free around such a text."""
+
+SIDES = (
+    (0.0, 0.8),
+    (1.0, 0.0),
+    (-1.0, 0.0),
+    (0.7, 0.6),
+    (-0.7, 0.6),
+    (0.7, -0.6),
+    (-0.7, -0.6),
+    (0.0, -0.8),
+)
+"""Directions from a dot in which its text may stand, the best first."""
+
+
+def strobe(
+    recording: Recording, prediction: Transfer | None = None, *, path: str | Path | None = None
+) -> Figure:
+    """Draw particle 0 at round times, with the times, over its analytic parabola.
+
+    Parameters
+    ----------
+    recording : Recording
+        From either engine.
+    prediction : Transfer, optional
+        By default `chutelab.theory.prediction` of the recording's scene.
+    path : path, optional
+        Also write the figure there, whole or not at all; the suffix says the format.
+
+    Returns
+    -------
+    Figure
+        9 by 5.6 inches at 300 dots to the inch.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    if prediction is None:
+        prediction = predict(scene_of(recording))
+    figure = Picture(figsize=SIZE, dpi=DPI)
+    ax = figure.add_axes((0.095, 0.09, 0.885, 0.77))
+    draw_view(ax, recording, analytic_of(recording, prediction)[0])
+    _write_times(ax, recording)
+    figure.headline(0.095, 0.955, recording.title, 70)
+    figure.write(path)
+    return figure
+
+
+def _write_times(ax: Axes, recording: Recording) -> None:
+    """Write the time beside each strobe dot in the picture, where there is room for it."""
+    track = recording.track(0)
+    step = strobe_step(recording)
+    times = round_times(float(track["t"][0]), float(track["t"][-1]), step)
+    dots = subset(recording, [0]).at(times)[0][:, 0]
+    digits = max(0, -floor(log10(step) + 1e-9))
+    half = 0.4 * AWAY * ax.figure.dpi / 72.0
+    taken = [text.get_window_extent() for text in ax.texts]
+    pixels = ax.transData.transform(dots)
+    taken += [Bbox([dot - half, dot + half]) for dot in pixels]
+    lines = _lines(ax)
+    gap = GAP * ax.figure.dpi / 72.0
+    frame = ax.get_window_extent()
+    inside = Bbox.from_extents(frame.x0 + half, frame.y0 + half, frame.x1 - half, frame.y1 - half)
+    for n, (t, dot) in enumerate(zip(times, dots, strict=True)):
+        label = ax.annotate(
+            f"{t + 0.0:.{digits}f}".replace("-", "−"),
+            dot,
+            xytext=(0.0, 0.0),
+            textcoords="offset points",
+            fontsize=style.SMALL,
+            color=style.TRACK,
+            path_effects=HALO,
+            zorder=8.0,
+            gid="time",
+        )
+        if not _placed(label, n, pixels, inside, taken, lines, gap):
+            label.remove()
+    ax.text(
+        1.0,
+        1.01,
+        "beside the dots: time, s",
+        transform=ax.transAxes,
+        fontsize=style.SMALL,
+        color=style.TRACK,
+        horizontalalignment="right",
+        verticalalignment="bottom",
+    )
+
+
+def _lines(ax: Axes) -> list[tuple[MplPath, bool]]:
+    """Return what is drawn as paths in pixels, and whether each is filled."""
+    drawn = [line for line in ax.lines if line.get_linestyle() != "None"]
+    paths = [(line.get_path().transformed(line.get_transform()), False) for line in drawn]
+    paths += [
+        (path.transformed(ax.transData), False)
+        for collection in ax.collections
+        for path in collection.get_paths()
+    ]
+    return paths + [
+        (patch.get_path().transformed(patch.get_transform()), True) for patch in ax.patches
+    ]
+
+
+def _placed(
+    label: Annotation,
+    own: int,
+    dots: Floats,
+    inside: Bbox,
+    taken: list[Bbox],
+    lines: list[tuple[MplPath, bool]],
+    gap: float,
+) -> bool:
+    """Put a text on the first side where it hides nothing, and tell whether there is one.
+
+    Its own dot must be the nearest of all to its middle, or it would be read as another's.
+    """
+    for x, y in SIDES:
+        label.xyann = (AWAY * x, AWAY * y)
+        label.set_horizontalalignment("left" if x > 0.0 else "right" if x < 0.0 else "center")
+        label.set_verticalalignment("bottom" if y > 0.0 else "top" if y < 0.0 else "center")
+        box = label.get_window_extent().padded(gap)
+        if (
+            inside.containsx(box.x0)
+            and inside.containsx(box.x1)
+            and inside.containsy(box.y0)
+            and inside.containsy(box.y1)
+            and np.hypot(*(dots - np.mean(box.corners(), axis=0)).T).argmin() == own
+            and not box.count_overlaps(taken)
+            and not any(path.intersects_bbox(box, filled=filled) for path, filled in lines)
+        ):
+            taken.append(box)
+            return True
+    return False

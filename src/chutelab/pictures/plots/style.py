@@ -1,0 +1,172 @@
+"""Colours, text sizes and units that every picture shares.
+
+Each of `chutelab.pictures.plots.style` stands for one thing in every panel.
+
+- The colours of all pictures, pages and notebooks.
+- A figure with a headline, that writes itself and shows itself in a notebook.
+"""
+
+from __future__ import annotations
+
+from io import BytesIO
+from math import floor, isfinite, log10
+from pathlib import Path
+from textwrap import shorten
+from typing import TYPE_CHECKING, Any, Final
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from chutelab.util.files import whole
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+BLUE: Final = "#0072B2"
+SKY: Final = "#56B4E9"
+GREEN: Final = "#009E73"
+ORANGE: Final = "#E69F00"
+VERMILION: Final = "#D55E00"
+PURPLE: Final = "#CC79A7"
+GREY: Final = "#8C8C8C"
+"""Not theirs: seen on white and on black."""
+
+
+INK = "#000000"
+MUTED = "#595959"
+GRID = "#E3E3E3"
+STEEL = GREY
+STEEL_LIGHT = "#E6E6E6"
+
+TRACK = BLUE
+ANALYTIC = ORANGE
+BELT = GREEN
+STRIKE = VERMILION
+STREAM = SKY
+
+VELOCITY = {"vx": BLUE, "vy": VERMILION}
+
+ENERGY = {
+    "start": "#BFBFBF",
+    "kinetic": ORANGE,
+    "potential": SKY,
+    "belt_work": GREEN,
+    "restitution_loss": VERMILION,
+    "friction_loss": PURPLE,
+    "residual": "#000000",
+}
+ENERGY_LABEL = {
+    "start": "energy at release",
+    "kinetic": "kinetic",
+    "potential": "potential",
+    "belt_work": "belt work",
+    "restitution_loss": "restitution loss",
+    "friction_loss": "slip heat",
+    "residual": "residual (error)",
+}
+
+SMALL, NORMAL, LARGE = 9.5, 10.5, 13.0
+"""Text sizes, pt; nothing is smaller, so that a projected picture stays readable."""
+
+_PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
+
+
+def scaled(largest: float, unit: str) -> tuple[float, str]:
+    """Return a factor and the prefixed unit that bring `largest` to between 1 and 1000.
+
+    >>> scaled(0.0202, "J")
+    (1000.0, 'mJ')
+    """
+    if not isfinite(largest) or largest == 0.0:
+        return 1.0, unit
+    power = min(max(3 * floor(log10(abs(largest)) / 3), -15), 6)
+    return float(f"1e{-power}"), _PREFIXES[power] + unit
+
+
+def quantity(value: float, unit: str) -> str:
+    """Return a value to three digits with a prefixed unit.
+
+    >>> quantity(0.0202, "J"), quantity(0.0, "J"), quantity(-1.5, "m/s")
+    ('20.2 mJ', '0 J', '−1.50 m/s')
+    """
+    if value == 0.0:
+        return f"0 {unit}"
+    factor, name = scaled(float(f"{value:.2e}"), unit)
+    shown = value * factor
+    if not 0.0995 < abs(shown) < 9995.0:
+        return f"{shown:.1e} {name}".replace("-", "−")
+    digits = max(0, 2 - floor(log10(float(f"{abs(shown):.2e}"))))
+    return f"{shown:.{digits}f} {name}".replace("-", "−")
+
+
+def dress(ax: Axes, x: str = "", y: str = "", title: str = "") -> Axes:
+    """Give axes the common look: light grid, two spines, readable text."""
+    ax.set_xlabel(x, fontsize=NORMAL)
+    ax.set_ylabel(y, fontsize=NORMAL)
+    ax.set_title(title, fontsize=NORMAL, loc="left", fontweight="bold")
+    ax.tick_params(labelsize=SMALL, color=MUTED)
+    ax.grid(visible=True, color=GRID, linewidth=0.6)
+    ax.set_axisbelow(True)
+    for side in ("top", "right"):
+        ax.spines[side].set_visible(False)
+    return ax
+
+
+def legend_above(ax: Axes, columns: int) -> None:
+    """Add a legend right above axes, in one line if it fits."""
+    ax.legend(
+        loc="lower left",
+        bbox_to_anchor=(-0.01, 1.0),
+        ncols=columns,
+        fontsize=SMALL,
+        frameon=False,
+        borderaxespad=0.3,
+        handlelength=2.2,
+    )
+
+
+def scientific(value: float, unit: str) -> str:
+    """Return a value that is read for its power of ten.
+
+    >>> scientific(-1.4e-17, "J"), scientific(0.0, "J")
+    ('−1e−17 J', '0 J')
+    """
+    return f"{value:.0e} {unit}".replace("-", "−").replace("e−0", "e−") if value else f"0 {unit}"
+
+
+DPI = 120
+"""Dots to the inch in files, unless a picture is for print."""
+
+ON_SCREEN = 80
+"""Dots to the inch in a notebook; files have what the figure was made with."""
+
+
+class Picture(Figure):
+    """A matplotlib figure with its canvas, made without pyplot; arguments as of `Figure`."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        FigureCanvasAgg(self)
+
+    def headline(self, x: float, y: float, title: str, longest: int = 80) -> None:
+        """Write a title at a place, in shares of the figure, cut at `longest` characters."""
+        self.text(
+            x, y, shorten(title, longest, placeholder=" …"),
+            fontsize=LARGE, fontweight="bold", verticalalignment="center",
+        )  # fmt: skip
+
+    def write(self, path: str | Path | None) -> None:
+        """Write the figure, whole or not at all; nothing without a path.
+
+        The suffix says the format, PNG without one.
+        """
+        if path is None:
+            return
+        with whole(path) as unfinished:
+            self.savefig(unfinished, format=Path(path).suffix.lstrip(".") or "png")
+
+    def _repr_png_(self) -> bytes:
+        buffer = BytesIO()
+        self.savefig(buffer, format="png", dpi=ON_SCREEN)
+        return buffer.getvalue()

@@ -1,0 +1,226 @@
+"""Collecting knots, events and ledger entries while an engine runs.
+
+Engines hand over whole arrays in the order of time *per particle*; sorting happens once, at the
+end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chutelab.results.recording import EVENT, KNOT, PARTICLES, Ints, Kind, Particle, Recording
+
+
+class StalledError(RuntimeError):
+    """A loop reached its bound: a particle goes on without getting on.
+
+    Parameters
+    ----------
+    particle : int
+        Which one.
+    t : float
+        When, s.
+    position : tuple of float
+        Where its centre is, m.
+    reason : str
+        What happened too often, and what to do about it; a half-sentence.
+    recording : Recording, optional
+        What was recorded until then. Tracks that were under way end at their last knots, with
+        reason ``"time"``.
+    """
+
+    def __init__(
+        self,
+        particle: int,
+        t: float,
+        position: tuple[float, float],
+        reason: str,
+        recording: Recording | None = None,
+    ) -> None:
+        super().__init__(particle, t, position, reason)
+        self.particle = particle
+        self.t = t
+        self.position = position
+        self.reason = reason
+        self.recording = recording
+
+    def __str__(self) -> str:
+        x, y = self.position
+        place = f"t = {self.t:.6g} s, x = {x:.6g} m, y = {y:.6g} m"
+        return f"particle {self.particle} is stuck at {place}: {self.reason}"
+
+
+class Recorder:
+    """Grows by chunks; `finish` turns it into a frozen `Recording`.
+
+    Parameters
+    ----------
+    count : int
+        Number of particles N.
+    surfaces : tuple of str
+        Names of the surfaces, without ``"particles"``, which is added last.
+    apart : bool
+        Whether the books of each particle are kept apart: `by_surface` is (N, S, 3) then.
+    """
+
+    def __init__(self, count: int, surfaces: tuple[str, ...], *, apart: bool = False) -> None:
+        self.surfaces = (*surfaces, PARTICLES)
+        self.entries = np.zeros((count, 3))
+        self.apart = apart
+        self.by_surface = np.zeros((*((count,) if apart else ()), len(self.surfaces), 3))
+        self.ended = np.zeros(count, dtype=np.int8)
+        self.contacts = 0
+        self.sizes = np.zeros(count, dtype=np.int64)
+        self._knots: list[NDArray[Any]] = []
+        self._owners: list[Ints] = []
+        self._events: list[NDArray[Any]] = []
+
+    def knots(
+        self,
+        particle: ArrayLike,
+        t: ArrayLike,
+        position: ArrayLike,
+        velocity: ArrayLike,
+        omega: ArrayLike,
+    ) -> None:
+        """Add one knot for each of some particles, with the entries booked so far.
+
+        `particle` has shape (k,), and may name a particle more than once only in the order of time;
+        the other arguments broadcast against it.
+        """
+        owner = np.atleast_1d(np.asarray(particle, dtype=np.int64))
+        chunk = np.empty(len(owner), dtype=KNOT)
+        chunk["t"], chunk["position"], chunk["velocity"] = t, position, velocity
+        chunk["omega"], chunk["entries"] = omega, self.entries[owner]
+        self.add(owner, chunk)
+
+    def add(self, particle: Ints, knots: NDArray[Any]) -> None:
+        """Add finished knots (k,) of particles (k,), each particle's in the order of time."""
+        self._knots.append(knots)
+        self._owners.append(particle)
+
+    def book(
+        self,
+        particle: ArrayLike,
+        surface: ArrayLike,
+        belt_work: ArrayLike = 0.0,
+        restitution_loss: ArrayLike = 0.0,
+        friction_loss: ArrayLike = 0.0,
+    ) -> None:
+        """Book ledger entries (J) on particles (k,), each once, and on the surfaces they met."""
+        owner = np.atleast_1d(np.asarray(particle, dtype=np.int64))
+        entry = np.empty((len(owner), 3))
+        entry[:, 0], entry[:, 1], entry[:, 2] = belt_work, restitution_loss, friction_loss
+        self.entries[owner] += entry
+        np.add.at(self.by_surface, np.broadcast_to(surface, owner.shape), entry)
+
+    def events(
+        self,
+        kind: Kind | ArrayLike,
+        particle: ArrayLike,
+        t: ArrayLike,
+        position: ArrayLike,
+        velocity: ArrayLike,
+        omega: ArrayLike = 0.0,
+        *,
+        velocity_before: ArrayLike | None = None,
+        omega_before: ArrayLike | None = None,
+        surface: ArrayLike = -1,
+        other: ArrayLike = -1,
+        normal_impulse: ArrayLike = 0.0,
+        tangential_impulse: ArrayLike = 0.0,
+    ) -> None:
+        """Add one event for each of some particles (k,); the state is the one after the event."""
+        owner = np.atleast_1d(np.asarray(particle))
+        chunk = np.empty(len(owner), dtype=EVENT)
+        chunk["particle"], chunk["kind"], chunk["t"] = owner, kind, t
+        chunk["position"], chunk["velocity_after"], chunk["omega_after"] = position, velocity, omega
+        chunk["velocity_before"] = velocity if velocity_before is None else velocity_before
+        chunk["omega_before"] = omega if omega_before is None else omega_before
+        chunk["surface"], chunk["other"] = surface, other
+        chunk["normal_impulse"], chunk["tangential_impulse"] = normal_impulse, tangential_impulse
+        self.tell(chunk)
+
+    def tell(self, events: NDArray[Any]) -> None:
+        """Add finished events."""
+        self._events.append(events)
+
+    def tracks(self, first: int, sizes: Ints, knots: NDArray[Any]) -> None:
+        """Add the whole tracks of the particles from `first` on, in their order.
+
+        Tracks have that many knots each; an engine that adds them so adds no others.
+        """
+        self.sizes[first : first + len(sizes)] = sizes
+        self._knots.append(knots)
+
+    def finish(
+        self,
+        *,
+        scene: str | Callable[[], str],
+        title: str,
+        engine: str,
+        particle: Particle,
+        gravity: float,
+        steps: int,
+        seconds: float,
+        origin: tuple[float, float] = (0.0, 0.0),
+    ) -> Recording:
+        """Sort what was collected, counted from `origin` (m), and freeze it."""
+        count = len(self.ended)
+        knots, sizes = _joined(self._knots, KNOT), self.sizes
+        if self._owners:
+            owners = np.concatenate(self._owners)
+            self._owners.clear()
+            knots = knots.take(np.argsort(owners, kind="stable"))
+            sizes = np.bincount(owners, minlength=count)
+        offsets = np.zeros(count + 1, dtype=np.int64)
+        sizes.cumsum(out=offsets[1:])
+        lonely = (sizes == 1).nonzero()[0]
+        if len(lonely):
+            # A track needs an interval: a lone knot is its own end.
+            knots = np.insert(knots, offsets[lonely], knots[offsets[lonely]])
+            np.cumsum(np.where(sizes == 1, 2, sizes), out=offsets[1:])
+        events = _joined(self._events, EVENT)
+        t = events["t"]
+        if count > 1 or np.count_nonzero(t[1:] < t[:-1]):
+            events = events.take(_in_time(events))
+        if any(origin):
+            knots = knots.copy()
+            for rows in (knots, events):
+                rows["position"] += origin
+        return Recording(
+            scene=cast("str", scene),  # or what writes it, see `Recording`
+            title=title,
+            engine=engine,
+            particle=particle,
+            gravity=gravity,
+            surfaces=self.surfaces,
+            knots=knots,
+            offsets=offsets,
+            ended=self.ended.copy(),
+            events=events,
+            by_surface=self.by_surface.copy(),
+            steps=steps,
+            contacts=self.contacts,
+            seconds=seconds,
+        )
+
+
+def _in_time(events: NDArray[Any]) -> Ints:
+    """Return the order of time; of events at one time that of the particles, then as they came."""
+    return np.lexsort((events["particle"].copy(), events["t"].copy()))
+
+
+def _joined(chunks: list[NDArray[Any]], dtype: np.dtype[Any]) -> NDArray[Any]:
+    """Join structured arrays and forget them; as bytes, which is several times as fast."""
+    if len(chunks) == 1:
+        return chunks.pop()
+    whole = np.empty(sum(map(len, chunks)), dtype=dtype)
+    if len(whole):
+        np.concatenate([chunk.view(np.uint8) for chunk in chunks], out=whole.view(np.uint8))
+    chunks.clear()
+    return whole

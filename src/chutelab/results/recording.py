@@ -1,0 +1,501 @@
+"""`Recording`: a finished run.
+
+A particle's track is a list of *knots*; between two knots it is the cubic Hermite curve through
+them. With exact end velocities that curve is the parabola of free flight, so a flight costs two
+knots however long it lasts. An impact is two knots at one time.
+
+- Names and array types of a recording.
+- Where the particles are, and what the books say, between the knots.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass, field
+from enum import IntEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chutelab.util.tables import Sheet, Shown
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+ENTRIES = ("belt_work", "restitution_loss", "friction_loss")
+"""The three entries of the energy ledger, in the order of every array that holds them."""
+
+PARTICLES = "particles"
+"""Name under which the losses of particle-particle contacts are booked."""
+
+
+class Kind(IntEnum):
+    """What happened in an event."""
+
+    RELEASE = 0
+    SEPARATION = 1
+    SLIP = 2
+    IMPACT = 3
+    LANDING = 4
+    COLLISION = 5
+    STICK = 6
+    SETTLE = 7
+    EXIT = 8
+
+
+REASONS = ("time", "landed", "settled", "exit")
+"""Why a particle's track ends; `Recording.ended` holds indices into this tuple."""
+
+EVENT = np.dtype(
+    [
+        ("t", "f8"),
+        ("particle", "i4"),
+        ("other", "i4"),
+        ("kind", "i1"),
+        ("surface", "i2"),
+        ("position", "f8", 2),
+        ("velocity_before", "f8", 2),
+        ("velocity_after", "f8", 2),
+        ("omega_before", "f8"),
+        ("omega_after", "f8"),
+        ("normal_impulse", "f8"),
+        ("tangential_impulse", "f8"),
+    ]
+)
+"""One event: SI units; `other` is the partner or -1, `surface` an index into `Recording.surfaces`
+or -1, `kind` a `Kind`; the impulses (N s) act on the particle, the normal one away from the
+surface, the tangential one along (n_y, -n_x) for the contact normal n."""
+
+KNOT = np.dtype(
+    [
+        ("t", "f8"),
+        ("position", "f8", 2),
+        ("velocity", "f8", 2),
+        ("omega", "f8"),
+        ("entries", "f8", 3),
+    ]
+)
+"""One knot: time, state, and the cumulative ledger entries (J) of that particle, see `ENTRIES`."""
+
+
+@dataclass(frozen=True)
+class Particle:
+    """The one kind of particle of a recording.
+
+    Attributes
+    ----------
+    radius : float
+        r, m; 0 for a mass point.
+    mass : float
+        m, kg.
+    inertia : float
+        Moment of inertia about the centre, kg m²; 0 for a particle that does not turn.
+    """
+
+    radius: float
+    mass: float
+    inertia: float
+
+    def kinetic(self, vx: ArrayLike, vy: ArrayLike, omega: ArrayLike) -> Floats:
+        """Return ½ m v² + ½ I ω² (J) for arrays of any one shape (m/s, rad/s)."""
+        vx, vy, omega = np.asarray(vx), np.asarray(vy), np.asarray(omega)
+        return np.asarray(0.5 * self.mass * (vx**2 + vy**2) + 0.5 * self.inertia * omega**2)
+
+
+def balance(entries: NDArray[Any]) -> Floats:
+    """Return the energy (J) that entries (..., 3) bring: belt work less both losses."""
+    return np.asarray(entries[..., 0] - entries[..., 1] - entries[..., 2])
+
+
+CELLS = 2**18
+"""Times × particles in one block: some 30 arrays of 2 MB each, near enough to the cache."""
+
+COLUMNS = ("kinetic", "potential", *ENTRIES, "residual")
+"""What `energies` returns, in this order."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Times at which particles are on their way, arrays (c,).
+
+    Attributes
+    ----------
+    row, particle : ndarray of int
+        Indices of the time and of the particle.
+    left : ndarray of int
+        Index of the last knot that is not later; ``left + 1`` closes the interval. At the end of a
+        track it is the last knot but one.
+    h : ndarray
+        Length of the interval, s; 0 where a track ends with an impact.
+    share : ndarray
+        Part of the interval that has passed, 0 to 1; 1 where `h` is 0.
+    """
+
+    row: Ints
+    particle: Ints
+    left: Ints
+    h: Floats
+    share: Floats
+
+
+def blocks(knots: NDArray[Any], offsets: Ints, times: Floats) -> Iterator[Cells]:
+    """Find the interval of every cell, block by block in the order of `times`.
+
+    Parameters
+    ----------
+    knots : ndarray, (K,), dtype `KNOT`
+        All tracks, one after the other.
+    offsets : ndarray, (N + 1,)
+        Particle i owns ``knots[offsets[i]:offsets[i + 1]]``.
+    times : ndarray, (T,)
+        s, in any order.
+    """
+    t = knots["t"]
+    released = np.flatnonzero(offsets[1:] > offsets[:-1])
+    first, last = offsets[released], offsets[released + 1] - 1
+    rows = max(1, CELLS // max(1, len(released)))
+    for begin in range(0, len(times), rows):
+        now = times[begin : begin + rows, None]
+        row, column = np.nonzero((now >= t[first]) & (now <= t[last]))
+        at = times[begin + row]
+        left = _bisect(t, first[column], last[column], at)
+        h = t[left + 1] - t[left]
+        share = np.divide(at - t[left], h, out=np.ones_like(h), where=h > 0.0)
+        yield Cells(begin + row, released[column], left, h, share)
+
+
+def _bisect(t: Floats, low: Ints, high: Ints, at: Floats) -> Ints:
+    """Return the last knot in [low, high) whose time is not later, all cells at once."""
+    low, high = low.copy(), high.copy()
+    while np.any(high - low > 1):
+        middle = (low + high) // 2
+        passed = t[middle] <= at
+        low = np.where(passed, middle, low)
+        high = np.where(passed, high, middle)
+    return low
+
+
+def hermite(knots: NDArray[Any], cells: Cells, axis: int) -> tuple[Floats, Floats]:
+    """Return one coordinate (m) and its velocity (m/s) on the cubic between two knots, (c,)."""
+    left, s, h = cells.left, cells.share, cells.h
+    position, velocity = knots["position"][:, axis], knots["velocity"][:, axis]
+    pa, pb, va, vb = position[left], position[left + 1], velocity[left], velocity[left + 1]
+    dx = pb - pa
+    # Written around the left knot, so that a long flight loses no digits.
+    where = pa + s * (
+        h * va + s * ((3.0 * dx - h * (2.0 * va + vb)) + s * (h * (va + vb) - 2.0 * dx))
+    )
+    slope = np.divide(dx, h, out=vb.copy(), where=h > 0.0)
+    pace = va + s * (2.0 * (3.0 * slope - 2.0 * va - vb) + 3.0 * s * (va + vb - 2.0 * slope))
+    over = s >= 1.0
+    return np.where(over, pb, where), np.where(over, vb, pace)
+
+
+def energies(
+    knots: NDArray[Any], offsets: Ints, times: Floats, particle: Particle, gravity: float
+) -> Floats:
+    """Return the books at each time, summed over released particles, (6, T), J; see `COLUMNS`.
+
+    A particle that has ended keeps what it had. Between two knots the entries follow from what
+    goes on there: the restitution loss changes in impacts only, at knots. While a particle slips,
+    the force and so the power of the belt is constant on a face, and the friction loss is what the
+    energy balance asks for, with the residuals of the two knots interpolated linearly. While it is
+    carried without slip, the belt work is. In flight nothing is booked, and what the balance leaves
+    over is the residual.
+    """
+    released = offsets[1:] > offsets[:-1]
+    firsts, lasts = knots[offsets[:-1][released]], knots[offsets[1:][released] - 1]
+    at_release = np.zeros(len(offsets) - 1)
+    at_release[released] = _energy(firsts, particle, gravity).sum(axis=0)
+
+    final = np.empty((len(COLUMNS), len(lasts)))
+    final[:2] = _energy(lasts, particle, gravity)
+    final[2:5] = lasts["entries"].T
+    final[5] = final[:2].sum(axis=0) - at_release[released] - balance(lasts["entries"])
+    order = np.argsort(lasts["t"], kind="stable")
+    sums = np.concatenate([np.zeros((len(COLUMNS), 1)), final[:, order].cumsum(axis=1)], axis=1)
+    out = sums[:, np.searchsorted(lasts["t"][order], times, side="left")]
+
+    for cells in blocks(knots, offsets, times):
+        values = _under_way(knots, cells, at_release[cells.particle], particle, gravity)
+        for total, value in zip(out, values, strict=True):
+            np.add.at(total, cells.row, value)
+    return out
+
+
+def _energy(knots: NDArray[Any], particle: Particle, gravity: float) -> Floats:
+    """Kinetic and potential energy of knots, (2, k)."""
+    velocity = knots["velocity"]
+    return np.stack(
+        [
+            particle.kinetic(velocity[..., 0], velocity[..., 1], knots["omega"]),
+            particle.mass * gravity * knots["position"][..., 1],
+        ]
+    )
+
+
+def _under_way(
+    knots: NDArray[Any], cells: Cells, at_release: Floats, particle: Particle, gravity: float
+) -> tuple[Floats, ...]:
+    """Return the `COLUMNS` of each cell, (c,)."""
+    share = cells.share
+    a, b = (_Books.of(knots, cells.left + side, at_release, particle, gravity) for side in (0, 1))
+    (_, vx), (y, vy) = hermite(knots, cells, 0), hermite(knots, cells, 1)
+    omega = a.omega + share * (b.omega - a.omega)
+    kinetic = particle.kinetic(vx, vy, omega)
+    potential = particle.mass * gravity * y
+    gain = kinetic + potential - at_release
+
+    slips, driven = a.friction != b.friction, a.belt != b.belt
+    restitution = np.where(share < 1.0, a.restitution, b.restitution)
+    residual = a.residual + share * (b.residual - a.residual)
+    belt = np.where(
+        driven & ~slips,
+        gain + restitution + a.friction - residual,
+        a.belt + share * (b.belt - a.belt),
+    )
+    friction = np.where(slips, belt - restitution + residual - gain, a.friction)
+    residual = np.where(slips | driven, residual, gain - (belt - restitution - friction))
+    return kinetic, potential, belt, restitution, friction, residual
+
+
+@dataclass(frozen=True, eq=False)
+class _Books:
+    """Entries and residual (J), angular velocity (rad/s) at knots, arrays (c,)."""
+
+    belt: Floats
+    restitution: Floats
+    friction: Floats
+    residual: Floats
+    omega: Floats
+
+    @classmethod
+    def of(
+        cls,
+        knots: NDArray[Any],
+        index: Ints,
+        at_release: Floats,
+        particle: Particle,
+        gravity: float,
+    ) -> _Books:
+        omega = knots["omega"][index]
+        velocity, entries = knots["velocity"], knots["entries"]
+        energy = particle.kinetic(velocity[index, 0], velocity[index, 1], omega)
+        energy += particle.mass * gravity * knots["position"][index, 1]
+        belt, restitution, friction = (entries[index, column] for column in range(3))
+        residual = energy - at_release - (belt - restitution - friction)
+        return cls(belt, restitution, friction, residual, omega)
+
+
+class _Text:
+    """A text field that may be given as a function, which is called when the text is asked for."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.key = f"_{name}"
+
+    def __get__(self, instance: object | None, owner: type) -> str:
+        if instance is None:
+            # So that the field has no default.
+            raise AttributeError(self.key)
+        text: str | Callable[[], str] = vars(instance)[self.key]
+        if not isinstance(text, str):
+            vars(instance)[self.key] = text = text()
+        return text
+
+    def __set__(self, instance: object, value: str | Callable[[], str]) -> None:
+        vars(instance)[self.key] = value
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(Shown):
+    """A finished run: read-only arrays, the same type from every engine.
+
+    Attributes
+    ----------
+    scene : str
+        The scene in canonical JSON, as `Scene.model_dump_json` writes it; an engine may give a
+        function instead, so that it is written only when somebody asks.
+    title, engine : str
+        The scene's title; ``"exact"``, ``"contact"`` or ``"pymunk"``.
+    particle : Particle
+        Radius, mass and inertia.
+    gravity : float
+        m/s².
+    surfaces : tuple of str
+        Names that `events["surface"]` indexes; the last is always ``"particles"``.
+    knots : ndarray, shape (K,), dtype `KNOT`
+        All tracks, one after the other.
+    offsets : ndarray, shape (N + 1,)
+        Particle i owns ``knots[offsets[i]:offsets[i + 1]]``: two or more, in the order of time, or
+        none if it was never released.
+    ended : ndarray, shape (N,)
+        Indices into `REASONS`.
+    events : ndarray, shape (E,), dtype `EVENT`
+        Sorted by time; at one time by particle, and of one particle as they came.
+    by_surface : ndarray, shape (len(surfaces), 3)
+        Ledger entries (J) of each surface, summed over particles. Of a family of machines (see
+        `chutelab.engines.exact`), and of none else, those of each particle, (N, len(surfaces), 3).
+    steps : int
+        Rounds (exact) or steps (contact, pymunk) taken.
+    contacts : int
+        Impacts and collisions resolved.
+    seconds : float
+        Wall time from the validated scene to the recording.
+    """
+
+    if TYPE_CHECKING:
+        scene: str
+    else:
+        scene: _Text = _Text()
+    title: str
+    engine: str
+    particle: Particle
+    gravity: float
+    surfaces: tuple[str, ...]
+    knots: NDArray[Any]
+    offsets: Ints
+    ended: NDArray[np.int8]
+    events: NDArray[Any]
+    by_surface: Floats
+    steps: int
+    contacts: int
+    seconds: float = field(default=0.0)
+
+    def __post_init__(self) -> None:
+        for name in ("knots", "offsets", "ended", "events", "by_surface"):
+            getattr(self, name).flags.writeable = False
+
+    @property
+    def count(self) -> int:
+        """Number of particles."""
+        return len(self.offsets) - 1
+
+    def sheet(self) -> Sheet:
+        """Return what it holds, in a few lines."""
+        first, last = self.ends()
+        happened = sorted(Counter(self.events["kind"].tolist()).items())
+        ended = sorted(Counter(self.ended.tolist()).items())
+        told = {
+            "engine": self.engine,
+            "particles": f"{self.count:,}",
+            "time": f"{first['t'].min():.6g} to {last['t'].max():.6g} s" if len(first) else "none",
+            "events": ", ".join(f"{n:,} {Kind(k).name.lower()}" for k, n in happened),
+            "ended": ", ".join(f"{n:,} {REASONS[k]}" for k, n in ended),
+            "knots": f"{len(self.knots):,}",
+            "run time": f"{self.seconds:.3g} s",
+        }
+        return Sheet(self.title, ("", ""), tuple(told.items()), texts=2)
+
+    def save(self, path: str | Path) -> Path:
+        """Write an npz file, whole or not at all; `load` gives the recording back bit for bit."""
+        from chutelab.results.storage import save
+
+        return save(self, path)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Recording:
+        """Read what `save` wrote; a `results.storage.RecordingError` says what is wrong."""
+        from chutelab.results.storage import load
+
+        return load(path)
+
+    def to_csv(
+        self,
+        folder: str | Path,
+        *,
+        step: float | None = None,
+        only: Collection[str] = ("events", "trajectory"),
+    ) -> list[Path]:
+        """Write events.csv and trajectory.csv into a folder; see `results.storage.to_csv`."""
+        from chutelab.results.storage import to_csv
+
+        return to_csv(self, folder, step=step, only=only)
+
+    def track(self, particle: int) -> NDArray[Any]:
+        """Return the knots of one particle, shape (k,)."""
+        return self.knots[self.offsets[particle] : self.offsets[particle + 1]]
+
+    def ends(self) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Return the first and last knots of all released particles, each of shape (n,)."""
+        released = self.offsets[1:] > self.offsets[:-1]
+        return (
+            self.knots[self.offsets[:-1][released]],
+            self.knots[self.offsets[1:][released] - 1],
+        )
+
+    def surface_index(self, name: str) -> int:
+        """Return the index of a surface, or -1 if the scene has none of that name."""
+        return self.surfaces.index(name) if name in self.surfaces else -1
+
+    def select(self, *kinds: Kind, surface: str | None = None) -> NDArray[Any]:
+        """Return the events of the given kinds (all if none is given), sorted by time.
+
+        With `surface`, those on that surface only: none if the scene has none of that name.
+        """
+        keep = np.ones(len(self.events), dtype=bool)
+        if kinds:
+            keep &= np.isin(self.events["kind"], [int(kind) for kind in kinds])
+        if surface is not None:
+            # Events on no surface have index -1, as unknown names do.
+            keep &= (self.events["surface"] == self.surface_index(surface)) & (
+                surface in self.surfaces
+            )
+        return self.events[keep]
+
+    def first(self, events: NDArray[Any]) -> NDArray[Any]:
+        """Reduce events to the first one of each particle, in the order of the particles."""
+        _, index = np.unique(events["particle"], return_index=True)
+        return events[index]
+
+    def at(self, times: ArrayLike) -> tuple[Floats, Floats]:
+        """Return positions (m) and velocities (m/s) at any times.
+
+        Parameters
+        ----------
+        times : array_like, shape (T,)
+            s, in any order.
+
+        Returns
+        -------
+        position, velocity : ndarray, shape (T, N, 2)
+            NaN before a particle's release and after its end; at an impact the state after it.
+        """
+        times = np.atleast_1d(np.asarray(times, dtype=np.float64))
+        position, velocity = np.full((2, len(times), self.count, 2), np.nan)
+        for cells in blocks(self.knots, self.offsets, times):
+            for axis in (0, 1):
+                where, pace = hermite(self.knots, cells, axis)
+                position[cells.row, cells.particle, axis] = where
+                velocity[cells.row, cells.particle, axis] = pace
+        return position, velocity
+
+    def energy_at(self, times: ArrayLike) -> dict[str, Floats]:
+        """Return the energy ledger of all released particles up to each time.
+
+        The books are right at any time, not only at knots: between two of them the belt work, the
+        friction loss or the residual follows the energy of the particle, see
+        `chutelab.results.recording.energies`. A particle that has ended keeps its last state.
+
+        Parameters
+        ----------
+        times : array_like, shape (T,)
+            s, in any order.
+
+        Returns
+        -------
+        dict of ndarray, shape (T,)
+            ``kinetic``, ``potential`` (y = 0 is the zero), the three `ENTRIES`, and ``residual``:
+            what the balance since each release leaves over. J.
+        """
+        times = np.atleast_1d(np.asarray(times, dtype=np.float64))
+        values = energies(self.knots, self.offsets, times, self.particle, self.gravity)
+        return dict(zip(COLUMNS, values, strict=True))
+
+    def energies(self, knots: NDArray[Any]) -> tuple[Floats, Floats]:
+        """Return kinetic (rotation included) and potential energy (J) of knots of any shape."""
+        velocity = knots["velocity"]
+        kinetic = self.particle.kinetic(velocity[..., 0], velocity[..., 1], knots["omega"])
+        return kinetic, self.particle.mass * self.gravity * knots["position"][..., 1]

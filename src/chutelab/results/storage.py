@@ -1,0 +1,190 @@
+"""Recordings on disk: one npz file that round-trips to the last bit, and CSV for spreadsheets."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Iterable
+from dataclasses import asdict, fields
+from math import inf
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from chutelab.results.recording import ENTRIES, EVENT, KNOT, REASONS, Kind, Particle, Recording
+from chutelab.util.files import whole
+
+FORMAT = 1
+"""Version of the file; a reader refuses what it does not know."""
+
+ARRAYS = {
+    "knots": KNOT,
+    "offsets": np.dtype("i8"),
+    "ended": np.dtype("i1"),
+    "events": EVENT,
+    "by_surface": np.dtype("f8"),
+}
+
+COLUMNS = ("t", "particle", "other", "kind", "surface")
+"""Fields of an event that events.csv begins with."""
+
+SAMPLES = 200
+"""Instants in trajectory.csv where no interval is asked for."""
+
+MOST_SAMPLES = 1_000_000
+"""Rows of trajectory.csv where no interval is asked for: beyond it no spreadsheet opens the file,
+so many particles get fewer instants."""
+
+
+class RecordingError(ValueError):
+    """A file is not a recording that this version can read."""
+
+
+def save(recording: Recording, path: str | Path) -> Path:
+    """Write a recording to an npz file, whole or not at all."""
+    path = Path(path)
+    about = {
+        field.name: getattr(recording, field.name)
+        for field in fields(recording)
+        if field.name not in ARRAYS
+    }
+    about["particle"] = asdict(recording.particle)
+    header = json.dumps({"format": FORMAT, **about})
+    arrays = {name: getattr(recording, name) for name in ARRAYS}
+    with whole(path) as unfinished, unfinished.open("wb") as file:
+        np.savez_compressed(file, about=np.array(header), **arrays)
+    return path
+
+
+def load(path: str | Path) -> Recording:
+    """Read what `save` wrote.
+
+    Raises
+    ------
+    RecordingError
+        If the file is missing, damaged, of another kind or of another version.
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
+            about: dict[str, Any] = json.loads(str(data["about"]))
+            version = about.pop("format", None)
+            arrays = {name: data[name] for name in ARRAYS} if version == FORMAT else {}
+        recording = None
+        if arrays:
+            about["particle"] = Particle(**about["particle"])
+            about["surfaces"] = tuple(about["surfaces"])
+            recording = Recording(**about, **arrays)
+            _check(recording)
+    except FileNotFoundError:
+        raise RecordingError(f"{path}: no such file") from None
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from None
+    except MemoryError:
+        raise
+    except Exception as error:
+        # Damaged bytes come up as anything: from zipfile, zlib, tokenize, json, NumPy.
+        raise RecordingError(
+            f"{path}: not a recording as `chutelab run --out` writes it (recording.npz)"
+        ) from error
+    if recording is None:
+        raise RecordingError(
+            f"{path}: a recording of another version of chutelab; run its scene again"
+        )
+    return recording
+
+
+def _check(recording: Recording) -> None:
+    """Raise a ValueError if the arrays contradict each other: every index has to lead somewhere."""
+    offsets, events = recording.offsets, recording.events
+    sizes, surfaces = np.diff(offsets), len(recording.surfaces)
+    sound = (
+        all(getattr(recording, name).dtype == dtype for name, dtype in ARRAYS.items())
+        and recording.knots.ndim == events.ndim == offsets.ndim == 1
+        and offsets[0] == 0
+        and offsets[-1] == len(recording.knots)
+        and not np.any((sizes < 0) | (sizes == 1))
+        and recording.ended.shape == sizes.shape
+        and not np.any((recording.ended < 0) | (recording.ended >= len(REASONS)))
+        and recording.by_surface.shape == (surfaces, len(ENTRIES))
+        and not np.any((events["surface"] < -1) | (events["surface"] >= surfaces))
+        and not np.any((events["particle"] < 0) | (events["particle"] >= len(sizes)))
+        and not np.any((events["kind"] < 0) | (events["kind"] >= len(Kind)))
+    )
+    if not sound:
+        raise ValueError("the arrays do not fit together")
+
+
+def to_csv(
+    recording: Recording,
+    folder: str | Path,
+    *,
+    step: float | None = None,
+    only: Collection[str] = ("events", "trajectory"),
+) -> list[Path]:
+    """Write events.csv and trajectory.csv, each whole or not at all.
+
+    Parameters
+    ----------
+    recording : Recording
+        What to write.
+    folder : path
+        Existing directory.
+    step : float, optional
+        Interval of the trajectory, s; by default `SAMPLES` instants, fewer for many particles.
+    only : collection of str
+        Which of the two.
+
+    Raises
+    ------
+    ValueError
+        If `step` is not positive and finite.
+    """
+    if step is not None and not 0.0 < step < inf:
+        raise ValueError(f"step = {step!r}: a finite number above 0 s")
+    written = []
+    for name, lines in (("events", _events), ("trajectory", _trajectory)):
+        if name in only:
+            path = Path(folder) / f"{name}.csv"
+            with whole(path) as unfinished, unfinished.open("w", encoding="utf-8") as file:
+                file.writelines(f"{line}\n" for line in lines(recording, step))
+            written.append(path)
+    return written
+
+
+def _events(recording: Recording, _step: float | None) -> Iterable[str]:
+    yield (
+        "t,particle,other,kind,surface,x,y,vx_before,vy_before,vx_after,vy_after,"
+        "omega_before,omega_after,normal_impulse,tangential_impulse"
+    )
+    events, kinds = recording.events, [kind.name.lower() for kind in Kind]
+    names = (*recording.surfaces, "")
+    vectors = ("position", "velocity_before", "velocity_after")
+    scalars = ("omega_before", "omega_after", "normal_impulse", "tangential_impulse")
+    numbers = [column for name in vectors for column in events[name].T.tolist()]
+    numbers += [events[name].tolist() for name in scalars]
+    heads = zip(*(events[name].tolist() for name in COLUMNS), strict=True)
+    for (t, particle, other, kind, surface), *row in zip(heads, *numbers, strict=True):
+        partner = "" if other < 0 else str(other)
+        yield ",".join(
+            [repr(t), str(particle), partner, kinds[kind], names[surface], *map(repr, row)]
+        )
+
+
+def _trajectory(recording: Recording, step: float | None) -> Iterable[str]:
+    yield "t,particle,x,y,vx,vy"
+    if not len(recording.knots):
+        return
+    begin, end = float(recording.knots["t"].min()), float(recording.knots["t"].max())
+    if step is None:
+        rows = max(2, min(SAMPLES, MOST_SAMPLES // recording.count))
+        times = np.linspace(begin, end, rows).tolist()
+    else:
+        # An end that is a whole number of steps away belongs to the table, whatever rounding says.
+        last = int((end - begin) / step * (1.0 + 1e-12))
+        times = [min(begin + step * n, end) for n in range(last + 1)]
+    for t in times:
+        (position,), (velocity,) = recording.at([t])
+        for i in np.flatnonzero(np.isfinite(position[:, 0])).tolist():
+            (x, y), (vx, vy) = position[i].tolist(), velocity[i].tolist()
+            yield f"{t!r},{i},{x!r},{y!r},{vx!r},{vy!r}"

@@ -1,0 +1,509 @@
+"""One scene, varied: every combination of values laid over it.
+
+- Scenes that differ in numbers only, as one scene whose varied keys hold arrays (N,).
+- What the varied keys of a scene are: their definitions and units.
+- What ``--vary`` takes, as it is written: keys, and the values or ranges of each.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from itertools import product
+from math import isfinite, prod
+from typing import Annotated, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import TypeAdapter, ValidationError
+
+from chutelab.scene.errors import MISSING, SceneError
+from chutelab.scene.loading import from_dict, plain, to_dict
+from chutelab.scene.overrides import Setting, apply
+from chutelab.scene.rules import Look, conflicts
+from chutelab.scene.schema import Scene
+from chutelab.scene.units import read_size
+
+_PATH: Final = re.compile(r"(?:(\w+)(?:\[(\d+)\])?\.)?(\w+)")
+
+_DEPENDENT: Final = {"plate": "pivot_height", "outgoing": "speed"}
+"""Keys whose defaults are other keys."""
+
+
+def _parted(path: str) -> tuple[str | None, int | None, str] | None:
+    """Take ``surface[0].speed`` apart: table, index, key; None if it goes deeper."""
+    match = _PATH.fullmatch(path)
+    if match is None:
+        return None
+    return match[1], None if match[2] is None else int(match[2]), match[3]
+
+
+def is_plain(path: str) -> bool:
+    """Tell whether a key holds a number that is no whole one, nor part of a list."""
+    parts = _parted(path)
+    if parts is None:
+        return False
+    table, index, key = parts
+    if table not in (None, *Scene.tables()) or (index is not None) != (table == "surface"):
+        return False
+    field = (Scene if table is None else Scene.tables()[table]).model_fields.get(key)
+    return (
+        field is not None
+        and "float" in str(field.annotation)
+        and "tuple" not in str(field.annotation)
+    )
+
+
+def accepted(path: str, values: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Tell which values a key takes, (N,), if nothing else is looked at."""
+    good = np.ones(len(values), dtype=bool)
+    try:
+        _adapter(path).validate_python(values.tolist())
+    except ValidationError as error:
+        good[[int(fault["loc"][0]) for fault in error.errors(include_url=False)]] = False
+    return good
+
+
+@cache
+def _adapter(path: str) -> TypeAdapter[Any]:
+    """Return what validates a list of values of a key as its model does."""
+    parts = _parted(path)
+    assert parts is not None
+    field = (Scene if parts[0] is None else Scene.tables()[parts[0]]).model_fields[parts[2]]
+    kind: Any = field.annotation
+    for limit in field.metadata:
+        kind = Annotated[kind, limit]
+    return TypeAdapter(list[kind])
+
+
+class _Noting(Look):
+    """Notes which keys the rules ask for: they cannot depend on another one."""
+
+    def __init__(self, document: Mapping[str, Any], model: Any) -> None:
+        super().__init__(document, model)
+        self.asked: set[str] = set()
+
+    def __call__(self, table: str, key: str) -> Any:
+        self.asked.add(f"{table}.{key}")
+        return super().__call__(table, key)
+
+
+def judged_by(mapping: Mapping[str, Any], overrides: Sequence[str] = ()) -> set[str]:
+    """Return the keys of tables whose numbers decide whether a scene contradicts itself.
+
+    Another number under any other key makes no contradiction, nor takes one away.
+
+    Parameters
+    ----------
+    mapping, overrides
+        As `chutelab.scene.from_dict` takes them; each key by itself must be right.
+    """
+    document = plain(mapping)
+    apply(document, overrides)
+    look = _Noting(document, Scene)
+    for _ in conflicts(look):
+        pass
+    return look.asked
+
+
+def family(scene: Scene, columns: Mapping[str, NDArray[np.float64]]) -> Scene:
+    """Return scenes that differ in plain numbers; they are not validated.
+
+    Parameters
+    ----------
+    scene : Scene
+        What they share, defaults included.
+    columns : mapping of ndarray, (N,)
+        Values of each varied key by its full path, such as ``plate.angle_deg``.
+
+    Returns
+    -------
+    Scene
+        With arrays under these keys, and under those whose defaults they are; `Scene.members` is N.
+    """
+    changes: dict[str, Any] = {}
+    for path, values in columns.items():
+        parts = _parted(path)
+        assert parts is not None
+        table, index, key = parts
+        if table is None:
+            changes[key] = values
+        elif index is None:
+            given = changes.get(table, getattr(scene, table))
+            changes[table] = given.model_copy(update={key: values})
+        else:
+            surfaces = list(changes.get(table, scene.surface))
+            surfaces[index] = surfaces[index].model_copy(update={key: values})
+            changes[table] = tuple(surfaces)
+    for table, key in _DEPENDENT.items():
+        given = changes.get(table, getattr(scene, table))
+        if given is not None and key not in given.model_fields_set:
+            changes[table] = given.model_copy(update={key: None})
+    many = scene.model_copy(update=changes)
+    many._source, many._members = scene.source, len(next(iter(columns.values())))
+    many._fill_defaults()
+    return many
+
+
+_VARIABLE: Final = ("particle", "incoming", "plate", "outgoing", "surface", "stream", "run")
+"""Tables whose numbers change what happens."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a varied key is.
+
+    Attributes
+    ----------
+    path : str
+        The key as messages have it; free surfaces by index.
+    label : str
+        Its definition, up to the first semicolon or colon; of a free surface, after its name.
+    unit : str
+        "" for a pure number; "degrees" for angles.
+    whole : bool
+        Whether it takes whole numbers only.
+    """
+
+    path: str
+    label: str
+    unit: str
+    whole: bool = False
+
+
+def quantity(scene: Scene, vary: Vary) -> Quantity:
+    """Return what a varied key of a scene is.
+
+    Raises
+    ------
+    VaryError
+        If the scene knows no such key, or it holds no number.
+    """
+    # Through JSON, so that there are lists to lay a value into, as in a file.
+    document = json.loads(json.dumps(to_dict(scene)))
+    faults, given = apply(document, [setting(vary.key, vary.values[0])])
+    if faults:
+        raise VaryError(vary.typed, faults[0].allowed)
+    (path,) = given
+    table, _, name = path.partition(".")
+    home = Scene if table == path else Scene.tables().get(table.partition("[")[0])
+    key = (name or table).partition("[")[0]
+    if home is None or key not in {f.alias or n for n, f in home.model_fields.items()}:
+        raise VaryError(vary.typed, _unknown(document, path))
+    about = home.model_json_schema()["properties"][key]
+    indexed = (name or table) != key
+    if not (indexed or _numeric(about)) or (home is not Scene and not table.startswith(_VARIABLE)):
+        raise VaryError(vary.typed, f"{path} is no number, and only numbers can be varied")
+    unit = str(about.get("x-unit") or "")
+    if vary.unit not in ("", unit) and (vary.unit, unit) != ("%", ""):
+        own = f"is in {unit}" if unit else "is a pure number"
+        raise VaryError(vary.typed, f"{path} {own}, not in {vary.unit}; plain numbers will do")
+    if indexed:
+        return Quantity(path, path, unit)
+    label = re.split("[;:]", str(about.get("description", path)))[0].removesuffix(".")
+    label = label.removesuffix(f" ({unit})").replace("->", "→")
+    if table.startswith("surface["):
+        name = document["surface"][int(table[8:-1])].get("name")
+        label = f"{name}: {label[0].lower()}{label[1:]}"
+    return Quantity(path, label, unit, whole="number" not in _kinds(about))
+
+
+def _numeric(about: dict[str, Any]) -> bool:
+    return bool(_kinds(about) & {"number", "integer"})
+
+
+def _kinds(about: dict[str, Any]) -> set[Any]:
+    return {about.get("type"), *(option.get("type") for option in about.get("anyOf", ()))}
+
+
+def _unknown(document: dict[str, Any], path: str) -> str:
+    """Say what the scene says of a key that it does not know."""
+    try:
+        from_dict(document)
+    except SceneError as error:
+        for fault in error.faults:
+            if fault.value is not MISSING and path.startswith(fault.key):
+                return fault.allowed
+    return "unknown key; `chutelab schema` lists all"
+
+
+def quantities(scene: Scene, varies: Sequence[Vary]) -> tuple[Quantity, ...]:
+    """Return what each of the varied keys is.
+
+    Raises
+    ------
+    VaryError
+        If a key cannot be varied, or two are the same.
+    """
+    found: list[Quantity] = []
+    for vary in varies:
+        one = quantity(scene, vary)
+        if any(one.path == other.path for other in found):
+            raise VaryError(vary.typed, f"{one.path} is varied already")
+        found.append(one)
+    return tuple(found)
+
+
+def setting(key: str, value: float) -> Setting:
+    """Return an override of one key, in digits that give the value back."""
+    # A whole number will do for a float, but not the other way round.
+    whole = value.is_integer() and abs(value) < 2.0**53
+    written = str(int(value)) if whole else repr(value)
+    return Setting(f"{key}={written}", f"--vary {key}={written}")
+
+
+MOST_VALUES: Final = 10_000
+"""Values of one key; more would be a slip of the keyboard."""
+
+FORM: Final = "must be KEY=FROM:TO:COUNT, such as plate.angle_deg=-20:70:46, or KEY=a,b,c"
+
+RANGE_FORM: Final = "must be KEY=FROM:TO, such as plate.angle_deg=-20:70"
+
+_WITH_UNIT: Final = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) *([^\s\d].*)?")
+
+
+class VaryError(ValueError):
+    """What cannot be varied so; the text says what was given, and what is allowed."""
+
+    def __init__(self, typed: str, allowed: str) -> None:
+        super().__init__(f"{typed}: {allowed}")
+
+
+@dataclass(frozen=True)
+class Vary:
+    """A key of the scene and the values it takes.
+
+    Attributes
+    ----------
+    key : str
+        Full path of the key, such as ``plate.angle_deg`` or ``surface.hood.speed``.
+    values : tuple of float
+        In the order they are gone through; in the key's unit.
+    typed : str
+        What messages call it; by default as on the command line.
+    unit : str
+        The unit that was written with the values, "" for none; `quantity` refuses a wrong one.
+    """
+
+    key: str
+    values: tuple[float, ...]
+    typed: str = field(default="", compare=False)
+    unit: str = field(default="", compare=False)
+
+    def __post_init__(self) -> None:
+        if not self.typed:
+            object.__setattr__(self, "typed", f"--vary {self.key}=...")
+        if not self.values:
+            raise VaryError(self.typed, "at least one value is needed")
+        if not all(isfinite(value) for value in self.values):
+            raise VaryError(self.typed, "only finite numbers are allowed")
+
+
+@dataclass(frozen=True)
+class Range(Vary):
+    """A key of the scene and the two ends of what it may be, to draw samples from."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if len(self.values) != 2:
+            raise VaryError(self.typed, RANGE_FORM)
+        low, high = self.values
+        if low >= high:
+            raise VaryError(self.typed, f"the range is empty: from {low:g} to {high:g}")
+
+
+def parse(text: str) -> Vary:
+    """Read what ``--vary`` takes; numbers may have a unit, such as 0.5mm.
+
+    Raises
+    ------
+    VaryError
+        If it is not of the form, no number, an empty range, or too many values.
+    """
+    typed, key, given = _parted_key(text, FORM)
+    if ":" not in given:
+        parts = given.split(",")
+        if len(parts) > MOST_VALUES:
+            raise VaryError(typed, f"{len(parts)} values, at most {MOST_VALUES} are allowed")
+        values, unit = _numbers(typed, parts, FORM)
+        return Vary(key, values, typed, unit)
+    parts = given.split(":")
+    if len(parts) != 3:
+        raise VaryError(typed, FORM)
+    (first, last), unit = _numbers(typed, parts[:2], FORM)
+    count = _count(typed, parts[2])
+    if count > 1 and first == last:
+        raise VaryError(typed, f"the range is empty: from {first:g} to {last:g}")
+    return Vary(key, _even(first, last, count), typed, unit)
+
+
+def parse_range(text: str) -> Range:
+    """Read what ``--vary`` takes where samples are drawn: ``KEY=FROM:TO``.
+
+    Raises
+    ------
+    VaryError
+        If it is not of the form, no number, or an empty range.
+    """
+    typed, key, given = _parted_key(text, RANGE_FORM)
+    parts = given.split(":")
+    if len(parts) != 2:
+        raise VaryError(typed, f"samples are drawn between two ends: it {RANGE_FORM}")
+    values, unit = _numbers(typed, parts, RANGE_FORM)
+    return Range(key, values, typed, unit)
+
+
+def _parted_key(text: str, form: str) -> tuple[str, str, str]:
+    typed = f"--vary {text}"
+    key, equals, given = (part.strip() for part in text.partition("="))
+    if not (key and equals and given):
+        raise VaryError(typed, form)
+    return typed, key, given
+
+
+def _numbers(typed: str, parts: Sequence[str], form: str) -> tuple[tuple[float, ...], str]:
+    """Return numbers in the SI unit, and which that is; "" if none was written."""
+    read = [_number(typed, part, form) for part in parts]
+    units = {unit for value, unit in read if unit or value != 0.0}
+    if len(units) > 1:
+        raise VaryError(typed, "give all numbers in one kind of unit, or all without")
+    return tuple(value for value, _ in read), units.pop() if units else ""
+
+
+def _number(typed: str, text: str, form: str) -> tuple[float, str]:
+    try:
+        return read_size(text)
+    except ValueError:
+        # A unit without prefixes, such as kg, is as good if it is the key's.
+        match = _WITH_UNIT.fullmatch(text.strip())
+    value = float(match[1]) if match else float("nan")
+    if match is None or not isfinite(value):
+        raise VaryError(typed, f"{text.strip() or 'nothing'} is not a number; it {form}")
+    return value, match[2]
+
+
+def _count(typed: str, text: str) -> int:
+    allowed = f"COUNT = {text.strip() or 'nothing'}; it must be a whole number from 1"
+    try:
+        count = int(text)
+    except ValueError:
+        raise VaryError(typed, f"{allowed} to {MOST_VALUES}") from None
+    if not 1 <= count <= MOST_VALUES:
+        raise VaryError(typed, f"{allowed} to {MOST_VALUES}")
+    return count
+
+
+def _even(first: float, last: float, count: int) -> tuple[float, ...]:
+    """Return evenly spaced values; 0.3 is 0.3, not 0.30000000000000004."""
+    if count == 1:
+        return (first,)
+    size = max(abs(first), abs(last))
+    digits = 12
+    values = []
+    for i in range(count):
+        value = first + (last - first) * i / (count - 1)
+        # What is left of a 0 by rounding is a 0.
+        values.append(0.0 if abs(value) < 1e-13 * size else float(f"{value:.{digits}g}"))
+    values[0], values[-1] = first, last
+    return tuple(values)
+
+
+MOST_VARIED: Final = 2
+"""Keys varied at once: a slider each, or the two axes of a picture."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One combination of values.
+
+    Attributes
+    ----------
+    values : tuple of float
+        One for each varied key.
+    scene : Scene or None
+        None if these values make no scene.
+    fault : str
+        Why not, in words; "" if they do.
+    """
+
+    values: tuple[float, ...]
+    scene: Scene | None
+    fault: str = ""
+
+
+def variants(scene: Scene, varies: Sequence[Vary], most: int = 1_000) -> tuple[Variant, ...]:
+    """Lay every combination of values over a scene; the last key runs fastest.
+
+    Parameters
+    ----------
+    scene : Scene
+        From `chutelab.load`.
+    varies : sequence of Vary
+        Up to `MOST_VARIED`; none gives the scene itself.
+    most : int
+        Combinations allowed.
+
+    Returns
+    -------
+    tuple of Variant
+        A combination that makes no scene is there with its fault.
+
+    Raises
+    ------
+    VaryError
+        If there are too many keys or combinations, or a key cannot be varied.
+    """
+    if len(varies) > MOST_VARIED:
+        raise VaryError(varies[MOST_VARIED].typed, f"at most {MOST_VARIED} keys can be varied")
+    quantities(scene, varies)
+    count_of(varies, most)
+    document = to_dict(scene)
+    return tuple(
+        variant(document, scene.source, [vary.key for vary in varies], values)
+        for values in product(*(vary.values for vary in varies))
+    )
+
+
+def count_of(varies: Sequence[Vary], most: int) -> int:
+    """Return how many combinations there are.
+
+    Raises
+    ------
+    VaryError
+        If there are more than `most`.
+    """
+    total = prod(len(vary.values) for vary in varies)
+    if total > most:
+        counts = "".join(f"{len(vary.values)} × " for vary in varies[:-1])
+        raise VaryError(
+            varies[-1].typed,
+            f"{counts}{len(varies[-1].values)} variants, at most {most} are allowed",
+        )
+    return total
+
+
+def variant(
+    document: Mapping[str, Any], source: str, keys: Sequence[str], values: tuple[float, ...]
+) -> Variant:
+    """Lay one combination of values over a scene.
+
+    Parameters
+    ----------
+    document, source : mapping and str
+        The scene, as `chutelab.scene.to_dict` has it, and what messages call it.
+    keys, values : sequence of str, tuple of float
+        What is varied, and what it is.
+    """
+    settings = [setting(key, value) for key, value in zip(keys, values, strict=True)]
+    try:
+        return Variant(values, from_dict(document, source, settings))
+    except SceneError as error:
+        return Variant(values, None, reason(error))
+
+
+def reason(error: SceneError) -> str:
+    """Return the faults of a scene without its file, in one line."""
+    return "; ".join(str(fault) for fault in error.faults)

@@ -1,0 +1,1 @@
+"""Many runs for one answer: accuracy, sweeps, design, measured tracks."""

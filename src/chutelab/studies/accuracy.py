@@ -1,0 +1,543 @@
+"""`reach`: run a scene until it is accurate enough, and say how that is known.
+
+An engine's word on its own error is not evidence: two runs of one engine may agree on a wrong
+answer. So a run is held against a *witness*: the theory where it speaks of the whole run, else
+another engine, which shares no formula with the first (see `chutelab.checks.agreement`). Of a crowd that
+meets only the whole is held against another engine's. Without a witness nothing is promised.
+
+- What accuracy is asked for: a relative error, or a length.
+- What a run answers, and how far two runs are apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from math import inf, isfinite
+from typing import Literal
+
+import numpy as np
+
+from chutelab import scene as scenes
+from chutelab.engines import reference
+from chutelab.engines.simulation import simulate
+from chutelab.machine import build
+from chutelab.results import ENTRIES, REASONS, Floats, Kind, Recording
+from chutelab.results.comparison import QUANTITIES, compare, scales, scene_of
+from chutelab.results.ledger import ledger
+from chutelab.results.recorder import StalledError
+from chutelab.scene import Scene, SceneError
+from chutelab.scene.units import read_size, write_size
+from chutelab.theory import predict
+
+Progress = Callable[[float], None]
+
+SMALLEST, LARGEST_SHARE, LARGEST_LENGTH = 1e-15, 0.5, 1e3
+"""Nothing is more exact than the rounding of a double; more than half of everything off is no
+accuracy; and no machine is larger than a kilometre."""
+
+ALLOWED = (
+    "a relative error from 1e-15 to 0.5, such as 1e-6 or 0.1%, or a length from 1e-15 to 1000 m"
+    " with its unit, such as 1mm (m, cm, mm, µm or um, nm)"
+)
+
+
+class AccuracyError(ValueError):
+    """An accuracy that cannot be asked for; its text says what can."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """An accuracy.
+
+    Attributes
+    ----------
+    size : float
+        The largest error that is good enough.
+    unit : {"relative", "m"}
+        "relative": of every answer of a run, see `chutelab.studies.accuracy`; "m": of places only.
+    """
+
+    size: float
+    unit: Literal["relative", "m"]
+
+    def __post_init__(self) -> None:
+        most = LARGEST_SHARE if self.unit == "relative" else LARGEST_LENGTH
+        if not SMALLEST <= self.size <= most:
+            raise AccuracyError(f"{self}: must be {ALLOWED}")
+
+    def __str__(self) -> str:
+        return self.written(self.size)
+
+    def written(self, size: float) -> str:
+        """Write another error in the same unit."""
+        return f"{size:.2g}" if self.unit == "relative" else write_size(size, "m", 2)
+
+
+def parse(text: str) -> Wanted:
+    """Read an accuracy.
+
+    Raises
+    ------
+    AccuracyError
+        If it is none that can be asked for.
+
+    Examples
+    --------
+    >>> parse("1e-6"), parse("1mm")
+    (Wanted(size=1e-06, unit='relative'), Wanted(size=0.001, unit='m'))
+    """
+    try:
+        size, unit = read_size(text)
+    except ValueError:
+        unit = "unknown"
+    if unit not in ("", "%", "m"):
+        raise AccuracyError(f"{text!r}: must be {ALLOWED}")
+    try:
+        return Wanted(size, "m" if unit == "m" else "relative")
+    except AccuracyError:
+        raise AccuracyError(f"{text!r}: must be {ALLOWED}") from None
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """One answer of a run.
+
+    Attributes
+    ----------
+    name : str
+        What it is.
+    kind : {"place", "time", "speed", "energy", "number"}
+        What kind of quantity.
+    values : ndarray, (N,) or (N, 2)
+        One a particle, or one for all, SI; NaN where it did not happen.
+    """
+
+    name: str
+    kind: str
+    values: Floats
+
+
+def each(recording: Recording) -> Iterator[Answer]:
+    """Yield what happens to each particle, and the ledger."""
+    kinds = ((Kind.SEPARATION, "separation"), (Kind.IMPACT, "impact"), (Kind.LANDING, "landing"))
+    for kind, what in kinds:
+        for surface in recording.surfaces[:-1]:
+            events = recording.first(recording.select(kind, surface=surface))
+            if not len(events):
+                continue
+            where = f"{what} on {surface}" if kind == Kind.IMPACT else what
+            for name, quantity, column in (
+                (f"place of the {where}", "place", "position"),
+                (f"time of the {where}", "time", "t"),
+                (f"velocity at the {where}", "speed", "velocity_before"),
+            ):
+                values = np.full((recording.count, *events[column].shape[1:]), np.nan)
+                values[events["particle"]] = events[column]
+                yield Answer(name, quantity, values)
+            if kind != Kind.SEPARATION:
+                values = np.full((recording.count, 2), np.nan)
+                pushed = [events["normal_impulse"], events["tangential_impulse"]]
+                values[events["particle"]] = np.transpose(pushed) / recording.particle.mass
+                yield Answer(f"impulse per mass of the {where}", "speed", values)
+    yield Answer("place of the end", "place", _ends(recording))
+    yield Answer("number of particles that end so", "number", recording.ended.astype(np.float64))
+    yield from _booked(recording)
+
+
+def _ends(recording: Recording) -> Floats:
+    """Return where particles are at the end of a run of given length, or lie at rest, (N, 2).
+
+    Others end where they do because a run has to stop somewhere.
+    """
+    scene = scene_of(recording)
+    driven = {free.name for free in scene.surface if free.speed != 0.0}
+    driven |= {name for name in ("incoming", "outgoing") if getattr(scene, name) is not None
+               and getattr(scene, name).speed != 0.0}  # fmt: skip
+    still = [k for k, name in enumerate(recording.surfaces[:-1]) if name not in driven]
+    settled = recording.select(Kind.SETTLE)
+    told = recording.ended == REASONS.index("time")
+    told[settled["particle"][np.isin(settled["surface"], still)]] = True
+    told &= np.diff(recording.offsets) > 0
+    out = np.full((recording.count, 2), np.nan)
+    out[told] = recording.knots["position"][recording.offsets[1:][told] - 1]
+    return out
+
+
+def _booked(recording: Recording) -> Iterator[Answer]:
+    books = ledger(recording)
+    for entry in ENTRIES:
+        yield Answer(entry.replace("_", " "), "energy", np.array([getattr(books, entry)]))
+
+
+def together(recording: Recording) -> Iterator[Answer]:
+    """Yield what can be said of a crowd as a whole."""
+    landed = recording.first(recording.select(Kind.LANDING))
+    if len(landed):
+        yield Answer("mean landing point", "place", landed["position"][:, :1].mean(axis=0))
+    else:
+        last = recording.ends()[1]["position"]
+        yield Answer("mean end point", "place", last.mean(axis=0, keepdims=True))
+    yield from _booked(recording)
+
+
+def sizes(recording: Recording) -> dict[str, float]:
+    """Return what each kind of answer is measured by: as in `results.comparison`, where it can be.
+
+    Otherwise by the extent of the way, its duration and the highest speed; energies always by the
+    energy that was turned over.
+    """
+    scene = scene_of(recording)
+    known = scales(scene, predict(scene))
+    knots = recording.knots
+    place = knots["position"]
+    extent = float(np.hypot(*np.ptp(place, axis=0))) if len(place) else 0.0
+    lasted = float(np.ptp(knots["t"])) if len(place) else 0.0
+    fastest = float(np.hypot(*knots["velocity"].T).max()) if len(place) else 0.0
+    return {
+        "place": known["length"] if isfinite(known["length"]) else extent,
+        "time": known["time"] if isfinite(known["time"]) else lasted,
+        "speed": known["speed"] if isfinite(known["speed"]) else fastest,
+        "energy": ledger(recording).turned_over,
+        "number": 1.0,
+    }
+
+
+def apart(
+    one: Sequence[Answer], other: Sequence[Answer], measured: dict[str, float], unit: str
+) -> tuple[float, str]:
+    """Return how far the answers of two runs are apart at most, and which one is.
+
+    Parameters
+    ----------
+    one, other : sequence of Answer
+        Of two runs.
+    measured : dict of float
+        From `sizes`; relative differences are to these, or to the value where that is larger.
+    unit : {"relative", "m"}
+        "m": places only, m.
+
+    Returns
+    -------
+    float, str
+        inf if not the same things happen in both.
+    """
+    if [a.name for a in one] != [a.name for a in other]:
+        return inf, "what happens at all"
+    worst, which = 0.0, "every answer"
+    for mine, its in zip(one, other, strict=True):
+        if not np.array_equal(np.isnan(mine.values), np.isnan(its.values)):
+            return inf, mine.name
+        difference, value = np.abs(mine.values - its.values), np.abs(its.values)
+        if difference.ndim > 1:
+            difference, value = (np.hypot(*pair.T) if pair.shape[1] == 2 else pair[:, 0]
+                                 for pair in (difference, value))  # fmt: skip
+        if mine.kind == "number":
+            if np.any(difference > 0.0):
+                return inf, mine.name
+            continue
+        if unit == "m":
+            if mine.kind != "place":
+                continue
+            size: Floats | float = 1.0
+        else:
+            scale = measured[mine.kind]
+            size = np.maximum(value, scale) if scale > 0.0 else np.where(value > 0.0, value, 1.0)
+        with np.errstate(invalid="ignore"):
+            largest = float(np.nanmax(difference / size, initial=0.0))
+        if largest > worst:
+            worst, which = largest, mine.name
+    return worst, which
+
+
+WITNESSES = {
+    "exact": ("dop853", "contact", "pymunk"),
+    "contact": ("exact", "dop853", "pymunk"),
+    "pymunk": ("exact", "dop853", "contact"),
+}
+"""Whom an engine's run is held against, the most exact first; who cannot run it is passed over."""
+
+STEPPED = ("contact", "pymunk")
+"""Engines whose error depends on run.dt."""
+
+FLOOR = 1e-14
+"""Relative; two answers nearer than this agree by luck: each went through some tens of roundings of
+1e-16, the closed form of a slip round the pulley through a quadrature."""
+
+STIR = 1e-9
+"""Share by which inputs are changed to see what that does to a crowd."""
+
+SHORTEST = 1e-7
+"""s; the shortest step a scene may have."""
+
+MOST_STEPS = 50_000
+"""Steps of one run; those before it take as many together."""
+
+STALE, PATIENCE = 0.9, 3
+"""Halving the step does not help where the error falls by less than that factor; so many times in a
+row, and the search is given up."""
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """What accuracy was asked for, and what was reached.
+
+    Attributes
+    ----------
+    asked, unit : float, str
+        As in `Wanted`.
+    reached : float or None
+        Largest difference from the witness, in the same unit; None if there is none to tell.
+    method : str
+        How it is known; begins with "none" if it is not.
+    met : bool
+        Whether `reached` is at most `asked`.
+    worst : str
+        Which answer is the least accurate.
+    chaotic : bool
+        Whether it speaks of the crowd as a whole only, not of the ways of its particles.
+    dt : float or None
+        run.dt of the run, s; None for the exact engine.
+    runs : int
+        How many runs it took.
+    against : str or None
+        The witness: "theory", "dop853" or an engine.
+    """
+
+    asked: float
+    unit: str
+    reached: float | None
+    method: str
+    met: bool
+    worst: str
+    chaotic: bool
+    dt: float | None
+    runs: int
+    against: str | None
+
+
+def reach(
+    scene: Scene, wanted: Wanted | str | float, progress: Progress | None = None
+) -> tuple[Recording, Accuracy]:
+    """Run a scene until it is accurate enough, or cannot be made so.
+
+    The scene's ``run.engine`` is kept to; ``run.dt`` is the longest step that is tried.
+
+    Parameters
+    ----------
+    scene : Scene
+        From `chutelab.load`.
+    wanted : Wanted, str or float
+        Such as ``"1mm"`` or ``1e-6``.
+    progress : callable, optional
+        Called now and then with the share that is done; how many runs it takes is not known
+        beforehand.
+
+    Returns
+    -------
+    Recording, Accuracy
+        The most accurate run, and how accurate it is.
+
+    Raises
+    ------
+    AccuracyError
+        If that cannot be asked for.
+    SceneError
+        As `chutelab.simulate`.
+
+    Notes
+    -----
+    What is reached is the difference between two independent answers. Where the witness is stepped
+    too, it holds the errors of both.
+    """
+    if not isinstance(wanted, Wanted):
+        wanted = parse(wanted if isinstance(wanted, str) else repr(float(wanted)))
+    return _Search(scene, wanted, progress).result()
+
+
+class _Search:
+    """Runs a scene and its witness, counts the runs, and passes the progress on."""
+
+    def __init__(self, scene: Scene, wanted: Wanted, progress: Progress | None) -> None:
+        self.scene, self.wanted, self.progress = scene, wanted, progress
+        self.runs = 0
+
+    def result(self) -> tuple[Recording, Accuracy]:
+        found = self.run(self.scene)
+        known = self.by_theory(found, found.engine)
+        if known is not None and (known.met or found.engine == "exact"):
+            return found, known
+        if self.scene.stream.interact and self.scene.stream.count > 1:
+            return found, self.crowd(found)
+        return self.refine(found, known)
+
+    def run(self, scene: Scene, engine: str | None = None) -> Recording:
+        """Run a scene once more."""
+        if engine == "dop853":
+            found = reference.run(build(scene))
+        else:
+            found = simulate(scene, engine, None if self.progress is None else self.share)
+        self.runs += 1
+        return found
+
+    def share(self, share: float) -> None:
+        # Half of what is left for each run, because nobody knows how many there will be.
+        if self.progress is not None:
+            self.progress(1.0 - 0.5**self.runs * (1.0 - 0.5 * share))
+
+    def said(self, found: Recording, error: float, which: str, how: str, against: str | None,
+             *, chaotic: bool = False) -> Accuracy:  # fmt: skip
+        """Return an error as an `Accuracy`; inf is one that cannot be told."""
+        floor = FLOOR * (sizes(found)["place"] if self.wanted.unit == "m" else 1.0)
+        reached = max(error, floor)
+        return Accuracy(
+            asked=self.wanted.size,
+            unit=self.wanted.unit,
+            reached=reached if isfinite(reached) else None,
+            method=how,
+            met=reached <= self.wanted.size,
+            worst=which,
+            chaotic=chaotic,
+            dt=scene_of(found).run.dt if found.engine in STEPPED else None,
+            runs=self.runs,
+            against=against,
+        )
+
+    def by_theory(self, found: Recording, engine: str) -> Accuracy | None:
+        """Hold a run against the closed form; None where that does not speak of all of it."""
+        compared = compare(found)
+        if compared.reason or found.count > 1 or self.scene.run.until != "landed":
+            return None
+        errors = dict(compared.errors)
+        if self.wanted.unit == "m":
+            errors = {
+                name: abs(compared.simulated[name] - compared.theory[name])
+                for name in errors
+                if QUANTITIES[name] == "length"
+            }
+        else:
+            errors["energy ledger"] = ledger(found).relative_residual
+        missing = len(compared.errors) < sum(map(isfinite, compared.theory.values())) - 2
+        if missing or not errors:
+            # All but belt_work and slip_heat happen up to the landing.
+            return self.said(found, inf, "what happens at all", f"none: {engine} and the theory"
+                             " differ in what happens", "theory")  # fmt: skip
+        worst = max(errors, key=lambda name: errors[name])
+        return self.said(found, errors[worst], worst, "difference from the closed form", "theory")
+
+    def witness(self, found: Recording) -> tuple[Recording | None, str]:
+        """Run the first engine that can; return why others could not."""
+        passed = []
+        for engine in WITNESSES[found.engine]:
+            try:
+                return self.run(self.scene, engine), ""
+            except (SceneError, StalledError, reference.UnableError) as error:
+                why = error.faults[0].allowed if isinstance(error, SceneError) else str(error)
+                passed.append(f"{engine} ({why})")
+        return None, f"none: no other answer; not {', nor '.join(passed)}"
+
+    def refine(self, found: Recording, known: Accuracy | None) -> tuple[Recording, Accuracy]:
+        """Shorten the steps of the run, or else of its witness, until the two are near enough."""
+        other = None
+        if known is None:
+            other, none = self.witness(found)
+            if other is None:
+                return found, self.said(found, inf, "every answer", none, None)
+        dt, least, stale = self.scene.run.dt, inf, 0
+        best: tuple[Recording, Accuracy] | None = None
+        while True:
+            now = self.by_theory(found, found.engine) if other is None else self.held(found, other)
+            assert now is not None
+            if best is None or _size(now) <= _size(best[1]):
+                best = found, now
+            if now.met:
+                return found, now
+            size = _size(now)
+            stale = 0 if size < STALE * least else stale + 1
+            least = min(least, size)
+            moving = [one for one in (found, other) if one is not None and one.engine in STEPPED]
+            reason = _hopeless(moving, dt, stale)
+            if reason:
+                last = replace(best[1], runs=self.runs, method=f"{best[1].method}; {reason}")
+                return best[0], last
+            dt *= 0.5
+            finer = changed(self.scene, f"run.dt={dt!r}")
+            if found.engine in STEPPED:
+                found = self.run(finer, found.engine)
+            if other is not None and other.engine in STEPPED:
+                other = self.run(finer, other.engine)
+
+    def held(self, found: Recording, other: Recording) -> Accuracy:
+        """Hold a run against its witness."""
+        error, which = apart(list(each(found)), list(each(other)), sizes(other), self.wanted.unit)
+        at = f" at dt = {scene_of(other).run.dt:.3g} s" if other.engine in STEPPED else ""
+        name = "SciPy's DOP853" if other.engine == "dop853" else f"the {other.engine} engine"
+        how = f"difference from {name}{at}"
+        if not isfinite(error):
+            how = f"none: {found.engine} and {other.engine} differ in {which}"
+        return self.said(found, error, which, how, other.engine)
+
+    def crowd(self, found: Recording) -> Accuracy:
+        """Hold what can be said of a crowd as a whole against another engine's, and stirs of both.
+
+        A change of the inputs that nobody would notice moves every particle's way after a few
+        collisions, and so, less, the mean: differences smaller than that would be luck.
+        """
+        engine = "pymunk" if found.engine == "contact" else "contact"
+        moved = stirred(self.scene, STIR)
+        runs = [
+            found,
+            self.run(moved, found.engine),
+            self.run(self.scene, engine),
+            self.run(moved, engine),
+        ]
+        tables = [list(together(one)) for one in runs]
+        error, which = max(
+            apart(one, two, sizes(found), self.wanted.unit) for one, two in combinations(tables, 2)
+        )
+        what = "mean landing point" + ("" if self.wanted.unit == "m" else " and ledger")
+        how = (
+            f"a crowd as a whole: the {what} of {found.engine} and {engine} at dt ="
+            f" {self.scene.run.dt:.3g} s, each with and without a change of the inputs by {STIR:g}"
+        )
+        return self.said(found, error, which, how, engine, chaotic=True)
+
+
+def _hopeless(moving: list[Recording], dt: float, stale: int) -> str:
+    """Return why shorter steps are not worth trying, "" if they are."""
+    if not moving:
+        return "neither has a step to shorten"
+    if stale >= PATIENCE:
+        return "a shorter step helps no more"
+    if 0.5 * dt < SHORTEST:
+        return f"a step may not be shorter than {SHORTEST:g} s"
+    if 2.0 * max(one.steps for one in moving) > MOST_STEPS:
+        return f"half the step would take more than {MOST_STEPS:,} steps"
+    return ""
+
+
+def _size(found: Accuracy) -> float:
+    return inf if found.reached is None else found.reached
+
+
+def changed(scene: Scene, *settings: str) -> Scene:
+    """Return a scene with some keys set, ``KEY=VALUE`` each, and without its expectations."""
+    tables = scenes.to_dict(scene)
+    tables.pop("expect", None)
+    return scenes.from_dict(tables, scene.source, settings)
+
+
+def stirred(scene: Scene, share: float) -> Scene:
+    """Return a scene with gravity and speeds lower by a share, a tiny one.
+
+    Lower, because many keys have an upper bound and none of these a lower one but 0. The belt and
+    what is released on it keep the same speed.
+    """
+    less = 1.0 - share
+    settings = [f"gravity={scene.gravity * less!r}"]
+    if scene.incoming is not None:
+        settings.append(f"incoming.speed={scene.incoming.speed * less!r}")
+    if scene.stream.velocity is not None:
+        settings.append(f"stream.velocity={[part * less for part in scene.stream.velocity]}")
+    return changed(scene, *settings)

@@ -1,0 +1,429 @@
+"""Many variants of a scene at once: the one place where they are run.
+
+Beside its numbers each variant has a *course*: which surfaces particle 0 touches up to its landing.
+Within one course the numbers are smooth functions of the keys; where it changes, they may jump.
+
+- What may vary, and how far: ``KEY=FROM:TO``, checked against the scene before anything runs.
+- One-particle variants through the exact engine all at once, and their quantities as columns.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from math import isfinite
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chutelab.engines.simulation import simulate
+from chutelab.results import ENTRIES, REASONS, Floats, Kind, Recording
+from chutelab.results.comparison import from_events, never
+from chutelab.results.recorder import StalledError
+from chutelab.scene import Scene, SceneError, overridden, rules, to_dict
+from chutelab.scene.overrides import value_at
+from chutelab.scene.variants import is_plain, parse_range, quantity, reason, setting
+from chutelab.studies.design.quantities import (
+    DesignError,
+    Given,
+    Measured,
+    Quantity,
+    course_of,
+    courses_of,
+    each_once,
+    measured,
+)
+from chutelab.studies.sweep.batch import Batch, Block, one_line
+
+Ints = NDArray[np.int64]
+
+FORM: Final = "must be KEY=FROM:TO, such as plate.angle_deg=0:80"
+
+ASK = f"say what may vary; it {FORM}"
+
+MOST: Final = 8
+"""Keys that may vary at once: beyond, a search over the whole range takes too long to be one."""
+
+INSIDE: Final = 0.3819660112501051
+"""Where in a range it is tried before the search: a share that makes no whole number."""
+
+
+@dataclass(frozen=True)
+class Span:
+    """A key of the scene and the values it may take.
+
+    Attributes
+    ----------
+    key : str
+        Its full path; free surfaces by index.
+    unit : str
+        "" for a pure number.
+    low, high : float
+        Ends of the range, low < high.
+    start : float or None
+        The scene's own value; None if it has none.
+    label : str
+        Its definition in words.
+    """
+
+    key: str
+    unit: str
+    low: float
+    high: float
+    start: float | None
+    label: str
+
+    @property
+    def width(self) -> float:
+        """High less low."""
+        return self.high - self.low
+
+
+def ranges(scene: Scene, texts: Sequence[str]) -> tuple[Span, ...]:
+    """Read what ``--vary`` takes, several times.
+
+    Raises
+    ------
+    DesignError, VaryError
+        If a range cannot be read, is empty, goes beyond what the scene allows, or is of a key that
+        is unknown, no continuous number, or given twice.
+    """
+    return each_once("--vary", texts, lambda text: _read(scene, text), ASK, MOST)
+
+
+def _read(scene: Scene, text: str) -> Span:
+    if text.count(":") != 1:
+        raise DesignError(f"--vary {text}", FORM)
+    given = parse_range(text)
+    home = given.key.partition(".")[0]
+    if home in Scene.tables() and getattr(scene, home) in (None, ()):
+        named = "[[surface]]" if home == "surface" else f"[{home}]"
+        raise DesignError(given.typed, f"the scene has no {named}")
+    low, high = given.values
+    about = quantity(scene, given)
+    if about.whole:
+        raise DesignError(given.typed, f"{about.path} is a whole number: it cannot be searched")
+    _allowed(scene, about.path, (low, low + INSIDE * (high - low), high), given.typed)
+    value = value_at(scene, about.path)
+    start = float(value) if isinstance(value, (int, float)) else None
+    return Span(about.path, about.unit, low, high, start, about.label)
+
+
+def _allowed(scene: Scene, path: str, values: Sequence[float], typed: str) -> None:
+    """Refuse values that the key cannot have; those that only do not go with others may pass."""
+    refused = []
+    for value in values:
+        try:
+            varied(scene, [path], [value])
+        except SceneError as error:
+            refused.append(error)
+            for fault in error.faults:
+                if fault.key == path and isfinite(value):
+                    raise DesignError(typed, without_source(str(fault))) from None
+    if len(refused) == len(values):
+        raise DesignError(typed, without_source(reason(refused[0])))
+
+
+def without_source(text: str) -> str:
+    """Leave out of a fault which override it came from: none that anybody typed.
+
+    >>> without_source("plate.angle_deg = 90: less than 90 (from --vary plate.angle_deg=90)")
+    'plate.angle_deg = 90: less than 90'
+    """
+    return re.sub(r" \(from --[^)]*\)", "", text)
+
+
+def varied(
+    scene: Scene, keys: Sequence[str], values: Sequence[float], extra: Sequence[str] = ()
+) -> Scene:
+    """Return a scene with other values of some keys.
+
+    Parameters
+    ----------
+    extra : sequence of str
+        Further ``KEY=VALUE``.
+
+    Raises
+    ------
+    SceneError
+        If the scene refuses a value, or two that do not go together.
+    """
+    overrides = [setting(key, float(value)) for key, value in zip(keys, values, strict=True)]
+    return overridden(scene, [*overrides, *extra])
+
+
+def suits(scene: Scene, keys: Sequence[str], quantities: Sequence[Quantity]) -> bool:
+    """Tell whether variants of a scene can run at once, and all quantities be read off that."""
+    return (
+        scene.stream.count == 1
+        and scene.stream.at is None
+        and scene.run.engine not in ("contact", "pymunk")
+        and all(is_plain(key) for key in keys)
+        and all(_readable(quantity) for quantity in quantities)
+    )
+
+
+def _readable(quantity: Quantity) -> bool:
+    if not isinstance(quantity, Measured):
+        return True
+    match quantity.key.split("."):
+        case ["separation" | "impact" | "landing", *column]:
+            return column[-1] not in ("count", *rules.STATISTICS)
+        case ["ledger", name]:
+            return name in ENTRIES
+        case ["ledger", "by_surface", *_]:
+            return True
+        case [symbol]:
+            return symbol in rules.SYMBOLS and symbol not in ("belt_work", "slip_heat")
+    return False
+
+
+class Family:
+    """The quantities of variants that can be run at once.
+
+    Parameters
+    ----------
+    block : Block
+        Of a scene that `suits`.
+    quantities : sequence of Quantity
+        What is read off.
+
+    Attributes
+    ----------
+    values : ndarray, shape (N, M)
+        The quantities, NaN where they did not happen.
+    courses : list of str
+        "" for variants that did not run here.
+    faults : list of str
+        Why there was no run; "" where there was one.
+    left : list of int
+        Variants that have to run by themselves.
+    """
+
+    def __init__(self, block: Block, quantities: Sequence[Quantity]) -> None:
+        self.quantities = quantities
+        self.values = np.full((len(block.values), len(quantities)), np.nan)
+        self.courses = [""] * len(block.values)
+        batch = Batch(block, self._read)
+        self.faults = [one_line(batch.faults.get(row, "")) for row in range(len(block.values))]
+        self.left = batch.left
+
+    def _read(self, recording: Recording, family: Scene, which: Ints) -> None:
+        for column, wanted in enumerate(self.quantities):
+            self.values[which, column] = _column(recording, family, wanted)
+        for row, course in zip(which.tolist(), courses_of(recording), strict=True):
+            self.courses[row] = course
+
+
+def _column(recording: Recording, family: Scene, quantity: Quantity) -> Any:
+    """Return a quantity of each variant of a recording, (N,), or a number for all."""
+    if isinstance(quantity, Given):
+        return value_at(family, quantity.name)
+    if not isinstance(quantity, Measured):
+        return quantity.value
+    found = _measured(recording, family, quantity.key)
+    if quantity.ending == "settled":
+        found = np.where(recording.ended == REASONS.index("settled"), found, np.nan)
+    return found * family.stream.rate if quantity.name == "power" else found
+
+
+def _measured(recording: Recording, family: Scene, name: str) -> Any:
+    match name.split("."):
+        case ["ledger", "by_surface", surface, entry]:
+            table = recording.by_surface.reshape(recording.count, -1, len(ENTRIES))
+            if surface not in recording.surfaces:
+                return np.zeros(recording.count)
+            return table[:, recording.surface_index(surface), ENTRIES.index(entry)]
+        case ["ledger", entry]:
+            return recording.ends()[1]["entries"][:, ENTRIES.index(entry)]
+        case ["separation" | "impact" | "landing" as event, *column]:
+            return _of_event(recording, event, column)
+    first = [_first(recording, event) for event in ("separation", "impact", "landing")]
+    # Without the one before, the next says nothing in the paper's frame.
+    for before, after in pairwise(first):
+        after[np.isnan(before["t"])] = never(1)
+    values = from_events(family, *first)
+    return np.degrees(values[name.removesuffix("_deg")]) if name.endswith("_deg") else values[name]
+
+
+def _of_event(recording: Recording, event: str, column: list[str]) -> Floats:
+    surface = column.pop(0) if len(column) > 1 else None
+    first = _first(recording, event, surface)
+    key = column[0]
+    if key in ("x", "y"):
+        return np.asarray(first["position"][:, "xy".index(key)])
+    if key == "t":
+        return np.asarray(first["t"])
+    when = "after" if key.endswith("_after") else "before"
+    return np.asarray(first[f"velocity_{when}"][:, "xy".index(key[1])])
+
+
+def _first(recording: Recording, event: str, surface: str | None = None) -> NDArray[Any]:
+    """Return the first such event of each particle, NaN where there is none."""
+    kind = {"separation": Kind.SEPARATION, "impact": Kind.IMPACT, "landing": Kind.LANDING}[event]
+    found = recording.first(recording.select(kind, surface=surface or rules.NEEDED[event]))
+    every = never(recording.count)
+    every[found["particle"]] = found
+    return every
+
+
+MANY: Final = 8
+"""Variants from which on it pays to run them at once."""
+
+BLOCK: Final = 4096
+"""Variants at once: what they need then is some tens of megabytes, and the progress moves."""
+
+NO_RUN: Final = "no run"
+"""The course of a variant that makes no scene, or cannot be run."""
+
+
+@dataclass(frozen=True, eq=False)
+class Outcomes:
+    """What became of N variants.
+
+    Attributes
+    ----------
+    values : ndarray, shape (N, M)
+        The M quantities of each, NaN where they did not happen.
+    courses : list of str, length N
+        Surfaces touched by particle 0, such as ``plate, outgoing``; `NO_RUN` without a run.
+    faults : list of str, length N
+        Why there was no run; "" where there was one.
+    """
+
+    values: Floats
+    courses: list[str]
+    faults: list[str]
+
+
+@dataclass
+class Evaluator:
+    """Runs variants of a scene, and counts them.
+
+    Attributes
+    ----------
+    scene : Scene
+        What is varied.
+    keys : sequence of str
+        Full paths of the keys that are.
+    quantities : sequence of Quantity
+        What is looked at.
+    progress : callable, optional
+        Called now and then with the share that is done; see `expect`.
+    runs : int
+        Variants run so far.
+    """
+
+    scene: Scene
+    keys: Sequence[str]
+    quantities: Sequence[Quantity]
+    progress: Callable[[float], None] | None = None
+    runs: int = field(default=0, init=False)
+    _done: float = field(default=0.0, init=False)
+    _expected: int = field(default=0, init=False)
+
+    def expect(self, runs: int) -> None:
+        """Say how many variants there will be about, for the progress."""
+        self._expected = runs
+
+    def __call__(self, points: ArrayLike) -> Outcomes:
+        """Run the variants at points, shape (N, K), K values of the keys each."""
+        table = np.asarray(points, dtype=np.float64)
+        values = np.full((len(table), len(self.quantities)), np.nan)
+        courses, faults = [""] * len(table), [""] * len(table)
+        left = list(range(len(table)))
+        if len(table) >= MANY and suits(self.scene, self.keys, self.quantities):
+            left = self._together(table, values, courses, faults)
+        for row in left:
+            courses[row], faults[row] = self._one(table[row], values[row])
+            self._tell(1)
+        self.runs += len(table)
+        return Outcomes(values, courses, faults)
+
+    def _together(
+        self, table: Floats, values: Floats, courses: list[str], faults: list[str]
+    ) -> list[int]:
+        """Fill in what can be run at once; return the rows that are left."""
+        left: set[int] = set()
+        for ending, columns in self._endings().items():
+            base = varied(self.scene, [], [], _until(ending))
+            chosen = [self.quantities[column] for column in columns]
+            keys = tuple(self.keys)
+            for start in range(0, len(table), BLOCK):
+                rows = slice(start, start + BLOCK)
+                block = Block(to_dict(base), base.source, keys, keys, table[rows], None)
+                family = Family(block, chosen)
+                values[rows, columns] = family.values
+                for row, (course, fault) in enumerate(
+                    zip(family.courses, family.faults, strict=True), start
+                ):
+                    courses[row], faults[row] = (NO_RUN, fault) if fault else (course, "")
+                left |= {start + row for row in family.left}
+                self._tell(len(family.values) / len(self._endings()))
+        for row in left:
+            values[row] = np.nan
+        refused = [row for row, fault in enumerate(faults) if fault]
+        values[refused] = np.nan
+        return sorted(left)
+
+    def _tell(self, runs: float) -> None:
+        self._done += runs
+        if self.progress is not None and self._expected:
+            self.progress(min(self._done / self._expected, 1.0))
+
+    def _endings(self) -> dict[str, list[int]]:
+        """Return how the runs must end, and which quantities are read off which."""
+        wanted = [quantity.ending for quantity in self.quantities]
+        first = "scene" if "scene" in wanted or "settled" not in wanted else "settled"
+        endings: dict[str, list[int]] = {}
+        for column, ending in enumerate(wanted):
+            endings.setdefault(first if ending == "any" else ending, []).append(column)
+        return endings
+
+    def _one(self, point: Floats, out: Floats) -> tuple[str, str]:
+        """Fill in the quantities of one variant; return its course, or why it has none."""
+        course = ""
+        try:
+            for ending, columns in self._endings().items():
+                scene = varied(self.scene, self.keys, point.tolist(), _until(ending))
+                recording = simulate(scene)
+                course = course_of(recording)
+                for column in columns:
+                    out[column] = self.quantities[column].of(recording, scene)
+        except (SceneError, StalledError) as error:
+            out[:] = np.nan
+            return NO_RUN, reason(error) if isinstance(error, SceneError) else str(error)
+        return course, ""
+
+
+def _until(ending: str) -> list[str]:
+    return ['run.until="settled"'] if ending == "settled" else []
+
+
+def value(scene: Scene, name: str) -> float:
+    """Run a scene and return one of its quantities; NaN if it did not happen.
+
+    Parameters
+    ----------
+    name : str
+        See `chutelab.studies.design.quantities`.
+
+    Raises
+    ------
+    DesignError
+        If the scene has no such quantity.
+    SceneError
+        If it cannot be run.
+
+    Examples
+    --------
+    >>> from chutelab.scene import load
+    >>> round(value(load("perpendicular"), "belt_work"), 9)
+    0.048
+    """
+    wanted = measured(scene, name)
+    given = varied(scene, [], [], _until(wanted.ending))
+    return wanted.of(simulate(given), given)

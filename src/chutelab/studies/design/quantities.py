@@ -1,0 +1,375 @@
+"""What can be aimed at: numbers of a run, keys of the scene and plain numbers, with their units.
+
+>>> from chutelab.scene import load
+>>> wish = target(load("perpendicular"), "landing.vx = outgoing.speed")
+>>> wish.left.unit, wish.right.name
+('m/s', 'outgoing.speed')
+
+- What is asked for and cannot be done, and the packages without which nothing can.
+- The course of a particle: which surfaces it touches, up to its landing.
+- A scene as TOML text, to be loaded again.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from math import nan
+from typing import Any, Final, Literal, Protocol, TypeVar
+
+import numpy as np
+
+from chutelab.results import REASONS, Kind, Recording
+from chutelab.results.summary import measure
+from chutelab.scene import MISSING, Scene, rules, to_dict
+from chutelab.scene.overrides import value_at
+from chutelab.scene.units import read_size
+from chutelab.scene.variants import Vary, VaryError, quantity
+
+
+class Keyed(Protocol):
+    """Something said of one key of a scene."""
+
+    @property
+    def key(self) -> str:
+        """Full path of the key."""
+
+
+T = TypeVar("T", bound=Keyed)
+
+
+class DesignError(ValueError):
+    """A question that makes no sense for the scene; says what was typed, and what is allowed."""
+
+    def __init__(self, typed: str, allowed: str) -> None:
+        super().__init__(f"{typed}: {allowed}")
+
+
+def each_once(
+    option: str, texts: Sequence[str], read: Callable[[str], T], ask: str, most: int
+) -> tuple[T, ...]:
+    """Read what an option takes, given 1 to `most` times, once for each key.
+
+    Raises
+    ------
+    DesignError
+        If it is not given, too often, or twice for one key; and what `read` raises.
+    """
+    if not texts:
+        raise DesignError(option, ask)
+    if len(texts) > most:
+        raise DesignError(f"{option} {texts[most]}", f"at most {most} keys are allowed")
+    found: dict[str, T] = {}
+    for text in texts:
+        one = read(text)
+        if one.key in found:
+            raise DesignError(f"{option} {text}", f"{one.key} is given already")
+        found[one.key] = one
+    return tuple(found.values())
+
+
+def scipy(name: str) -> Any:
+    """Return a module of SciPy, such as ``optimize``.
+
+    Raises
+    ------
+    ImportError
+        Without SciPy; says what to install.
+    """
+    try:
+        return import_module(f"scipy.{name}")
+    except ImportError as error:
+        text = 'SciPy is needed: pip install "chutelab[design]"'
+        raise ImportError(text) from error
+
+
+MANY: Final = 6
+"""Touches of one surface in a row from which on they are not counted: a particle that bounces to
+rest does so a thousand times, and one more is no other course."""
+
+LONGEST: Final = 6
+"""Surfaces that are named: what is thrown to and fro longer goes by the same name."""
+
+
+def course_of(recording: Recording) -> str:
+    """Return the surfaces that particle 0 touches up to its first landing."""
+    return courses_of(recording, 1)[0]
+
+
+def courses_of(recording: Recording, count: int | None = None) -> list[str]:
+    """Return the courses of the first `count` particles, of all by default.
+
+    Such as ``plate, outgoing``, or ``plate, never lands (exit)``.
+    """
+    count = recording.count if count is None else count
+    events = recording.events[recording.events["particle"] < count]
+    events = events[np.isin(events["kind"], (Kind.IMPACT, Kind.LANDING))]
+    events = events[np.argsort(events["particle"], kind="stable")]
+    bounds = np.searchsorted(events["particle"], np.arange(count + 1)).tolist()
+    surfaces, landed = events["surface"].tolist(), (events["kind"] == Kind.LANDING).tolist()
+    known: dict[tuple[object, ...], str] = {}
+    found = []
+    for particle in range(count):
+        start, stop = bounds[particle], bounds[particle + 1]
+        last = next((i for i in range(start, stop) if landed[i]), None)
+        touched = tuple(surfaces[start : stop if last is None else last + 1])
+        end = "" if last is not None else REASONS[recording.ended[particle]]
+        if (touched, end) not in known:
+            names = _folded([recording.surfaces[surface] for surface in touched])
+            if len(names) > LONGEST:
+                names = [*names[: LONGEST - 1], "and so on"]
+            known[touched, end] = ", ".join([*names, *([f"never lands ({end})"] if end else [])])
+        found.append(known[touched, end])
+    return found
+
+
+def _folded(names: Sequence[str]) -> list[str]:
+    """Write repeats as one."""
+    out: list[tuple[str, int]] = []
+    for name in names:
+        if out and out[-1][0] == name:
+            out[-1] = (name, out[-1][1] + 1)
+        else:
+            out.append((name, 1))
+    return [name if times == 1 else f"{name} {_times(times)}" for name, times in out]
+
+
+def _times(times: int) -> str:
+    if times == 2:
+        return "twice"
+    return f"{times} times" if times < MANY else "many times"
+
+
+Ending = Literal["any", "scene", "settled"]
+"""How a run must end for a quantity: it does not matter, as the scene says, or without slip."""
+
+SHORT: Final[dict[str, tuple[str, Ending]]] = {
+    "belt_work": ("ledger.by_surface.outgoing.belt_work", "settled"),
+    "slip_heat": ("ledger.by_surface.outgoing.friction_loss", "settled"),
+    "power": ("ledger.by_surface.outgoing.belt_work", "settled"),
+    "restitution_loss": ("ledger.restitution_loss", "scene"),
+    "friction_loss": ("ledger.friction_loss", "scene"),
+}
+"""Short names: what each stands for, and how the run must end. The first three are what the
+outgoing belt pays until nothing slips on it any more, however the scene itself ends; `power` is
+that work per particle times the stream's rate."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A number of a run.
+
+    Attributes
+    ----------
+    name, unit : str
+        As it was asked for, and its unit.
+    key : str
+        Its full name, see `chutelab.scene.rules`.
+    ending : {"any", "scene", "settled"}
+        How the run must end.
+    """
+
+    name: str
+    unit: str
+    key: str
+    ending: Ending
+
+    def of(self, recording: Recording, scene: Scene) -> float:
+        """Return its value; NaN if it did not happen."""
+        if self.ending == "settled" and any(
+            REASONS[reason] != "settled" for reason in recording.ended
+        ):
+            return nan
+        value = measure(recording, self.key, scene)
+        return value * scene.stream.rate / recording.count if self.name == "power" else value
+
+
+@dataclass(frozen=True)
+class Given:
+    """A key of the scene, by its full path."""
+
+    name: str
+    unit: str
+    ending: Ending = "any"
+
+    def of(self, _recording: Recording | None, scene: Scene) -> float:
+        """Return its value in a scene; NaN where it has none."""
+        value = value_at(scene, self.name)
+        return float(value) if isinstance(value, (int, float)) else nan
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """A plain number."""
+
+    value: float
+    unit: str
+    ending: Ending = "any"
+
+    @property
+    def name(self) -> str:
+        """The number as text."""
+        return f"{self.value:.12g} {self.unit}".strip()
+
+    def of(self, _recording: Recording | None, _scene: Scene) -> float:
+        """Return the number."""
+        return self.value
+
+
+Quantity = Measured | Given | Fixed
+
+
+@dataclass(frozen=True)
+class Target:
+    """Two quantities that are to be equal."""
+
+    left: Measured
+    right: Quantity
+
+    def __str__(self) -> str:
+        return f"{self.left.name} = {self.right.name}"
+
+
+def measured(scene: Scene, name: str, typed: str = "") -> Measured:
+    """Return the quantity of a scene that has this name, short or full.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``belt_work``, ``landing.x`` or ``ledger.by_surface.plate.restitution_loss``.
+    typed : str
+        What messages call it.
+
+    Raises
+    ------
+    DesignError
+        If the scene has no such quantity.
+    """
+    known = scene.surfaces
+    key, ending = SHORT.get(name, (name, _ending(name)))
+    unit = rules.unit_of(key, known)
+    if unit is None:
+        raise DesignError(typed or name, f"no such quantity here; {_suggestion(name, key, known)}")
+    if name == "power":
+        unit = "W"
+    return Measured(name, unit, key, ending)
+
+
+def _ending(name: str) -> Ending:
+    # What comes before the landing, and the landing itself, is there however the run ends.
+    head = name.partition(".")[0]
+    return "any" if head in (*rules.NEEDED, *rules.SYMBOLS) else "scene"
+
+
+def _suggestion(name: str, key: str, known: Sequence[str]) -> str:
+    near = difflib.get_close_matches(name, SHORT, n=1, cutoff=0.75)
+    if near and near[0] != name:
+        return f"did you mean {near[0]}?"
+    said = rules.suggestion(key, known)
+    return said if said.startswith(("did", "it needs")) else f"{said}; short are {', '.join(SHORT)}"
+
+
+def target(scene: Scene, text: str) -> Target:
+    """Read ``QUANTITY=VALUE``: a quantity, and the number, key or quantity that it is to equal.
+
+    Raises
+    ------
+    DesignError
+        If it is not of that form, one of them is unknown, or their units differ.
+    """
+    typed = f"--target {text}"
+    name, equals, given = (part.strip() for part in text.partition("="))
+    if not (name and equals and given):
+        raise DesignError(
+            typed, "must be QUANTITY=VALUE, such as landing.x=1.2 or landing.vx=outgoing.speed"
+        )
+    left = measured(scene, name, typed)
+    right = _right(scene, given, typed, left)
+    if right.unit != left.unit:
+        if not (isinstance(right, Fixed) and right.unit == ""):
+            raise DesignError(
+                typed, f"{left.name} is {_in(left.unit)}, and {right.name} is {_in(right.unit)}"
+            )
+        right = Fixed(right.value, left.unit)
+    if right == left:
+        raise DesignError(typed, "both sides are the same")
+    return Target(left, right)
+
+
+def _in(unit: str) -> str:
+    return f"in {unit}" if unit else "a pure number"
+
+
+def _right(scene: Scene, text: str, typed: str, left: Measured) -> Quantity:
+    try:
+        number, unit = read_size(text)
+    except ValueError as error:
+        if text[0].isdigit() or text[0] in "+-.":
+            raise DesignError(
+                typed, f"{text} is no number of a quantity {_in(left.unit)}; {error}"
+            ) from None
+    else:
+        return Fixed(number, unit)
+    if text in SHORT or rules.unit_of(text, scene.surfaces) is not None:
+        return measured(scene, text, typed)
+    try:
+        found = quantity(scene, Vary(text, (0.0,), typed))
+    except VaryError as error:
+        allowed = str(error).removeprefix(f"{typed}: ")
+        raise DesignError(
+            typed, f"{text} is neither a number, nor a quantity, nor a key of the scene: {allowed}"
+        ) from None
+    value = value_at(scene, found.path)
+    if value is MISSING or value is None or isinstance(value, (str, bool)):
+        raise DesignError(typed, f"{found.path} has no number as its value in this scene")
+    return Given(found.path, found.unit)
+
+
+def to_toml(scene: Scene, comment: str = "") -> str:
+    """Return the keys of a scene that were set, as the text of a scene file.
+
+    Its ``[[expect]]`` are left out: they were promised for another scene.
+
+    Parameters
+    ----------
+    comment : str
+        Lines to begin with.
+
+    Examples
+    --------
+    >>> from chutelab.scene import load, parse
+    >>> scene = load("perpendicular")
+    >>> parse(to_toml(scene)).plate == scene.plate
+    True
+    """
+    document = {key: value for key, value in to_dict(scene).items() if key != "expect"}
+    lines = [f"# {line}".rstrip() for line in comment.splitlines()]
+    lines += [""] if lines else []
+    for key, value in document.items():
+        if not isinstance(value, dict) and not _tables(value):
+            lines.append(f"{key} = {_value(value)}")
+    for key, value in document.items():
+        for table in value if _tables(value) else [value]:
+            if isinstance(table, dict):
+                lines += ["", f"[[{key}]]" if _tables(value) else f"[{key}]"]
+                lines += [f"{k} = {_value(v)}" for k, v in table.items() if v is not None]
+    return "\n".join(lines) + "\n"
+
+
+def _tables(value: Any) -> bool:
+    return isinstance(value, (list, tuple)) and bool(value) and isinstance(value[0], dict)
+
+
+def _value(value: Any) -> str:
+    match value:
+        case bool():
+            return "true" if value else "false"
+        case str():
+            # JSON's strings are TOML's, but for one character that only TOML wants escaped.
+            return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+        case list() | tuple():
+            return f"[{', '.join(map(_value, value))}]"
+    return repr(value)

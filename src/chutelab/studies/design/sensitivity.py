@@ -1,0 +1,217 @@
+"""How much an answer depends on each key: its derivatives, and what one per cent does.
+
+- What each uncertain input contributes to a variance, from three sets of points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from chutelab.results import Floats
+from chutelab.studies.design.evaluation import Evaluator, Span
+from chutelab.studies.design.quantities import scipy
+
+RESAMPLES: Final = 200
+"""Of the bootstrap, enough for an interval of two digits."""
+
+LEVEL: Final = 0.95
+
+
+@dataclass(frozen=True, eq=False)
+class Indices:
+    """Sobol indices of one quantity, arrays of shape (K,) and (K, 2).
+
+    Attributes
+    ----------
+    first, total : ndarray
+        Share of the variance that an input explains alone, and with all its interactions.
+    first_interval, total_interval : ndarray
+        Bootstrap intervals at 95 %.
+    """
+
+    first: Floats
+    total: Floats
+    first_interval: Floats
+    total_interval: Floats
+
+
+def design(inputs: int, samples: int, seed: int) -> tuple[Floats, Floats]:
+    """Return A and B, shares 0 to 1 of shape (samples, inputs): scrambled Sobol points.
+
+    Parameters
+    ----------
+    samples : int
+        A power of 2.
+    """
+    sampler = scipy("stats").qmc.Sobol(d=2 * inputs, scramble=True, seed=seed)
+    points = np.asarray(sampler.random_base2(int(samples).bit_length() - 1), dtype=np.float64)
+    return points[:, :inputs], points[:, inputs:]
+
+
+def crossed(a: Floats, b: Floats) -> Floats:
+    """Return A with one column of B in turn, shape (inputs, samples, inputs)."""
+    every = np.repeat(a[np.newaxis], a.shape[1], axis=0)
+    for i in range(a.shape[1]):
+        every[i, :, i] = b[:, i]
+    return every
+
+
+def indices(f_a: Floats, f_b: Floats, f_ab: Floats, seed: int) -> Indices:
+    """Estimate the indices of a function.
+
+    Parameters
+    ----------
+    f_a, f_b : ndarray, shape (N,)
+        The function at A and B.
+    f_ab : ndarray, shape (K, N)
+        The function at `crossed` points.
+    seed : int
+        Of the bootstrap.
+    """
+    first, total = _estimates(f_a, f_b, f_ab)
+    draws = np.random.default_rng(seed).integers(0, len(f_a), size=(RESAMPLES, len(f_a)))
+    again = np.array([_estimates(f_a[rows], f_b[rows], f_ab[:, rows]) for rows in draws])
+    tails = (0.5 * (1.0 - LEVEL), 0.5 * (1.0 + LEVEL))
+    spans = np.quantile(again, tails, axis=0)
+    return Indices(first, total, spans[:, 0].T, spans[:, 1].T)
+
+
+def _estimates(f_a: Floats, f_b: Floats, f_ab: Floats) -> tuple[Floats, Floats]:
+    both = np.concatenate([f_a, f_b])
+    middle, variance = both.mean(), both.var()
+    if variance <= (1e-14 * np.abs(both).max()) ** 2:
+        return np.full(len(f_ab), np.nan), np.full(len(f_ab), np.nan)
+    # Around the mean: the products lose fewer digits, and scatter less.
+    saltelli = np.mean((f_b - middle) * (f_ab - f_a), axis=1) / variance
+    jansen = 1.0 - 0.5 * np.mean((f_b - f_ab) ** 2, axis=1) / variance
+    share = np.clip(jansen, 0.0, 1.0)
+    first = share * jansen + (1.0 - share) * saltelli
+    total = 0.5 * np.mean((f_a - f_ab) ** 2, axis=1) / variance
+    return first, total
+
+
+STEPS: Final = (1e-3, 1e-4, 1e-5, 1e-6)
+"""Of a range: over the largest, differences lose fewest digits to rounding, over the smallest they
+see least of what bends the function."""
+
+PERCENT: Final = 0.01
+
+ROUNDING: Final = 1e-15
+"""Relative error of a quantity: what a difference over a step must stay clear of."""
+
+STEADY: Final = 0.01
+"""By how much a one-sided slope may change when its step is halved."""
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """What a key does to a quantity at a point.
+
+    Attributes
+    ----------
+    key, unit : str
+        What is changed, and its unit.
+    quantity, quantity_unit : str
+        What changes.
+    derivative : float
+        In quantity_unit per unit; NaN where the course changes within a millionth of the range.
+    step : float
+        One per cent of the key's value; of its range, if its value is 0.
+    lower, upper : float
+        The quantity with the key one `step` less and more; NaN where it has none.
+    courses : tuple of str
+        The way of particle 0 there.
+    """
+
+    key: str
+    unit: str
+    quantity: str
+    quantity_unit: str
+    derivative: float
+    step: float
+    lower: float
+    upper: float
+    courses: tuple[str, str]
+
+
+def sensitivities(
+    evaluate: Evaluator, ranges: Sequence[Span], at: Floats, columns: Sequence[int]
+) -> tuple[Sensitivity, ...]:
+    """Return what each key does to some quantities at a point.
+
+    Parameters
+    ----------
+    evaluate : Evaluator
+        Of the keys of `ranges`.
+    at : ndarray, shape (K,)
+        The point.
+    columns : sequence of int
+        Which of the evaluator's quantities.
+    """
+    found = []
+    for k, one in enumerate(ranges):
+        derivative = _derivatives(evaluate, at, k, one.width)
+        step = PERCENT * (abs(float(at[k])) or one.width)
+        sides = evaluate(np.stack([_moved(at, k, -step), _moved(at, k, step)]))
+        for column in columns:
+            quantity = evaluate.quantities[column]
+            lower, upper = (float(value) for value in sides.values[:, column])
+            found.append(
+                Sensitivity(
+                    one.key, one.unit, quantity.name, quantity.unit, float(derivative[column]),
+                    step, lower, upper, (sides.courses[0], sides.courses[1]),
+                )
+            )  # fmt: skip
+    return tuple(found)
+
+
+def _moved(at: Floats, k: int, step: float) -> Floats:
+    moved = at.copy()
+    moved[k] += step
+    return moved
+
+
+def _derivatives(evaluate: Evaluator, at: Floats, k: int, width: float) -> Floats:
+    """Return the derivatives of all quantities by one key; one-sided where the course ends.
+
+    Differences over a step and half of it are extrapolated; of all steps the one counts at which
+    the two agree best, since next to a jump the function may bend within any step.
+    """
+    here = evaluate(at[np.newaxis])
+    sides: dict[float, dict[float, Floats]] = {1.0: {}, -1.0: {}}
+    for share in STEPS:
+        for sign, found in sides.items():
+            steps = sign * share * width * np.array([1.0, 0.5])
+            near = evaluate(np.stack([_moved(at, k, step) for step in steps]))
+            if set(near.courses) == set(here.courses):
+                found[share] = near.values
+    slopes = []
+    for share in STEPS:
+        step = share * width
+        if all(share in found for found in sides.values()):
+            far, half = (sides[1.0][share] - sides[-1.0][share]) / (step * np.array([[2.0], [1.0]]))
+            rounding = ROUNDING * np.abs(here.values[0]) / step
+            slopes.append(((4.0 * half - far) / 3.0, np.abs(half - far) + rounding))
+    if not slopes:
+        return _one_sided(here.values[0], sides, width)
+    values, apart = (np.array(part) for part in zip(*slopes, strict=True))
+    best = np.argmin(np.where(np.isfinite(apart), apart, np.inf), axis=0)
+    chosen: Floats = np.take_along_axis(values, best[np.newaxis], axis=0)[0]
+    return chosen
+
+
+def _one_sided(here: Floats, sides: dict[float, dict[float, Floats]], width: float) -> Floats:
+    for sign, found in sides.items():
+        for share in reversed(STEPS):
+            if share in found:
+                step = sign * share * width
+                far, half = (found[share] - here) / (step * np.array([[1.0], [0.5]]))
+                # A slope that depends on the step is none: at a grazing blow it is infinite.
+                steady = np.abs(half - far) <= STEADY * np.abs(half)
+                slope: Floats = np.where(steady, 2.0 * half - far, np.nan)
+                return slope
+    return np.full(len(here), np.nan)

@@ -1,0 +1,440 @@
+"""`uncertainty`: how uncertain inputs make a landing point and a belt's work uncertain.
+
+- Uncertain inputs: ``KEY=MEAN±SPREAD``, checked against the scene before anything runs.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final, Literal
+
+import numpy as np
+
+from chutelab.results import Floats
+from chutelab.scene import Scene, SceneError
+from chutelab.scene.overrides import limits_of, parts_of, rule_at, value_at
+from chutelab.scene.units import read_size, with_unit
+from chutelab.scene.variants import Vary, quantity, reason
+from chutelab.studies.design.answers import finite
+from chutelab.studies.design.evaluation import (
+    INSIDE,
+    Evaluator,
+    Outcomes,
+    varied,
+    without_source,
+)
+from chutelab.studies.design.quantities import DesignError, each_once, measured, scipy
+from chutelab.studies.design.sensitivity import Indices, crossed, design, indices
+from chutelab.util.tables import Sheet, Shown, csv_text, frame
+
+FORM: Final = (
+    "must be KEY=MEAN±SPREAD, such as restitution=0.5±0.05 or incoming.speed=2+-1% (or ±SPREAD"
+    " alone, around the scene's value); :uniform at the end makes SPREAD a half-width"
+)
+
+ASK = f"say what is uncertain; it {FORM}"
+
+LAWS: Final = ("normal", "uniform")
+
+HOMES: Final = ("plate", "incoming", "outgoing", "particle", "stream")
+"""Tables in which a name without one is looked for, in this order."""
+
+MOST: Final = 12
+"""Uncertain inputs at once."""
+
+_SIGN: Final = re.compile(r"±|\+/-|\+-")
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A number of the scene that is not known exactly.
+
+    Attributes
+    ----------
+    key, unit : str
+        Its full path, and its unit.
+    mean, spread : float
+        Normal: mean and standard deviation. Uniform: middle and half-width.
+    law : {"normal", "uniform"}
+        How it is distributed.
+    low, high : float
+        The least and the largest value that the scene allows; the distribution is cut there.
+    """
+
+    key: str
+    unit: str
+    mean: float
+    spread: float
+    law: Literal["normal", "uniform"]
+    low: float
+    high: float
+
+    @property
+    def cut(self) -> float:
+        """Share of the distribution that the scene does not allow."""
+        below, above = self._tails()
+        return below + above
+
+    def _tails(self) -> tuple[float, float]:
+        if self.law == "normal":
+            ndtr = scipy("special").ndtr
+            return (
+                float(ndtr((self.low - self.mean) / self.spread)),
+                float(ndtr((self.mean - self.high) / self.spread)),
+            )
+        width = 2.0 * self.spread
+        below = (self.low - self.mean + self.spread) / width
+        above = (self.mean + self.spread - self.high) / width
+        return float(np.clip(below, 0.0, 1.0)), float(np.clip(above, 0.0, 1.0))
+
+    def values(self, shares: Floats) -> Floats:
+        """Return the values below which given shares, 0 to 1, of the (cut) distribution lie."""
+        below, above = self._tails()
+        inside = below + shares * (1.0 - below - above)
+        if self.law == "normal":
+            # Sobol points begin at 0, where a normal distribution has no value.
+            safe = np.clip(inside, 1e-12, 1.0 - 1e-12)
+            found = self.mean + self.spread * scipy("special").ndtri(safe)
+        else:
+            found = self.mean + self.spread * (2.0 * inside - 1.0)
+        inside_limits: Floats = np.clip(found, self.low, self.high)
+        return inside_limits
+
+
+def spreads(scene: Scene, texts: Sequence[str]) -> tuple[Spread, ...]:
+    """Read what ``--uncertainty`` takes, several times.
+
+    Raises
+    ------
+    DesignError, VaryError
+        If one cannot be read, or is of a key that is unknown, no continuous number, or given twice.
+    """
+    return each_once("--uncertainty", texts, lambda text: _read(scene, text), ASK, MOST)
+
+
+def _read(scene: Scene, text: str) -> Spread:
+    typed = f"--uncertainty {text}"
+    key, equals, given = (part.strip() for part in text.partition("="))
+    given, _, law = (part.strip() for part in given.partition(":"))
+    parts = [part.strip() for part in _SIGN.split(given)]
+    if not (key and equals) or len(parts) != 2 or not parts[1]:
+        raise DesignError(typed, FORM)
+    if law not in ("", *LAWS):
+        raise DesignError(typed, f"{law} is no distribution here; there are {' and '.join(LAWS)}")
+    about = quantity(scene, Vary(_full(scene, key), (0.0,), typed))
+    own = value_at(scene, about.path)
+    if not isinstance(own, (int, float)):
+        own = None
+    if own is None and not parts[0]:
+        raise DesignError(typed, f"{about.path} has no value in this scene: give the mean, too")
+    mean = float(own) if own is not None and not parts[0] else _number(parts[0], about.unit, typed)
+    spread = _size(parts[1], mean, about.unit, typed)
+    low, high = limits_of(rule_at(parts_of(about.path)) or {}) or (-np.inf, np.inf)
+    for value in (mean, float(np.clip(mean + INSIDE * spread, low, high))):
+        try:
+            varied(scene, [about.path], [value])
+        except SceneError as error:
+            raise DesignError(typed, without_source(reason(error))) from None
+    return Spread(
+        about.path, about.unit, mean, spread, "uniform" if law == "uniform" else "normal", low, high
+    )
+
+
+def _full(scene: Scene, key: str) -> str:
+    """Add the table to a name that has none."""
+    if "." in key or "[" in key or key in Scene.model_fields:
+        return key
+    for home in HOMES:
+        if getattr(scene, home) is not None and key in Scene.tables()[home].model_fields:
+            return f"{home}.{key}"
+    return key
+
+
+def _number(text: str, unit: str, typed: str) -> float:
+    try:
+        value, found = read_size(text)
+    except ValueError as error:
+        raise DesignError(typed, f"{text or 'nothing'}: {error}; it {FORM}") from None
+    if found not in ("", unit):
+        allowed = f"it is in {unit}" if unit else "it is a pure number"
+        raise DesignError(typed, f"wrong unit in {text}: {allowed}")
+    return value
+
+
+def _size(text: str, mean: float, unit: str, typed: str) -> float:
+    value = mean
+    if text.endswith("%"):
+        value = abs(mean) * _number(text.removesuffix("%"), "", typed) / 100.0
+    else:
+        value = _number(text, unit, typed)
+    if not value > 0.0:
+        raise DesignError(typed, f"the spread {text} must be more than 0; it {FORM}")
+    return value
+
+
+QUANTITIES: Final = ("landing.x", "belt_work")
+"""What is looked at unless said."""
+
+SAMPLES: Final = 1024
+"""Of each of the K + 2 sets of points: indices to about a hundredth."""
+
+NOTHING: Final = 1e-9
+"""Share of a distribution that is not worth a sentence."""
+
+FEWEST: Final = 64
+MOST_SAMPLES: Final = 1 << 20
+
+INTERVAL: Final = (0.025, 0.975)
+"""Between these shares of the sample lies the 95 % interval."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Uncertainty(Shown):
+    """What becomes of uncertain inputs, N samples of K inputs and M quantities.
+
+    Attributes
+    ----------
+    scene : str
+        Its title.
+    spreads : tuple of Spread
+        The inputs.
+    quantities, units : tuple of str
+        What is looked at.
+    nominal : ndarray, shape (M,)
+        The quantities with all inputs at their means.
+    inputs : ndarray, shape (N, K)
+        Values that were run: a sample of the inputs.
+    outputs : ndarray, shape (N, M)
+        What came of them, NaN where it did not happen.
+    indices : tuple of Indices
+        Of each quantity.
+    lost : dict of str
+        Why samples lack a value, of which quantities, and how many.
+    runs, samples, seed : int
+        Variants that were run, samples of each set, and the seed of the points.
+    """
+
+    scene: str
+    spreads: tuple[Spread, ...]
+    quantities: tuple[str, ...]
+    units: tuple[str, ...]
+    nominal: Floats
+    inputs: Floats
+    outputs: Floats
+    indices: tuple[Indices, ...]
+    lost: dict[str, int]
+    runs: int
+    samples: int
+    seed: int
+
+    @property
+    def mean(self) -> Floats:
+        """Means of the quantities, (M,); NaN without a single value."""
+        return np.array([np.mean(one) if len(one) else np.nan for one in self._kept()])
+
+    @property
+    def deviation(self) -> Floats:
+        """Their standard deviations, (M,)."""
+        return np.array([np.std(one) if len(one) else np.nan for one in self._kept()])
+
+    @property
+    def interval(self) -> Floats:
+        """Their 95 % intervals, (M, 2)."""
+        return np.array(
+            [np.quantile(one, INTERVAL) if len(one) else [np.nan] * 2 for one in self._kept()]
+        )
+
+    def _kept(self) -> list[Floats]:
+        return [column[np.isfinite(column)] for column in self.outputs.T]
+
+    @property
+    def columns(self) -> dict[str, Floats]:
+        """Inputs and outputs by name, (N,) each."""
+        names = (*(one.key for one in self.spreads), *self.quantities)
+        return dict(zip(names, (*self.inputs.T, *self.outputs.T), strict=True))
+
+    def frame(self) -> Any:
+        """Return inputs and outputs as a pandas DataFrame; ImportError without pandas."""
+        return frame(self.columns)
+
+    def csv(self) -> str:
+        """Return inputs and outputs as CSV; an empty cell is a sample without the quantity."""
+        return csv_text(self.columns)
+
+    def sheet(self) -> Sheet:
+        """Return mean, interval and indices of each quantity."""
+        columns = ["", *(with_unit(n, u) for n, u in zip(self.quantities, self.units, strict=True))]
+        rows = [("all inputs at their means", *(f"{value:.6g}" for value in self.nominal))]
+        rows.append(("mean", *(f"{value:.6g}" for value in self.mean)))
+        rows.append(("standard deviation", *(f"{value:.3g}" for value in self.deviation)))
+        rows.append(("95 % interval", *(f"{low:.5g} .. {high:.5g}" for low, high in self.interval)))
+        foot = [
+            (f"share of {one.key}", *(_share(found, k) for found in self.indices))
+            for k, one in enumerate(self.spreads)
+        ]
+        return Sheet(
+            f"{self.scene}: {_inputs(self.spreads)}", tuple(columns), tuple(rows), foot=tuple(foot),
+            notes=tuple(self._notes()),
+        )  # fmt: skip
+
+    def _notes(self) -> list[str]:
+        said = [
+            "Each ± is a standard deviation, of a uniform input the half-width.",
+            "Shares are first-order Sobol indices, the part of the variance that an input explains"
+            " alone, with their 95 % intervals.",
+        ]
+        said += [
+            f"{100.0 * one.cut:.2g} % of {one.key} = {one.mean:g} ± {one.spread:g} lies outside"
+            f" what is allowed, {one.low:g} to {one.high:g}: its distribution is cut there."
+            for one in self.spreads
+            if one.cut > NOTHING
+        ]
+        total = len(self.inputs)
+        for why, count in sorted(self.lost.items(), key=lambda item: -item[1])[:3]:
+            said.append(f"{count} of {total} samples are left out: {why}.")
+        for name, found in zip(self.quantities, self.indices, strict=True):
+            if np.isnan(found.first).all() and np.isfinite(self.outputs).any():
+                said.append(f"{name} does not depend on these inputs.")
+        return said
+
+
+def _share(found: Indices, k: int) -> str:
+    low, high = found.first_interval[k]
+    if not np.isfinite(found.first[k]):
+        return "-"
+    return f"{100.0 * found.first[k]:.1f} % ({100.0 * low:.0f} .. {100.0 * high:.0f})"
+
+
+def _inputs(given: Sequence[Spread]) -> str:
+    return ", ".join(
+        f"{one.key} = {one.mean:g} ± {one.spread:g} {one.unit}".rstrip()
+        + (" uniform" if one.law == "uniform" else "")
+        for one in given
+    )
+
+
+def uncertainty(
+    scene: Scene,
+    given: str | Sequence[str],
+    quantities: Sequence[str] = QUANTITIES,
+    *,
+    samples: int = SAMPLES,
+    seed: int = 0,
+    progress: Callable[[float], None] | None = None,
+) -> Uncertainty:
+    """Propagate uncertain inputs through a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        From `chutelab.load`.
+    given : str or sequence of str
+        ``KEY=MEAN±SPREAD``, or ``KEY=±SPREAD`` around the scene's own value. SPREAD is a standard
+        deviation, or in per cent of the mean; with ``:uniform`` at the end a half-width.
+    quantities : sequence of str
+        What is looked at, see `chutelab.studies.design.quantities`.
+    samples : int
+        Points of each of the K + 2 sets, a power of 2 (else the next one is taken).
+    seed : int
+        Of the Sobol points.
+    progress : callable, optional
+        Called with the share that is done.
+
+    Raises
+    ------
+    DesignError, VaryError
+        If the question makes no sense for the scene. Nothing has run then.
+    ImportError
+        Without SciPy.
+
+    Examples
+    --------
+    >>> from chutelab.scene import load
+    >>> found = uncertainty(
+    ...     load("perpendicular"), ["restitution=0.5±0.05", "plate.distance=±1%"], ["landing.x"],
+    ...     samples=64,
+    ... )
+    >>> bool(found.indices[0].first[0] > found.indices[0].first[1])
+    True
+    """
+    inputs = spreads(scene, [given] if isinstance(given, str) else list(given))
+    names = list(dict.fromkeys(quantities))
+    wanted = [measured(scene, name, f"quantity {name}") for name in names]
+    if not wanted:
+        raise DesignError("quantities", "name at least one, such as landing.x")
+    if not FEWEST <= samples <= MOST_SAMPLES:
+        raise DesignError(f"samples {samples}", f"must be from {FEWEST} to {MOST_SAMPLES}")
+    if seed < 0:
+        raise DesignError(f"seed {seed}", "must be a whole number from 0")
+    samples = 1 << (int(samples) - 1).bit_length()
+    evaluate = Evaluator(scene, [one.key for one in inputs], wanted, progress)
+    evaluate.expect(samples * (len(inputs) + 2) + 1)
+    nominal = evaluate(np.array([[one.mean for one in inputs]])).values[0]
+    a, b = design(len(inputs), samples, seed)
+    shares = np.concatenate([a, b, crossed(a, b).reshape(-1, len(inputs))])
+    points = np.column_stack(
+        [one.values(column) for one, column in zip(inputs, shares.T, strict=True)]
+    )
+    outcomes = evaluate(points)
+    used = 2 * samples
+    missing = np.flatnonzero(~np.isfinite(outcomes.values[:used]).all(axis=1))
+    lost = Counter(_why(outcomes, i, names) for i in missing.tolist())
+    return Uncertainty(
+        scene.title, inputs, tuple(names), tuple(one.unit for one in wanted), nominal,
+        points[:used], outcomes.values[:used],
+        tuple(_indices(column, samples, len(inputs), seed) for column in outcomes.values.T),
+        dict(lost), evaluate.runs, samples, seed,
+    )  # fmt: skip
+
+
+def _why(outcomes: Outcomes, row: int, names: Sequence[str]) -> str:
+    """Return why a sample lacks some of the quantities, or all."""
+    if outcomes.faults[row]:
+        return outcomes.faults[row]
+    lacking = [n for n, value in zip(names, outcomes.values[row], strict=True) if np.isnan(value)]
+    return f"no {' and no '.join(lacking)} (touches {outcomes.courses[row]})"
+
+
+def _indices(values: Floats, samples: int, inputs: int, seed: int) -> Indices:
+    """Return the indices from the values of A, B and all crossed points, one after the other."""
+    sets = values.reshape(inputs + 2, samples)
+    # A point is left out of all sets if one of them has no value there.
+    sets = sets[:, np.isfinite(sets).all(axis=0)]
+    if sets.shape[1] < 2:
+        none = np.full(inputs, np.nan)
+        return Indices(none, none, np.full((inputs, 2), np.nan), np.full((inputs, 2), np.nan))
+    return indices(sets[0], sets[1], sets[2:], seed)
+
+
+def as_dict(found: Uncertainty) -> dict[str, Any]:
+    """Return the result as plain lists and floats, for JSON; without the samples."""
+    return {
+        "format": 1,
+        "scene": found.scene,
+        "inputs": [
+            {
+                "key": one.key, "unit": one.unit, "mean": one.mean, "spread": one.spread,
+                "law": one.law, "cut": one.cut,
+            }
+            for one in found.spreads
+        ],
+        "quantities": {
+            name: {
+                "unit": found.units[m],
+                "nominal": finite(float(found.nominal[m])),
+                "mean": finite(float(found.mean[m])),
+                "deviation": finite(float(found.deviation[m])),
+                "interval": [finite(float(value)) for value in found.interval[m]],
+                "first": [finite(float(value)) for value in found.indices[m].first],
+                "total": [finite(float(value)) for value in found.indices[m].total],
+            }
+            for m, name in enumerate(found.quantities)
+        },
+        "lost": found.lost,
+        "runs": found.runs,
+        "samples": found.samples,
+        "seed": found.seed,
+    }  # fmt: skip

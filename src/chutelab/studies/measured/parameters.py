@@ -1,0 +1,268 @@
+"""What can be fitted: the numbers of a scene, and how the measured points lie in the world.
+
+Units and bounds are those of the scene's own validation, read from its JSON Schema.
+
+- How measured positions respond to parameters, and which parameters they cannot tell.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from chutelab.scene import MISSING, Fault, Scene, SceneError, overridden, shown
+from chutelab.scene.errors import at_path, joined
+from chutelab.scene.overrides import limits_of, rule_at
+from chutelab.studies.measured.track import Floats, MeasuredError, Track
+
+PLACEMENT: Final = {
+    "t0": ("s", -np.inf, np.inf),
+    "scale": ("m per unit", 0.0, np.inf),
+    "origin.x": ("file units", -np.inf, np.inf),
+    "origin.y": ("file units", -np.inf, np.inf),
+}
+"""What can be fitted of a track's `Placement`: unit and bounds."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number that a fit may change.
+
+    Attributes
+    ----------
+    key, unit : str
+        Its full path in the scene, or one of `PLACEMENT`; "" for the unit of a pure number.
+    start : float
+        Its value in the scene or the placement.
+    low, high : float
+        The least and the largest value that are allowed.
+    """
+
+    key: str
+    unit: str
+    start: float
+    low: float
+    high: float
+
+    @property
+    def size(self) -> float:
+        """By how much it may be expected to change: its own size, but not next to nothing."""
+        return max(abs(self.start), 0.1)
+
+
+def resolve(scene: Scene, track: Track, keys: Sequence[str]) -> tuple[Parameter, ...]:
+    """Return the parameters that keys name.
+
+    Raises
+    ------
+    MeasuredError
+        With all keys that are unknown, no number, without a value to start from, or given twice.
+    """
+    document = scene.model_dump(by_alias=True)
+    faults: list[Fault] = []
+    found: list[Parameter] = []
+    if not keys:
+        faults.append(Fault("fit", None, "name at least one key, such as plate.restitution"))
+    for key in keys:
+        known = _placed(track, key) if key in PLACEMENT else _of_scene(document, key)
+        if isinstance(known, str):
+            faults.append(Fault(f"fit {key}", None, known))
+        elif any(known.key == other.key for other in found):
+            faults.append(Fault(f"fit {key}", None, "given twice"))
+        else:
+            found.append(known)
+    if faults:
+        raise MeasuredError(scene.source, faults)
+    return tuple(found)
+
+
+def changed(
+    scene: Scene, track: Track, parameters: Sequence[Parameter], values: Sequence[float]
+) -> tuple[Scene, Track]:
+    """Return scene and track with the values of some parameters changed.
+
+    Raises
+    ------
+    SceneError
+        If the scene refuses a value, or two that do not go together.
+    """
+    overrides = []
+    origin = list(track.placement.origin)
+    placement: dict[str, Any] = {}
+    for parameter, value in zip(parameters, (float(value) for value in values), strict=True):
+        match parameter.key:
+            case "origin.x":
+                origin[0] = value
+            case "origin.y":
+                origin[1] = value
+            case "t0" | "scale":
+                placement[parameter.key] = value
+            case key:
+                overrides.append(f"{key}={value!r}")
+    if overrides:
+        scene = overridden(scene, overrides)
+    return scene, track.placed(origin=(origin[0], origin[1]), **placement)
+
+
+def _placed(track: Track, key: str) -> Parameter:
+    unit, low, high = PLACEMENT[key]
+    placement = track.placement
+    start = {
+        "t0": placement.t0,
+        "scale": placement.scale,
+        "origin.x": placement.origin[0],
+        "origin.y": placement.origin[1],
+    }[key]
+    return Parameter(key, unit, start, low, high)
+
+
+def _of_scene(document: Mapping[str, Any], key: str) -> Parameter | str:
+    """Return the parameter of a key of the scene, or why there is none."""
+    parts = _parts(document, key)
+    rule = rule_at(parts)
+    head = str(parts[0]) if parts else ""
+    if rule is None:
+        return _unknown(document, key)
+    if document.get(head) in (None, ()):
+        return f"the scene has no [{head}]"
+    value: Any = at_path(document, parts)
+    path, limits = joined(parts), limits_of(rule)
+    if value is None or value is MISSING:
+        if limits is None:
+            return "not a number"
+        return f"has no value in this scene; give one to start from, --set {path}=..."
+    if limits is None or isinstance(value, (str, bool)):
+        return f"{shown(value)} is not a number that can vary continuously"
+    return Parameter(path, rule.get("x-unit", ""), float(value), *limits)
+
+
+def _parts(document: Mapping[str, Any], key: str) -> list[str | int]:
+    """Split ``surface.hood.speed`` or ``stream.at[0]`` into keys and indices."""
+    parts: list[str | int] = [
+        int(part) if part.isdecimal() else part
+        for part in re.sub(r"\[(\d{1,9})\]", r".\1", key).split(".")
+    ]
+    if len(parts) > 1 and parts[0] == "surface":
+        names = [surface["name"] for surface in document["surface"]]
+        if parts[1] in names:
+            parts[1] = names.index(parts[1])
+    return parts
+
+
+def _unknown(document: Mapping[str, Any], key: str) -> str:
+    known = [*numbers(document), *PLACEMENT]
+    near = difflib.get_close_matches(key, known, n=3, cutoff=0.6)
+    if not near:
+        near = [name for name in known if name.rpartition(".")[2] == key.rpartition(".")[2]]
+    advice = f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(known)}"
+    return f"unknown key; {advice}"
+
+
+def numbers(document: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the keys of a scene's tables whose values are numbers that can be fitted."""
+    for head, table in document.items():
+        entries = {head: table}
+        if isinstance(table, dict):
+            entries = {f"{head}.{name}": value for name, value in table.items()}
+        elif head == "surface":
+            entries = {
+                f"surface.{surface['name']}.{name}": value
+                for surface in table
+                for name, value in surface.items()
+            }
+        for key, value in entries.items():
+            if isinstance(value, float) and rule_at(_parts(document, key)):
+                yield key
+
+
+STEP = 1e-6
+"""Of a parameter's size. Tracks of the exact engine are smooth to rounding, so a difference over
+this step is right to about 1e-9, and next to no point lies within it of an impact."""
+
+SINGULAR = 1e-6
+"""Least singular value, relative to the largest, of a Jacobian with columns of equal length: far
+above what differences leave of zero, far below what noise would let anybody measure."""
+
+UNMOVED = 1e-7
+"""m; a parameter that moves the points by no more when it changes by its own size has no effect."""
+
+PART = 0.1
+"""Share of a combination of parameters from which on a parameter is named as belonging to it."""
+
+
+def jacobian(
+    function: Callable[[Floats], Floats],
+    values: Floats,
+    steps: Floats,
+    parameters: Sequence[Parameter],
+) -> Floats:
+    """Return the derivatives of `function` by differences, (M, p); one-sided at a bound.
+
+    A column is 0 where the scene refuses a step to either side.
+
+    Parameters
+    ----------
+    function : callable
+        Values (p,) to residuals (M,).
+    values, steps : ndarray, shape (p,)
+        Where, and how far to go to each side.
+    """
+    columns = []
+    for k, parameter in enumerate(parameters):
+        sides = []
+        for step in (-steps[k], steps[k]):
+            moved = values.copy()
+            moved[k] = np.clip(values[k] + step, parameter.low, parameter.high)
+            try:
+                sides.append((moved[k], function(moved)))
+            except SceneError:
+                sides.append((values[k], function(values)))
+        (low, before), (high, after) = sides
+        columns.append((after - before) / ((high - low) or 1.0))
+    return np.stack(columns, axis=1)
+
+
+def without_effect(derivatives: Floats, parameters: Sequence[Parameter]) -> list[str]:
+    """Say which parameters do not move the points at all.
+
+    Parameters
+    ----------
+    derivatives : ndarray, shape (M, p)
+        See `jacobian`.
+    """
+    moves = np.linalg.norm(derivatives, axis=0) / np.sqrt(len(derivatives))
+    return [
+        f"{parameter.key} does not move the particle where it was measured: leave it out"
+        for parameter, move in zip(parameters, moves, strict=True)
+        if move * parameter.size < UNMOVED
+    ]
+
+
+def inseparable(derivatives: Floats, parameters: Sequence[Parameter]) -> list[str]:
+    """Say which combinations of parameters the points cannot tell, though each moves them.
+
+    Parameters
+    ----------
+    derivatives : ndarray, shape (M, p)
+        See `jacobian`.
+    """
+    directions = derivatives / np.linalg.norm(derivatives, axis=0)
+    _, values, vectors = np.linalg.svd(directions, full_matrices=False)
+    said = []
+    for value, vector in zip(values, vectors, strict=True):
+        if value < SINGULAR * values[0]:
+            *first, last = (
+                parameter.key
+                for parameter, share in zip(parameters, vector, strict=True)
+                if abs(share) > PART
+            )
+            said.append(
+                f"{', '.join(first)} and {last} cannot be told apart: a change of one moves these"
+                " points as a change of the others does; fit fewer of them"
+            )
+    return said

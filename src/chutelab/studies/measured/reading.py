@@ -1,0 +1,422 @@
+"""Tracks from the files that the video-analysis program Tracker exports.
+
+Tracker (https://opensourcephysics.github.io/tracker-website) writes a line with the track's name
+(older versions alone, newer ones over its columns), a line with the names of the columns, and a
+line per frame; a frame without a mark has empty cells. Several tracks stand side by side under
+``#multi:``, with the names over the first column of each. Separator and decimal mark are the
+user's choice. Any other table with columns t, x and y does as well.
+
+- The bytes of a table in a text file as lines of cells, and the cells as numbers.
+- A film that was never shot: a simulated track with noise, in the form that Tracker exports.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from chutelab.scene import Fault, Scene, load, shipped
+from chutelab.scene.errors import did_you_mean
+from chutelab.studies.measured.residuals import LEAST, ends, follow, run
+from chutelab.studies.measured.track import MeasuredError, Placement, Track
+
+LARGEST_FILE: Final = 20_000_000
+"""Bytes; an hour of film at 50 frames a second is a quarter of it."""
+
+SEPARATORS: Final = ("\t", ";", ",", " ")
+"""Tried in this order: a comma may be a decimal mark where a tab or a semicolon stands."""
+
+NAMES: Final = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "spaces"}
+
+_NUMBER: Final = re.compile(r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?")
+
+_EMPTY: Final = ("", "nan", "null", "na", "n/a", "-", "--")
+"""What stands for no value, in small letters."""
+
+
+def lines_of(path: Path) -> list[str]:
+    """Return the lines of a text file.
+
+    Raises
+    ------
+    MeasuredError
+        If it cannot be read, is too large, or holds no text.
+    """
+    try:
+        with path.open("rb") as file:
+            data = file.read(LARGEST_FILE + 1)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise refused(path, "", f"cannot be read: {reason}") from None
+    if len(data) > LARGEST_FILE:
+        raise refused(path, "", f"too large for a track: at most {LARGEST_FILE // 10**6} MB")
+    if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        text = data.decode("utf-16", errors="replace")
+    else:
+        if b"\0" in data:
+            raise refused(path, "", "not a text file; a table with columns t, x, y is needed")
+        try:
+            text = data.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            # Only a track's name can hold letters that are not ASCII: any 8-bit code will do.
+            text = data.decode("latin-1")
+    return re.split(r"\r\n|\r|\n", text)
+
+
+def cells_of(line: str, separator: str) -> list[str]:
+    """Split a line at a separator that is not in quotes; blanks around cells are cut off.
+
+    >>> cells_of('0,02;"1,5"; 2', ";")
+    ['0,02', '1,5', '2']
+    """
+    if separator == " ":
+        return line.split()
+    # One line at a time: a quote that is never closed must not swallow the rest of the file.
+    try:
+        rows = list(csv.reader([line], delimiter=separator, skipinitialspace=True))
+    except csv.Error:
+        # A cell too large for the reader, which is no number anyway.
+        rows = [line.split(separator)]
+    return [cell.strip() for cell in rows[0]] if rows else []
+
+
+def is_empty(cell: str) -> bool:
+    """Tell whether a cell stands for no value."""
+    return cell.lower() in _EMPTY
+
+
+def number(cell: str) -> float | None:
+    """Return the number in a cell, with decimal point or comma; None if there is none.
+
+    >>> number("1,5E-1"), number("−0.5"), number("1.234,5")
+    (0.15, -0.5, None)
+    """
+    cell = cell.replace("\N{MINUS SIGN}", "-")
+    if len(cell) > 60 or not _NUMBER.fullmatch(cell):
+        return None
+    return float(cell.replace(",", "."))
+
+
+def marks(cells: Iterable[str]) -> set[str]:
+    """Return which decimal marks the numbers use: of "." and ","."""
+    return {mark for cell in cells for mark in ".," if mark in cell}
+
+
+def refused(source: object, place: str, allowed: str, value: object = None) -> MeasuredError:
+    """Return the error that says what is wrong at a place of a file."""
+    return MeasuredError(str(source), [Fault(place, value, allowed)])
+
+
+LENGTHS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1e3, "in": 0.0254, "ft": 0.3048}
+TIMES: Final = {"s": 1.0, "sec": 1.0, "ms": 1e-3}
+PIXELS: Final = ("px", "pixel", "pixels")
+
+LARGEST: Final = 1e9
+"""Bound on a number of the file: far from overflow when residuals are squared."""
+
+_COLUMN: Final = re.compile(
+    r"(time|t|x|y)(?:\s*[(\[/]\s*(?P<bracket>[a-z]+)\s*[)\]]?|(?:\s+in\s+|_)(?P<plain>[a-z]+))?"
+)
+_HEADER_WITHIN: Final = 100
+"""Lines in which the names of the columns are looked for."""
+
+
+@dataclass(frozen=True)
+class _Columns:
+    """Where a track's columns are: cell numbers, and the units that the header gives them."""
+
+    name: str
+    cells: dict[str, int]
+    units: dict[str, str]
+
+
+def find(name_or_path: str | Path) -> Path:
+    """Return the file meant: one that exists, or else the shipped track of this name.
+
+    Raises
+    ------
+    MeasuredError
+        If there is neither.
+    """
+    path = Path(name_or_path)
+    try:
+        if str(name_or_path) and path.exists():
+            return path
+    except (OSError, ValueError):
+        pass
+    tracks = {
+        file.stem: file
+        for folder in {scene.parent for scene in shipped().values()}
+        for file in sorted((folder / "data").glob("*.csv"))
+    }
+    if (name := str(name_or_path).removesuffix(".csv")) in tracks:
+        return tracks[name]
+    advice = did_you_mean(path.stem, tracks, f"shipped: {', '.join(tracks) or 'none'}")
+    raise refused(name_or_path or '""', "", f"no such file, and no shipped track; {advice}")
+
+
+def read(
+    path: str | Path,
+    *,
+    scale: float | None = None,
+    origin: tuple[float, float] = (0.0, 0.0),
+    flip_y: bool = False,
+    t0: float = 0.0,
+    track: str | None = None,
+) -> Track:
+    """Read a track from a table with the columns t, x and y; others are ignored.
+
+    Parameters
+    ----------
+    path
+        A file, or the name of a shipped track.
+    scale
+        Metres per unit of the file; by default what the header's unit says (m, cm, mm, in, ft),
+        metres if it names none. Columns in pixels need it.
+    origin
+        The pulley's axis, in the units of the file.
+    flip_y
+        Whether y is counted downward in the file.
+    t0
+        s; the time in the file at which particle 0 is released.
+    track
+        Which one, of a file that holds several.
+
+    Returns
+    -------
+    Track
+        Lines without a position are left out and counted.
+
+    Raises
+    ------
+    MeasuredError
+        Says file, line, column and value, and what is allowed.
+    """
+    source = find(path)
+    lines = lines_of(source)
+    header, separator = _header(source, lines)
+    above = cells_of(lines[header - 1], separator) if header else []
+    columns = _chosen(source, _tracks(cells_of(lines[header], separator), above), track, header)
+    seconds, points, numbers, skipped = _rows(source, lines, header, separator, columns)
+    if len(seconds) < LEAST:
+        text = f"{len(seconds)} points with a time and a position; at least {LEAST} are needed"
+        raise refused(source, "", text)
+    clock = TIMES[columns.units["t"]]
+    return Track(
+        name=columns.name,
+        source=str(source),
+        seconds=clock * np.array(seconds),
+        points=np.array(points),
+        lines=np.array(numbers),
+        placement=Placement(_scale(source, columns, header, scale), origin, flip_y, t0),
+        skipped=skipped,
+    )
+
+
+def _header(source: Path, lines: Sequence[str]) -> tuple[int, str]:
+    """Return the index of the line with the columns' names, and the separator."""
+    best: tuple[int, set[str]] = (0, set())
+    for index, line in enumerate(lines[:_HEADER_WITHIN]):
+        for separator in SEPARATORS:
+            if separator not in line:
+                continue
+            found = {name for cell in cells_of(line, separator) if (name := _named(cell)[0])}
+            if {"t", "x", "y"} <= found:
+                return index, separator
+            if len(found) > len(best[1]):
+                best = index, found
+    if len(best[1]) > 1:
+        missing = ", ".join(sorted({"t", "x", "y"} - best[1]))
+        raise refused(source, f"line {best[0] + 1}", f"no column {missing}; t, x, y are needed")
+    first = next((line.strip() for line in lines if line.strip()), None)
+    text = "no line names the columns t, x, y; Tracker writes it above the numbers"
+    raise refused(source, "line 1" if first else "", text if first else f"empty; {text}", first)
+
+
+def _named(cell: str) -> tuple[str, str]:
+    """Return which column (t, x or y) a header's cell names, "" for another, and its unit.
+
+    >>> _named("x (cm)"), _named("Time"), _named("v_{x}")
+    (('x', 'cm'), ('t', ''), ('', ''))
+    """
+    match = _COLUMN.fullmatch(cell.lower())
+    if match is None:
+        return "", ""
+    name, unit = match[1][0], match["bracket"] or match["plain"] or ""
+    known = TIMES if name == "t" else {**LENGTHS, **dict.fromkeys(PIXELS, 1.0)}
+    return (name, unit) if not unit or unit in known else ("", "")
+
+
+def _tracks(header: Sequence[str], above: Sequence[str]) -> list[_Columns]:
+    """Return the tracks that stand side by side: each x with the y that follows it."""
+    named = [_named(cell) for cell in header]
+    names = [name for name, _ in named]
+    clock = names.index("t")
+    starts = [i for i, name in enumerate(names) if name == "x"]
+    found = []
+    for i, start in enumerate(starts):
+        stop = starts[i + 1] if i + 1 < len(starts) else len(names)
+        # One track may have its columns in any order; of several, y comes after x.
+        y = next((k for k in range(start, stop) if names[k] == "y"), None)
+        if y is None and len(starts) == 1:
+            y = names.index("y")
+        if y is None:
+            continue
+        cells = {"t": clock, "x": start, "y": y}
+        titles = above[: stop if len(starts) > 1 else None]
+        title = next((cell for cell in reversed(titles) if cell), "").removesuffix(":")
+        units = {key: named[cell][1] for key, cell in cells.items()}
+        found.append(_Columns(title.lstrip("#").strip(), cells, {**units, "t": units["t"] or "s"}))
+    return found
+
+
+def _chosen(source: Path, tracks: Sequence[_Columns], wanted: str | None, header: int) -> _Columns:
+    place = f"line {header + 1}"
+    if not tracks:
+        raise refused(source, place, "each column x needs a column y after it")
+    if wanted is None and len(tracks) == 1:
+        return tracks[0]
+    names = [columns.name for columns in tracks]
+    said = ", ".join(f'"{name}"' for name in names)
+    if wanted is None:
+        raise refused(source, place, f"holds {len(tracks)} tracks; choose one of {said}")
+    if wanted not in names:
+        raise refused(source, place, f"no such track; there are {said}", wanted)
+    return tracks[names.index(wanted)]
+
+
+def _rows(
+    source: Path, lines: Sequence[str], header: int, separator: str, columns: _Columns
+) -> tuple[list[float], list[tuple[float, float]], list[int], int]:
+    """Return times, positions and line numbers, and how many lines have no position."""
+    width = len(cells_of(lines[header], separator))
+    seconds: list[float] = []
+    points: list[tuple[float, float]] = []
+    numbers: list[int] = []
+    skipped = 0
+    used: set[str] = set()
+    for line, text in enumerate(lines[header + 1 :], start=header + 2):
+        if not text.strip() or text.lstrip().startswith("#"):
+            continue
+        row = cells_of(text, separator)
+        if len(row) > width and any(row[width:]):
+            allowed = f"{len(row)} cells under {width} columns"
+            if separator == ",":
+                allowed += "; with decimal commas, export with tabs or semicolons between cells"
+            raise refused(source, f"line {line}", allowed, text.strip())
+        row += [""] * (width - len(row))
+        wanted = {key: row[cell] for key, cell in columns.cells.items()}
+        if any(is_empty(cell) for cell in wanted.values()):
+            skipped += 1
+            continue
+        t, x, y = (_value(source, line, key, cell) for key, cell in wanted.items())
+        used |= marks(wanted.values())
+        if len(used) > 1:
+            place = f"line {line}"
+            allowed = (
+                f"decimal points and decimal commas in one file (cells apart by {NAMES[separator]})"
+            )
+            raise refused(source, place, allowed, text.strip())
+        if seconds and t <= seconds[-1]:
+            allowed = (
+                f"times must increase; the point before has {seconds[-1]:g} (line {numbers[-1]})"
+            )
+            raise refused(source, f"line {line}, column t", allowed, t)
+        seconds.append(t)
+        points.append((x, y))
+        numbers.append(line)
+    return seconds, points, numbers, skipped
+
+
+def _value(source: Path, line: int, column: str, cell: str) -> float:
+    value = number(cell)
+    if value is None or not isfinite(value) or abs(value) > LARGEST:
+        allowed = f"must be a number from {-LARGEST:g} to {LARGEST:g}, or empty"
+        raise refused(source, f"line {line}, column {column}", allowed, cell)
+    return value
+
+
+def _scale(source: Path, columns: _Columns, header: int, given: float | None) -> float:
+    """Return the metres per unit: those given, or what the header says."""
+    if given is not None:
+        return given
+    units = {columns.units["x"] or "m", columns.units["y"] or "m"}
+    place = f"line {header + 1}"
+    if units & set(PIXELS):
+        raise refused(source, place, "x and y are in pixels: a scale, metres per pixel, is needed")
+    if len(units) > 1:
+        raise refused(source, place, f"x and y have different units: {', '.join(sorted(units))}")
+    return LENGTHS[units.pop()]
+
+
+SCENE: Final = "perpendicular"
+TRUTH: Final = {"plate.restitution": 0.62, "incoming.speed": 1.9}
+"""What the shipped track was made with; the scene itself says 0.5 and 2 m/s."""
+
+NAME: Final = "simulated_with_noise"
+FRAMES: Final = 120.0
+"""1/s: slow motion of a common telephone."""
+
+NOISE: Final = 0.001
+"""m; how well a ball of 8 mm is marked by hand."""
+
+SEED: Final = 4
+BEGIN: Final = 0.4
+"""s; the film begins when the particle comes into the picture, a little before the pulley."""
+
+
+def filmed(
+    scene: Scene,
+    *,
+    frames: float = FRAMES,
+    noise: float = NOISE,
+    seed: int = SEED,
+    begin: float = 0.0,
+) -> Track:
+    """Return what a camera would see of particle 0, to a tenth of a millimetre.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is filmed, until particle 0 ends.
+    frames : float
+        Frames per second.
+    noise : float
+        Standard deviation of each coordinate, m; independent and normal.
+    seed : int
+        Of the noise.
+    begin : float
+        s, on the clock of the simulation, which is that of the film.
+    """
+    recording = run(scene)
+    first, last = np.ceil(begin * frames), np.floor(ends(recording)[1] * frames)
+    seconds = np.arange(first, last + 1.0) / frames
+    errors = noise * np.random.default_rng(seed).standard_normal((len(seconds), 2))
+    return Track(
+        name=NAME,
+        source="<simulated>",
+        seconds=seconds,
+        points=np.round(follow(recording, seconds) + errors, 4),
+        lines=np.arange(len(seconds)) + 3,
+    )
+
+
+def tracker_text(track: Track) -> str:
+    """Return a track as Tracker would export it: its name, the columns' names, the points."""
+    rows = [
+        f"{t:.6f},{x:.4f},{y:.4f}" for t, (x, y) in zip(track.seconds, track.points, strict=True)
+    ]
+    return "\n".join([track.name, "t,x,y", *rows]) + "\n"
+
+
+def shipped_text() -> str:
+    """Return the content of the shipped track."""
+    scene = load(SCENE, [f"{key}={value}" for key, value in TRUTH.items()])
+    return tracker_text(filmed(scene, begin=BEGIN))

@@ -1,0 +1,327 @@
+"""`Fit`: what a fit found.
+
+- What makes the result of a fit less certain than its uncertainties say.
+- A comparison for programs: as one JSON object, and as a table of points.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from chutelab.scene import Scene
+from chutelab.scene.units import write_size
+from chutelab.studies.measured.parameters import Parameter
+from chutelab.studies.measured.residuals import Residuals, best_t0, over
+from chutelab.studies.measured.track import Floats, MeasuredError
+from chutelab.util.tables import Sheet, Shown
+
+MAD = 1.4826
+"""Standard deviations of a normal distribution in its median absolute deviation."""
+
+CORRELATED = 0.9
+BENT = 0.2
+"""Relative change of the Jacobian over one uncertainty from which on it is no straight line."""
+ALIKE = 0.4
+"""Correlation of neighbouring residuals that is no accident in a film of some tens of points."""
+FEW = 10
+"""Points from which on that can be told."""
+FAR = 6.0
+"""Robust standard deviations; one point in 60 million lies so far off by chance."""
+NAMED = 5
+"""Points that are named one by one."""
+
+
+FAR_CLOSER = 10.0
+"""Times smaller that residuals must be for a t0 to be advised."""
+ASTRAY = 3.0
+"""Sizes of the simulated track that points must lie off it, for their placement to be doubted."""
+
+
+def advice(found: Residuals) -> str:
+    """Say what is probably wrong with how the points were placed, "" if nothing stands out."""
+    off = float(np.median(np.hypot(*found.values[found.used].T)))
+    size = float(np.ptp(found.recording.track(0)["position"], axis=0).max())
+    if off > ASTRAY * size:
+        return (
+            f"the points lie {off / size:.0f} times as far off as the simulated track is large:"
+            " look at scale, origin and flip-y"
+        )
+    t0 = best_t0(found.recording, found.track)
+    apart = abs(t0 - found.track.placement.t0)
+    if apart == 0.0:
+        return ""
+    try:
+        better = over(found.recording, found.track.placed(t0=t0))
+    except MeasuredError:
+        return ""
+    times = float(np.hypot(*found.rms) / max(np.hypot(*better.rms), 1e-12))
+    if times < FAR_CLOSER:
+        return ""
+    return (
+        f"the clocks of film and simulation seem {apart:.2g} s apart: with t0 = {t0:.3g} the"
+        f" residuals are {times:.0f} times smaller, and t0 can be fitted"
+    )
+
+
+def notes(
+    parameters: Sequence[Parameter],
+    values: Floats,
+    errors: Floats,
+    correlation: Floats,
+    derivatives: Floats,
+    wide: Floats,
+    after: Residuals,
+    *,
+    robust: bool,
+    settled: bool,
+) -> Iterator[str]:
+    """Yield what should be said beside the result.
+
+    Parameters
+    ----------
+    derivatives, wide : ndarray, shape (M, p)
+        The Jacobian by a small step, and by one as large as the uncertainties.
+    settled : bool
+        Whether the fit came to an end with the same points within the simulated time.
+    """
+    if doubt := advice(after):
+        # Then nothing else that could be said means anything.
+        yield doubt
+        return
+    for k, parameter in enumerate(parameters):
+        if values[k] <= parameter.low + errors[k] or values[k] >= parameter.high - errors[k]:
+            yield f"{parameter.key} is at the edge of what is allowed: its uncertainty is one-sided"
+        elif errors[k] > max(abs(values[k]), parameter.size):
+            yield f"{parameter.key} is hardly told by these points: uncertain by its own size"
+    for i, k in combinations(range(len(parameters)), 2):
+        if abs(correlation[i, k]) > CORRELATED:
+            yield (
+                f"{parameters[i].key} and {parameters[k].key} are correlated"
+                f" ({correlation[i, k]:+.3f}): the points tell a combination of them better"
+            )
+    change = np.linalg.norm(wide - derivatives, axis=0) / np.linalg.norm(derivatives, axis=0)
+    for parameter, bent in zip(parameters, change, strict=True):
+        if bent > BENT:
+            yield (
+                f"within its uncertainty the track does not respond to {parameter.key} along a"
+                " straight line: the uncertainty is rough"
+            )
+    left = after.values[after.used]
+    deviation = MAD * float(np.median(np.abs(left)))
+    distance = np.hypot(*left.T)
+    far = np.flatnonzero(distance > max(FAR * deviation, 1e-12))
+    if 0 < len(far) <= NAMED:
+        lines = after.track.lines[after.used]
+        said = ", ".join(f"line {lines[i]} ({write_size(float(distance[i]), 'm')})" for i in far)
+        less = "" if robust else "; a robust fit gives such points less weight"
+        yield f"far off the others: {said}{less}"
+    elif alike(left.ravel()):
+        yield (
+            f"neighbouring residuals are alike (correlation {_neighbours(left):.2f}): the points"
+            " differ from the simulation in a way that is no noise, and the uncertainties are too"
+            " small"
+        )
+    if not settled:
+        yield "the fit did not come to rest; start it nearer to the result"
+
+
+def alike(left: Floats) -> bool:
+    """Tell whether residuals (2 n,), x and y of each point in turn, are more than noise."""
+    points = left.reshape(-1, 2)
+    return len(points) >= FEW and _neighbours(points) > ALIKE
+
+
+def _neighbours(left: Floats) -> float:
+    """Return the correlation of residuals (n, 2) with those of the next points."""
+    total = float((left**2).sum())
+    return float((left[1:] * left[:-1]).sum()) / total if total > 1e-20 else 0.0
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Fit(Shown):
+    """What a fit found.
+
+    Attributes
+    ----------
+    parameters : tuple of Parameter
+        What was fitted: key, unit, start and bounds.
+    values, errors : ndarray, shape (p,)
+        The best values, and their standard uncertainties (one standard deviation).
+    low, high : ndarray, shape (p,)
+        Ends of the intervals that hold the true value with 95 % confidence (Student's t).
+    correlation : ndarray, shape (p, p)
+        Of the uncertainties.
+    scatter : float
+        Standard deviation of a measured coordinate, m, from the residuals.
+    freedom : int
+        Degrees of freedom: coordinates less parameters.
+    before, after : Residuals
+        With the starting values, and with the best ones.
+    scene : Scene
+        With the best values.
+    robust : bool
+        Whether points that lie far off were given less weight.
+    notes : tuple of str
+        What makes the result less certain than it looks.
+
+    Notes
+    -----
+    The uncertainties are those of linearised least squares: covariance s² (JᵀJ)⁻¹ with the Jacobian
+    J at the best values and s² the sum of squares over the degrees of freedom. They hold if the
+    errors of all coordinates are independent and alike, and the model is right. A robust fit has
+    Huber's covariance, [Σψ²/(M - p)] / mean(ψ')² (JᵀJ)⁻¹ (Robust Statistics, 1981, 7.6).
+    """
+
+    parameters: tuple[Parameter, ...]
+    values: Floats
+    errors: Floats
+    low: Floats
+    high: Floats
+    correlation: Floats
+    scatter: float
+    freedom: int
+    before: Residuals
+    after: Residuals
+    scene: Scene
+    robust: bool
+    notes: tuple[str, ...]
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """The fitted keys."""
+        return tuple(parameter.key for parameter in self.parameters)
+
+    def sheet(self) -> Sheet:
+        """Return the parameters with their uncertainties, and what makes them less certain."""
+        rows = tuple(
+            (
+                parameter.key,
+                plus_minus(value, error),
+                parameter.unit,
+                f"{rounded(low, error)} to {rounded(high, error)}",
+                f"{parameter.start:.4g}",
+            )
+            for parameter, value, error, low, high in zip(
+                self.parameters, self.values, self.errors, self.low, self.high, strict=True
+            )
+        )
+        scatter, x, y = (write_size(size, "m") for size in (self.scatter, *self.after.rms))
+        kind = "a coordinate, robustly" if self.robust else "a coordinate"
+        notes = (
+            f"scatter {scatter} {kind}, {self.freedom} degrees of freedom; RMS"
+            f" residual {x} in x, {y} in y",
+            *(f"note: {note}" for note in self.notes),
+        )
+        title = "Fit, ± one standard deviation"
+        return Sheet(title, ("", "value", "", "95 %", "from"), rows, notes=notes)
+
+
+def plus_minus(value: float, error: float) -> str:
+    """Return a value with its uncertainty, to the digits that mean something.
+
+    >>> plus_minus(0.62134, 0.00213), plus_minus(1.9, 0.0)
+    ('0.6213 ± 0.0021', '1.9 ± 0')
+    """
+    return f"{rounded(value, error)} ± {rounded(error, error)}"
+
+
+def rounded(value: float, error: float) -> str:
+    """Return a value to the second digit of its uncertainty."""
+    if not 0.0 < error < np.inf:
+        return f"{value:.9g}"
+    digits = max(0, 1 - int(np.floor(np.log10(float(f"{error:.1e}")))))
+    return f"{value:.{digits}f}"
+
+
+COLUMNS = (
+    "line", "t", "x", "y", "simulated_x", "simulated_y", "residual_x", "residual_y",
+)  # fmt: skip
+
+
+def as_dict(found: Residuals, fit: Fit | None = None) -> dict[str, Any]:
+    """Return what is known of a comparison, SI units, ready for JSON."""
+    track, place = found.track, found.track.placement
+    return {
+        "format": 1,
+        "scene": found.recording.title,
+        "data": track.source,
+        "track": track.name,
+        "points": len(track),
+        "used": int(found.used.sum()),
+        "left_out": found.left_out(),
+        "skipped": track.skipped,
+        "placement": {
+            "scale": place.scale,
+            "origin": list(place.origin),
+            "flip_y": place.flip_y,
+            "t0": place.t0,
+        },
+        "residuals": _residuals(found),
+        "advice": advice(found),
+        "fit": None if fit is None else _fit(fit),
+    }
+
+
+def points_csv(found: Residuals) -> str:
+    """Return a table of the points, in the world and on the simulation's clock.
+
+    Points outside the simulated time have no simulated position and no residual.
+    """
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow(COLUMNS)
+    track = found.track
+    for line, t, measured, simulated, off in zip(
+        track.lines, track.t, track.position, found.simulated, found.values, strict=True
+    ):
+        numbers = (t, *measured, *simulated, *off)
+        table.writerow([line, *(f"{value:.9g}" if isfinite(value) else "" for value in numbers)])
+    return text.getvalue()
+
+
+def _residuals(found: Residuals) -> dict[str, Any]:
+    i = found.worst
+    (rms_x, rms_y), (mean_x, mean_y) = found.rms, found.mean
+    return {
+        "rms_x": rms_x,
+        "rms_y": rms_y,
+        "mean_x": mean_x,
+        "mean_y": mean_y,
+        "worst": {
+            "line": int(found.track.lines[i]),
+            "t": float(found.track.t[i]),
+            "x": float(found.values[i, 0]),
+            "y": float(found.values[i, 1]),
+        },
+    }
+
+
+def _fit(fit: Fit) -> dict[str, Any]:
+    columns = zip(fit.parameters, fit.values, fit.errors, fit.low, fit.high, strict=True)
+    return {
+        "parameters": {
+            parameter.key: {
+                "value": float(value),
+                "error": float(error),
+                "low": float(low),
+                "high": float(high),
+                "start": parameter.start,
+                "unit": parameter.unit,
+            }
+            for parameter, value, error, low, high in columns
+        },
+        "correlation": fit.correlation.tolist(),
+        "scatter": fit.scatter,
+        "freedom": fit.freedom,
+        "robust": fit.robust,
+        "notes": list(fit.notes),
+        "before": _residuals(fit.before),
+    }

@@ -1,0 +1,55 @@
+"""Many variants of one scene: grids and samples, a row for each.
+
+>>> import chutelab
+>>> from chutelab.studies.sweep import sweep
+>>> swept = sweep(chutelab.load("perpendicular"), ["incoming.speed=2,4", "plate.restitution=0,1"])
+>>> len(swept), swept.columns["landing.vx"].round(3).tolist()
+(4, [0.0, -2.0, 0.0, -4.0])
+
+- `plan`: what is to be varied, looked at before anything runs; `samples`: Latin hypercubes and
+  Sobol points.
+- `columns`, `rows`: what a row holds, and how it is read off a recording; `deviation`: the error
+  against the theory.
+- `alone`: one variant at a time, the reference; `batch`: many at once through the exact engine;
+  `screening`: validation of many at once.
+- `block`: a unit of work; `workers`: who does it, this process, several, or a Dask cluster.
+- `table`, `part`: CSV and Parquet files, and the rows of a sweep that is not finished.
+- `sweeping`, `result`: `sweep`, and the `Sweep` it returns.
+
+SciPy, pyarrow, Dask and pandas are imported when they are needed.
+"""
+
+from chutelab.studies.sweep.batch import row_of
+from chutelab.studies.sweep.plan import DESIGNS, MOST_VARIANTS, Plan, SampleError, planned
+from chutelab.studies.sweep.result import PartError, Sweep, TableError
+from chutelab.studies.sweep.rows import NUMBERS, REASON
+from chutelab.studies.sweep.sweeping import (
+    Crew,
+    LostWorkersError,
+    WorkersError,
+    crew,
+    sweep,
+    sweep_to,
+    swept_by,
+)
+
+__all__ = [
+    "DESIGNS",
+    "MOST_VARIANTS",
+    "NUMBERS",
+    "REASON",
+    "Crew",
+    "LostWorkersError",
+    "PartError",
+    "Plan",
+    "SampleError",
+    "Sweep",
+    "TableError",
+    "WorkersError",
+    "crew",
+    "planned",
+    "row_of",
+    "sweep",
+    "sweep_to",
+    "swept_by",
+]

@@ -1,0 +1,204 @@
+"""What is to be swept: which keys, over which values, in which order.
+
+- Samples of several ranges at once: Latin hypercube, or Sobol points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chutelab.engines.simulation import ENGINES
+from chutelab.scene import Scene, to_dict
+from chutelab.scene.variants import (
+    Quantity,
+    Range,
+    Vary,
+    VaryError,
+    count_of,
+    parse,
+    parse_range,
+    quantities,
+)
+
+DESIGNS: Final = {"lhs": "LatinHypercube", "sobol": "Sobol"}
+"""Names of the designs, and of the classes of `scipy.stats.qmc` that draw them."""
+
+
+class SampleError(ValueError):
+    """Samples that cannot be drawn; the text says what is allowed."""
+
+
+def drawn(
+    varies: Sequence[Vary],
+    about: Sequence[Quantity],
+    count: int,
+    design: str,
+    seed: int,
+    most: int,
+) -> NDArray[np.float64]:
+    """Draw samples, (count, K), between the two values of each `Vary`.
+
+    Whole numbers are drawn with both ends, all equally likely. The same seed draws the same
+    samples.
+
+    Raises
+    ------
+    SampleError
+        If the design is unknown, there are too many samples, or SciPy is not installed.
+    """
+    if design not in DESIGNS:
+        raise SampleError(f"--design {design}: one of {', '.join(DESIGNS)}")
+    if not 1 <= count <= most:
+        raise SampleError(f"--sample {count}: a whole number from 1 to {most}")
+    if seed < 0:
+        raise SampleError(f"--seed {seed}: a whole number from 0")
+    try:
+        from scipy.stats import qmc
+    except ImportError:
+        raise SampleError('--sample needs SciPy: pip install "chutelab[design]"') from None
+    sampler = getattr(qmc, DESIGNS[design])(d=len(varies), seed=np.random.default_rng(seed))
+    if design == "sobol":
+        # Of a power of two points the first ones: SciPy warns of all other numbers.
+        shares = sampler.random_base2((count - 1).bit_length())[:count]
+    else:
+        shares = sampler.random(count)
+    low, high = (np.array([vary.values[end] for vary in varies]) for end in (0, 1))
+    whole = np.array([one.whole for one in about])
+    points = low + shares * (high - low)
+    steps = low + np.floor(shares * (high - low + 1.0))
+    return np.asarray(np.where(whole, np.minimum(steps, high), points))
+
+
+MOST_VARIANTS: Final = 1_000_000
+"""Rows of one sweep: some 300 MB while it runs."""
+
+MOST_KEYS: Final = 20
+"""Keys varied at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A scene and the variants of it, numbered from 0.
+
+    Attributes
+    ----------
+    document, source : dict, str
+        The scene, as `chutelab.scene.to_dict` has it, and what messages call it.
+    title : str
+        Of the scene.
+    varies : tuple of Vary
+        Keys, and the values of each in a grid, or the ends of what samples are drawn from.
+    quantities : tuple of Quantity
+        What the keys are.
+    engine : str or None
+        Overrides ``run.engine``.
+    samples : ndarray, (N, K), or None
+        Values of the keys; None for the grid, in which the last key runs fastest.
+    count : int
+        Number of variants N.
+    """
+
+    document: dict[str, Any] = field(repr=False)
+    source: str
+    title: str
+    varies: tuple[Vary, ...]
+    quantities: tuple[Quantity, ...]
+    engine: str | None
+    samples: NDArray[np.float64] | None
+    count: int
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """The varied keys, as they were written."""
+        return tuple(vary.key for vary in self.varies)
+
+    def values(self, first: int, last: int) -> NDArray[np.float64]:
+        """Return the values of the variants from `first` up to `last`, (n, K)."""
+        if self.samples is not None:
+            return self.samples[first:last] + 0.0
+        axes = [np.array(vary.values) for vary in self.varies]
+        places = np.unravel_index(np.arange(first, last), tuple(map(len, axes)))
+        # + 0.0: there is one zero.
+        return np.stack([axis[at] for axis, at in zip(axes, places, strict=True)], axis=1) + 0.0
+
+
+def planned(
+    scene: Scene,
+    varies: Sequence[Vary | str] | Mapping[str, Any],
+    *,
+    sample: int | None = None,
+    design: str = "lhs",
+    seed: int = 0,
+    engine: str | None = None,
+) -> Plan:
+    """Look whether a sweep can be done, before anything runs.
+
+    Parameters
+    ----------
+    scene : Scene
+        From `chutelab.load`.
+    varies : sequence of Vary or str, or mapping
+        What to vary: texts as ``--vary`` takes them, or values (with `sample`, two ends) by key.
+    sample, design, seed : int, str, int
+        How many samples to draw, how ("lhs" or "sobol"), and the seed; without `sample` a grid.
+    engine : {"auto", "exact", "contact", "pymunk"}, optional
+        Overrides the scene's ``run.engine``.
+
+    Raises
+    ------
+    VaryError
+        If a key cannot be varied so, or there is too much.
+    SampleError
+        If samples cannot be drawn so.
+    ValueError
+        If there is no engine of that name.
+    """
+    if engine is not None and engine not in ENGINES:
+        raise ValueError(f"engine = {engine!r}: one of {', '.join(ENGINES)}")
+    varied = tuple(_varies(varies, ranges=sample is not None))
+    if not varied:
+        raise VaryError("--vary", "at least one key is to be varied, such as plate.angle_deg")
+    if len(varied) > MOST_KEYS:
+        raise VaryError(varied[MOST_KEYS].typed, f"at most {MOST_KEYS} keys can be varied")
+    about = quantities(scene, varied)
+    _check_whole(varied, about)
+    samples = None
+    if sample is not None:
+        samples = drawn(varied, about, sample, design, seed, MOST_VARIANTS)
+    return Plan(
+        document=to_dict(scene),
+        source=scene.source,
+        title=scene.title,
+        varies=varied,
+        quantities=about,
+        engine=engine,
+        samples=samples,
+        count=count_of(varied, MOST_VARIANTS) if samples is None else len(samples),
+    )
+
+
+def _varies(varies: Sequence[Vary | str] | Mapping[str, Any], *, ranges: bool) -> list[Vary]:
+    """Read what is to be varied; two ends each if samples are drawn."""
+    kind = Range if ranges else Vary
+    if not hasattr(varies, "items"):
+        given = [(parse_range if ranges else parse)(v) if isinstance(v, str) else v for v in varies]
+        for vary in given:
+            if ranges and not isinstance(vary, Range):
+                raise VaryError(vary.typed, "samples are drawn from ranges, not from lists")
+        return given
+    # + 0.0: there is one zero.
+    return [
+        kind(key, tuple((np.asarray(values, dtype=np.float64).ravel() + 0.0).tolist()))
+        for key, values in varies.items()
+    ]
+
+
+def _check_whole(varies: Sequence[Vary], about: Sequence[Quantity]) -> None:
+    for vary, one in zip(varies, about, strict=True):
+        if one.whole and not all(value.is_integer() for value in vary.values):
+            raise VaryError(vary.typed, f"{one.path} takes whole numbers only")

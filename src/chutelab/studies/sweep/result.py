@@ -1,0 +1,372 @@
+"""`Sweep`: the rows of all variants, as plain arrays.
+
+- Rows as text and back, to the bit; CSV and Parquet files, whole or not at all.
+- The finished rows of a sweep that is not finished: a file beside the one that it is to write.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import json
+import os
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from time import monotonic
+from types import TracebackType
+from typing import Any, BinaryIO, Final, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chutelab.scene.variants import Quantity
+from chutelab.studies.sweep.plan import Plan
+from chutelab.studies.sweep.rows import NUMBERS, REASON
+from chutelab.util.files import whole
+from chutelab.util.tables import Sheet, Shown, frame, number
+from chutelab.util.versions import version_of
+
+Rows = Mapping[str, NDArray[Any]]
+
+SUFFIXES: Final = {".csv": "csv", ".parquet": "parquet"}
+"""Endings of files, and the formats they stand for."""
+
+
+class TableError(ValueError):
+    """A file that cannot be written; the text says what is allowed."""
+
+
+def format_of(path: str | Path) -> str:
+    """Return the format of a file by its ending.
+
+    Raises
+    ------
+    TableError
+        If it is none that is known, or what it needs is not installed; or it is a folder, or in one
+        that is not there.
+    """
+    if Path(path).is_dir():
+        raise TableError(f"{path} is a folder, not a file")
+    if not (folder := Path(path).parent).is_dir():
+        raise TableError(f"{path}: there is no folder {folder}")
+    found = SUFFIXES.get(Path(path).suffix.lower())
+    if found is None:
+        raise TableError(f"{path}: the name of a table ends with {' or '.join(SUFFIXES)}")
+    if found == "parquet":
+        _pyarrow()
+    return found
+
+
+def write(columns: Rows, path: str | Path, form: str) -> Path:
+    """Write a table as "csv" or "parquet"."""
+    if form == "csv":
+        return write_csv(tuple(columns), [text_of(columns)], path)
+    pa, parquet = _pyarrow()
+    table = pa.table({name: pa.array(values, from_pandas=True) for name, values in columns.items()})
+    with whole(path) as unfinished:
+        parquet.write_table(table, unfinished)
+    return Path(path)
+
+
+def write_csv(names: Sequence[str], texts: Iterable[str], path: str | Path) -> Path:
+    """Write a head and texts of rows as a CSV file."""
+    with whole(path) as unfinished, unfinished.open("w", encoding="utf-8", newline="") as file:
+        file.write(",".join(map(_quoted, names)) + "\n")
+        file.writelines(texts)
+    return Path(path)
+
+
+def text_of(columns: Rows) -> str:
+    """Return rows as lines of CSV, from which `columns_of` gets every bit back."""
+    cells = [
+        list(map(_quoted, values.tolist())) if name == REASON else _numbers(values)
+        for name, values in columns.items()
+    ]
+    return "".join([f"{','.join(row)}\n" for row in zip(*cells, strict=True)])
+
+
+def columns_of(names: Sequence[str], text: str) -> dict[str, NDArray[Any]]:
+    """Read what `text_of` wrote."""
+    cells = list(zip(*csv.reader(text.splitlines()), strict=True))
+    return {
+        name: np.array(column, dtype=object)
+        if name == REASON
+        else np.array([float(cell) if cell else np.nan for cell in column])
+        for name, column in zip(names, cells, strict=True)
+    }
+
+
+def _numbers(values: NDArray[np.float64]) -> list[str]:
+    """Write numbers in as few digits as give them back, whole ones without a point."""
+    return ["" if x != x else repr(x).removesuffix(".0") for x in values.tolist()]
+
+
+def _quoted(text: str) -> str:
+    if '"' not in text and "," not in text:
+        return text
+    doubled = text.replace('"', '""')
+    return f'"{doubled}"'
+
+
+def _pyarrow() -> tuple[Any, Any]:
+    try:
+        import pyarrow as pa
+        from pyarrow import parquet
+    except ImportError:
+        raise TableError('Parquet needs pyarrow: pip install "chutelab[parquet]"') from None
+    return pa, parquet
+
+
+MOST_REASONS = 5
+"""Reasons that are listed."""
+
+PARTIAL = (
+    "belt_work, slip_heat and power are counted up to run.until. --set run.until=settled counts"
+    " them until nothing slips on the belt, as the theory, solve and --uncertainty do."
+)
+"""Said where runs may end before the slip does."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Sweep(Shown):
+    """Many variants of one scene.
+
+    Attributes
+    ----------
+    title : str
+        Of the scene.
+    quantities : dict of str to Quantity
+        What each varied key is.
+    columns : dict of str to ndarray, (N,)
+        Read-only: the varied keys, then what came of each variant, see `NUMBERS`
+        (NaN where there is nothing to tell), then ``reason``: why there are no numbers, or not all.
+    shape : tuple of int or None
+        Values of each key in a grid, whose last key runs fastest; None for samples.
+    settled : bool
+        Whether all runs go on until nothing slips.
+    """
+
+    title: str
+    quantities: Mapping[str, Quantity]
+    columns: Mapping[str, NDArray[Any]]
+    shape: tuple[int, ...] | None
+    settled: bool = False
+
+    def __post_init__(self) -> None:
+        for values in self.columns.values():
+            values.flags.writeable = False
+
+    def __len__(self) -> int:
+        return len(self.columns[REASON])
+
+    def unit(self, column: str) -> str:
+        """Return the unit of a column, "" for a pure number."""
+        return self.quantities[column].unit if column in self.quantities else NUMBERS[column][1]
+
+    def frame(self) -> Any:
+        """Return a pandas DataFrame; a varied key or a result is a column. Needs pandas."""
+        return frame(self.columns)
+
+    def to_csv(self, path: str | Path) -> Path:
+        """Write a CSV file, whole or not at all; NaN is an empty cell."""
+        return write(self.columns, path, "csv")
+
+    def to_parquet(self, path: str | Path) -> Path:
+        """Write a Parquet file, whole or not at all; NaN is null. Needs pyarrow."""
+        return write(self.columns, path, "parquet")
+
+    def sheet(self) -> Sheet:
+        """Return from where to where each column goes, and why rows have no numbers."""
+        rows = []
+        for name, values in self.columns.items():
+            if name == REASON or not np.isfinite(values).any():
+                continue
+            unit = self.unit(name)
+            known = values[np.isfinite(values)]
+            low, high = float(known.min()), float(known.max())
+            if name in self.quantities or low != high or low != 0.0:
+                rows.append((name, unit, number(low), number(high), f"{len(known):,}"))
+        notes = []
+        if not self.settled and np.any(np.nan_to_num(self.columns["slip_heat"])):
+            notes.append(PARTIAL)
+        reasons = Counter(reason for reason in self.columns[REASON].tolist() if reason)
+        notes += [f"{count:,} × {reason}" for reason, count in reasons.most_common(MOST_REASONS)]
+        if len(reasons) > MOST_REASONS:
+            notes.append(f"and {len(reasons) - MOST_REASONS:,} other reasons")
+        return Sheet(
+            f"{self.title}: {len(self):,} variant{'s' if len(self) != 1 else ''}",
+            ("", "", "least", "most", "rows"),
+            tuple(rows),
+            texts=2,
+            notes=tuple(notes),
+        )
+
+
+FORMAT: Final = 1
+
+INTERVAL: Final = 0.5
+"""s between two times that the file is forced to the disk: what an interruption may cost."""
+
+WORDS: Final = {
+    "format": "the format of the file",
+    "chutelab": "the version of chutelab",
+    "scene": "the scene",
+    "vary": "what --vary says",
+    "samples": "--sample, --design or --seed",
+    "engine": "--engine",
+}
+"""What a sweep can differ in, for people."""
+
+
+class PartError(ValueError):
+    """A file of finished rows that cannot be used; the text says what to do."""
+
+
+def head_of(plan: Plan) -> dict[str, Any]:
+    """Return what decides the rows of a sweep."""
+    samples = None
+    if plan.samples is not None:
+        samples = hashlib.sha256(plan.samples.tobytes()).hexdigest()
+    return {
+        "format": FORMAT,
+        "chutelab": version_of("chutelab"),
+        "scene": json.loads(json.dumps(plan.document)),
+        "vary": [[vary.key, list(vary.values)] for vary in plan.varies],
+        "samples": samples,
+        "engine": plan.engine,
+    }
+
+
+class Part:
+    """The file of finished rows; use it in a ``with`` statement.
+
+    Parameters
+    ----------
+    out : Path
+        The file that the sweep is to write.
+    plan : Plan
+        What is swept.
+    resume : bool
+        Whether to go on with a file that is there; without, there must be none.
+
+    Attributes
+    ----------
+    done : dict of int to str
+        Rows that are there already, as text, by where their block begins.
+
+    Raises
+    ------
+    PartError
+        If the file is of another sweep, there although it should not be, or cannot be written.
+    """
+
+    def __init__(self, out: Path, plan: Plan, *, resume: bool) -> None:
+        self.path = part_of(out)
+        self.done: dict[int, str] = {}
+        self._last, self._added = monotonic(), False
+        self._file: BinaryIO
+        head = head_of(plan)
+        line = json.dumps(head).encode() + b"\n"
+        try:
+            # It may have been cut off in its first line.
+            if not self.path.exists() or _begins(self.path, line):
+                self._file = self.path.open("wb")
+                self._file.write(line)
+                self._sync()
+                return
+            if not resume:
+                raise PartError(
+                    f"{self.path} holds the finished rows of a sweep that was interrupted: go on"
+                    " with --resume, or remove the file"
+                )
+            length = self._read(head)
+            self._file = self.path.open("r+b")
+            self._file.truncate(length)
+            self._file.seek(length)
+        except OSError as error:
+            raise PartError(f"{self.path}: {error.strerror or error}") from error
+
+    def _read(self, head: Mapping[str, Any]) -> int:
+        """Read the file that is there, and return the length of what is whole."""
+        data = self.path.read_bytes()
+        first, newline, _ = data.partition(b"\n")
+        try:
+            found = json.loads(first) if newline else None
+        except ValueError:
+            found = None
+        if not isinstance(found, dict):
+            raise PartError(f"{self.path} holds no rows of a sweep: remove it, or choose --out")
+        other = [words for key, words in WORDS.items() if found.get(key) != head[key]]
+        if other:
+            raise PartError(
+                f"{self.path} is of another sweep, with a difference in {', '.join(other)}: repeat"
+                " that command, or remove the file and begin anew"
+            )
+        length = len(first) + 1
+        for begin, text, end in _blocks(data, length):
+            self.done[begin] = text
+            length = end
+        return length
+
+    def add(self, begin: int, count: int, text: str) -> None:
+        """Append a block of rows."""
+        self._added = True
+        self._file.write(f"@{begin},{count}\n{text}".encode())
+        if monotonic() - self._last >= INTERVAL:
+            self._sync()
+
+    @property
+    def empty(self) -> bool:
+        """Whether there are no rows yet."""
+        return not self.done and not self._added
+
+    def _sync(self) -> None:
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        self._last = monotonic()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._sync()
+        self._file.close()
+        if kind is None or self.empty:
+            self.path.unlink()
+
+
+def _begins(path: Path, line: bytes) -> bool:
+    """Tell whether a file holds a part of a line and nothing else."""
+    with path.open("rb") as file:
+        data = file.read(len(line))
+    return len(data) < len(line) and line.startswith(data)
+
+
+def part_of(out: Path) -> Path:
+    """Return where the finished rows are kept while the sweep goes on."""
+    return out.with_name(f"{out.name}.part")
+
+
+def _blocks(data: bytes, begin: int) -> Iterator[tuple[int, str, int]]:
+    """Yield where a block of rows begins, its text, and where it ends in the file."""
+    lines = data[begin:].split(b"\n")[:-1]
+    at = 0
+    while at < len(lines):
+        try:
+            first, count = map(int, lines[at].removeprefix(b"@").split(b","))
+            rows = lines[at + 1 : at + 1 + count]
+            text = b"".join(row + b"\n" for row in rows).decode()
+        except ValueError:
+            return
+        if not lines[at].startswith(b"@") or len(rows) < count:
+            return
+        begin += len(lines[at]) + 1 + sum(len(row) + 1 for row in rows)
+        at += 1 + count
+        yield first, text, begin

@@ -1,0 +1,265 @@
+"""From recordings to rows.
+
+A recording is of one variant with all its particles, or of many variants, each of which is one
+particle with a machine of its own: V variants of M particles, where V or M is 1. Both go through
+the same operations, so that a row does not depend on which it came from.
+
+- What a row of a sweep holds: the columns, what they mean, and how many of them are kept.
+- How far particle 0 of each variant is from the closed form, as far as it went the same way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from chutelab.results import ENTRIES, REASONS, Kind, Recording, balance
+from chutelab.results.comparison import QUANTITIES, from_events, never, relative_errors, scales
+from chutelab.scene import Scene
+from chutelab.theory import unbounded
+
+Columns = dict[str, NDArray[Any]]
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+NUMBERS: dict[str, tuple[str, str]] = {
+    "landing.x": ("x of the landing on the outgoing belt, mean over the particles", "m"),
+    "landing.x_spread": ("its standard deviation", "m"),
+    "landing.y": ("y of the landing, mean", "m"),
+    "landing.vx": ("forward velocity just before the landing, mean", "m/s"),
+    "landing.vx_spread": ("its standard deviation", "m/s"),
+    "landing.vy": ("upward velocity just before the landing, mean", "m/s"),
+    "landing.vy_spread": ("its standard deviation", "m/s"),
+    "landing.t": ("time from a particle's release to its landing, mean", "s"),
+    "time": ("time from a particle's release to the end of its track, mean", "s"),
+    "belt_work": ("what the outgoing belt's drive pays up to run.until, all particles", "J"),
+    "slip_heat": ("heat of the slip on the outgoing belt up to run.until", "J"),
+    "restitution_loss": ("loss of all bounces", "J"),
+    "power": ("belt work up to run.until per particle times stream.rate", "W"),
+    "misses": ("particles that never landed on the outgoing belt", ""),
+    "residual": ("energy that the ledger cannot explain: the numerical error", "J"),
+    "error": ("largest relative error of particle 0 against the theory", ""),
+}
+"""Columns of numbers, with their definitions and units; NaN where there is nothing to tell."""
+
+REASON = "reason"
+"""The column that says why there are no numbers, or not all; "" otherwise."""
+
+
+def empty(count: int) -> Columns:
+    """Return rows that tell nothing yet."""
+    found: Columns = {name: np.full(count, np.nan) for name in NUMBERS}
+    found[REASON] = np.full(count, "", dtype=object)
+    return found
+
+
+def joined(parts: Sequence[Mapping[str, NDArray[Any]]]) -> Columns:
+    """Put rows below each other."""
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+WAY = ((Kind.SEPARATION, "incoming"), (Kind.IMPACT, "plate"), (Kind.LANDING, "outgoing"))
+"""The events that the equations describe, in this order."""
+
+OTHER = (Kind.COLLISION, Kind.STICK, Kind.SETTLE)
+"""Kinds of events that they do not know of, on the way or on another surface."""
+
+
+def deviation(recording: Recording, scene: Scene, shape: tuple[int, int]) -> Floats:
+    """Return the largest relative error, (V,), as `results.comparison` measures it; NaN for none.
+
+    Parameters
+    ----------
+    recording, scene : Recording, Scene
+        Of one variant, or a family of them.
+    shape : tuple of int
+        Variants V, and the particles M of each.
+    """
+    count = shape[0]
+    if scene.incoming is None or scene.plate is None or (scene.stream.interact and shape[1] > 1):
+        return np.full(count, np.nan)
+    events = _way(recording, shape[1], count)
+    begins = _begins(recording, scene, shape)
+    for one in events:
+        one[~begins] = never(1)
+    simulated = from_events(scene, *events)
+    theory = unbounded(scene)
+    settled = _settled(recording, shape)
+    if settled is not None:
+        simulated |= settled
+    sizes = scales(scene, theory)
+    worst = np.full(count, np.nan)
+    for name, found in simulated.items():
+        expected = getattr(theory, name)
+        errors = relative_errors(found, expected, sizes[QUANTITIES[name]])
+        worst = np.fmax(worst, np.where(np.isfinite(errors), errors, np.nan))
+    return worst
+
+
+def _begins(recording: Recording, scene: Scene, shape: tuple[int, int]) -> Bools:
+    """Tell whether particle 0 was released on the belt, as fast as the belt is, (V,)."""
+    assert scene.incoming is not None
+    belt, start = scene.incoming, recording.offsets[: -1 : shape[1]]
+    released = recording.offsets[1 :: shape[1]] > start
+    first = recording.knots[np.where(released, start, 0)]
+    (x, y), (vx, vy) = first["position"].T, first["velocity"].T
+    height = belt.pulley_radius + scene.particle.radius
+    on_belt = (y == height) & (-belt.length <= x) & (x <= 0.0)
+    return np.asarray(released & on_belt & (vx == belt.speed) & (vy == 0.0))
+
+
+def _way(recording: Recording, every: int, count: int) -> list[NDArray[Any]]:
+    """Return leaving, blow and landing of particle 0 of each variant, NaN from where it strays."""
+    events = recording.events
+    kinds = [int(kind) for kind, _ in WAY] + [int(kind) for kind in OTHER]
+    incoming = recording.surface_index("incoming")
+    # Grip and slip on the belt and the pulley are in the equations.
+    known = (events["kind"] == Kind.STICK) & (events["surface"] == incoming)
+    mine = np.isin(events["kind"], kinds) & (events["particle"] % every == 0) & ~known
+    own = events[mine]
+    own = own[np.argsort(own["particle"], kind="stable")]
+    variant = own["particle"] // every
+    rank = np.arange(len(own)) - np.searchsorted(variant, variant)
+    # A carried particle leaves the belt with a blow that throws it off, too.
+    second = np.full(count, np.nan)
+    second[variant[rank == 1]] = own["t"][rank == 1]
+    found = [never(count) for _ in WAY]
+    astray = np.zeros(count, dtype=bool)
+    for n, ((kind, surface), into) in enumerate(zip(WAY, found, strict=True)):
+        at = rank == n
+        there, which = variant[at], own[at]
+        fits = (which["kind"] == kind) & (which["surface"] == recording.surface_index(surface))
+        here = np.zeros(count, dtype=bool)
+        here[there] = fits
+        here &= ~astray
+        into[there[here[there]]] = which[here[there]]
+        astray = ~here
+    early = found[0]["t"] >= second
+    for into in found:
+        into[early] = never(1)
+    return found
+
+
+def _settled(recording: Recording, shape: tuple[int, int]) -> dict[str, Floats] | None:
+    """Return what the outgoing belt paid for those that no longer slip on it, NaN for others."""
+    if shape[1] > 1 or "outgoing" not in recording.surfaces:
+        return None
+    entries = recording.by_surface.reshape(shape[0], -1, len(ENTRIES))
+    belt = entries[:, recording.surface_index("outgoing")]
+    over = recording.ended == REASONS.index("settled")
+    return {
+        "belt_work": np.where(over, belt[:, ENTRIES.index("belt_work")], np.nan),
+        "slip_heat": np.where(over, belt[:, ENTRIES.index("friction_loss")], np.nan),
+    }
+
+
+FATES = {
+    "time": "still under way when the run ended",
+    "settled": "came to rest elsewhere",
+    "exit": "left the scene",
+}
+"""What became of particles that did not land, by why their tracks ended."""
+
+
+def rows(recording: Recording, scene: Scene, variants: int = 1) -> Columns:
+    """Return the rows of the variants of a recording.
+
+    Parameters
+    ----------
+    recording : Recording
+        Of one variant; or of as many as there are particles, each on a machine of its own.
+    scene : Scene
+        What was run: a family in the second case.
+    variants : int
+        How many.
+    """
+    found = empty(variants)
+    shape = variants, recording.count // variants
+    first, last = recording.ends()
+    released = recording.offsets[1:] > recording.offsets[:-1]
+    began = np.full(recording.count, np.nan)
+    began[released] = first["t"]
+    ended = np.full(recording.count, np.nan)
+    ended[released] = last["t"]
+
+    landings = recording.first(recording.select(Kind.LANDING, surface="outgoing"))
+    who = landings["particle"]
+    values = {
+        "landing.x": landings["position"][:, 0],
+        "landing.y": landings["position"][:, 1],
+        "landing.vx": landings["velocity_before"][:, 0],
+        "landing.vy": landings["velocity_before"][:, 1],
+        "landing.t": landings["t"] - began[who],
+    }
+    landed = np.zeros(recording.count, dtype=bool)
+    landed[who] = True
+    for name, value in values.items():
+        of_all = np.zeros(recording.count)
+        of_all[who] = value
+        found[name], spread = _mean_and_spread(of_all.reshape(shape), landed.reshape(shape))
+        if f"{name}_spread" in found:
+            found[f"{name}_spread"] = spread
+    found["time"], _ = _mean_and_spread(
+        np.where(released, ended - began, 0.0).reshape(shape), released.reshape(shape)
+    )
+    _balance(found, recording, scene, shape)
+    if scene.outgoing is not None:
+        found["misses"] = (shape[1] - landed.reshape(shape).sum(axis=1)).astype(np.float64)
+        _tell_misses(found[REASON], recording.ended.reshape(shape), ~landed.reshape(shape))
+        # Where it is varied, it is an array of numbers.
+        if isinstance(scene.run.until, str) and scene.run.until == "settled":
+            restless = landed & (recording.ended != REASONS.index("settled"))
+            _tell_restless(found[REASON], restless.reshape(shape).sum(axis=1), shape[1])
+    found["error"] = deviation(recording, scene, shape)
+    return found
+
+
+def _mean_and_spread(values: Floats, counted: Bools) -> tuple[Floats, Floats]:
+    """Return mean and standard deviation over the particles that count, (V,) of (V, M)."""
+    count = counted.sum(axis=1)
+    some = np.maximum(count, 1)
+    mean = np.where(counted, values, 0.0).sum(axis=1) / some
+    square = np.where(counted, (values - mean[:, None]) ** 2, 0.0).sum(axis=1) / some
+    return np.where(count > 0, mean, np.nan), np.where(count > 0, np.sqrt(square), np.nan)
+
+
+def _balance(found: Columns, recording: Recording, scene: Scene, shape: tuple[int, int]) -> None:
+    """Fill in the energies."""
+    first, last = recording.ends()
+    (kinetic_first, potential_first), (kinetic_last, potential_last) = (
+        recording.energies(knots) for knots in (first, last)
+    )
+    change = (kinetic_last - kinetic_first) + (potential_last - potential_first)
+    whole = np.zeros((2, recording.count))
+    released = recording.offsets[1:] > recording.offsets[:-1]
+    whole[0, released] = change - balance(last["entries"])
+    whole[1, released] = last["entries"][:, ENTRIES.index("restitution_loss")]
+    found["residual"], found["restitution_loss"] = whole.reshape(2, *shape).sum(axis=2)
+    if scene.outgoing is not None:
+        entries = recording.by_surface.reshape(shape[0], -1, len(ENTRIES))
+        belt = entries[:, recording.surface_index("outgoing")]
+        found["belt_work"] = belt[:, ENTRIES.index("belt_work")].copy()
+        found["slip_heat"] = belt[:, ENTRIES.index("friction_loss")].copy()
+        found["power"] = np.asarray(found["belt_work"] / shape[1] * scene.stream.rate)
+
+
+def _tell_misses(reason: NDArray[Any], ended: NDArray[np.int8], missed: Bools) -> None:
+    """Say what became of those that did not land."""
+    for row in np.flatnonzero(missed.any(axis=1)).tolist():
+        fates = [REASONS[k] for k in ended[row, missed[row]].tolist()]
+        told = [f"{fates.count(name)} {fate}" for name, fate in FATES.items() if name in fates]
+        of_all = f"{len(fates)} of {missed.shape[1]} particles" if missed.shape[1] > 1 else "it"
+        if missed.shape[1] == 1:
+            told = [FATES[fates[0]]]
+        reason[row] = f"{of_all} missed the outgoing belt: {', '.join(told)}"
+
+
+def _tell_restless(reason: NDArray[Any], restless: NDArray[Any], of: int) -> None:
+    """Say that what the belt pays is not all, where a run until settled ended before that."""
+    for row in np.flatnonzero(restless).tolist():
+        who = f"{restless[row]} of {of} particles" if of > 1 else "it"
+        more = f"{who} landed, but never came to rest on a belt: belt_work has only a part"
+        reason[row] = f"{reason[row]}; {more}" if reason[row] else more

@@ -1,0 +1,371 @@
+"""`sweep`: all variants of a scene, by whoever does the work, and what came of each.
+
+- Who does the work: this process, processes of this computer, or a Dask cluster.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import re
+import signal
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    wait,
+)
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any, Final
+
+from chutelab.scene import Scene
+from chutelab.scene.variants import Vary, is_plain
+from chutelab.studies.sweep.batch import Block, swept_block
+from chutelab.studies.sweep.plan import Plan, planned
+from chutelab.studies.sweep.result import (
+    Part,
+    Sweep,
+    columns_of,
+    format_of,
+    text_of,
+    write,
+    write_csv,
+)
+from chutelab.studies.sweep.rows import NUMBERS, REASON, Columns, joined
+
+Job = tuple[int, Any]
+
+ATTEMPTS: Final = 3
+"""Times in a row that all processes may die without finishing anything."""
+
+PATIENCE: Final = 10.0
+"""s that a scheduler may take to answer."""
+
+
+ADDRESS: Final = re.compile(r"(\w+://)?[^\s:/]+:\d{1,5}")
+"""A host and a port."""
+
+
+class WorkersError(ValueError):
+    """Nobody is there to do the work; the text says what is wrong with what was asked for."""
+
+
+class LostWorkersError(RuntimeError):
+    """Those who did the work are gone; the text says what to do."""
+
+
+class Here(Executor):
+    """Does at once what is submitted."""
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Call a function; what it raises is raised here."""
+        done: Future[Any] = Future()
+        done.set_result(fn(*args, **kwargs))
+        return done
+
+
+class Crew:
+    """An executor, how many jobs it is to have at a time, and how to get a new one if it breaks."""
+
+    def __init__(self, executor: Executor, ahead: int, anew: Callable[[], Executor] | None) -> None:
+        self.executor, self.ahead, self.anew = executor, ahead, anew
+
+    def results(self, work: Callable[[Any], Any], jobs: Iterable[Job]) -> Iterator[tuple[int, Any]]:
+        """Yield a number and what came of it for each job, as they are finished.
+
+        Raises
+        ------
+        LostWorkersError
+            If processes keep dying, or a cluster is gone.
+        """
+        left, broken = iter(jobs), 0
+        running: dict[Future[Any], Job] = {}
+        again: list[Job] = []
+        while True:
+            while len(running) < self.ahead:
+                job = again.pop() if again else next(left, None)
+                if job is None:
+                    break
+                try:
+                    running[self.executor.submit(work, job[1])] = job
+                except BrokenExecutor:
+                    again.append(job)
+                    break
+            if not running and not again:
+                return
+            finished = wait(running, return_when=FIRST_COMPLETED).done if running else set()
+            died = not finished
+            for future in finished:
+                job = running.pop(future)
+                try:
+                    result = future.result()
+                except BrokenExecutor:
+                    again.append(job)
+                    died = True
+                else:
+                    broken = 0
+                    yield job[0], result
+            if died:
+                broken += 1
+                again += running.values()
+                running.clear()
+                self._renew(broken)
+
+    def _renew(self, broken: int) -> None:
+        if self.anew is None or broken > ATTEMPTS:
+            raise LostWorkersError(
+                "the worker processes keep dying, perhaps for want of memory: try fewer with --jobs"
+            )
+        self.executor.shutdown(wait=False)
+        self.executor = self.anew()
+
+
+@contextmanager
+def crew(jobs: int = 1, scheduler: str | None = None) -> Iterator[Crew]:
+    """Give those who do the work.
+
+    Parameters
+    ----------
+    jobs : int
+        Processes; 1 is this one. 0 is one for each processor.
+    scheduler : str, optional
+        Address of a Dask scheduler, such as ``tcp://10.0.0.1:8786``.
+
+    Raises
+    ------
+    WorkersError
+        If Dask is not installed, no scheduler answers, or it has no workers.
+    """
+    if scheduler is not None:
+        yield from _cluster(scheduler)
+        return
+    count = jobs or os.cpu_count() or 1
+    if count == 1:
+        yield Crew(Here(), 1, None)
+        return
+
+    def processes() -> Executor:
+        # Not forked: there may be threads.
+        spawning = multiprocessing.get_context("spawn")
+        return ProcessPoolExecutor(count, mp_context=spawning, initializer=_ignore_interrupts)
+
+    others = {child.pid for child in multiprocessing.active_children()}
+    team = Crew(processes(), 2 * count, processes)
+    try:
+        yield team
+    except BaseException:
+        team.executor.shutdown(wait=False, cancel_futures=True)
+        for child in multiprocessing.active_children():
+            if child.pid not in others:
+                child.terminate()
+        raise
+    team.executor.shutdown()
+
+
+def _ignore_interrupts() -> None:
+    # Ctrl-C goes to all processes of a terminal; the first one tells the others.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _cluster(address: str) -> Iterator[Crew]:
+    try:
+        from distributed import Client, KilledWorker
+    except ImportError:
+        raise WorkersError('--scheduler needs Dask: pip install "chutelab[cluster]"') from None
+    if not ADDRESS.fullmatch(address):
+        raise WorkersError(f"--scheduler {address}: must be like tcp://10.0.0.1:8786")
+    connect: Any = Client
+    try:
+        client = connect(address, timeout=PATIENCE, set_as_default=False)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise WorkersError(f"--scheduler {address}: no Dask scheduler answers: {error}") from error
+    with client:
+        threads = sum(client.nthreads().values())
+        if not threads:
+            raise WorkersError(f"--scheduler {address}: it has no workers; start some with `dask`")
+        try:
+            with client.get_executor(pure=False) as executor:
+                yield Crew(executor, 2 * threads, None)
+        except (KilledWorker, CancelledError) as error:
+            raise LostWorkersError(
+                f"--scheduler {address}: the workers or the scheduler are gone: {error}"
+            ) from error
+
+
+TOGETHER: Final = 8192
+"""Variants in a block that goes through the exact engine at once."""
+
+EXACT: Final = 16
+"""The same of variants that go one by one, a millisecond each."""
+
+STEPPED: Final = 1
+"""The same of variants that are stepped: each may take seconds."""
+
+
+AHEAD: Final = 64
+"""Blocks that an executor of the caller's has at a time."""
+
+
+def sweep(
+    scene: Scene,
+    varies: Sequence[Vary | str] | Mapping[str, Any],
+    *,
+    sample: int | None = None,
+    design: str = "lhs",
+    seed: int = 0,
+    engine: str | None = None,
+    jobs: int = 1,
+    executor: Executor | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Sweep:
+    """Simulate many variants of a scene.
+
+    Variants of one particle that differ in plain numbers go through the exact engine together;
+    every row is the one that `chutelab.simulate` of its variant gives, to the bit.
+
+    Parameters
+    ----------
+    scene : Scene
+        From `chutelab.load`.
+    varies : sequence of Vary or str, or mapping
+        ``KEY=FROM:TO:COUNT`` or ``KEY=a,b,c`` each, or values by key; a grid of all combinations,
+        whose last key runs fastest. With `sample`, ``KEY=FROM:TO``, or two ends by key.
+    sample : int, optional
+        Draw so many samples from the ranges instead; needs SciPy.
+    design, seed : {"lhs", "sobol"}, int
+        Latin hypercube or Sobol points, and the seed.
+    engine : {"auto", "exact", "contact", "pymunk"}, optional
+        Overrides the scene's ``run.engine``.
+    jobs : int
+        Processes to spread the work over; 0 is one for each processor.
+    executor : concurrent.futures.Executor, optional
+        Who does the work instead, such as that of a Dask client.
+    progress : callable, optional
+        Called now and then with the share that is done, 0 to 1.
+
+    Returns
+    -------
+    Sweep
+        Also of variants that cannot be, or miss: with the reason.
+
+    Raises
+    ------
+    VaryError, SampleError
+        If the variants cannot be made so; before anything runs.
+
+    Examples
+    --------
+    >>> import chutelab
+    >>> swept = sweep(chutelab.load("perpendicular"), ["plate.restitution=0:1:3"])
+    >>> swept.columns["landing.vx"]
+    array([ 0., -1., -2.])
+    """
+    plan = planned(scene, varies, sample=sample, design=design, seed=seed, engine=engine)
+    with ExitStack() as stack:
+        team = Crew(executor, AHEAD, None) if executor else stack.enter_context(crew(jobs))
+        return swept_by(plan, team, progress=progress)
+
+
+def swept_by(plan: Plan, team: Crew, *, progress: Callable[[float], None] | None = None) -> Sweep:
+    """Carry a plan out; see `sweep_to`."""
+    found = dict(_work(plan, team, {}, progress))
+    return _gathered(plan, [found[begin] for begin in sorted(found)])
+
+
+def sweep_to(
+    plan: Plan,
+    out: str | Path,
+    team: Crew,
+    *,
+    resume: bool = False,
+    progress: Callable[[float], None] | None = None,
+) -> Sweep:
+    """Carry a plan out and write its rows to a file, whole or not at all.
+
+    Finished rows are kept beside it meanwhile, see `sweep.result`; an interrupted sweep goes
+    on from there with `resume`, and writes the same file as one that was not.
+
+    Parameters
+    ----------
+    plan : Plan
+        From `planned`.
+    out : str or Path
+        A .csv or .parquet file.
+    team : Crew
+        Who does the work, from `chutelab.studies.sweep.sweeping.crew`.
+    resume : bool
+        Whether to go on with an interrupted sweep, if there is one.
+    progress : callable, optional
+        Called now and then with the share that is done, 0 to 1.
+
+    Raises
+    ------
+    TableError, PartError
+        If the file is of no known format or a folder, or there are rows of another sweep.
+    """
+    out, form = Path(out), format_of(out)
+    names = (*plan.keys, *NUMBERS, REASON)
+    with Part(out, plan, resume=resume) as part:
+        texts = {begin: text for begin, text in part.done.items() if begin < plan.count}
+        blocks = {begin: columns_of(names, text) for begin, text in texts.items()}
+        for begin, columns in _work(plan, team, texts, progress):
+            blocks[begin] = columns
+            texts[begin] = text_of(columns)
+            part.add(begin, len(columns[REASON]), texts[begin])
+        order = sorted(texts)
+        result = _gathered(plan, [blocks[begin] for begin in order])
+        if form == "csv":
+            write_csv(names, (texts[begin] for begin in order), out)
+        else:
+            write(result.columns, out, form)
+    return result
+
+
+def _work(
+    plan: Plan,
+    team: Crew,
+    done: Mapping[int, object],
+    progress: Callable[[float], None] | None,
+) -> Iterator[tuple[int, Columns]]:
+    """Yield where blocks begin, and their rows, but for those that are done."""
+    size = _size(plan)
+    begins = [begin for begin in range(0, plan.count, size) if begin not in done]
+    paths = tuple(quantity.path for quantity in plan.quantities)
+
+    def block(begin: int) -> Block:
+        values = plan.values(begin, min(begin + size, plan.count))
+        return Block(plan.document, plan.source, plan.keys, paths, values, plan.engine)
+
+    over = plan.count - sum(min(size, plan.count - begin) for begin in begins)
+    for begin, columns in team.results(swept_block, ((begin, block(begin)) for begin in begins)):
+        over += len(columns[REASON])
+        if progress is not None:
+            progress(over / plan.count)
+        values = plan.values(begin, begin + len(columns[REASON]))
+        yield begin, {**dict(zip(plan.keys, values.T.copy(), strict=True)), **columns}
+
+
+def _size(plan: Plan) -> int:
+    """Return how many variants make a block; it depends on the plan only, so that it can resume."""
+    stream, run = plan.document.get("stream", {}), plan.document.get("run", {})
+    one = stream.get("count", 1) == 1 and "stream.count" not in plan.keys
+    wanted = plan.engine or run.get("engine", "auto")
+    if wanted in ("contact", "pymunk") or (stream.get("interact", False) and not one):
+        return STEPPED
+    plain = all(is_plain(quantity.path) for quantity in plan.quantities)
+    return TOGETHER if one and plain else EXACT
+
+
+def _gathered(plan: Plan, blocks: Sequence[Columns]) -> Sweep:
+    return Sweep(
+        title=plan.title,
+        quantities=dict(zip(plan.keys, plan.quantities, strict=True)),
+        columns=joined(blocks),
+        shape=None if plan.samples is not None else tuple(len(v.values) for v in plan.varies),
+        settled=plan.document.get("run", {}).get("until") == "settled",
+    )

@@ -1,0 +1,339 @@
+"""`predict`: the theory's answer for a scene, or the reason why it has none.
+
+The finite machine is laid over the numbers of `transfer`: what is touched before the plate, whether
+the plate is there, what is touched between rebound and landing, whether the belt is there.
+
+- One scene as the closed form sees it: its numbers, and the finite machine round them.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from chutelab.scene import Incoming, Plate, Scene
+from chutelab.theory.obstacles import Flight, Segments, corner_times, first_in_flight, first_on_arc
+from chutelab.theory.results import Reason, Transfer, cut, unanswered
+from chutelab.theory.transfer import Rebound, transfer
+
+LEAST_CLEARANCE = 0.05
+"""m of the default plate's lower end above the outgoing belt, for particles below 17 mm."""
+
+RADII_CLEARANCE = 3.0
+"""The same in particle radii, for larger ones."""
+
+REACH_WITHOUT_BELT = 2.0
+"""m of the default plate below its pivot where there is no outgoing belt."""
+
+
+class Course:
+    """Particle 0 on its way through one scene that has an incoming belt and a plate."""
+
+    def __init__(self, scene: Scene, rebound: Rebound) -> None:
+        assert scene.incoming is not None
+        assert scene.plate is not None
+        self.scene = scene
+        self.rebound = rebound
+        self.belt: Incoming = scene.incoming
+        self.plate: Plate = scene.plate
+        self.radius = scene.particle.radius
+        self.ride_radius = self.belt.pulley_radius + self.radius
+        self.angle = np.radians(self.plate.angle_deg)
+
+    @cached_property
+    def up(self) -> NDArray[np.float64]:
+        """Unit vector up along the plate, (2,)."""
+        return np.array([-np.sin(self.angle), np.cos(self.angle)])
+
+    @cached_property
+    def normal(self) -> NDArray[np.float64]:
+        """Unit vector out of the struck face, (2,)."""
+        return np.array([-np.cos(self.angle), -np.sin(self.angle)])
+
+    @cached_property
+    def pivot(self) -> NDArray[np.float64]:
+        """Where the plate is hung, (2,), m."""
+        ahead = self.belt.pulley_radius + self.plate.distance
+        return np.array([ahead, self.plate.pivot_height], dtype=np.float64)
+
+    @cached_property
+    def found(self) -> Transfer:
+        """What the equations say about unbounded plate and belt; of a family, arrays (N,)."""
+        out = self.scene.outgoing
+        if out is None:
+            return self._transfer(drop=0.0, belt_speed=0.0)
+        if out.drop_from == "impact":
+            return self._transfer(drop=out.drop, belt_speed=out.speed)
+        impact = self._transfer(drop=0.0, belt_speed=out.speed)
+        # Eq. (16) solved for d2; `predict` refuses a belt above the impact
+        sunk = self.ride_radius * (1.0 - np.cos(impact.phi1)) + impact.y2
+        return self._transfer(drop=np.maximum(out.drop - sunk, 0.0), belt_speed=out.speed)
+
+    def _transfer(self, **outgoing: ArrayLike) -> Transfer:
+        scene = self.scene
+        grip = self.belt.friction
+        return transfer(
+            speed=self.belt.speed,
+            pulley_radius=self.belt.pulley_radius,
+            distance=self.plate.distance,
+            angle=self.angle,
+            pivot_height=self.plate.pivot_height,
+            restitution=self.plate.restitution,
+            particle_radius=self.radius,
+            mass=scene.particle.mass,
+            gravity=scene.gravity,
+            friction=np.inf if isinstance(grip, str) else grip,
+            spin=scene.particle.spin,
+            plate_friction=self.plate.friction,
+            interval=1.0 / scene.stream.rate,
+            rebound=self.rebound,
+            unbounded_plate=False,
+            **outgoing,
+        )
+
+    @cached_property
+    def separation(self) -> Flight:
+        """The flight from the pulley."""
+        phi, speed = self.found.phi1, self.found.v1
+        ahead, outward = np.array([np.cos(phi), -np.sin(phi)]), np.array([np.sin(phi), np.cos(phi)])
+        return Flight(self.ride_radius * outward, speed * ahead, self.scene.gravity)
+
+    @cached_property
+    def impact(self) -> NDArray[np.float64]:
+        """World position of the centre on the plate's line, (2,); NaN if it never gets there."""
+        left = self.separation.position
+        return np.array([left[0] + self.found.x2, left[1] - self.found.y2])
+
+    @cached_property
+    def rebounded(self) -> Flight:
+        """The flight from the plate."""
+        speed, angle = self.found.v2r, self.found.phi2r
+        away, down = speed * np.sin(angle), speed * np.cos(angle)
+        return Flight(self.impact, away * self.normal - down * self.up, self.scene.gravity)
+
+    @property
+    def belt_height(self) -> float | None:
+        """World y of the outgoing belt; None if there is none or nothing to measure it from."""
+        out = self.scene.outgoing
+        if out is None:
+            return None
+        if out.drop_from == "top":
+            return self.belt.pulley_radius - out.drop
+        height = float(self.impact[1] - out.drop - self.radius)
+        return height if np.isfinite(height) else None
+
+    @cached_property
+    def plate_reach(self) -> tuple[float, float]:
+        """Ends of the plate, measured upwards from the pivot along it, m."""
+        below, height = self.plate.below, self.belt_height
+        if below is None:
+            below = REACH_WITHOUT_BELT
+            if height is not None:
+                lowest = height + max(LEAST_CLEARANCE, RADII_CLEARANCE * self.radius)
+                below = max((self.pivot[1] - lowest) / np.cos(self.angle), 0.0)
+        return -below, self.plate.above
+
+    @cached_property
+    def lines(self) -> list[tuple[str, Any, Any]]:
+        """Plate, outgoing belt and free surfaces, in this order."""
+        low, high = self.plate_reach
+        lines: list[tuple[str, Any, Any]] = [
+            ("plate", self.pivot + low * self.up, self.pivot + high * self.up)
+        ]
+        out, height = self.scene.outgoing, self.belt_height
+        if out is not None and height is not None:
+            lines.append(("outgoing", (out.start, height), (out.start + out.length, height)))
+        for free in self.scene.surface:
+            lines += [(free.name, first, second) for first, second in pairwise(free.points)]
+        return lines
+
+
+ON_BELT = 1e-12
+"""m; a release this close to the riding height differs from it by the rounding of a sum only."""
+
+
+def predict(scene: Scene, rebound: Rebound = "corrected") -> Transfer:
+    """Predict particle 0 of a scene in closed form.
+
+    Parameters
+    ----------
+    scene : Scene
+        A validated scene; its particle 0 is nominal (no spread, lowest layer).
+    rebound : {"corrected", "as-printed"}
+        Which Eq. (9), see `transfer`.
+
+    Returns
+    -------
+    Transfer
+        0-d arrays. NaN from the stage on that is not reached as the equations assume, with a
+        `reason`: see `chutelab.theory.Reason` for what each claims. ``P`` takes 1 / stream.rate for
+        the time per particle. ``belt_work`` and ``slip_heat`` are what the outgoing belt pays once
+        the particle no longer slips on it.
+
+    Notes
+    -----
+    Surface names in reasons are the scene's own, with ``plate``, ``outgoing``, ``incoming`` (the
+    belt's straight part) and ``pulley``. What happens after the landing is not looked at. Contacts
+    that graze to within rounding may be judged either way.
+    """
+    fault = _outside(scene)
+    if fault:
+        return cut(unanswered(), "separation", Reason.OUTSIDE.because(fault))
+    return _answer(Course(scene, rebound))
+
+
+def unbounded(scene: Scene) -> Transfer:
+    """Return what the equations say of a scene if nothing else were in the way.
+
+    Plate and outgoing belt are without ends, the pulley is met no more, and what the scene says of
+    releases is not looked at.
+
+    Parameters
+    ----------
+    scene : Scene
+        With an incoming conveyor and a plate; or a family of such, see `chutelab.scene.variants`.
+
+    Returns
+    -------
+    Transfer
+        0-d arrays; of a family, (N,).
+    """
+    return Course(scene, "corrected").found
+
+
+def _outside(scene: Scene) -> str:
+    """Return what makes the scene another problem than the paper's, "" if nothing does."""
+    if scene.incoming is None:
+        return "there is no incoming conveyor"
+    if scene.plate is None:
+        return "there is no damping plate"
+    at, velocity = scene.stream.at, scene.stream.velocity
+    if at is not None:
+        above = at[1] - scene.incoming.pulley_radius - scene.particle.radius
+        if abs(above) > ON_BELT or not -scene.incoming.length <= at[0] <= 0.0:
+            return "the release point stream.at is not on the incoming belt"
+    if velocity is not None and tuple(velocity) != (scene.incoming.speed, 0.0):
+        return "the release velocity stream.velocity is not the incoming belt's"
+    if scene.stream.interact and scene.stream.count > 1:
+        return "particles interact"
+    return ""
+
+
+def _answer(course: Course) -> Transfer:
+    """Lay the finite machine over the numbers, in the order of events."""
+    found = course.found
+    if np.isnan(found.phi1):
+        return found
+    if course.scene.outgoing is not None and course.belt_height is None:
+        # Nothing places the belt, nor the plate's lower end: there is no machine to look at.
+        return cut(found, "separation", str(found.reason))
+    low, high = course.plate_reach
+    if high <= low:
+        return cut(found, "impact", Reason.OUTSIDE.because("the plate has no length"))
+    trouble = _on_the_ride(course) or _before_the_plate(course)
+    if trouble is None and course.scene.outgoing is None and np.isfinite(found.v2r):
+        trouble = cut(found, "landing", Reason.OUTSIDE.because("there is no outgoing conveyor"))
+    if trouble is None and Reason.of(found.reason) in (None, Reason.MISSES):
+        trouble = _after_the_rebound(course)
+    return trouble or found
+
+
+def _on_the_ride(course: Course) -> Transfer | None:
+    obstacles = Segments.of(course.lines)
+    at, radius = course.scene.stream.at, course.radius
+    start = np.array([-course.belt.length if at is None else at[0], course.ride_radius])
+    index = obstacles.overlapped(start, radius)
+    if index < 0:
+        straight = Flight(start, np.array([1.0, 0.0]), 0.0)
+        index = first_in_flight(straight, obstacles, radius, float(-start[0]))[1]
+    if index < 0:
+        last = float(course.found.phi1)
+        index = first_on_arc(course.ride_radius, last, obstacles, radius)[1]
+    if index < 0:
+        return None
+    what = f"{obstacles.names[index]}: it is in the way of the ride"
+    return cut(course.found, "separation", Reason.EARLY.because(what))
+
+
+def _before_the_plate(course: Course) -> Transfer | None:
+    found, radius, flight = course.found, course.radius, course.separation
+    low, high = course.plate_reach
+    foot = float((course.impact - course.pivot) @ course.up)
+    hit = low <= foot <= high  # false for NaN: the line is not met
+    plate = Segments.of(course.lines[:1])
+    obstacles = Segments.of(course.lines[1:] if hit else course.lines)
+    horizon = float(found.t2) if hit else _horizon(flight, plate, radius)
+    index = first_in_flight(flight, obstacles, radius, horizon)[1]
+    # What is in the way of a flight that misses the plate anyway does not matter.
+    stopped = hit or np.isfinite(first_in_flight(flight, plate, radius, horizon)[0])
+    if stopped and index >= 0:
+        name = obstacles.names[index]
+        how = "its end or its back is touched" if name == "plate" else "it is touched first"
+        return cut(found, "impact", Reason.EARLY.because(f"{name}: {how}"))
+    if hit:
+        return None
+    if np.isnan(foot):
+        return cut(found, "impact", str(found.reason))
+    where = f"{foot - high:.4g} m above" if foot > high else f"{low - foot:.4g} m below"
+    what = f"the plate's line is met {where} the end of the plate"
+    return cut(found, "impact", Reason.NO_IMPACT.because(what))
+
+
+def _horizon(flight: Flight, targets: Segments, radius: float) -> float:
+    """Return a time after which the flight is past all targets."""
+    if flight.gravity > 0.0:
+        return flight.time_below(float(targets.points[:, 1].min()) - radius)
+    apart = targets.points - flight.position
+    reach = float(np.hypot(apart[:, 0], apart[:, 1]).max()) + 2.0 * radius
+    speed = float(np.hypot(*flight.velocity))
+    return reach / speed if speed > 0.0 else 0.0
+
+
+def _after_the_rebound(course: Course) -> Transfer | None:
+    found, radius, out = course.found, course.radius, course.scene.outgoing
+    height = course.belt_height
+    assert out is not None
+    assert height is not None
+    if course.impact[1] - radius < height:
+        return cut(found, "landing", Reason.MISSES.because("the plate is met below the belt"))
+    lands = bool(np.isfinite(found.t3))
+    flight, top = course.rebounded, course.belt.pulley_radius
+    around = Segments.of([("pulley", (-top, -top), (top, top)), *course.lines])
+    horizon = float(found.t3) if lands else _horizon(flight, around, radius)
+    solid = Segments.of([("incoming", (-course.belt.length, top), (0.0, top)), *course.lines[2:]])
+    time, index = first_in_flight(flight, solid, radius, horizon)
+    time, name = min(
+        (time, solid.names[index]),
+        (_plate_again(course, horizon), "plate"),
+        (corner_times(flight, np.zeros((1, 2)), course.ride_radius, horizon)[0], "pulley"),
+    )
+    # The outgoing belt is not among them: no part of it, ends included, is met above its level.
+    if np.isfinite(time):
+        what = f"{name}: {time:.4g} s after the rebound"
+        return cut(found, "landing", Reason.SECOND.because(what))
+    x = float(course.impact[0] - found.x3)
+    if lands and not out.start <= x <= out.start + out.length:
+        what = f"it comes down at x = {x:.4g} m, off the belt"
+        return cut(found, "landing", Reason.MISSES.because(what))
+    return None
+
+
+def _plate_again(course: Course, horizon: float) -> float:
+    """Return when the plate is touched again, inf if not before `horizon`."""
+    flight = course.rebounded
+    pressing = -flight.gravity * np.sin(course.angle)
+    if pressing <= 0.0:
+        return np.inf
+    low, high = course.plate_reach
+    face = np.inf
+    away = flight.velocity @ course.normal
+    if 2.0 * away < pressing * horizon:
+        again = 2.0 * away / pressing
+        foot = float((flight.at(np.array(again)) - course.pivot) @ course.up)
+        face = float(again) if low <= foot <= high else np.inf
+    clipped = corner_times(flight, Segments.of(course.lines[:1]).points, course.radius, horizon)
+    return float(min(face, clipped.min()))

@@ -16,7 +16,8 @@ from chutelab.checks.agreement import MOST_ALONE, verify
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind
 from chutelab.results.comparison import scene_of
-from chutelab.results.summary import measure, summary
+from chutelab.results.quantities import measure
+from chutelab.results.summary import summary
 from chutelab.scene.rules import SYMBOLS, unit_of
 from chutelab.scene.units import read_size, write_size
 from machines import PERPENDICULAR

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from chutelab import machine, scene
 from chutelab.engines import exact
-from chutelab.results import ENTRIES, REASONS, Kind, Particle
+from chutelab.machine import Particle
+from chutelab.results import ENTRIES, REASONS, Kind
 from chutelab.results import recording as tracks
 from chutelab.results.ledger import ledger
 from chutelab.results.recorder import Recorder

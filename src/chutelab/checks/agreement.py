@@ -18,8 +18,8 @@ from chutelab.machine import build
 from chutelab.results import Kind, Recording
 from chutelab.results.comparison import compare, relative_error, scales
 from chutelab.results.ledger import ledger
+from chutelab.results.quantities import measure
 from chutelab.results.recorder import StalledError
-from chutelab.results.summary import measure
 from chutelab.scene import Expect, Scene, SceneError
 from chutelab.scene.rules import SYMBOLS, unit_of
 from chutelab.studies.accuracy import apart, changed, each, sizes, stirred

@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from chutelab.checks.workprecision import Claim, Record, Size
 from chutelab.cli.parameters import folder
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
+
+    from chutelab.checks.workprecision import Claim, Record, Size
 
 
 def record_tables(rows: Sequence[Record], said: Sequence[Claim]) -> Iterator[RenderableType]:
@@ -44,7 +45,7 @@ def record_tables(rows: Sequence[Record], said: Sequence[Claim]) -> Iterator[Ren
 
 
 def _table(title: str, rows: Sequence[Record], *, crowd: bool) -> RenderableType:
-    from chutelab.cli.output import plain_table, titled
+    from chutelab.cli.report import plain_table, titled
 
     beside = ["worst", "residual", "shift"] if crowd else ["of", "runs"]
     table = plain_table(["method", "at", "first", "median", "error", "memory", *beside])
@@ -83,7 +84,7 @@ def size_tables(rows: Sequence[Size]) -> Iterator[RenderableType]:
     """Return a table for each case and method of ``--scaling``, with the fitted exponents."""
     from chutelab.checks.workprecision import METHODS as KNOWN
     from chutelab.checks.workprecision.claims import exponent
-    from chutelab.cli.output import plain_table, titled
+    from chutelab.cli.report import plain_table, titled
 
     for case, method in dict.fromkeys((one.case, one.method) for one in rows):
         table = plain_table(

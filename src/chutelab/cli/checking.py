@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from chutelab.checks.agreement import Agreement, Finding, Verification
-from chutelab.checks.preflight import Coverage, Effort, Preflight, Stepping
 from chutelab.cli.parameters import complete_scene, set_option
-from chutelab.scene import Scene
 
 if TYPE_CHECKING:
     from rich.text import Text
+
+    from chutelab.checks.agreement import Agreement, Finding, Verification
+    from chutelab.checks.preflight import Coverage, Effort, Preflight, Stepping
+    from chutelab.scene import Scene
 
 
 NAMES = 16

@@ -10,11 +10,12 @@ import click
 
 from chutelab.cli.parameters import complete_scene, folder, set_option
 from chutelab.cli.program import RefusedError
-from chutelab.scene import Scene
-from chutelab.studies.measured import Fit, Residuals, Track
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
+
+    from chutelab.scene import Scene
+    from chutelab.studies.measured import Fit, Residuals, Track
 
 
 FILES = ("compare.png", "points.csv", "fit.json")
@@ -173,7 +174,7 @@ def _tell(found: Residuals, fit: Fit | None, out: Path | None, *, as_json: bool)
         return
     from rich.text import Text
 
-    from chutelab.cli.output import drawn
+    from chutelab.cli.report import drawn
     from chutelab.studies.measured.result import advice
     from chutelab.util.tables import wrapped
 

@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from chutelab.results import Recording
-
 if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.progress import Progress
+
+    from chutelab.results import Recording
 
 
 def show(*parts: RenderableType) -> None:

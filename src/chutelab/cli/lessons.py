@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING
 import click
 from click.shell_completion import CompletionItem
 
-from chutelab.classroom.grading import Grade
-from chutelab.classroom.lessons import Lesson
 from chutelab.cli.parameters import folder
 from chutelab.cli.program import InOrder, RefusedError
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
+
+    from chutelab.classroom.grading import Grade
+    from chutelab.classroom.lessons import Lesson
 
 
 def complete_lesson(
@@ -60,7 +61,7 @@ def list_lessons(as_json: bool) -> None:
         return
     from rich.text import Text
 
-    from chutelab.cli.output import plain_table
+    from chutelab.cli.report import plain_table
 
     table = plain_table(["", "lesson", "level", "minutes", "what it is about"], texts=5)
     for one in found:
@@ -216,7 +217,7 @@ def _shown(lesson: Lesson) -> list[RenderableType]:
     from chutelab.classroom.lessons import scene_of
     from chutelab.classroom.lessons.building import plain_of
     from chutelab.classroom.lessons.reading import unit_in
-    from chutelab.cli.output import plain_table, titled
+    from chutelab.cli.report import plain_table, titled
 
     number = "" if lesson.number is None else f"{lesson.number}  "
     head = Text(f"{number}{lesson.title}", style="bold")
@@ -312,7 +313,7 @@ def _notebooks(path: Path) -> list[Path]:
 
 
 def _marks(grades: list[Grade]) -> RenderableType:
-    from chutelab.cli.output import plain_table
+    from chutelab.cli.report import plain_table
 
     table = plain_table(["file", "student", "lesson", "marks", "remarks"], texts=5)
     table.columns[0].no_wrap = False

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.shell_completion import CompletionItem
 
 from chutelab.cli.program import RefusedError
-from chutelab.scene import Scene
+
+if TYPE_CHECKING:
+    from chutelab.scene import Scene
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 

@@ -7,7 +7,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -21,10 +23,12 @@ from chutelab.cli.parameters import (
     set_option,
 )
 from chutelab.cli.program import RefusedError
-from chutelab.pictures.live.page import Written
-from chutelab.results import Recording
-from chutelab.scene.variants import Vary
-from chutelab.studies.accuracy import Accuracy, Wanted
+
+if TYPE_CHECKING:
+    from chutelab.pictures.live.page import Written
+    from chutelab.results import Recording
+    from chutelab.scene.variants import Vary
+    from chutelab.studies.accuracy import Accuracy, Wanted
 
 
 class MissedError(click.ClickException):
@@ -179,9 +183,9 @@ def tell(
     if as_json:
         from chutelab.results.summary import summary
 
-        console.show_json(summary(recording, accuracy))
+        console.show_json(summary(recording, asdict(accuracy) if accuracy else None))
     elif not quiet:
-        from chutelab.cli.output import report
+        from chutelab.cli.report import report
 
         console.show(*report(recording, accuracy))
         if out is not None:

@@ -15,11 +15,12 @@ import click
 
 from chutelab.cli.parameters import folder
 from chutelab.cli.program import RefusedError
-from chutelab.theory import Table
-from chutelab.theory.figures import PaperFigure
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
+
+    from chutelab.theory import Table
+    from chutelab.theory.figures import PaperFigure
 
 
 STANDARD_OUTPUT = Path("-")
@@ -42,7 +43,7 @@ def scenes(as_json: bool) -> None:
         return
     from rich.text import Text
 
-    from chutelab.cli.output import plain_table
+    from chutelab.cli.report import plain_table
 
     table = plain_table(["scene", "what it shows"], texts=2)
     for scene in found:
@@ -122,7 +123,7 @@ def _plain(table: Table) -> dict[str, object]:
 def _shown(table: Table) -> list[RenderableType]:
     from rich.text import Text
 
-    from chutelab.cli.output import plain_table, titled
+    from chutelab.cli.report import plain_table, titled
 
     sheet = table.sheet()
     # Broken here, or the terminal breaks some of them elsewhere.
@@ -210,7 +211,7 @@ def _tell(found: PaperFigure) -> None:
     from rich.text import Text
 
     from chutelab.cli import console
-    from chutelab.cli.output import drawn
+    from chutelab.cli.report import drawn
 
     sheet = found.sheet()
     console.show(drawn(sheet), Text(), *(Text(note) for note in sheet.notes))

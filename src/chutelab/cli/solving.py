@@ -8,13 +8,16 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from chutelab.cli.parameters import complete_scene, folder, retitled, set_option
 from chutelab.cli.program import RefusedError
-from chutelab.scene import Scene
-from chutelab.studies.design import Solution, Uncertainty
+
+if TYPE_CHECKING:
+    from chutelab.scene import Scene
+    from chutelab.studies.design import Solution, Uncertainty
 
 FILES = ("overlay.png", "scan.png", "solution.toml", "nearest.toml", "solve.json")
 """What ``--out`` may write: scan.png with one key, nearest.toml if there is no solution."""
@@ -180,7 +183,7 @@ def _tell(found: Solution) -> None:
     from rich.text import Text
 
     from chutelab.cli import console
-    from chutelab.cli.output import drawn
+    from chutelab.cli.report import drawn
 
     sheet = found.sheet()
     notes = [Text(f"\n{note}" if i == 0 else note) for i, note in enumerate(sheet.notes)]

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING
 import click
 from click.shell_completion import CompletionItem
 
-from chutelab.checks.stress import Result
-from chutelab.checks.stress.harness import Run
 from chutelab.cli.program import RefusedError
 
 if TYPE_CHECKING:
     from rich.text import Text
+
+    from chutelab.checks.stress import Result
+    from chutelab.checks.stress.harness import Run
 
 
 ENGINES = ("exact", "contact", "pymunk", "fixed")

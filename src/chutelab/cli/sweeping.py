@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from click.shell_completion import CompletionItem
 
 from chutelab.cli.parameters import complete_scene, set_option
 from chutelab.cli.program import RefusedError
-from chutelab.studies.sweep import Plan, Sweep
+
+if TYPE_CHECKING:
+    from chutelab.studies.sweep import Plan, Sweep
 
 
 def _complete_column(

@@ -9,10 +9,11 @@
 """
 
 from chutelab.machine.builder import RefusedError, build, members
-from chutelab.machine.parts import Machine, Pulley, Segments, moved, origin
+from chutelab.machine.parts import Machine, Particle, Pulley, Segments, moved, origin
 
 __all__ = [
     "Machine",
+    "Particle",
     "Pulley",
     "RefusedError",
     "Segments",

@@ -20,9 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.machine.nominal import Discharge, discharge, plate_hit
-from chutelab.machine.parts import Machine, Pulley, Segments
+from chutelab.machine.parts import Machine, Particle, Pulley, Segments
 from chutelab.machine.releases import ON_BELT, Releases, draw, release_point
-from chutelab.results import Particle
 from chutelab.scene import Fault, Scene, SceneError
 from chutelab.util.many import Value, at, each, larger, of, smaller, some
 

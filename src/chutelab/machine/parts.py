@@ -14,10 +14,9 @@ from math import ceil, inf, log2
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chutelab.machine.releases import Releases
-from chutelab.results import Particle
 from chutelab.util.many import Value, larger, smaller
 
 Floats = NDArray[np.float64]
@@ -78,6 +77,30 @@ def _reach(row: Floats) -> float:
 
 EXIT_MARGIN = 1.0
 """m below the lowest surface, or outside the box of all without gravity, where a track ends."""
+
+
+@dataclass(frozen=True)
+class Particle:
+    """The one kind of particle of a machine and its recording.
+
+    Attributes
+    ----------
+    radius : float
+        r, m; 0 for a mass point.
+    mass : float
+        m, kg.
+    inertia : float
+        Moment of inertia about the centre, kg m²; 0 for a particle that does not turn.
+    """
+
+    radius: float
+    mass: float
+    inertia: float
+
+    def kinetic(self, vx: ArrayLike, vy: ArrayLike, omega: ArrayLike) -> Floats:
+        """Return ½ m v² + ½ I ω² (J) for arrays of any one shape (m/s, rad/s)."""
+        vx, vy, omega = np.asarray(vx), np.asarray(vy), np.asarray(omega)
+        return np.asarray(0.5 * self.mass * (vx**2 + vy**2) + 0.5 * self.inertia * omega**2)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,6 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.results import Kind, Recording
 from chutelab.scene import Scene
 from chutelab.util.many import Value
 
@@ -84,43 +83,6 @@ def schedule(scene: Scene) -> NDArray[np.float64]:
     if scene.members is not None:
         return np.zeros(scene.members)
     return np.arange(scene.stream.count) / scene.stream.rate
-
-
-@dataclass(frozen=True)
-class Waits:
-    """Particles that were released late because their place was taken.
-
-    Attributes
-    ----------
-    particles : int
-        How many waited and were released.
-    longest, mean : float
-        How long these waited, s; 0 if none did.
-    never : int
-        How many were due, and found no place until the end of the run.
-    """
-
-    particles: int
-    longest: float
-    mean: float
-    never: int
-
-
-def waits(scene: Scene, recording: Recording) -> Waits | None:
-    """Return who waited for its place in a run of a scene; None if nobody did."""
-    due = schedule(scene)[: recording.count]
-    # The pymunk engine releases at the beginning of a step: up to a step late is not waiting.
-    least = (1.0 + 1e-6) * scene.run.dt if recording.engine == "pymunk" else 1e-9
-    released = recording.select(Kind.RELEASE)
-    late = released["t"] - due[released["particle"]]
-    late = late[late > least]
-    missing = np.diff(recording.offsets) == 0
-    end = recording.knots["t"].max(initial=0.0)
-    never = int(np.count_nonzero(due[missing] < end - scene.run.dt))
-    if not len(late) and not never:
-        return None
-    longest, mean = (float(late.max()), float(late.mean())) if len(late) else (0.0, 0.0)
-    return Waits(len(late), longest, mean, never)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,6 @@ from chutelab.results.recording import (
     Floats,
     Ints,
     Kind,
-    Particle,
     Recording,
     balance,
 )
@@ -28,7 +27,6 @@ __all__ = [
     "Floats",
     "Ints",
     "Kind",
-    "Particle",
     "Recording",
     "balance",
 ]

@@ -12,7 +12,8 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.results.recording import EVENT, KNOT, PARTICLES, Ints, Kind, Particle, Recording
+from chutelab.machine.parts import Particle
+from chutelab.results.recording import EVENT, KNOT, PARTICLES, Ints, Kind, Recording
 
 
 class StalledError(RuntimeError):

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from chutelab.machine.parts import Particle
 from chutelab.util.tables import Sheet, Shown
 
 Floats = NDArray[np.float64]
@@ -79,30 +80,6 @@ KNOT = np.dtype(
     ]
 )
 """One knot: time, state, and the cumulative ledger entries (J) of that particle, see `ENTRIES`."""
-
-
-@dataclass(frozen=True)
-class Particle:
-    """The one kind of particle of a recording.
-
-    Attributes
-    ----------
-    radius : float
-        r, m; 0 for a mass point.
-    mass : float
-        m, kg.
-    inertia : float
-        Moment of inertia about the centre, kg m²; 0 for a particle that does not turn.
-    """
-
-    radius: float
-    mass: float
-    inertia: float
-
-    def kinetic(self, vx: ArrayLike, vy: ArrayLike, omega: ArrayLike) -> Floats:
-        """Return ½ m v² + ½ I ω² (J) for arrays of any one shape (m/s, rad/s)."""
-        vx, vy, omega = np.asarray(vx), np.asarray(vy), np.asarray(omega)
-        return np.asarray(0.5 * self.mass * (vx**2 + vy**2) + 0.5 * self.inertia * omega**2)
 
 
 def balance(entries: NDArray[Any]) -> Floats:

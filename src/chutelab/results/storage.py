@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from chutelab.results.recording import ENTRIES, EVENT, KNOT, REASONS, Kind, Particle, Recording
+from chutelab.machine.parts import Particle
+from chutelab.results.recording import ENTRIES, EVENT, KNOT, REASONS, Kind, Recording
 from chutelab.util.files import whole
 
 FORMAT = 1

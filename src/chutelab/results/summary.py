@@ -5,20 +5,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import asdict
-from math import degrees, isfinite, nan
+from math import degrees, isfinite
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.machine.releases import squeeze, waits
-from chutelab.results.comparison import compare, observed, scene_of
+from chutelab.machine.releases import squeeze
+from chutelab.results.comparison import compare, scene_of
 from chutelab.results.ledger import ledger
-from chutelab.results.recording import REASONS, Floats, Kind, Recording
+from chutelab.results.quantities import waits
+from chutelab.results.recording import REASONS, Kind, Recording
 from chutelab.scene import Scene
-from chutelab.studies.accuracy import Accuracy
 from chutelab.theory import Transfer, predict
 
 FORMAT = 1
@@ -34,13 +34,13 @@ THEORY = (
 )  # fmt: skip
 
 
-def summary(recording: Recording, accuracy: Accuracy | None = None) -> dict[str, Any]:
+def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Return a recording's numbers as plain lists and floats, None for what did not happen.
 
     Lists have one entry a particle. Lengths, times and energies are in SI units, angles in degrees
     under names that end in ``_deg``. ``accuracy`` is None unless one was asked for, ``rolling``
     unless disks settled on the outgoing belt without being carried by it (see `rolling`), and
-    ``waited`` unless particles found their place taken (see `chutelab.machine.releases.Waits`), and
+    ``waited`` unless particles found their place taken (see `results.quantities.Waits`), and
     ``squeezed`` unless riders by adhesion got into each other (see `machine.releases.Squeeze`).
     """
     scene = scene_of(recording)
@@ -69,7 +69,7 @@ def summary(recording: Recording, accuracy: Accuracy | None = None) -> dict[str,
         "theory": _theory(predict(scene)),
         "theory_as_printed": _as_printed(scene),
         "error": {**compared.errors, "max": compared.max},
-        "accuracy": None if accuracy is None else asdict(accuracy),
+        "accuracy": None if accuracy is None else dict(accuracy),
     }
 
 
@@ -145,86 +145,3 @@ def _as_printed(scene: Scene) -> dict[str, Any] | None:
     if scene.plate is None or scene.plate.friction != 0.0 or scene.plate.angle_deg != 0.0:
         return None
     return _theory(predict(scene, rebound="as-printed"))
-
-
-_STATISTICS: dict[str, Callable[[Floats], Any]] = {
-    "mean": np.mean, "spread": np.std, "min": np.min, "max": np.max,
-}  # fmt: skip
-
-
-def measure(recording: Recording, name: str, scene: Scene) -> float:
-    """Return a quantity of a recording, in the unit its name has; NaN if it did not happen.
-
-    Parameters
-    ----------
-    recording : Recording
-        The run.
-    name : str
-        Such as ``x2``, ``landing.x.mean`` or ``ledger.by_surface.plate.restitution_loss``. A
-        name without statistic is particle 0's; ``spread`` is the standard deviation.
-    scene : Scene
-        The recording's, see `chutelab.results.comparison.scene_of`.
-
-    Raises
-    ------
-    KeyError
-        If there is no quantity of that name.
-    """
-    match name.split("."):
-        case ["contacts"]:
-            return float(recording.contacts)
-        case ["ended", "t", *statistic]:
-            released = np.flatnonzero(np.diff(recording.offsets) > 0)
-            return _of_column(released, recording.ends()[1]["t"], statistic)
-        case ["ended", ending]:
-            return float(np.count_nonzero(recording.ended == REASONS.index(ending)))
-        case ["ledger", *entry]:
-            return _booked(recording, entry)
-        case ["separation" | "impact" | "landing" as event, *column]:
-            return _of_event(recording, event, column)
-        case [symbol]:
-            values = observed(recording, scene)
-            if symbol.endswith("_deg"):
-                return degrees(values[symbol.removesuffix("_deg")])
-            return values[symbol]
-    raise KeyError(name)
-
-
-def _of_event(recording: Recording, event: str, column: list[str]) -> float:
-    kind, surface = {
-        "separation": (Kind.SEPARATION, "incoming"),
-        "impact": (Kind.IMPACT, "plate"),
-        "landing": (Kind.LANDING, "outgoing"),
-    }[event]
-    if event == "impact" and column[0] in recording.surfaces:
-        surface, column = column[0], column[1:]
-    first = recording.first(recording.select(kind, surface=surface))
-    if column == ["count"]:
-        return float(len(first))
-    key = column[0]
-    if key == "t":
-        values = first["t"]
-    elif key in ("x", "y"):
-        values = first["position"][:, "xy".index(key)]
-    else:
-        when = "after" if key.endswith("_after") else "before"
-        values = first[f"velocity_{when}"][:, "xy".index(key[1])]
-    return _of_column(first["particle"], values, column[1:])
-
-
-def _of_column(particle: Any, values: Floats, statistic: list[str]) -> float:
-    """Return particle 0's value, or a statistic of all."""
-    if statistic:
-        return float(_STATISTICS[statistic[0]](values)) if len(values) else nan
-    own = values[particle == 0]
-    return float(own[0]) if len(own) else nan
-
-
-def _booked(recording: Recording, entry: list[str]) -> float:
-    books = ledger(recording)
-    match entry:
-        case ["by_surface", surface, name]:
-            return books.by_surface[surface][name]
-        case [stored, end]:
-            return float(getattr(books, stored)[("start", "end").index(end)])
-    return float(getattr(books, entry[0]))

@@ -11,9 +11,9 @@ import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from functools import cache
+from math import inf, nextafter
 from typing import Any, Final
 
-import numpy as np
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
@@ -98,11 +98,11 @@ def limits_of(rule: Mapping[str, Any]) -> tuple[float, float] | None:
     if not kinds:
         return None
     limits = kinds[0]
-    low, high = limits.get("minimum", -np.inf), limits.get("maximum", np.inf)
+    low, high = limits.get("minimum", -inf), limits.get("maximum", inf)
     if "exclusiveMinimum" in limits:
-        low = np.nextafter(limits["exclusiveMinimum"], np.inf)
+        low = nextafter(limits["exclusiveMinimum"], inf)
     if "exclusiveMaximum" in limits:
-        high = np.nextafter(limits["exclusiveMaximum"], -np.inf)
+        high = nextafter(limits["exclusiveMaximum"], -inf)
     return float(low), float(high)
 
 

@@ -10,15 +10,17 @@ from __future__ import annotations
 
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.scene import Incoming, Plate, Scene
 from chutelab.theory.obstacles import Flight, Segments, corner_times, first_in_flight, first_on_arc
 from chutelab.theory.results import Reason, Transfer, cut, unanswered
 from chutelab.theory.transfer import Rebound, transfer
+
+if TYPE_CHECKING:
+    from chutelab.scene import Incoming, Plate, Scene
 
 LEAST_CLEARANCE = 0.05
 """m of the default plate's lower end above the outgoing belt, for particles below 17 mm."""

@@ -25,8 +25,9 @@ from chutelab.checks.preflight.results import (
 from chutelab.checks.preflight.trial import Trial, effort, trial
 from chutelab.engines.simulation import choose
 from chutelab.machine import Machine, build
-from chutelab.machine.releases import squeeze, waits
+from chutelab.machine.releases import squeeze
 from chutelab.results import REASONS, Recording
+from chutelab.results.quantities import waits
 from chutelab.scene import Scene, SceneError
 
 

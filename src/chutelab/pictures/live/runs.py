@@ -21,8 +21,8 @@ from chutelab.pictures.animation.moments import sentence
 from chutelab.pictures.plots import Arc, Window, analytic_of, style, window_of
 from chutelab.pictures.plots.scenery import STRUCK, action, strobe_step
 from chutelab.results import ENTRIES, REASONS, Kind, Recording
+from chutelab.results.quantities import measure
 from chutelab.results.recorder import StalledError
-from chutelab.results.summary import measure
 from chutelab.scene import Scene, SceneError, from_dict, to_dict
 from chutelab.scene.overrides import value_at
 from chutelab.scene.rules import unit_of

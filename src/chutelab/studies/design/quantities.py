@@ -23,7 +23,7 @@ from typing import Any, Final, Literal, Protocol, TypeVar
 import numpy as np
 
 from chutelab.results import REASONS, Kind, Recording
-from chutelab.results.summary import measure
+from chutelab.results.quantities import measure
 from chutelab.scene import MISSING, Scene, rules, to_dict
 from chutelab.scene.overrides import value_at
 from chutelab.scene.units import read_size

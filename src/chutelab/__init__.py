@@ -76,7 +76,7 @@ _HOME = {
 def __getattr__(name: str) -> Any:
     value: Any
     if name == "__version__":
-        value = _version()
+        value = import_module("chutelab.util.versions").own_version()
     elif name in _PACKAGES:
         value = import_module(_PACKAGES[name])
     elif name in _HOME:
@@ -89,9 +89,3 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
-
-
-def _version() -> str:
-    from chutelab.util.versions import version_of
-
-    return version_of("chutelab") or "unknown (not installed)"

@@ -23,6 +23,11 @@ def version_of(package: str) -> str | None:
         return None
 
 
+def own_version() -> str:
+    """Return chutelab's version, as far as it is known."""
+    return version_of("chutelab") or "unknown (not installed)"
+
+
 PACKAGES = ("chutelab", "numpy", "pymunk", "wasmtime", "scipy")
 
 

@@ -29,7 +29,7 @@ from chutelab.classroom.lessons.reading import Lesson, LessonError, read, scene_
 from chutelab.engines.simulation import simulate
 from chutelab.scene import Fault, Scene, to_dict
 from chutelab.util.files import whole
-from chutelab.util.versions import version_of
+from chutelab.util.versions import own_version, version_of
 
 HEAD: Final = "chutelab lesson"
 TRAILER: Final = b"\x3b"
@@ -343,9 +343,7 @@ def _filled(name: str, lesson: Lesson, size: tuple[int, int], **more: str) -> st
 
 
 def _page(name: str, **values: str) -> str:
-    import chutelab
-
-    return Template(_asset(name)).substitute(version=escape(chutelab.__version__), **values)
+    return Template(_asset(name)).substitute(version=escape(own_version()), **values)
 
 
 def _asset(name: str) -> str:

@@ -13,12 +13,12 @@ from pathlib import Path
 from string import Template
 from typing import Final
 
-import chutelab
 from chutelab.pictures.live.runs import Study, pack, study
 from chutelab.pictures.plots import style
 from chutelab.scene import Scene
 from chutelab.scene.variants import Vary
 from chutelab.util.files import whole
+from chutelab.util.versions import own_version
 
 SCRIPTS: Final = (
     "tracks.js", "books.js", "view.js", "picture.js", "film.js", "panels.js", "input.js", "main.js",
@@ -112,7 +112,7 @@ def _html(done: Study, home: tuple[str, str] | None) -> str:
     link = f'<a class="home" href="{escape(home[1])}">{escape(home[0])}</a>' if home else ""
     return Template(_asset("page.html")).substitute(
         title=escape(done.scene.title),
-        version=escape(chutelab.__version__),
+        version=escape(own_version()),
         home=link,
         css=css,
         css_hash=_hash(css),

@@ -3,8 +3,8 @@
     python tools/size.py [DIRECTORY]
 
 The directory is ``src`` beside this folder by default. A function is short with five lines or
-fewer, its docstring aside. A private helper is called once if its name, which begins with an underscore,
-stands in one place of its module besides its definition.
+fewer, its docstring aside. A private helper is called once if its name, which begins with an
+underscore, stands in one place of its module besides its definition.
 """
 
 from __future__ import annotations

@@ -5,16 +5,23 @@
 >>> chutelab.compare(recording).max < 1e-12
 True
 
-- `load`, `Scene`, `SceneError`: scene files, see `chutelab.scene`;
-- `simulate`, `Recording`: run a scene, keep what happened;
-- `theory`: the paper's equations in closed form;
-- `compare`: simulated against theory;
-- `overlay`, `animate`: pictures;
-- `exercises`, `measured`, `design`, `figures`: questions that answer back, points from a film, what
-  to build, the paper's figures.
+The rooms of the house; each imports only those below it:
 
-Each is imported when it is first asked for, so that text output never waits for matplotlib, nor the
-exact engine for pymunk or wasmtime.
+- `cli`: the commands;
+- `classroom`: lessons, exercises, grading;
+- `pictures`: plots, films, pages;
+- `checks`: verify, check, stress, bench;
+- `studies`: accuracy, sweeps, design, measured tracks;
+- `engines`: exact, contact, pymunk, and `simulate`, which chooses;
+- `results`: recordings, ledger, comparison, summary;
+- `theory` and `machine`: the paper in closed form; a scene resolved to arrays for the engines;
+- `mechanics`: flight, impact, ride;
+- `scene`: scene files; `util`: small things for all.
+
+What most people need is here: `load`, `Scene`, `SceneError`, `simulate`, `Recording`, `theory`,
+`compare`, `overlay`, `animate`, and `exercises`, `measured`, `design`, `figures`. Each is imported
+when it is first asked for, so that text output never waits for matplotlib, nor the exact engine for
+pymunk or wasmtime.
 """
 
 from __future__ import annotations

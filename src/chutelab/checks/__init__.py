@@ -1,1 +1,7 @@
-"""Whether to trust a scene, a run or an engine: verify, check, stress, bench."""
+"""Whether to trust a scene, a run or an engine.
+
+- `agreement`: ``verify``: the answers beside each other, and beside what a scene expects.
+- `preflight`: ``check``: the look at a scene before it runs.
+- `stress`: hard scenes, and the laws that engines must keep.
+- `workprecision`: ``bench``: run time against error.
+"""

@@ -1,6 +1,8 @@
-"""The ``[[expect]]`` of a scene beside what each engine, and the theory, give.
+"""Whether the answers agree: with each other, and with what a scene is expected to show.
 
-- Particle 0 alone in all answers: each against the theory, and against the first of the others.
+`agreement` runs particle 0 alone through all engines and compares each with the theory, and with
+the first of the others. `verify` shows the ``[[expect]]`` of a scene beside what each engine and
+the theory give.
 """
 
 from __future__ import annotations

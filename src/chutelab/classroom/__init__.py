@@ -1,1 +1,6 @@
-"""Lessons, exercises and their grading."""
+"""What a class needs.
+
+- `lessons`: a question, a worksheet, an exercise, a picture, and scenes to run.
+- `exercises`: exercises that answer back, with each student's own numbers.
+- `grading`: marks from returned notebooks.
+"""

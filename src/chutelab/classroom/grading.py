@@ -1,7 +1,8 @@
-"""Marks from returned notebooks, and a CSV file for the class.
+"""Marks from returned notebooks. It runs students' code: use a container for strangers.
 
-- The code of a notebook file.
-- Run a notebook in a kernel of its own, and ask it what its tasks were answered.
+A notebook runs in a kernel of its own, with a time limit. What it prints is not looked at: the
+kernel hands over the numbers that were checked, and they are judged again here, against the numbers
+of the student's name. `write_csv` writes the marks of a class.
 """
 
 from __future__ import annotations

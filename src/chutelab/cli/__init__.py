@@ -2,28 +2,19 @@
 
 ===============  ==================================================================================
 `program`        the command ``chutelab`` itself, and what becomes of errors
-`running`        ``run``
-`checking`       ``check``
-`recordings`     ``show``
+`running`        ``run``, ``show``, ``page``
+`checking`       ``check``, ``verify``
+`scenes`         ``scenes``, ``schema``, ``new``, ``tables``, ``figure``
 `comparing`      ``compare``
-`paper`          ``tables``
-`scenes`         ``scenes``, ``schema`` and ``new``
-`verifying`      ``verify``
+`sweeping`       ``sweep``
+`solving`        ``solve``, and ``sweep --uncertainty``
+`lessons`        ``lesson``: list, show, build, new, grade, page
 `stressing`      ``stress``
 `benching`       ``bench``
-`lessons`        ``lesson``: list, show, build, new, page
-`grading`        ``lesson grade``
-`pages`          ``page``
-`sweeping`       ``sweep``
-`solving`        ``solve``
-`figures`        ``figure``
-`uncertain`      what ``sweep --uncertainty`` does
 `parameters`     what several commands take: scenes, overrides, output
 `output`         the files of ``--out``, all of them or none
 `report`         summaries as tables for people
-`console`        text and JSON on standard output
-`stalling`       what becomes of a run that gets stuck
-`progress`       a bar on standard error for what takes longer than a second
+`console`        text and JSON on standard output, a bar on standard error, runs that get stuck
 ===============  ==================================================================================
 
 Modules that take long to import are imported inside the commands that need them, so that

@@ -1,7 +1,4 @@
-"""``bench``: run time against error, and against the number of particles.
-
-- What ``bench`` measured, as tables.
-"""
+"""``bench``: run time against error, and against the number of particles, as tables."""
 
 from __future__ import annotations
 

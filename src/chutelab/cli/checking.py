@@ -1,7 +1,4 @@
-"""``check``: the look at a scene before it runs.
-
-- ``verify``: what scenes are expected to show, and all answers side by side.
-"""
+"""``check``, the look at a scene before it runs, and ``verify``, what scenes are to show."""
 
 from __future__ import annotations
 

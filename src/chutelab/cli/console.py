@@ -1,7 +1,7 @@
-"""Text for people and JSON for programs, on standard output.
+"""What commands print: text and JSON, a progress bar, and what becomes of a run that gets stuck.
 
-- A progress bar on standard error, for people who wait longer than a second.
-- What becomes of a run that gets stuck: a message, exit code 1, and, if asked, its recording.
+The bar is on standard error, for people who wait longer than a second. A run that gets stuck ends
+with a message, exit code 1 and, if asked for, its recording.
 """
 
 from __future__ import annotations

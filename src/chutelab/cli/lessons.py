@@ -1,7 +1,4 @@
-"""``lesson``: list, show, build, start, grade and bundle lessons.
-
-- ``lesson grade``: returned notebooks, run and marked.
-"""
+"""``lesson``: list, show, build, start, grade and bundle lessons."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The files of ``--out``: made in a folder of their own, then moved in, all of them or none.
-
-- A recording's summary as tables for people.
-"""
+"""The files of ``--out``: made in a folder of their own, then moved in, all of them or none."""
 
 from __future__ import annotations
 

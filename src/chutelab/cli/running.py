@@ -1,8 +1,4 @@
-"""``run``: from a scene to a summary and its files.
-
-- ``show``: what a saved recording holds, and its pictures once more.
-- ``page``: a scene and its variants as one HTML file.
-"""
+"""``run``, ``show`` and ``page``: one scene simulated, a saved recording, one HTML file."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""``scenes``, ``schema`` and ``new``: what one needs to write a scene.
+"""What one needs to write a scene, and the paper: five commands.
 
-- ``tables``: the paper's tables, printed beside computed.
-- ``figure``: the paper's figures, as printed and corrected side by side.
+``scenes``, ``schema`` and ``new``; ``tables`` and ``figure``, the paper's tables and figures as
+printed beside computed.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """``solve``: which value of a key makes a quantity what it should be, or least, or largest.
 
-- What ``sweep --uncertainty`` does: uncertain inputs in, words, numbers and a picture out.
+What ``sweep --uncertainty`` does is here too: uncertain inputs in; words, numbers and a picture
+out.
 """
 
 from __future__ import annotations

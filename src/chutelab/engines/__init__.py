@@ -1,5 +1,8 @@
 """Engines: they take a `chutelab.machine.Machine` and answer with a `chutelab.results.Recording`.
 
+- `exact`: event-driven, for particles that do not meet each other.
 - `contact`: particles that meet; a C core in WebAssembly.
 - `pymunk`: the same scene by Pymunk as it is, the check from outside.
+- `reference`: one particle by SciPy's DOP853, the witness of `chutelab.studies.accuracy`.
+- `simulation`: `simulate`, which chooses.
 """

@@ -1,10 +1,8 @@
-"""A scene resolved to world-frame arrays: what both engines take, and all they take.
+"""A scene resolved to world-frame arrays: what the engines take, and all they take.
 
-- `parts`: `Machine`, its segments and its pulley.
-- `crossings`: what `chutelab check` says of surfaces that cross.
-- `clearance`: releases that overlap a surface.
-- `frame`: a place near the machine to count from.
-- `family`: machines that differ in numbers only.
+- `parts`: `Machine`, its particle, segments and pulley.
+- `releases`: where, when and how fast each particle starts.
+- `nominal`: the flight of particle 0, which settles the geometry.
 - `builder`: `build`, from a validated scene to a machine.
 """
 

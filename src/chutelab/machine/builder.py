@@ -1,10 +1,9 @@
 """`build`: the geometry of a scene, settled once for the nominal particle.
 
 That is particle 0: no spread, lowest layer. Where it meets the unbounded line of the plate gives
-the height of the outgoing belt, and that the lower end of the plate.
-
-- Families of machines: which of them cannot be built, and some of them as a family.
-- Releases that overlap a surface: refused, or moved out where it is by rounding only.
+the height of the outgoing belt, and that the lower end of the plate. A release that overlaps a
+surface is refused, or moved out where it is by rounding only. A family of scenes becomes a family
+of machines, without those that cannot be built.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """`Machine` and its parts: what the engines take, and all they take.
 
-- Surfaces that cross: allowed, the first contact wins, but rarely what was meant.
-- Where to count positions from: far from the world's origin coordinates have few digits left.
+Also here: surfaces that cross (allowed, the first contact wins, but rarely what was meant), and a
+place near the machine to count positions from, since far from the world's origin coordinates have
+few digits left.
 """
 
 from __future__ import annotations

@@ -1,1 +1,6 @@
-"""What is looked at: plots, films, pages, the live picture."""
+"""What is looked at.
+
+- `plots`: figures of recordings, sweeps, designs, fits and benchmarks, by matplotlib.
+- `animation`: the lesson picture, a film as GIF or video.
+- `live`: one HTML page with sliders, and the sliders of a notebook.
+"""

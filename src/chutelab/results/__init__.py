@@ -1,8 +1,12 @@
-"""What an engine leaves behind: knots, events and the books they carry.
+"""What a run leaves behind, and how it is read.
 
-- `layout`: names and array types: events, knots, ledger entries.
-- `recording`: `Recording`, a finished run.
-- `tracks`: where the particles are, and what the books say, between the knots.
+- `recording`: `Recording`, a finished run: knots, events, and the ledger entries they carry.
+- `recorder`: what engines write a run into.
+- `ledger`: where the energy went, in total and by surface.
+- `comparison`: `compare`, particle 0 against the theory.
+- `quantities`: a run's quantities by name.
+- `summary`: all of it as the JSON object of ``chutelab run --json``.
+- `storage`: recordings as files.
 """
 
 from chutelab.results.recording import (

@@ -1,11 +1,8 @@
-"""`Recording`: a finished run.
+"""`Recording`: a finished run, its tracks, and the names of its events and ledger entries.
 
 A particle's track is a list of *knots*; between two knots it is the cubic Hermite curve through
 them. With exact end velocities that curve is the parabola of free flight, so a flight costs two
 knots however long it lasts. An impact is two knots at one time.
-
-- Names and array types of a recording.
-- Where the particles are, and what the books say, between the knots.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""The JSON object of a run: what ``chutelab run --json`` prints and summary.json holds.
-
-- A number of a recording by its name; `chutelab.scene.rules` says which names there are.
-"""
+"""The JSON object of a run: what ``chutelab run --json`` prints and summary.json holds."""
 
 from __future__ import annotations
 

@@ -1,19 +1,12 @@
 """Scene files: from TOML text to a frozen, validated `Scene`.
 
 - `errors`: a fault (key, value found, what is allowed) and the one message that lists them all.
-- `quantities`: what a key may hold: strict types, units, ranges.
-- `units`: sizes with their units, as people write them.
-- `models`: the tables of a scene as frozen Pydantic models, with the defaults; `tables`: what they
-  share.
-- `measures`, `expectations`: what a scene can be expected to show, and ``[[expect]]``.
-- `rules`: what no table can judge alone: conflicts between tables.
-- `wording`: Pydantic's errors as faults, with the allowed values said in words.
-- `overrides`: ``KEY=VALUE`` texts, as ``--set`` takes them, laid over a scene.
-- `loading`: read, parse, override, validate.
-- `editor`: the JSON Schema, for editors that complete scene files.
-- `paths`: values and limits at a key's full path.
-- `family`: many scenes that differ in numbers, as one.
-- `library`: the shipped scenes, found by name; the starter scene.
+- `units`: sizes with their units, and what a key may hold: strict types and ranges.
+- `rules`: conflicts between keys and between tables; ``[[expect]]``.
+- `schema`: the tables of a scene as frozen Pydantic models, with the defaults.
+- `overrides`: keys by their full path: JSON Schema, limits, ``KEY=VALUE`` texts.
+- `loading`: read, parse, override, validate; the shipped scenes.
+- `variants`: one scene with other values: ``--vary``, combinations, families.
 """
 
 from chutelab.scene.errors import MISSING, Fault, SceneError, shown

@@ -1,7 +1,4 @@
-"""A fault of a scene file, and the one error that lists all of them.
-
-- What was probably meant by a name that nothing has.
-"""
+"""A fault of a scene file, the one error that lists all of them, and what was probably meant."""
 
 from __future__ import annotations
 

@@ -1,7 +1,6 @@
-"""Scenes from files, texts and mappings: read, override, validate, and say all that is wrong.
+"""Scenes from files, texts, mappings and by name: read, override, validate, say what is wrong.
 
-- The shipped scenes, found by name, and the starter scene.
-- Pydantic's validation errors as faults: the key's full path, and what is allowed in words.
+Pydantic's errors are told as faults: the key's full path, and what is allowed in words.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
-"""``KEY=VALUE`` texts, as ``--set plate.angle_deg=20`` takes them, laid over a scene's tables.
+"""Keys by their full path: the JSON Schema, values and limits at a path, ``KEY=VALUE`` texts.
 
-- The JSON Schema of scene files, for editors that complete and check TOML while one types.
-- What is at the full path of a key, such as ``plate.angle_deg`` or ``stream.at[0]``.
+``--set plate.angle_deg=20`` lays such a text over a scene's tables.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
-"""What no single key can answer for: keys that contradict or need one another.
+"""What no single key can answer for: conflicts between keys, and ``[[expect]]``.
 
 Every rule is written so that it speaks only when a comparison is *true*. A `Look` answers NaN for
 a key that is itself at fault, and nothing is true of NaN: so the rules can be asked about a
 half-broken scene, and all faults of a file come out in one message.
 
-- What a scene can be expected to show: the names of a run's numbers, and their units.
-- ``[[expect]]``: what a scene is expected to show, for ``chutelab verify`` to look at.
+What a scene is expected to show, for ``chutelab verify``, goes by the names of a run's quantities,
+which are listed here with their units.
 """
 
 from __future__ import annotations

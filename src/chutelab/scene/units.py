@@ -1,8 +1,4 @@
-"""Sizes as people write them, a number with its unit: "0.5 mm", "2 %", "1e-3 J".
-
-- What all tables of a scene share.
-- What a key of a scene may hold: strict types, units, ranges, and how a key is described.
-"""
+"""Sizes with their units, such as "0.5 mm" or "1e-3 J", and what a key of a scene may hold."""
 
 from __future__ import annotations
 

@@ -1,8 +1,6 @@
-"""One scene, varied: every combination of values laid over it.
+"""One scene, varied: what ``--vary`` takes, what the keys are, and every combination of values.
 
-- Scenes that differ in numbers only, as one scene whose varied keys hold arrays (N,).
-- What the varied keys of a scene are: their definitions and units.
-- What ``--vary`` takes, as it is written: keys, and the values or ranges of each.
+Scenes that differ in numbers only can be held as one, a family, whose varied keys hold arrays (N,).
 """
 
 from __future__ import annotations

@@ -1,1 +1,7 @@
-"""Many runs for one answer: accuracy, sweeps, design, measured tracks."""
+"""Many runs for one answer.
+
+- `accuracy`: the step that reaches an accuracy, and what was reached.
+- `sweep`: many variants of one scene, a row for each.
+- `design`: what to change so that a quantity becomes what it should be; uncertainty.
+- `measured`: measured tracks over the model: read, compare, fit.
+"""

@@ -1,12 +1,10 @@
 """`reach`: run a scene until it is accurate enough, and say how that is known.
 
-An engine's word on its own error is not evidence: two runs of one engine may agree on a wrong
-answer. So a run is held against a *witness*: the theory where it speaks of the whole run, else
-another engine, which shares no formula with the first (see `chutelab.checks.agreement`). Of a crowd that
-meets only the whole is held against another engine's. Without a witness nothing is promised.
-
-- What accuracy is asked for: a relative error, or a length.
-- What a run answers, and how far two runs are apart.
+An accuracy is a relative error or a length, `Wanted`. An engine's word on its own error is not
+evidence: two runs of one engine may agree on a wrong answer. So a run is compared with a *witness*:
+the theory where it speaks of the whole run, else another engine, which shares no formula with the
+first (see `chutelab.checks.agreement`). Of a crowd that meets, only totals are compared with those
+of another engine. Without a witness nothing is promised.
 """
 
 from __future__ import annotations

@@ -3,16 +3,14 @@
 V. Molnár et al., "Energy calculation model of an outgoing conveyor with application of a transfer
 chute with the damping plate", Mech. Sci. 7, 167-177, 2016, doi:10.5194/ms-7-167-2016.
 
-- `transfer`: Eqs. (2)-(16) and their generalisations, vectorised; plain numbers in, `Transfer` out.
-- `results`: `Transfer`, and which stage of the way yields which quantity.
-- `reasons`: `Reason`, why there is no answer.
-- `stages`: separate, fly, rebound, fall; one method each, the equations tagged.
+- `results`: `Transfer` and `Reason`: the answer, or why there is none.
 - `separation`: how the pulley is left: adhesion, slip at finite friction, a rolling disk.
-- `predict`: particle 0 of a scene, or the reason why the closed form does not hold for it;
-  `unbounded`: the same without looking at the finite machine.
-- `course`: a scene's numbers and its finite machine, for `predict`.
+- `transfer`: Eqs. (2)-(16) and their generalisations, vectorised; plain numbers in.
 - `obstacles`: first contacts of a disk with finite surfaces.
-- `tables`: the paper's tables beside what the equations give; `printed`: their digits.
+- `prediction`: `predict`, particle 0 of a scene, or the reason why the closed form does not hold
+  for it; `unbounded`, the same without looking at the finite machine.
+- `paper`: the paper's tables beside what the equations give.
+- `figures`: the paper's figures.
 
 Only NumPy and `chutelab.scene` are imported.
 """

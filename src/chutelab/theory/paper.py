@@ -1,7 +1,4 @@
-"""The paper's Tables 1, 3, 4 and 5 beside what the equations give, cell by cell.
-
-- Tables 1, 3, 4 and 5 of the paper, digit by digit as printed.
-"""
+"""The paper's Tables 1, 3, 4 and 5, as printed, beside what the equations give, cell by cell."""
 
 from __future__ import annotations
 

@@ -2,8 +2,6 @@
 
 The finite machine is laid over the numbers of `transfer`: what is touched before the plate, whether
 the plate is there, what is touched between rebound and landing, whether the belt is there.
-
-- One scene as the closed form sees it: its numbers, and the finite machine round them.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""`Transfer`: what the theory answers, and at which stage of the way each quantity arises.
-
-- Why the theory has no answer: a class for machines, then words for people.
-"""
+"""`Transfer`: what the theory answers, at which stage each quantity arises, or why it has none."""
 
 from __future__ import annotations
 

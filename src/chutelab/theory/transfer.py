@@ -1,8 +1,7 @@
 """The paper's equations (2) to (16) in closed form, vectorised, with their generalisations.
 
-Any plate angle, finite particles, friction and spin; the printed Eq. (9) beside the right one.
-
-- The stages of a transfer, one method each: separate, fly, rebound, fall and be taken along.
+Any plate angle, finite particles, friction and spin; the printed Eq. (9) beside the right one. A
+transfer has four stages, one method each: separate, fly, rebound, fall and be taken along.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Columns as a pandas DataFrame, where pandas is installed, and as CSV.
+"""A small table for terminal and notebook; columns as a pandas DataFrame and as CSV.
 
-- A small table that reads well in a terminal and in a notebook.
+pandas is imported only where a DataFrame is asked for.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Versions of installed packages.
-
-- What the figures were measured on: kind of processor and versions, nothing that names anybody.
-"""
+"""Versions of installed packages, and what figures were measured on: nothing that names anybody."""
 
 from __future__ import annotations
 

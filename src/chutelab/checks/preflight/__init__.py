@@ -1,12 +1,8 @@
 """The look at a scene before it runs: what will happen, what it will cost, what to mind.
 
-- `results`: `Preflight` and its parts.
-- `inventory`: what will be built, and what is skipped because the scene does not need it.
-- `trial`: a short run of the first particles; `effort`: contacts and run time, estimated from it.
-- `stepping`: what finite steps mean for this scene.
-- `coverage`: what the closed form answers, in words.
-- `advice`: warnings, each with the key and the value that would do.
-- `look`: `preflight`, all of it.
+- `results`: `Preflight` and its parts: what will be built, what the closed form answers.
+- `trial`: a short run of the first particles; contacts and run time, estimated from it.
+- `advice`: `preflight`, all of it, and the warnings, each with the key and the value that would do.
 """
 
 from chutelab.checks.preflight.advice import preflight

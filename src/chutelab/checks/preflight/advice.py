@@ -1,7 +1,6 @@
-"""Warnings, each with what would change it: settings are tried before they are recommended.
+"""`preflight`, the look at a scene before it runs, and its warnings.
 
-- What finite steps mean for a scene that an engine with steps runs.
-- `preflight`: the look at a scene before it runs.
+Each warning comes with what would change it: settings are tried before they are recommended.
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""What a look at a scene finds.
-
-- What the closed form will and will not cover, in words.
-- What will be built from a scene, and what is skipped because it does not need it.
-"""
+"""What a look at a scene finds: what is built and skipped, and what the closed form covers."""
 
 from __future__ import annotations
 

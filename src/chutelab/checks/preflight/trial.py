@@ -1,6 +1,6 @@
 """A trial run of a stream's first particles, cut off after a moment.
 
-- Contacts and run time, estimated from a trial run of the stream's first particles.
+From it contacts and run time of the whole stream are estimated.
 """
 
 from __future__ import annotations

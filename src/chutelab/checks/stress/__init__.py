@@ -2,20 +2,14 @@
 
 ===============  ==================================================================================
 `case`           `Case`: a scene, its engines and steps, and what is asked of it
-`extremes`       speed, radius, mass, restitution, friction, belts, no gravity
+`extremes`       speed, mass, materials and belts at their limits; what lasts, piles, coarse steps
 `geometry`       grazing, critical speed, ends, corners, contact from the start
-`lasting`        many bounces, long flights, late releases, piles, coarse steps
-`symmetric`      the machine far away and in a mirror; steps halved again and again
-`drawn`          machines drawn at random
-`cases`          all of them, and how they are chosen
+`cases`          all cases, and how they are chosen; far away, in a mirror, drawn at random
 `evidence`       what a law looks at, and how it answers
-`laws`           the laws for all, one function each, with
-`barriers`       those on where nobody may be, and
-`conservation`   those on energy, ledger and momentum
-`demands`        what single cases ask for besides
-`watchdog`       a bound on the wall time of a run
-`harness`        run, judge, yield a `Result` a line
-`table`          results as TSV and for JSON, and the worst of each law
+`laws`           the laws for all, one function each, and what single cases ask for
+`barriers`       laws on where nobody may be
+`conservation`   laws on energy, ledger and momentum
+`harness`        run, judge, yield a `Result` a line; results as a table
 ===============  ==================================================================================
 """
 

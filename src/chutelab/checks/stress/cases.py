@@ -1,7 +1,8 @@
 """All cases, and how they are chosen.
 
-- Cases run twice: the machine far away, the machine in a mirror; and at ever smaller steps.
-- Machines drawn at random: a particle thrown into surfaces that cross, fold, move and grip.
+Defined here are the cases that run twice (the machine far away, or in a mirror), those at ever
+smaller steps, and machines drawn at random: a particle thrown into surfaces that cross, fold, move
+and grip.
 """
 
 from __future__ import annotations

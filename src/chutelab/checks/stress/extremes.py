@@ -1,6 +1,7 @@
-"""Cases at the ends of what a scene may hold: speed, size, mass, materials, belts, gravity.
+"""Cases at the ends of what a scene may hold, and cases that last.
 
-- Cases that last: many bounces, long flights, late releases, piles, coarse steps.
+Speed, size, mass, materials, belts and gravity at their limits; many bounces, long flights, late
+releases, piles and coarse steps.
 """
 
 from __future__ import annotations

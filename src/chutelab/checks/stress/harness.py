@@ -1,7 +1,6 @@
-"""Run cases on engines at their steps, and judge them law by law.
+"""Run cases on engines at their steps, judge them law by law, and put the results in a table.
 
-- A bound on the wall time of a run, whatever the run does.
-- Results as a table: the worst of each run, tab-separated text, plain values for JSON.
+A watchdog bounds the wall time of each run, whatever the run does.
 """
 
 from __future__ import annotations

@@ -1,10 +1,8 @@
-"""The laws that every run must keep, one function each.
+"""The laws that every run must keep, and what single cases ask for besides, one function each.
 
 A law takes `Evidence` and answers with a `Verdict`, or with None where it says nothing. Bounds are
 argued, not fitted: for the exact engine rounding, for the others also what can happen within a
 step.
-
-- What single cases ask for besides the laws: endings, rest, symmetry, order of convergence.
 """
 
 from __future__ import annotations

@@ -1,14 +1,12 @@
-"""The cases: a machine, or a few that differ by millimetres, and what is known about it.
+"""The cases of the benchmark: a machine or a few, what is known about them, and a method's error.
 
 A stepping method may be right by luck, where a step happens to end at a contact. So the cases of
 one particle are several machines whose belts and plates differ by millimetres, and the error is the
-worst of them; times are those of the first.
+worst of them; times are those of the first. A crowd is chaotic and has no reference: its error is
+how deep its particles overlap.
 
 One particle starts where scene files start it, on 1 m of belt before the pulley. Particles of a
 stream, whose upper layers no belt of Pymunk's would carry, start at the pulley's top.
-
-- What every method has to say about a case, and how far that is from the reference.
-- The error of a crowd, which is chaotic and has no reference.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What the measured rows say, in sentences; every number is computed from the rows.
 
-- Lines through measured points on logarithmic axes: slopes, exponents, times at an error.
+Slopes, exponents and times at an error come from lines through points on logarithmic axes.
 """
 
 from __future__ import annotations

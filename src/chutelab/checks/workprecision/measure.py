@@ -1,7 +1,7 @@
 """Measuring: one record for each case, method and value of the parameter.
 
-- The whole process: what one waits for a run on the command line, imports and all.
-- Time and memory against the number of particles.
+Also measured: the whole process with its imports, as one waits for it on the command line, and time
+and memory against the number of particles.
 """
 
 from __future__ import annotations

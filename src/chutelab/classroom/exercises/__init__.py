@@ -5,14 +5,10 @@
 >>> task.check(1, "quickly")
 ? Question 1: not a number. That is text (“quickly”). Give a number, without quotes.
 
-- `catalogue`: `lesson` hands out a task; all exercises by name.
-- `task`: `Task`, with `question`, `check`, `hint`, `reveal` and `progress`.
-- `exercise`: what an exercise is made of: parameters, questions, known mistakes.
-- `general`: mistakes that every question knows: sign, power of ten, radians, ½.
-- `drawing`: parameters from a name, redrawn until every mistake can be told from the others.
-- `reading`: a number out of what a student hands over, or a kind word.
-- `judging`: right, a known mistake, or how far off.
-- `replies`, `html`, `values`: how it all is shown.
+- `catalogue`: `lesson` hands out a `Task`, with `question`, `check`, `hint`, `reveal` and
+  `progress`; all exercises by name.
+- `exercise`: what an exercise is made of: parameters, drawn from a name, questions, known mistakes.
+- `judging`: a number read and judged: right, a known mistake, or how far off; replies.
 - `the_parabola` … `trust`: the eight lessons, a module each.
 
 Answers are computed from `chutelab.theory` for the parameters drawn; none is stored.

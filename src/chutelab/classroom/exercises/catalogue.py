@@ -1,7 +1,4 @@
-"""The exercises by lesson, and `lesson`, which hands one out.
-
-- `Task`: the exercise of one lesson for one student, and what it answers.
-"""
+"""`lesson` hands out a `Task`: the exercise of one lesson for one student, and its answers."""
 
 from __future__ import annotations
 

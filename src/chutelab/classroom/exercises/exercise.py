@@ -1,8 +1,8 @@
 """What an exercise is made of: parameters, questions, and the mistakes that are known.
 
-- Named numbers, and how texts show them.
-- Mistakes that any question knows: they turn the right answer into a number that tells of them.
-- A student's own parameters, drawn from the name: the same on every machine, for ever.
+Some mistakes any question knows: a sign, a power of ten, radians, ½. A student's own parameters are
+drawn from the name, the same on every machine, and redrawn until every mistake can be told from the
+others.
 """
 
 from __future__ import annotations

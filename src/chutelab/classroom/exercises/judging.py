@@ -1,8 +1,7 @@
-"""Judging a number: right, a known mistake, or how far off.
+"""From what a student hands over to a reply: right, a known mistake, or how far off.
 
-- Replies as HTML: no background and no text colour of their own, so right on light and on dark.
-- What a task answers: made to be read, in a terminal and in a notebook.
-- What a student handed over: a number, nothing yet, or something to be kind about.
+Replies read well in a terminal and, as HTML without colours of background and text, in light and
+dark notebooks.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
-"""``lesson.gif``: made anew only if what it is made from has changed.
+"""What is made of lessons: their pictures, new lessons, and all of them as web pages.
 
-- What a picture was made from, kept in a comment of the GIF itself: no further file to lose.
-- Worksheets in Markdown as HTML.
-- A new lesson, from the template or as a copy of another: it validates and builds at once.
-- All lessons as a folder of web pages: no server, no network, every link relative.
+``lesson.gif`` is made anew only if what it is made from has changed; the stamp that tells is kept
+in a comment of the GIF itself. A new lesson comes from the template or is a copy of another: it
+validates and builds at once. The web pages need no server and no network; every link is relative.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""A lesson's folder: read, validated with its scenes, and all that is wrong said at once.
+"""Lessons: ``lesson.toml`` as a frozen model, a lesson's folder, and the shipped lessons.
 
-- ``lesson.toml`` as a frozen Pydantic model: what a lesson asks, shows and varies.
-- The shipped lessons, found by number, by name or by folder.
+A folder is read and validated with its scenes, and all that is wrong is said at once. Shipped
+lessons are found by number, by name or by folder.
 """
 
 from __future__ import annotations

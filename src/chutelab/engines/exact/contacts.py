@@ -1,8 +1,4 @@
-"""What a contact does: a blow, coming to rest on a surface, gripping or slipping there.
-
-- Rest in the corner of two obstacles.
-- Contact that lasts: the load on it, gripping or slipping, and coming to rest.
-"""
+"""What a contact does: a blow, coming to rest, gripping or slipping, rest in a corner."""
 
 from __future__ import annotations
 

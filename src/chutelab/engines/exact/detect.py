@@ -1,8 +1,7 @@
-"""When and what a particle in flight (or sliding straight) meets next: solved, not stepped.
+"""What a particle meets next, and when: solved, not stepped.
 
-- Particles on their way: what detection has to know about them.
-- The first circle met: a segment's end, or the pulley.
-- Where a ride round a circle is stopped by something else: angles, in closed form.
+In flight, or sliding straight, it may meet a face or a circle (a segment's end, the pulley). A ride
+round a circle is stopped by something else at an angle in closed form.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Rounds of the event-driven engine, block by block.
 
-- Which machines of a family can run together: those whose surfaces join in the same way.
+Machines of a family can run together, `kinds`, if their surfaces join in the same way.
 """
 
 from __future__ import annotations

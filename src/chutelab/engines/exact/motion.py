@@ -1,6 +1,7 @@
-"""Flight, sliding on a face, being carried along the belt: constant acceleration to an event.
+"""Motion between events: flight, sliding on a face, being carried, riding round a circle.
 
-- Rides round a circle: by adhesion in closed form, by friction step by step along the arc.
+The first three have constant acceleration. A ride by adhesion is in closed form, one by friction
+goes step by step along the arc.
 """
 
 from __future__ import annotations

@@ -6,8 +6,6 @@ numbered: segments first, then circles.
 
 Arrays have the particles last, and the two components of vectors first, so that what one operation
 reads lies together.
-
-- From a machine to obstacles: which faces and circles there are, and how they join.
 """
 
 from __future__ import annotations

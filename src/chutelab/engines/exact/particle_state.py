@@ -1,7 +1,4 @@
-"""The state of a block of particles of an exact run, and the way it is written down.
-
-- What all blocks of an exact run share: the machine, and where it is counted from.
-"""
+"""The state of a block of particles of an exact run, and what all blocks share, the `World`."""
 
 from __future__ import annotations
 

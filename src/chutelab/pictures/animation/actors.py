@@ -1,9 +1,7 @@
-"""What moves in the scene: particle 0 with its velocity, the other particles, belts and pulley.
+"""What moves in the picture: particles, the arrow of a velocity, belts, pulley, energy bars.
 
-Each actor draws itself on axes, lists its `artists`, and `show`s one of the film's moments.
-
-- The velocity of particle 0 as an arrow, with its components.
-- The energy ledger as two stacked bars of equal height: what was put in, and where it is now.
+Each actor draws itself on axes, lists its `artists`, and `show`s one of the film's moments. The
+energy ledger is two stacked bars of equal height: what was put in, and where it is now.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""The lesson picture as a file: a GIF, or a video for those who project from other programs.
+"""`animate`: the lesson picture as a GIF, or as a video for those who project from other programs.
 
-- A GIF, frame by frame: one shared palette, and of each frame only the rectangle that changed.
-- A film as mp4 or webm, for programs that show no GIF; through imageio and its ffmpeg.
+A GIF has one palette for all frames, and of each frame only the rectangle that changed. Videos, mp4
+or webm, go through imageio and its ffmpeg.
 """
 
 from __future__ import annotations

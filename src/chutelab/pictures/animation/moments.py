@@ -1,7 +1,4 @@
-"""Which moments of a recording the film shows, and for how long each.
-
-- What happened to particle 0, in words.
-"""
+"""Which moments of a recording the film shows, for how long each, and what happened, in words."""
 
 from __future__ import annotations
 

@@ -1,10 +1,9 @@
-"""The palette of every film: fixed, so that no colour can flicker, and small, so that files are.
+"""The palette of every film, and text that changes with every frame.
 
-It holds white, the greys and the colours of `chutelab.pictures.plots.style` unmixed, and the mixtures at
-which anti-aliased edges between them are read as smooth. Every other colour is shown as the nearest
-of these.
-
-- Text that changes with every frame: characters drawn once, then set side by side.
+The palette is fixed, so that no colour can flicker, and small, so that files are. It holds white,
+the greys and the colours of `chutelab.pictures.plots.style` unmixed, and the mixtures at which
+anti-aliased edges between them are read as smooth. Every other colour is shown as the nearest of
+these. Text is set from characters that are drawn once.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""The picture of the film: a background drawn once, and what moves on it.
-
-- Where everything is in the picture, and which part of the world it shows.
-"""
+"""The picture of the film: where everything is, a background drawn once, and what moves on it."""
 
 from __future__ import annotations
 

@@ -1,11 +1,18 @@
-"""Sliders over the exact engine, for notebooks.
+"""Pictures that answer: sliders for notebooks, and a page that needs no installation.
 
 >>> from chutelab.pictures.live import sliders
 >>> sliders("perpendicular")  # doctest: +SKIP
 
-- `controls`: which quantities of a scene get a slider, and a scene with other values for them.
 - `picture`: a run as SVG and a table; drawn as text, since that takes a few milliseconds.
 - `board`: the sliders and the picture together; the only module that needs ipywidgets.
+- `runs`: every variant of a page simulated, and packed.
+- `page`: `write`, a scene and its variants as one HTML file.
+- ``assets``: HTML, CSS and JavaScript of the page: ``tracks.js`` (curves between knots),
+  ``books.js`` (the energy ledger), ``view.js``, ``picture.js`` and ``film.js`` (the canvas: scale,
+  what rests, what moves), ``panels.js`` (bars and numbers), ``input.js`` (keyboard and touch),
+  ``main.js`` (sliders and clock).
+
+No physics is in the page: it draws the cubic Hermite curves through the knots that the engine left.
 """
 
 from __future__ import annotations

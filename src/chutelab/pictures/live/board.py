@@ -1,6 +1,6 @@
-"""Sliders and picture together.
+"""Sliders and picture together; which quantities of a scene get a slider, from where to where.
 
-- Which quantities of a scene get a slider, from where to where.
+This is the only module that needs ipywidgets.
 """
 
 from __future__ import annotations

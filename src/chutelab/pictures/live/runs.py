@@ -1,7 +1,7 @@
-"""Every variant of a scene simulated, and how much a page can hold.
+"""Every variant of a scene simulated and packed for a page, and how much a page can hold.
 
-- The numbers of a variant: as simulated, and as the analytic parabola has them.
-- A study as what the page reads: binary columns in base64, and JSON for the rest.
+The page reads binary columns in base64, and JSON for the rest: knots, surfaces, and the numbers of
+each variant, simulated and from the analytic parabola.
 """
 
 from __future__ import annotations

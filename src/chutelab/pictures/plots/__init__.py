@@ -1,14 +1,14 @@
 """Pictures of recordings: `overlay`, `strobe`, and small functions that take and return `Axes`.
 
 ===============  ==================================================================================
-`style`          colours, text sizes, units
-`sampling`       times and parts of a recording that are worth drawing; energies to stack
-`window`         the part of the world in which something happens
-`scenery`        the machine to scale, with the names of its surfaces
-`analytic`       the analytic parabola as arcs of flight
+`style`          colours, text sizes, units; a figure that shows itself
+`scenery`        the machine to scale, and the part of the world in which something happens
 `panels`         tracks, parabola, residual, velocity, energy ledger
-`figure`         the overlay
+`figure`         the overlay; the paper's figures
 `strobe`         a still for print: where the particle is at round times
+`design`         searches, uncertainty, sweeps
+`measured`       measured points over the model
+`workprecision`  run time against error
 ===============  ==================================================================================
 
 Figures are drawn by Agg through `Figure` objects: no pyplot, no global state.

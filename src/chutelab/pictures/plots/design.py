@@ -1,6 +1,6 @@
-"""Pictures of a search over one key, and of how uncertain inputs spread.
+"""Pictures of many runs: a search over one key, the spread of uncertain inputs, sweeps.
 
-- Pictures of sweeps: lines over one varied key, a heat map over two, dots for samples.
+A sweep is drawn as lines over one varied key, a heat map over two, dots for samples.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""The overlay: one figure that shows a recording on top of its analytic parabola.
+"""Whole figures: `overlay`, a recording on its analytic parabola, and the paper's figures.
 
-- The paper's figures, computed anew: as printed on the left, corrected on the right.
+The paper's figures are computed anew: as printed on the left, corrected on the right.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The panels of the overlay; each function takes axes, draws one thing and returns the axes.
 
-- The analytic parabola of a transfer, as arcs that can be drawn and compared with.
+The analytic parabola of a transfer is made of arcs, which can be drawn and compared with.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The machine drawn to scale: pulley, belts, plate and free surfaces, with their names.
 
-- Times and parts of a recording that are worth drawing.
-- The part of the world that is shown: where something happens.
+Also here: which part of the world is shown (where something happens), and which times and parts of
+a recording are worth drawing.
 """
 
 from __future__ import annotations

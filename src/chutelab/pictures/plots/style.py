@@ -1,9 +1,7 @@
-"""Colours, text sizes and units that every picture shares.
+"""Colours, text sizes and units that every picture, page and notebook shares.
 
-Each of `chutelab.pictures.plots.style` stands for one thing in every panel.
-
-- The colours of all pictures, pages and notebooks.
-- A figure with a headline, that writes itself and shows itself in a notebook.
+Each colour stands for one thing in every panel. `Picture` is a figure with a headline, which writes
+itself to a file and shows itself in a notebook.
 """
 
 from __future__ import annotations

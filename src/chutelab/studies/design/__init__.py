@@ -7,16 +7,13 @@
 >>> round(found.answer.values[0], 3)
 47.255
 
-- `solve`, `minimize`, `maximize`: in `solving`, from a question to a `Solution`;
-- `uncertainty`: in `propagation`, how uncertain inputs spread, and whose fault it is: an
-  `Uncertainty`;
-- `quantities`, `ranges`, `spreads`: what can be aimed at, varied, and be uncertain;
-- `evaluation`: the one place where variants are run; `value`, one quantity of one scene;
-  `families`, many at once; `courses`, the surfaces that a particle touches;
-- `pieces`, `roots`, `extrema`, `scalar`: one key: smooth pieces, all roots, all minima;
-- `search`: several keys; `sensitivity`: slopes, and what one per cent does;
-- `sobol`: Sobol points, and what each input contributes to a variance;
-- `answers`, `words`, `documents`: results, in words, and as scene files.
+- `quantities`: what can be aimed at.
+- `evaluation`: what can be varied, and the one place where variants are run.
+- `roots`: one key: smooth pieces, all roots, all minima.
+- `solving`: `solve`, `minimize` and `maximize`; several keys.
+- `answers`: a `Solution`, in numbers and in words.
+- `sensitivity`: slopes, what one per cent does, shares of a variance.
+- `uncertainty`: how uncertain inputs spread, and which of them matters: an `Uncertainty`.
 """
 
 from chutelab.studies.design.answers import Answer, Solution

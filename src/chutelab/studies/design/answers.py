@@ -1,6 +1,7 @@
-"""What `solve`, `minimize` and `maximize` answer: `Solution`, with the numbers and in words.
+"""What `solve`, `minimize` and `maximize` answer: `Solution`, as numbers and in words.
 
-- A solution in words: how many, where they stop, what is a jump and what one per cent does.
+The words say how many answers there are, where they stop, what is a jump, and what one per cent
+does.
 """
 
 from __future__ import annotations

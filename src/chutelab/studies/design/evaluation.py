@@ -1,10 +1,8 @@
-"""Many variants of a scene at once: the one place where they are run.
+"""Many variants of a scene at once: the one place where a design runs them.
 
-Beside its numbers each variant has a *course*: which surfaces particle 0 touches up to its landing.
-Within one course the numbers are smooth functions of the keys; where it changes, they may jump.
-
-- What may vary, and how far: ``KEY=FROM:TO``, checked against the scene before anything runs.
-- One-particle variants through the exact engine all at once, and their quantities as columns.
+Ranges, ``KEY=FROM:TO``, are checked against the scene before anything runs. Beside its numbers each
+variant has a *course*: which surfaces particle 0 touches up to its landing. Within one course the
+numbers are smooth functions of the keys; where it changes, they may jump.
 """
 
 from __future__ import annotations

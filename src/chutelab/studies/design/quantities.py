@@ -5,9 +5,8 @@
 >>> wish.left.unit, wish.right.name
 ('m/s', 'outgoing.speed')
 
-- What is asked for and cannot be done, and the packages without which nothing can.
-- The course of a particle: which surfaces it touches, up to its landing.
-- A scene as TOML text, to be loaded again.
+Also here: `DesignError`, the course of a particle (which surfaces it touches up to its landing),
+and a solved scene as TOML text.
 """
 
 from __future__ import annotations

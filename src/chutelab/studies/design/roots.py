@@ -1,8 +1,8 @@
-"""Where a function of one key is 0: all roots in a range, and none that is only a jump.
+"""Roots and minima of a function of one key over a range.
 
-- SciPy's bracketed root finder and bounded minimiser, set to the last bits of the key.
-- A function of one key, cut into pieces on which it is smooth.
-- Where a function of one key is least: over the whole range, jumps and ends included.
+The function is cut into pieces on which it is smooth. Every root on a piece is found, and none is
+reported that is only a jump between two pieces; minima include jumps and the ends of the range.
+SciPy's bracketed root finder and bounded minimiser do the work on a piece.
 """
 
 from __future__ import annotations

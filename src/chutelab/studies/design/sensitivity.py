@@ -1,6 +1,7 @@
-"""How much an answer depends on each key: its derivatives, and what one per cent does.
+"""How much an answer depends on each key.
 
-- What each uncertain input contributes to a variance, from three sets of points.
+Derivatives and what one per cent does, for a solution; shares of a variance (Sobol indices), from
+three sets of points, for uncertain inputs.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """`solve`, `minimize` and `maximize`: from a question in words to a `Solution`.
 
-- Several keys at once: a global search with a seed, and a polish.
+One key is solved piece by piece, see `roots`; several keys by a global search with a seed, and a
+polish.
 """
 
 from __future__ import annotations

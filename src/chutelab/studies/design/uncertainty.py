@@ -1,6 +1,6 @@
 """`uncertainty`: how uncertain inputs make a landing point and a belt's work uncertain.
 
-- Uncertain inputs: ``KEY=MEAN±SPREAD``, checked against the scene before anything runs.
+Inputs are written ``KEY=MEAN±SPREAD`` and checked against the scene before anything runs.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Least squares: the parameters with which the simulation follows the measured points best.
-
-- Scene, track and parameters as a function from values to residuals.
-"""
+"""Least squares: the parameters with which the simulation follows the measured points best."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """What can be fitted: the numbers of a scene, and how the measured points lie in the world.
 
-Units and bounds are those of the scene's own validation, read from its JSON Schema.
-
-- How measured positions respond to parameters, and which parameters they cannot tell.
+Units and bounds are those of the scene's own validation, read from its JSON Schema. How positions
+respond to parameters, and which of them they cannot tell apart, is found by differences.
 """
 
 from __future__ import annotations

@@ -6,8 +6,7 @@ line per frame; a frame without a mark has empty cells. Several tracks stand sid
 ``#multi:``, with the names over the first column of each. Separator and decimal mark are the
 user's choice. Any other table with columns t, x and y does as well.
 
-- The bytes of a table in a text file as lines of cells, and the cells as numbers.
-- A film that was never shot: a simulated track with noise, in the form that Tracker exports.
+`filmed` makes a track without a film: a simulation with noise.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """A measured track beside the simulation, point by point.
 
-- When the clock of a film and the clock of the simulation agree: a search, not a refinement.
+Where the clocks of film and simulation agree, `best_t0`, is searched for, not refined.
 """
 
 from __future__ import annotations

@@ -1,8 +1,4 @@
-"""`Fit`: what a fit found.
-
-- What makes the result of a fit less certain than its uncertainties say.
-- A comparison for programs: as one JSON object, and as a table of points.
-"""
+"""`Fit`: what a fit found, what makes it less certain than its uncertainties say, its files."""
 
 from __future__ import annotations
 

@@ -6,15 +6,11 @@
 >>> len(swept), swept.columns["landing.vx"].round(3).tolist()
 (4, [0.0, -2.0, 0.0, -4.0])
 
-- `plan`: what is to be varied, looked at before anything runs; `samples`: Latin hypercubes and
-  Sobol points.
-- `columns`, `rows`: what a row holds, and how it is read off a recording; `deviation`: the error
-  against the theory.
-- `alone`: one variant at a time, the reference; `batch`: many at once through the exact engine;
-  `screening`: validation of many at once.
-- `block`: a unit of work; `workers`: who does it, this process, several, or a Dask cluster.
-- `table`, `part`: CSV and Parquet files, and the rows of a sweep that is not finished.
-- `sweeping`, `result`: `sweep`, and the `Sweep` it returns.
+- `plan`: what is to be varied, looked at before anything runs; samples of ranges.
+- `rows`: what a row holds, and how it is read off a recording.
+- `batch`: a block of variants run: many at once through the exact engine, or one by one.
+- `result`: `Sweep`, CSV and Parquet files, and the rows of a sweep that is not finished.
+- `sweeping`: `sweep`, and who does the work: this process, several, or a Dask cluster.
 
 SciPy, pyarrow, Dask and pandas are imported when they are needed.
 """

@@ -1,12 +1,8 @@
-"""One-particle variants that differ in plain numbers, through the exact engine all at once.
+"""A block of variants run: many at once where they differ in plain numbers only, else one by one.
 
-A variant is a particle with a machine of its own. What is slow for one by one, validating and
-building, is done on arrays too; and every number is, to the bit, the one that the variant gives by
-itself. What does not fit is left over, to be run alone: that is never wrong, only slower.
-
-- Validation of many variants at once: key by key, and rules between keys where they matter.
-- One variant at a time: any key, any engine. What all faster ways are measured against.
-- Some variants of one scene: a unit of work, for this process or another one.
+Many at once, a variant is a particle with a machine of its own. What is slow one by one, validating
+and building, is done on arrays too; and every number is, to the bit, the one that the variant gives
+by itself. What does not fit is left over, to be run alone: that is never wrong, only slower.
 """
 
 from __future__ import annotations
@@ -151,7 +147,7 @@ def one_line(why: str) -> str:
     return " ".join(why.split())
 
 
-def swept(block: Block) -> Columns:
+def swept_together(block: Block) -> Columns:
     """Return the rows of a block whose keys are plain numbers.
 
     See `chutelab.scene.variants.is_plain`.
@@ -272,8 +268,8 @@ class Block:
     engine: str | None
 
 
-def swept_block(block: Block) -> Columns:
+def swept(block: Block) -> Columns:
     """Return the rows of a block: together where that can be, else one by one."""
     if all(is_plain(path) for path in block.paths):
-        return swept(block)
+        return swept_together(block)
     return joined([alone(block, row) for row in range(len(block.values))])

@@ -1,6 +1,6 @@
 """What is to be swept: which keys, over which values, in which order.
 
-- Samples of several ranges at once: Latin hypercube, or Sobol points.
+Values are grids, or samples of several ranges at once: Latin hypercube or Sobol points.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""`Sweep`: the rows of all variants, as plain arrays.
+"""`Sweep`: the rows of all variants, and their files.
 
-- Rows as text and back, to the bit; CSV and Parquet files, whole or not at all.
-- The finished rows of a sweep that is not finished: a file beside the one that it is to write.
+Rows are written as text that gives them back to the bit, in CSV or Parquet, whole or not at all.
+The finished rows of an unfinished sweep are in a file beside the one it is to write.
 """
 
 from __future__ import annotations

@@ -1,11 +1,8 @@
-"""From recordings to rows.
+"""From recordings to rows: what a row holds, and how it is read off a recording.
 
 A recording is of one variant with all its particles, or of many variants, each of which is one
 particle with a machine of its own: V variants of M particles, where V or M is 1. Both go through
 the same operations, so that a row does not depend on which it came from.
-
-- What a row of a sweep holds: the columns, what they mean, and how many of them are kept.
-- How far particle 0 of each variant is from the closed form, as far as it went the same way.
 """
 
 from __future__ import annotations

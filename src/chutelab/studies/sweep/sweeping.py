@@ -1,6 +1,6 @@
 """`sweep`: all variants of a scene, by whoever does the work, and what came of each.
 
-- Who does the work: this process, processes of this computer, or a Dask cluster.
+The work is done by this process, by processes of this computer, or by a Dask cluster.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from typing import Any, Final
 
 from chutelab.scene import Scene
 from chutelab.scene.variants import Vary, is_plain
-from chutelab.studies.sweep.batch import Block, swept_block
+from chutelab.studies.sweep.batch import Block, swept
 from chutelab.studies.sweep.plan import Plan, planned
 from chutelab.studies.sweep.result import (
     Part,
@@ -342,7 +342,7 @@ def _work(
         return Block(plan.document, plan.source, plan.keys, paths, values, plan.engine)
 
     over = plan.count - sum(min(size, plan.count - begin) for begin in begins)
-    for begin, columns in team.results(swept_block, ((begin, block(begin)) for begin in begins)):
+    for begin, columns in team.results(swept, ((begin, block(begin)) for begin in begins)):
         over += len(columns[REASON])
         if progress is not None:
             progress(over / plan.count)

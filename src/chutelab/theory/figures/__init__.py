@@ -3,9 +3,9 @@
 >>> figure(7).columns["R, m"].shape
 (93,)
 
-- `model`: a figure as data: lines in panels, numbers, what the misprint does to its conclusion;
-- `radius`: Figures 6 to 9, energy and velocities against the radius of the drive pulley;
-- `paths`: Figures 11 to 13, trajectories; `flights`: what they are made of.
+- `model`: a figure as data: lines in panels, numbers, what the misprint does to its conclusion.
+- `radius`: Figures 6 to 9, energy and velocities against the radius of the drive pulley.
+- `paths`: Figures 11 to 13, trajectories.
 
 V. Molnár et al., Mech. Sci. 7, 167-177, 2016, doi:10.5194/ms-7-167-2016. The paper's pictures are
 not copied: what its text gives is computed anew, and what it does not give is said.

@@ -1,6 +1,7 @@
 """A figure of the paper as data: lines in panels, printed beside corrected, and what it means.
 
-- Flights over a plate, with Eq. (9) as printed or corrected.
+Flights over a plate, which several figures are made of, are computed here with either form of
+Eq. (9).
 """
 
 from __future__ import annotations

@@ -20,9 +20,9 @@ from chutelab.cli import main
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
 from chutelab.pictures.animation import Moment, Stage, VideoError, animate, film, moments
-from chutelab.pictures.animation import film as video
+from chutelab.pictures.animation import files as video
 from chutelab.pictures.animation.actors import SIGNS, outline, stacks
-from chutelab.pictures.animation.film import GifWriter
+from chutelab.pictures.animation.files import GifWriter
 from chutelab.pictures.animation.moments import (
     contact_normal,
     going_on,

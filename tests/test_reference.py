@@ -142,7 +142,8 @@ def test_what_it_cannot_follow_is_refused():
 def test_without_scipy_it_says_what_to_install():
     code = (
         "import sys; sys.modules['scipy.integrate'] = None\n"
-        "from chutelab import reference, scene; from chutelab.machine import build\n"
+        "from chutelab import scene; from chutelab.machine import build\n"
+        "from chutelab.engines import reference\n"
         "try: reference.run(build(scene.load('perpendicular')))\n"
         "except reference.UnableError as error: print(error)"
     )

@@ -20,9 +20,6 @@ import chutelab
 from chutelab import cli, machine, scene
 from chutelab.checks import stress
 from chutelab.checks.stress import ENGINES, Case, Evidence, Ladder, Twin, cases, harness, laws
-from chutelab.checks.stress import harness as table
-from chutelab.checks.stress import harness as watchdog
-from chutelab.checks.stress import laws as demands
 from chutelab.checks.stress.case import TRANSFER, by_name, merged, scene_of, surface, thrown
 from chutelab.cli import main
 from chutelab.engines.simulation import simulate
@@ -370,17 +367,17 @@ def test_momentum_on_a_frictionless_floor_holds_along_it_only():
 
 def test_endings_boxes_and_rest_can_be_broken():
     e = evidence()
-    assert demands.ended(e, ("time",)).holds
-    assert demands.ended(e, ("settled", "landed")).figure == 2
-    assert demands.inside(e, (-1.0, 2.0, 0.0, 1.0)).holds
-    assert demands.inside(e, (-1.0, 2.0, 0.0, 0.2)).figure == 2
-    assert not demands.still(evidence(merged(HOP, {"run": {"until": 0.3}}))).holds
+    assert laws.ended(e, ("time",)).holds
+    assert laws.ended(e, ("settled", "landed")).figure == 2
+    assert laws.inside(e, (-1.0, 2.0, 0.0, 1.0)).holds
+    assert laws.inside(e, (-1.0, 2.0, 0.0, 0.2)).figure == 2
+    assert not laws.still(evidence(merged(HOP, {"run": {"until": 0.3}}))).holds
     resting = merged(HOP, {"stream": {"at": [0.0, 0.004], "velocity": [0.0, 0.0], "count": 1}})
-    assert demands.still(evidence(resting)).holds
-    assert demands.sunk(evidence(resting)).holds
+    assert laws.still(evidence(resting)).holds
+    assert laws.sunk(evidence(resting)).holds
     low = evidence(resting, knots=adder("position", -1, [0.0, -0.0002]))
-    assert demands.sunk(low).figure == pytest.approx(0.05, rel=1e-9)
-    assert not demands.sunk(low).holds
+    assert laws.sunk(low).figure == pytest.approx(0.05, rel=1e-9)
+    assert not laws.sunk(low).holds
 
 
 MIRROR = Twin("mirror symmetry", {}, lambda p: p * [-1.0, 1.0])
@@ -388,14 +385,14 @@ MIRROR = Twin("mirror symmetry", {}, lambda p: p * [-1.0, 1.0])
 
 def test_a_twin_that_moves_elsewhere_is_no_twin():
     one, other = evidence(HOP), evidence(cases.mirrored(HOP))
-    assert demands.symmetric(one, other, MIRROR).figure < 1e-15
-    assert demands.symmetric(one, other, MIRROR).holds
+    assert laws.symmetric(one, other, MIRROR).figure < 1e-15
+    assert laws.symmetric(one, other, MIRROR).holds
     off = evidence(cases.mirrored(HOP), knots=adder("position", 1, [1e-6, 0.0]))
-    assert demands.symmetric(one, off, MIRROR).figure == pytest.approx(1e-6, rel=0.1)
-    assert not demands.symmetric(one, off, MIRROR).holds
-    assert not demands.symmetric(one, evidence(HOP), MIRROR).holds
+    assert laws.symmetric(one, off, MIRROR).figure == pytest.approx(1e-6, rel=0.1)
+    assert not laws.symmetric(one, off, MIRROR).holds
+    assert not laws.symmetric(one, evidence(HOP), MIRROR).holds
     shorter = evidence(merged(cases.mirrored(HOP), {"run": {"until": 0.9}}))
-    assert not demands.symmetric(one, shorter, MIRROR).holds
+    assert not laws.symmetric(one, shorter, MIRROR).holds
 
 
 def test_moved_and_mirrored_scenes_are_that():
@@ -409,7 +406,7 @@ def test_moved_and_mirrored_scenes_are_that():
 
 def ladder(errors, floor=1e-10):
     steps = tuple(2.0**-n for n in range(len(errors)))
-    return demands.order(Ladder(steps, lambda recording: 0.0, floor), errors)
+    return laws.order(Ladder(steps, lambda recording: 0.0, floor), errors)
 
 
 def test_the_order_of_convergence_is_the_slope_until_rounding():
@@ -515,7 +512,7 @@ def test_the_watchdog_ends_what_never_would(monkeypatch, calls):
 
 def test_the_watchdog_leaves_no_alarm_behind():
     before = signal.getsignal(signal.SIGALRM)
-    with watchdog.bounded(0.05):
+    with harness.bounded(0.05):
         pass
     time.sleep(0.2)
     assert signal.getsignal(signal.SIGALRM) is before
@@ -536,7 +533,7 @@ def test_what_is_not_promised_is_a_line_and_no_failure():
     (line,) = one(Case("hop", "test", HOP, unpromised={"exact": "too long"}))
     assert (line.law, line.holds, line.broken) == ("runs to its end", False, False)
     assert (line.detail, line.unpromised) == ("not run", "too long")
-    (run,) = table.runs([line])
+    (run,) = harness.runs([line])
     assert (run.failed, run.kept, run.laws) == ((), 0, 1)
 
 
@@ -555,14 +552,14 @@ def test_pymunk_keeps_the_laws_that_it_promises(name):
 
 
 def test_the_quick_set_on_the_exact_engine_keeps_all_laws():
-    names = [c.name for c in stress.cases() if not c.name.startswith("bounces")]
+    names = [c.name for c in stress.all_cases() if not c.name.startswith("bounces")]
     found = [r for _, r in stress.results(stress.chosen(names), ["exact"])]
     assert len({r.case for r in found}) > 100
     assert [(r.case, r.law, r.figure, r.bound) for r in found if not r.holds] == []
 
 
 def test_every_case_of_the_list_is_there():
-    groups = {case.group for case in stress.cases(full=True)}
+    groups = {case.group for case in stress.all_cases(full=True)}
     assert groups == {
         "200 m/s against a 2 mm plate", "radius", "mass", "restitution", "friction", "belt speed",
         "g = 0", "grazing plates", "v²/(g R) within 1e-15 of 1", "a plate's very end",
@@ -574,7 +571,7 @@ def test_every_case_of_the_list_is_there():
 
 
 def test_names_are_unique_and_short_enough_for_the_table():
-    names = [case.name for case in stress.cases(full=True)]
+    names = [case.name for case in stress.all_cases(full=True)]
     assert len(set(names)) == len(names)
     assert max(len(name) for name in names) <= 23
 
@@ -591,7 +588,7 @@ def test_cases_are_chosen_by_name_and_pattern():
 
 
 def test_the_scenes_are_what_they_are_called():
-    tables = {case.name: case.tables for case in stress.cases(full=True)}
+    tables = {case.name: case.tables for case in stress.all_cases(full=True)}
     speed = scene_of(tables["critical-+0"], "test", "exact", None).incoming.speed
     assert abs(speed**2 / (9.81 * 0.104) - 1.0) < 1e-15
     points = tables["plate-200"]["surface"][0]["points"]
@@ -619,22 +616,22 @@ def result(**changes):
 def test_the_worst_is_the_one_nearest_to_its_bound_or_furthest_beyond():
     near, far = result(law="near", figure=1.9), result(law="far", figure=0.1)
     none = result(law="none", figure=0.0, bound=0.0)
-    (run,) = table.runs([far, near, none])
+    (run,) = harness.runs([far, near, none])
     assert (run.worst, run.failed, run.laws) == (near, (), 3)
     beyond = result(law="beyond", figure=3.0, holds=False)
     raised = result(law="raised", figure=None, bound=None, holds=False)
-    (run,) = table.runs([near, beyond])
+    (run,) = harness.runs([near, beyond])
     assert (run.worst, run.failed) == (beyond, (beyond,))
-    (run,) = table.runs([beyond, raised])
+    (run,) = harness.runs([beyond, raised])
     assert run.worst == raised
-    assert table.exhausted(result(figure=2.0, bound=1.0, least=True)) == 0.5
-    assert table.exhausted(result(figure=-inf, bound=1.0, least=True, holds=False)) == inf
-    assert [r.worst.dt for r in table.runs([result(dt=1.0), result(dt=2.0)])] == [1.0, 2.0]
+    assert harness.exhausted(result(figure=2.0, bound=1.0, least=True)) == 0.5
+    assert harness.exhausted(result(figure=-inf, bound=1.0, least=True, holds=False)) == inf
+    assert [r.worst.dt for r in harness.runs([result(dt=1.0), result(dt=2.0)])] == [1.0, 2.0]
 
 
 def test_the_file_has_every_figure_to_the_last_digit(tmp_path):
     found = [result(figure=1.0 / 3.0, detail="a\tb\nc"), result(figure=None, holds=False, dt=0.1)]
-    table.write(found, tmp_path / "out.tsv")
+    harness.write(found, tmp_path / "out.tsv")
     assert listed(tmp_path) == ["out.tsv"]
     with (tmp_path / "out.tsv").open() as file:
         one, two = csv.DictReader(file, delimiter="\t")

@@ -52,7 +52,6 @@ G, R, RADIUS, V, EPS, MU, DROP = 9.81, 0.1, 0.004, 2.0, 0.5, 0.3, 1.0
 KNOWN = cases()
 # Functions of the package hide these modules.
 MEASURE = import_module("chutelab.checks.workprecision.measure")
-SCALING = import_module("chutelab.checks.workprecision.measure")
 
 
 def one(case, method, value=None):
@@ -498,7 +497,7 @@ def test_scaling_counts_particles_and_events():
 
 
 def test_scaling_measures_every_size(monkeypatch):
-    monkeypatch.setitem(SCALING.QUICK, "independent", 1000)
+    monkeypatch.setitem(MEASURE.QUICK, "independent", 1000)
     sizes = scaling(["independent", "interacting"], ["exact"], repeats=1, quick=True)
     assert [one.particles for one in sizes] == [1, 10, 100, 1000]
     assert exponent(sizes, "independent", "exact", "memory") == pytest.approx(1.0, abs=0.2)
@@ -652,8 +651,8 @@ def test_the_command_knows_all_cases_and_methods():
     assert (*KNOWN, "process") == benching.CASES
     assert tuple(METHODS) == benching.METHODS
     assert MEASURE.REPEATS == benching.REPEATS
-    assert tuple(SCALING.COUNTS) == benching.MANY
-    assert {m for runs in SCALING.RUNS.values() for m in runs} == set(benching.STREAMED)
+    assert tuple(MEASURE.COUNTS) == benching.MANY
+    assert {m for runs in MEASURE.RUNS.values() for m in runs} == set(benching.STREAMED)
 
 
 def test_bench_prints_tables_and_writes_both_files(tmp_path):
@@ -688,7 +687,7 @@ def test_bench_json(tmp_path, monkeypatch):
 
 
 def test_bench_scaling(tmp_path, monkeypatch):
-    monkeypatch.setitem(SCALING.QUICK, "independent", 100)
+    monkeypatch.setitem(MEASURE.QUICK, "independent", 100)
     said = call("--scaling", "independent", "--quick", "--repeats", 1, "--out", tmp_path).stdout
     assert "Independent, exact: time ∝ N^" in said
     assert "400" in said

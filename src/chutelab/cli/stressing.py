@@ -27,9 +27,9 @@ HEAD = " {:<22} {:<7} {:>6} {:>5} {:>7} {:>7}  {}"
 def _complete_case(
     _ctx: click.Context, _parameter: click.Parameter, incomplete: str
 ) -> list[CompletionItem]:
-    from chutelab.checks.stress import cases
+    from chutelab.checks.stress import all_cases
 
-    names = [case.name for case in cases(full=True)]
+    names = [case.name for case in all_cases(full=True)]
     return [CompletionItem(name) for name in names if name.startswith(incomplete)]
 
 

@@ -14,7 +14,7 @@
 """
 
 from chutelab.checks.stress.case import ENGINES, Case, Ladder, Twin
-from chutelab.checks.stress.cases import cases, chosen
+from chutelab.checks.stress.cases import all_cases, chosen
 from chutelab.checks.stress.evidence import Evidence, Verdict
 from chutelab.checks.stress.harness import Result, results
 from chutelab.checks.stress.laws import LAWS
@@ -28,7 +28,7 @@ __all__ = [
     "Result",
     "Twin",
     "Verdict",
-    "cases",
+    "all_cases",
     "chosen",
     "results",
 ]

@@ -229,12 +229,12 @@ def drawn_cases() -> tuple[Case, ...]:
     return tuple(out)
 
 
-def cases(*, full: bool = False) -> tuple[Case, ...]:
+def all_cases(*, full: bool = False) -> tuple[Case, ...]:
     """Return the quick set, or all."""
     found = (
         *extremes.CASES,
         *geometry.CASES,
-        *extremes.cases(),
+        *extremes.lasting_cases(),
         *symmetric_cases(),
         *drawn_cases(),
     )
@@ -252,8 +252,8 @@ def chosen(names: Collection[str], *, full: bool = False) -> tuple[Case, ...]:
         If a pattern matches nothing.
     """
     if not names:
-        return cases(full=full)
-    known = cases(full=True)
+        return all_cases(full=full)
+    known = all_cases(full=True)
     for pattern in names:
         if not any(_matches(case, pattern) for case in known):
             near = get_close_matches(pattern, [case.name for case in known], n=3)

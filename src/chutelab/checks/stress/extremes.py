@@ -351,6 +351,6 @@ def _coarse() -> list[Case]:
     ]  # fmt: skip
 
 
-def cases() -> tuple[Case, ...]:
+def lasting_cases() -> tuple[Case, ...]:
     """Return the cases; the shipped scenes among them are read now."""
     return (*_bounces(), *_flights(), *_late(), *_piles(), *_coarse())

@@ -5,11 +5,11 @@
 `palette`        the colours of every film; numbers that change with every frame
 `actors`         what moves: particles, arrows, belts, pulley, and the energy bars
 `stage`          where everything is: a background drawn once, and what moves on it
-`film`           `animate`: all of it as a GIF, or as mp4 or webm
+`files`          `animate`: all of it as a GIF, or as mp4 or webm
 ===============  ==================================================================================
 """
 
-from chutelab.pictures.animation.film import FORMATS, VideoError, animate, need_video
+from chutelab.pictures.animation.files import FORMATS, VideoError, animate, need_video
 from chutelab.pictures.animation.moments import Moment, film
 from chutelab.pictures.animation.stage import SHOWS, Stage
 

@@ -20,8 +20,9 @@ from typing import Any
 import numpy as np
 
 from chutelab.machine import Machine
-from chutelab.results import Floats, Kind, Recording
+from chutelab.results import Kind, Recording
 from chutelab.results.recorder import Recorder
+from chutelab.util.arrays import Floats
 
 Guard = Callable[[Floats], Floats]
 

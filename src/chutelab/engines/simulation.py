@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from time import perf_counter
 
 from chutelab.machine import Machine, build
 from chutelab.results import Recording
 from chutelab.scene import Fault, Scene, SceneError
-
-Progress = Callable[[float], None]
+from chutelab.util.arrays import Progress
 
 ENGINES = ("auto", "exact", "contact", "pymunk")
 

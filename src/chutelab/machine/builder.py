@@ -16,15 +16,14 @@ from math import ceil, cos, hypot, inf, radians, sin
 from sys import float_info
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.machine.nominal import Discharge, discharge, plate_hit
 from chutelab.machine.parts import Machine, Particle, Pulley, Segments
 from chutelab.machine.releases import ON_BELT, Releases, draw, release_point
 from chutelab.scene import Fault, Scene, SceneError
+from chutelab.util.arrays import Floats, Ints
 from chutelab.util.many import Value, at, each, larger, of, smaller, some
 
-Floats = NDArray[np.float64]
 Row = tuple[Value, ...]
 
 
@@ -42,7 +41,7 @@ class RefusedError(ValueError):
         self.reasons = dict(reasons)
 
 
-def members(machine: Machine, places: NDArray[np.int64]) -> Machine:
+def members(machine: Machine, places: Ints) -> Machine:
     """Return some members of a family of machines, as a family."""
     segments, start, pulley = machine.segments, machine.releases, machine.pulley
     own = ("start", "tangent", "length", "speed", "restitution", "friction")
@@ -325,7 +324,7 @@ class _Builder:
             }
         )
 
-    def _columns(self) -> NDArray[np.float64]:
+    def _columns(self) -> Floats:
         """Return ends, speed, restitution and friction of the segments, (7, S) or (7, S, N)."""
         count = self.scene.members
         if count is None:

@@ -9,15 +9,13 @@ from dataclasses import dataclass, replace
 from math import cos, inf, nan, radians, sin
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.machine.releases import on_belt, release_point, release_velocity
 from chutelab.mechanics.ballistics import closing_time, crossing, descent
 from chutelab.mechanics.ride import Circle, Outcome, advance, grip_slip, normal_force
 from chutelab.scene import Scene
+from chutelab.util.arrays import Bools, Floats, Ints
 from chutelab.util.many import Value, each, ratio, root, smaller, where
-
-Floats = NDArray[np.float64]
 
 STEPS = 100_000
 """Knots of a ride after which it counts as one without an end; a quarter turn takes 65, the slowest
@@ -82,7 +80,7 @@ def _slip_round(scene: Scene, rho: Value, speed: Value, distance: Value) -> Disc
 
 
 def _along_belt(
-    w: Floats, distance: Floats, drag: Floats, belt: Floats, turns: NDArray[np.bool_]
+    w: Floats, distance: Floats, drag: Floats, belt: Floats, turns: Bools
 ) -> tuple[Floats, Floats]:
     """Return speed and r ω at the top of the pulley after slipping along the belt, NaN if never."""
     slip = w - belt
@@ -123,7 +121,7 @@ def _round_pulley(circle: Circle) -> tuple[Floats, Floats]:
     return phi, w
 
 
-def _some(circle: Circle, which: NDArray[np.int64] | NDArray[np.bool_]) -> Circle:
+def _some(circle: Circle, which: Ints | Bools) -> Circle:
     return Circle(**{name: array[which] for name, array in vars(circle).items()})
 
 

@@ -15,12 +15,11 @@ from math import ceil, inf, log2
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chutelab.machine.releases import Releases
+from chutelab.util.arrays import Floats, Ints
 from chutelab.util.many import Value, larger, smaller
-
-Floats = NDArray[np.float64]
 
 FIRST_WINS = "; surfaces may cross, the first contact wins"
 
@@ -120,20 +119,20 @@ class Segments:
         Index of the surface a segment belongs to, into `Machine.surfaces`.
     """
 
-    start: NDArray[np.float64]
-    tangent: NDArray[np.float64]
-    length: NDArray[np.float64]
-    speed: NDArray[np.float64]
-    restitution: NDArray[np.float64]
-    friction: NDArray[np.float64]
-    surface: NDArray[np.int64]
+    start: Floats
+    tangent: Floats
+    length: Floats
+    speed: Floats
+    restitution: Floats
+    friction: Floats
+    surface: Ints
 
     def __post_init__(self) -> None:
         for array in vars(self).values():
             array.flags.writeable = False
 
     @property
-    def end(self) -> NDArray[np.float64]:
+    def end(self) -> Floats:
         """Second end, (..., S, 2), m."""
         return self.start + self.length[..., None] * self.tangent
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from math import inf
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.scene import Scene
+from chutelab.util.arrays import Bools, Floats
 from chutelab.util.many import Value
 
 ON_BELT = 1e-9
@@ -36,10 +36,10 @@ class Releases:
         Rides the incoming belt by adhesion, at radius R + r + h round the pulley, until separation.
     """
 
-    t: NDArray[np.float64]
-    position: NDArray[np.float64]
-    velocity: NDArray[np.float64]
-    carried: NDArray[np.bool_]
+    t: Floats
+    position: Floats
+    velocity: Floats
+    carried: Bools
 
     def __post_init__(self) -> None:
         for array in vars(self).values():
@@ -78,7 +78,7 @@ def on_belt(scene: Scene) -> bool:
     return y == riding and -scene.incoming.length <= x <= 0.0
 
 
-def schedule(scene: Scene) -> NDArray[np.float64]:
+def schedule(scene: Scene) -> Floats:
     """Return when each particle is due, s (N,); of a family each scene has one, at 0 s."""
     if scene.members is not None:
         return np.zeros(scene.members)
@@ -107,7 +107,7 @@ class Squeeze:
     grip: float
 
 
-def squeeze(scene: Scene, t: NDArray[np.float64], position: NDArray[np.float64]) -> Squeeze | None:
+def squeeze(scene: Scene, t: Floats, position: Floats) -> Squeeze | None:
     """Return who rides into others; None if nobody does.
 
     A ride that something ends early counts as if it went on. Two that would be in each other on the
@@ -187,9 +187,9 @@ def draw(scene: Scene) -> Releases:
 
 def _spread_apart(
     scene: Scene,
-    t: NDArray[np.float64],
-    height: NDArray[np.float64],
-    velocity: NDArray[np.float64],
+    t: Floats,
+    height: Floats,
+    velocity: Floats,
     fall: float,
     floor: float,
     rng: np.random.Generator,

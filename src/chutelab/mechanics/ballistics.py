@@ -10,9 +10,10 @@ import itertools
 from math import comb, inf, sqrt
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from chutelab.util.arrays import Floats
+
 Values = Floats | np.float64 | float
 
 ITERATIONS = 120

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from chutelab.util.arrays import Floats
 
 DISK_SHARE = 1.0 / 3.0
 """m*/m of a free disk: at its rim, with I = m r²/2, an impulse moves the contact point 3 times as

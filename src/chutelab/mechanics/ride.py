@@ -20,8 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.mechanics.ballistics import polynomial
-
-Floats = NDArray[np.float64]
+from chutelab.util.arrays import Bools, Floats
 
 ORDER = 14
 """Degree of the series: with the steps below the first term left out is under 1e-16."""
@@ -76,7 +75,7 @@ class Circle:
     friction: Floats
     belt: Floats
     slip: Floats
-    turns: NDArray[np.bool_]
+    turns: Bools
     low: Floats
     high: Floats
 
@@ -207,7 +206,7 @@ def _gauges(c: Circle, series: Floats) -> Floats:
     return gauges
 
 
-def _first_negative(gauges: Floats, dt: Floats, passed: NDArray[np.bool_]) -> Floats:
+def _first_negative(gauges: Floats, dt: Floats, passed: Bools) -> Floats:
     """Bisect each gauge that is negative at dt for its change of sign, (6, k); inf for the rest."""
     low, high = np.zeros(passed.shape), np.broadcast_to(dt, passed.shape).copy()
     for _ in range(HALVINGS):

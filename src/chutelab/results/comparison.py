@@ -17,9 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from chutelab import scene as scenes
 from chutelab.results.ledger import ledger
-from chutelab.results.recording import EVENT, REASONS, Floats, Kind, Recording
+from chutelab.results.recording import EVENT, REASONS, Kind, Recording
 from chutelab.scene import Scene
 from chutelab.theory import Transfer, predict
+from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet, Shown, number
 
 QUANTITIES = {

@@ -12,8 +12,9 @@ import numpy as np
 from chutelab.machine.releases import schedule
 from chutelab.results.comparison import observed
 from chutelab.results.ledger import ledger
-from chutelab.results.recording import REASONS, Floats, Kind, Recording
+from chutelab.results.recording import REASONS, Kind, Recording
 from chutelab.scene import Scene
+from chutelab.util.arrays import Floats
 
 _STATISTICS: dict[str, Callable[[Floats], Any]] = {
     "mean": np.mean, "spread": np.std, "min": np.min, "max": np.max,

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.machine.parts import Particle
-from chutelab.results.recording import EVENT, KNOT, PARTICLES, Ints, Kind, Recording
+from chutelab.results.recording import EVENT, KNOT, PARTICLES, Kind, Recording
+from chutelab.util.arrays import Ints
 
 
 class StalledError(RuntimeError):

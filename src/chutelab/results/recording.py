@@ -18,10 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.machine.parts import Particle
+from chutelab.util.arrays import Floats, Ints
 from chutelab.util.tables import Sheet, Shown
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 ENTRIES = ("belt_work", "restitution_loss", "friction_loss")
 """The three entries of the energy ledger, in the order of every array that holds them."""

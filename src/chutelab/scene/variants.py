@@ -15,7 +15,6 @@ from math import isfinite, prod
 from typing import Annotated, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
 from chutelab.scene.errors import MISSING, SceneError
@@ -24,6 +23,7 @@ from chutelab.scene.overrides import Setting, apply
 from chutelab.scene.rules import Look, conflicts
 from chutelab.scene.schema import Scene
 from chutelab.scene.units import read_size
+from chutelab.util.arrays import Bools, Floats
 
 _PATH: Final = re.compile(r"(?:(\w+)(?:\[(\d+)\])?\.)?(\w+)")
 
@@ -55,7 +55,7 @@ def is_plain(path: str) -> bool:
     )
 
 
-def accepted(path: str, values: NDArray[np.float64]) -> NDArray[np.bool_]:
+def accepted(path: str, values: Floats) -> Bools:
     """Tell which values a key takes, (N,), if nothing else is looked at."""
     good = np.ones(len(values), dtype=bool)
     try:
@@ -107,7 +107,7 @@ def judged_by(mapping: Mapping[str, Any], overrides: Sequence[str] = ()) -> set[
     return look.asked
 
 
-def family(scene: Scene, columns: Mapping[str, NDArray[np.float64]]) -> Scene:
+def family(scene: Scene, columns: Mapping[str, Floats]) -> Scene:
     """Return scenes that differ in plain numbers; they are not validated.
 
     Parameters

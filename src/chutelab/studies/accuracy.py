@@ -9,7 +9,7 @@ of another engine. Without a witness nothing is promised.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from math import inf, isfinite
@@ -21,15 +21,14 @@ from chutelab import scene as scenes
 from chutelab.engines import reference
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
-from chutelab.results import ENTRIES, REASONS, Floats, Kind, Recording
+from chutelab.results import ENTRIES, REASONS, Kind, Recording
 from chutelab.results.comparison import QUANTITIES, compare, scales, scene_of
 from chutelab.results.ledger import ledger
 from chutelab.results.recorder import StalledError
 from chutelab.scene import Scene, SceneError
 from chutelab.scene.units import read_size, write_size
 from chutelab.theory import predict
-
-Progress = Callable[[float], None]
+from chutelab.util.arrays import Floats, Progress
 
 SMALLEST, LARGEST_SHARE, LARGEST_LENGTH = 1e-15, 0.5, 1e3
 """Nothing is more exact than the rounding of a double; more than half of everything off is no

@@ -11,9 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from chutelab.util.arrays import Floats
 
 HALVINGS = 60
 """Bisections of a contact time: they exhaust a double's digits."""

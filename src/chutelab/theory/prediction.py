@@ -11,11 +11,12 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chutelab.theory.obstacles import Flight, Segments, corner_times, first_in_flight, first_on_arc
 from chutelab.theory.results import Reason, Transfer, cut, unanswered
 from chutelab.theory.transfer import Rebound, transfer
+from chutelab.util.arrays import Floats
 
 if TYPE_CHECKING:
     from chutelab.scene import Incoming, Plate, Scene
@@ -45,17 +46,17 @@ class Course:
         self.angle = np.radians(self.plate.angle_deg)
 
     @cached_property
-    def up(self) -> NDArray[np.float64]:
+    def up(self) -> Floats:
         """Unit vector up along the plate, (2,)."""
         return np.array([-np.sin(self.angle), np.cos(self.angle)])
 
     @cached_property
-    def normal(self) -> NDArray[np.float64]:
+    def normal(self) -> Floats:
         """Unit vector out of the struck face, (2,)."""
         return np.array([-np.cos(self.angle), -np.sin(self.angle)])
 
     @cached_property
-    def pivot(self) -> NDArray[np.float64]:
+    def pivot(self) -> Floats:
         """Where the plate is hung, (2,), m."""
         ahead = self.belt.pulley_radius + self.plate.distance
         return np.array([ahead, self.plate.pivot_height], dtype=np.float64)
@@ -103,7 +104,7 @@ class Course:
         return Flight(self.ride_radius * outward, speed * ahead, self.scene.gravity)
 
     @cached_property
-    def impact(self) -> NDArray[np.float64]:
+    def impact(self) -> Floats:
         """World position of the centre on the plate's line, (2,); NaN if it never gets there."""
         left = self.separation.position
         return np.array([left[0] + self.found.x2, left[1] - self.found.y2])

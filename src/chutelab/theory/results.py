@@ -8,7 +8,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from chutelab.util.arrays import Floats
 
 
 class Reason(StrEnum):

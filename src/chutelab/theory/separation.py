@@ -11,10 +11,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from chutelab.util.arrays import Bools, Floats
 
 MOST_ROUNDS = 100
 """Newton rounds; fewer than 20 are ever used, as it starts within e² of the root."""

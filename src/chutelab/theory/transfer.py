@@ -10,13 +10,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chutelab.theory.results import STAGES, Reason, Transfer
 from chutelab.theory.separation import separation
-
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
+from chutelab.util.arrays import Bools, Floats
 
 
 @dataclass(frozen=True, eq=False)

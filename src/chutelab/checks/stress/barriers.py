@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.checks.stress.evidence import PIECES, PRESSED, Evidence, Floats, Ints, Verdict
+from chutelab.checks.stress.evidence import PIECES, PRESSED, Evidence, Verdict
 from chutelab.machine import Machine
 from chutelab.results import REASONS, Kind
+from chutelab.util.arrays import Floats, Ints
 
 AT_SURFACES = (Kind.IMPACT, Kind.LANDING, Kind.STICK, Kind.SLIP, Kind.SETTLE)
 """What happens at a surface, if one is named."""

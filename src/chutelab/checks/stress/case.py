@@ -6,15 +6,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from chutelab.checks.stress.evidence import Evidence, Verdict
 from chutelab.results import Recording
 from chutelab.scene import Scene
+from chutelab.util.arrays import Floats
 
 Tables = Mapping[str, Any]
-Map = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+Map = Callable[[Floats], Floats]
 
 ENGINES = ("exact", "contact", "pymunk", "fixed")
 """``fixed`` is pymunk with run.align = false: every step lasts dt."""

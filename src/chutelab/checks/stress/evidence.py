@@ -6,14 +6,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.machine import Machine
 from chutelab.results import Recording
 from chutelab.results.recording import Cells, hermite
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from chutelab.util.arrays import Floats, Ints
 
 EPS = float(np.finfo(np.float64).eps)
 

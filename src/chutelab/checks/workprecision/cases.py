@@ -17,13 +17,13 @@ from math import sqrt
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.machine.releases import draw
 from chutelab.results import Kind, Recording
 from chutelab.results.comparison import relative_error, scales
 from chutelab.scene import Scene, from_dict
 from chutelab.theory import predict, transfer
+from chutelab.util.arrays import Floats
 
 SHIFTS = (0.0, 0.0047, 0.0091, 0.0137, 0.0179)
 """m; how much farther the plate is, or higher the start. With 2 m/s, uneven parts of the way in the
@@ -239,7 +239,6 @@ def cases() -> dict[str, Case]:
     }
 
 
-Floats = NDArray[np.float64]
 Answer = dict[str, Floats]
 
 TRANSFER = ("t2", "y2", "t3", "x3", "v3x", "v3y")

@@ -26,7 +26,6 @@ import numpy as np
 from chutelab.checks.workprecision.cases import (
     Answer,
     Case,
-    Floats,
     MissedError,
     cases,
     frames_of,
@@ -39,6 +38,7 @@ from chutelab.checks.workprecision.records import Record, Size
 from chutelab.results import Recording
 from chutelab.results.ledger import ledger
 from chutelab.scene import Scene, from_dict, to_dict
+from chutelab.util.arrays import Floats
 
 PATIENCE = 2.0
 """s of repeats of one measurement, after which no further one is begun."""

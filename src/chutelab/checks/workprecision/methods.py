@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-from chutelab.checks.workprecision.cases import Answer, Floats
+from chutelab.checks.workprecision.cases import Answer
 from chutelab.results import Recording
 from chutelab.scene import Scene, from_dict, to_dict
+from chutelab.util.arrays import Floats
 
 
 class UnableError(RuntimeError):

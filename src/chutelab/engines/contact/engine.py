@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import inf
 from time import perf_counter
 from typing import Any
@@ -14,8 +13,7 @@ from chutelab.engines.contact.module import Module, Status, borrow, constants, d
 from chutelab.machine import Machine, moved, origin
 from chutelab.results import EVENT, KNOT, Recording
 from chutelab.results.recorder import Recorder, StalledError
-
-Progress = Callable[[float], None]
+from chutelab.util.arrays import Progress
 
 GREATEST = 1e300
 """Friction without a bound, as a number that can be multiplied by zero."""

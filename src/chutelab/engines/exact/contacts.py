@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import fields
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.engines.exact.detect import bounds
-from chutelab.engines.exact.obstacles import NONE, Floats, Ints, bare, dot, length_of, pick
+from chutelab.engines.exact.obstacles import NONE, bare, dot, length_of, pick
 from chutelab.engines.exact.particle_state import COLLAPSE, Contact, Mode, Swarm, below
 from chutelab.mechanics.impact import impulses, limited
 from chutelab.results import Kind
+from chutelab.util.arrays import Bools, Floats, Ints
 from chutelab.util.many import Value, of
-
-Bools = NDArray[np.bool_]
 
 WEIGHTLESS = 1e-9
 """Share of the weight that a surface may seem to pull with, by rounding, where it holds nothing."""
@@ -24,9 +22,7 @@ class CornerError(RuntimeError):
     """A spinning disk held between moving surfaces: beyond the exact engine."""
 
 
-def hold(
-    s: Swarm, who: Ints, on: tuple[Ints, Floats], other: tuple[Ints, Floats]
-) -> NDArray[np.bool_]:
+def hold(s: Swarm, who: Ints, on: tuple[Ints, Floats], other: tuple[Ints, Floats]) -> Bools:
     """Bring particles to rest in the corner of two obstacles, each given with its side.
 
     A moving surface under them goes on doing work, all of it heat. Where a surface is at rest its
@@ -80,7 +76,7 @@ def _grip(c: Contact) -> Floats:
     return np.where((c.belt == 0.0) | np.isinf(c.friction), 0.0, c.friction)
 
 
-def _corner_loads(gravity: Value, a: Contact, b: Contact) -> tuple[Floats, NDArray[np.bool_]]:
+def _corner_loads(gravity: Value, a: Contact, b: Contact) -> tuple[Floats, Bools]:
     """Return the two normal forces per mass that hold a particle, (2, k), and where it locks."""
     first, second = (c.normal + (np.sign(c.belt) * _grip(c)) * c.tangent for c in (a, b))
     determinant = first[0] * second[1] - first[1] * second[0]

@@ -10,24 +10,12 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from chutelab.engines.exact.obstacles import (
-    NONE,
-    Floats,
-    Ints,
-    Obstacles,
-    bare,
-    dot,
-    length_of,
-    pick,
-    rows_of,
-)
+from chutelab.engines.exact.obstacles import NONE, Obstacles, bare, dot, length_of, pick, rows_of
 from chutelab.mechanics.ballistics import descent, first_descent
+from chutelab.util.arrays import Bools, Floats, Ints
 from chutelab.util.many import Value, of
 from chutelab.util.many import of as some_of
-
-Bools = NDArray[np.bool_]
 
 PARALLEL = 1e-14
 """Share of a speed or an acceleration along a surface below which it has no part towards it."""
@@ -395,17 +383,17 @@ class Bounds:
     low: Floats
     low_obstacle: Ints
     low_side: Floats
-    low_handover: NDArray[np.bool_]
+    low_handover: Bools
     high: Floats
     high_obstacle: Ints
     high_side: Floats
-    high_handover: NDArray[np.bool_]
+    high_handover: Bools
 
     @classmethod
     def free(cls, count: int) -> Self:
         """No obstacle in any direction."""
 
-        def nothing(limit: float) -> tuple[Floats, Ints, Floats, NDArray[np.bool_]]:
+        def nothing(limit: float) -> tuple[Floats, Ints, Floats, Bools]:
             return (
                 np.full(count, limit),
                 np.full(count, NONE, dtype=np.int64),
@@ -416,7 +404,7 @@ class Bounds:
         return cls(*nothing(-np.inf), *nothing(np.inf))
 
     def narrow(
-        self, phi: Floats, angle: Floats, closing: Floats, met: NDArray[np.bool_],
+        self, phi: Floats, angle: Floats, closing: Floats, met: Bools,
         obstacle: Ints | int, side: Floats | int, handover: bool = False,
     ) -> None:  # fmt: skip
         """Take in one more obstacle, whose gap falls with φ at the rate `closing` at `angle`."""

@@ -5,20 +5,16 @@ Machines of a family can run together, `kinds`, if their surfaces join in the sa
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import combinations
 from time import perf_counter
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.engines.exact.motion import carry, fly, ride, slide
 from chutelab.engines.exact.obstacles import (
     FOLDED,
     JOINT,
     NONE,
-    Floats,
-    Ints,
     corners_of,
     size_of,
     spots_of,
@@ -28,10 +24,8 @@ from chutelab.engines.exact.particle_state import Mode, Swarm, World
 from chutelab.machine import Machine
 from chutelab.results import Kind, Recording
 from chutelab.results.recorder import Recorder, StalledError
+from chutelab.util.arrays import Bools, Floats, Ints, Progress
 from chutelab.util.many import at
-
-Bools = NDArray[np.bool_]
-Progress = Callable[[float], None]
 
 MOST_KINDS = 16
 """Kinds that are looked for; what is left over runs by itself."""

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.engines.exact.obstacles import Floats, Ints
 from chutelab.results import EVENT, KNOT
 from chutelab.results.recorder import Recorder
+from chutelab.util.arrays import Floats, Ints
 
 STATE = 9
 """Rows of a state: the columns of a knot, namely time, position, velocity, ω, ledger entries."""

@@ -7,18 +7,16 @@ goes step by step along the arc.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.engines.exact.contacts import end_slip, face_force, rest_on, settle_law, strike
 from chutelab.engines.exact.detect import FEW, Motion, bounds, first_contact
-from chutelab.engines.exact.obstacles import NONE, Floats, Ints, bare, dot, pick, rows_of
+from chutelab.engines.exact.obstacles import NONE, bare, dot, pick, rows_of
 from chutelab.engines.exact.particle_state import Mode, Swarm
 from chutelab.mechanics.ballistics import descent
 from chutelab.mechanics.ride import STEP_ANGLE, Circle, Outcome, advance, normal_force
 from chutelab.results import Kind
+from chutelab.util.arrays import Bools, Floats, Ints
 from chutelab.util.many import of
-
-Bools = NDArray[np.bool_]
 
 
 def ride_on(s: Swarm, who: Ints, circle: Ints) -> None:

@@ -15,9 +15,9 @@ from functools import cached_property
 from sys import float_info
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.machine import Machine, Segments
+from chutelab.util.arrays import Bools, Floats, Ints
 from chutelab.util.many import Value, at, of
 
 FOOT = 1e-12
@@ -208,9 +208,6 @@ def _ends(
     return ends, circles
 
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
-
 NONE = -1
 
 FOLDED = 1e-9
@@ -288,7 +285,7 @@ class Obstacles:
         return self.faces[:, 2, :, 0]
 
     @cached_property
-    def owns(self) -> NDArray[np.bool_]:
+    def owns(self) -> Bools:
         """Tell of which segments a circle is an end, (C, S)."""
         circle = np.arange(self.segments, len(self.surface))[:, None]
         owns = (self.end_circle[:, 0] == circle) | (self.end_circle[:, 1] == circle)
@@ -311,7 +308,7 @@ class Obstacles:
         return np.arange(self.segments), np.arange(len(self.rho))
 
     @cached_property
-    def under_belt(self) -> NDArray[np.bool_]:
+    def under_belt(self) -> Bools:
         """Return what particles held on the incoming belt cannot meet at any height, (S + C,)."""
         held = np.zeros(len(self.surface), dtype=bool)
         held[0] = held[self.pulley] = True

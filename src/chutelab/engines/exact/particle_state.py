@@ -8,15 +8,16 @@ from sys import float_info
 from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chutelab.engines.exact.detect import Bounds, Past
 from chutelab.engines.exact.event_log import STATE, Journal
-from chutelab.engines.exact.obstacles import NONE, Floats, Ints, Obstacles, along, obstacles, pick
+from chutelab.engines.exact.obstacles import NONE, Obstacles, along, obstacles, pick
 from chutelab.machine import Machine, origin
 from chutelab.mechanics.impact import DISK_SHARE
 from chutelab.results import REASONS, Kind
 from chutelab.results.recorder import Recorder, StalledError
+from chutelab.util.arrays import Bools, Floats, Ints
 from chutelab.util.many import Value, at, of
 
 
@@ -323,7 +324,7 @@ NO_SLIP = 1e-13
 """Share of the speeds involved below which a slip is rounding."""
 
 
-def below(limit: Floats, friction: Floats, load: Floats) -> NDArray[np.bool_]:
+def below(limit: Floats, friction: Floats, load: Floats) -> Bools:
     """Tell whether a force is within Coulomb's limit; friction may be inf."""
     finite = np.where(np.isinf(friction), 0.0, friction)
     return np.isinf(friction) | (limit <= finite * load)

@@ -10,20 +10,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.patches import Polygon, Rectangle
-from numpy.typing import NDArray
 
 from chutelab.machine import Machine
 from chutelab.pictures.animation.palette import Label, Lettering, Pixels, tint
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.scenery import round_times, strobe_step, subset, track_times
 from chutelab.results import Recording
+from chutelab.util.arrays import Floats
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
 
-Floats = NDArray[np.float64]
 
 LONGEST = 0.10
 """Share of the picture's width that the arrow of the highest speed is long."""
@@ -350,7 +349,7 @@ class Bars:
         J, see `chutelab.pictures.plots.scenery.energies`; the highest bar sets the scale.
     """
 
-    def __init__(self, ax: Axes, table: Axes, books: dict[str, NDArray[np.float64]]) -> None:
+    def __init__(self, ax: Axes, table: Axes, books: dict[str, Floats]) -> None:
         self.books = books
         heights = [sum(stacks(self._at(i))[0].values()) for i in range(len(books["start"]))]
         self.factor, self.unit = style.scaled(max(heights), "J")

@@ -23,6 +23,7 @@ from chutelab.pictures.plots import machine_of
 from chutelab.results import Recording
 from chutelab.results.comparison import scene_of
 from chutelab.theory import predict
+from chutelab.util.arrays import Bools
 from chutelab.util.files import whole
 
 FOREVER = b"!\xff\x0bNETSCAPE2.0\x03\x01\x00\x00\x00"
@@ -125,7 +126,7 @@ def _block(part: Part, indices: NDArray[np.uint8]) -> bytes:
     return place + image.tobytes("gif", "P", BITS, 0) + b"\0"
 
 
-def bounds(mask: NDArray[np.bool_], part: Part) -> Part | None:
+def bounds(mask: Bools, part: Part) -> Part | None:
     """Return the smallest part that holds all that is true in the mask of a part, None if nothing.
 
     >>> bounds(np.array([[False, True, True], [False, False, False]]), np.s_[10:12, 20:23])

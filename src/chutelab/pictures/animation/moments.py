@@ -15,6 +15,7 @@ from chutelab.pictures.plots import Window, machine_of
 from chutelab.pictures.plots.scenery import STRUCK, action, subset
 from chutelab.pictures.plots.style import quantity
 from chutelab.results import PARTICLES, Kind, Recording
+from chutelab.util.arrays import Bools, Floats, Ints
 
 
 def surface_words(name: str) -> str:
@@ -32,7 +33,7 @@ def _machine(recording: Recording) -> Machine:
     return machine_of(recording)
 
 
-def contact_normal(machine: Machine, event: Any) -> NDArray[np.float64]:
+def contact_normal(machine: Machine, event: Any) -> Floats:
     """Return the unit normal of an impact, away from the surface, (2,).
 
     From where the particle is: a fixed step's velocities have gravity in them, too.
@@ -57,7 +58,7 @@ def contact_normal(machine: Machine, event: Any) -> NDArray[np.float64]:
     return normal if normal @ event["velocity_before"] < 0.0 else -normal
 
 
-def losses(recording: Recording, event: Any) -> NDArray[np.float64]:
+def losses(recording: Recording, event: Any) -> Floats:
     """Return what an impact booked on particle 0, J: belt work, restitution and friction loss."""
     track = recording.track(0)
     now = np.flatnonzero(track["t"] == event["t"])
@@ -126,7 +127,7 @@ def going_on(recording: Recording, event: Any, *, flying: bool, still: bool = Fa
     return f"{verb} on {surface_words(recording.surfaces[event['surface']])}"
 
 
-def in_flight(recording: Recording, times: NDArray[np.float64], near: float) -> NDArray[np.bool_]:
+def in_flight(recording: Recording, times: Floats, near: float) -> Bools:
     """Tell at which times (T,) particle 0 moves as gravity alone would have it.
 
     Just before a time or just after it, within `near` seconds: an impact is in flight too.
@@ -273,7 +274,7 @@ def _events_of_nominal(recording: Recording, begin: float, end: float) -> NDArra
     return np.asarray(events[mine & (events["t"] >= begin) & (events["t"] <= end)])
 
 
-def _held(mine: NDArray[Any]) -> NDArray[np.int64]:
+def _held(mine: NDArray[Any]) -> Ints:
     """Return the indices of the hardest impacts worth a hold, in order, one for each time."""
     struck = np.flatnonzero(np.isin(mine["kind"], [int(kind) for kind in STRUCK]))
     if not len(struck):
@@ -289,8 +290,8 @@ def _held(mine: NDArray[Any]) -> NDArray[np.int64]:
 def _words(
     recording: Recording,
     mine: NDArray[Any],
-    held: NDArray[np.int64],
-    times: NDArray[np.float64],
+    held: Ints,
+    times: Floats,
     slow: float,
 ) -> list[str]:
     """Return the caption at each time: for a while what happened last, then what goes on.
@@ -309,7 +310,7 @@ def _words(
     gone = float(recording.track(0)["t"][-1])
     near = 0.25 * float(np.diff(times).min(initial=np.inf))
     flying = in_flight(recording, times, near)
-    still: NDArray[np.bool_] = ~np.any(subset(recording, [0]).at(times)[1], axis=(1, 2))
+    still: Bools = ~np.any(subset(recording, [0]).at(times)[1], axis=(1, 2))
     captions = []
     for t, flies, lies in zip(times, flying.tolist(), np.asarray(still).tolist(), strict=True):
         story = int(np.searchsorted(mine["t"][stories], t, side="right")) - 1

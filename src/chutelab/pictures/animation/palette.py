@@ -20,6 +20,7 @@ from matplotlib.font_manager import FontProperties
 from numpy.typing import NDArray
 
 from chutelab.pictures.plots import style
+from chutelab.util.arrays import Floats
 
 Pixels = NDArray[np.uint32]
 
@@ -54,7 +55,7 @@ def tint(colour: str, share: float, ground: str = "#FFFFFF") -> str:
     return "#{:02X}{:02X}{:02X}".format(*mixed)
 
 
-def _rgb(colour: str) -> NDArray[np.float64]:
+def _rgb(colour: str) -> Floats:
     return np.array(list(bytes.fromhex(colour.removeprefix("#"))), dtype=np.float64)
 
 

@@ -18,13 +18,13 @@ from chutelab.pictures.plots import Window, analytic_of, draw_analytic, draw_sce
 from chutelab.pictures.plots.scenery import around, energies, round_step, subset, track_times
 from chutelab.results import Recording
 from chutelab.theory import Transfer
+from chutelab.util.arrays import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
     from matplotlib.text import Text
 
-Floats = NDArray[np.float64]
 Box = tuple[float, float, float, float]
 
 SHOWS = ("parabola", "trails", "strobe", "velocity", "energy")

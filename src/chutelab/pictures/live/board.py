@@ -13,13 +13,12 @@ from math import isnan
 from typing import Any
 
 import ipywidgets
-import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.engines.exact import CornerError, run
 from chutelab.machine import build
 from chutelab.pictures.live.picture import View, draw, numbers, table, tracks, view_of
 from chutelab.scene import Scene, SceneError, overridden
+from chutelab.util.arrays import Floats
 
 
 @dataclass(frozen=True)
@@ -145,7 +144,7 @@ class Board:
         self.scene = changed(scene, _simpler(scene))
         self.controls = controls(self.scene)
         self.view = self._view()
-        self.before: list[NDArray[np.float64]] = []
+        self.before: list[Floats] = []
         self.sliders = {
             control.key: ipywidgets.FloatSlider(
                 value=control.value,

@@ -10,13 +10,13 @@ from html import escape
 from math import degrees, isfinite, nan
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.machine import Machine
 from chutelab.pictures.plots import style
 from chutelab.results import Kind, Recording
 from chutelab.results.comparison import observed
 from chutelab.scene import Scene
+from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet
 
 TRACK, GHOST, STRIKE = style.BLUE, style.GREY, style.VERMILION
@@ -63,7 +63,7 @@ class View:
         """Pixels per metre."""
         return min(WIDTH / (self.right - self.left), TALLEST / (self.top - self.bottom))
 
-    def pixels(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def pixels(self, points: Floats) -> Floats:
         """Return points, (..., 2) in m, as pixels from the top left corner."""
         return (points - (self.left, self.top)) * (self.scale, -self.scale)
 
@@ -107,7 +107,7 @@ def view_of(scene: Scene, recording: Recording) -> View:
     return View(float(left), float(right), float(bottom), float(top)).padded(0.08)
 
 
-def tracks(recording: Recording) -> list[NDArray[np.float64]]:
+def tracks(recording: Recording) -> list[Floats]:
     """Return the points of the tracks to draw, (P, 2) each; the first is particle 0's."""
     knots = recording.knots["t"]
     times = np.union1d(np.linspace(knots.min(), knots.max(), SAMPLES), knots[:MOST_KNOTS])
@@ -120,7 +120,7 @@ def draw(
     machine: Machine,
     recording: Recording,
     view: View,
-    before: list[NDArray[np.float64]],
+    before: list[Floats],
 ) -> str:
     """Return the picture of a run as SVG.
 
@@ -218,7 +218,7 @@ def _dots(view: View, recording: Recording) -> list[str]:
 
 def _line(
     view: View,
-    points: NDArray[np.float64],
+    points: Floats,
     colour: str,
     width: float,
     *,

@@ -29,6 +29,7 @@ from chutelab.scene.rules import unit_of
 from chutelab.scene.units import symbol
 from chutelab.scene.variants import Quantity, Variant, Vary, parse, quantities, reason, variants
 from chutelab.theory import predict
+from chutelab.util.arrays import Floats
 
 LABELS = {
     "separation.t": "Leaves pulley at",
@@ -220,7 +221,7 @@ def _nearest(study: Study, axis: int) -> int:
     return int(np.argmin(np.abs(np.array(study.varies[axis].values) - found)))
 
 
-def _columns(knots: NDArray[Any]) -> dict[str, NDArray[np.float64]]:
+def _columns(knots: NDArray[Any]) -> dict[str, Floats]:
     """Return the knots by column; one that holds zeros only is left out."""
     columns = {
         "t": knots["t"],
@@ -234,11 +235,11 @@ def _columns(knots: NDArray[Any]) -> dict[str, NDArray[np.float64]]:
     return {name: values for name, values in columns.items() if values.any()}
 
 
-def _base64(values: NDArray[np.float64]) -> str:
+def _base64(values: Floats) -> str:
     return b64encode(np.ascontiguousarray(values, dtype="<f8").tobytes()).decode("ascii")
 
 
-def _segments(run: Run) -> NDArray[np.float64]:
+def _segments(run: Run) -> Floats:
     """Return a row for each straight surface: ends (m), speed (m/s), restitution, friction."""
     s = run.machine.segments
     return np.column_stack([s.start, s.end, s.speed, s.restitution, s.friction])

@@ -12,19 +12,18 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.style import DPI, Picture
 from chutelab.scene.units import symbol, with_unit
 from chutelab.studies.design import Solution, Uncertainty
 from chutelab.studies.sweep import NUMBERS, REASON, Sweep
+from chutelab.util.arrays import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Floats = NDArray[np.float64]
 
 SIZE = (9.0, 5.6)
 BARS = (style.TRACK, style.STREAM)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.collections import LineCollection
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chutelab.machine.releases import on_belt, release_velocity
 from chutelab.pictures.plots import style
@@ -32,12 +32,10 @@ from chutelab.results.comparison import scene_of
 from chutelab.scene import Incoming, Scene
 from chutelab.theory import Transfer
 from chutelab.theory.separation import separation
+from chutelab.util.arrays import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -237,7 +235,7 @@ def draw_analytic(ax: Axes, parts: tuple[Arc, ...]) -> Axes:
     return ax
 
 
-def _times_of(parts: tuple[Arc, ...], each: int = 120) -> NDArray[np.float64]:
+def _times_of(parts: tuple[Arc, ...], each: int = 120) -> Floats:
     return np.unique(np.concatenate([np.linspace(arc.begin, arc.end, each) for arc in parts]))
 
 
@@ -343,7 +341,7 @@ def draw_velocity(
     return ax
 
 
-def _beyond(times: NDArray[np.float64]) -> float:
+def _beyond(times: Floats) -> float:
     """Return a time a little after the end, so that a jump at the end can be seen."""
     return float(times[-1] + (0.04 * (times[-1] - times[0]) or 1e-3))
 

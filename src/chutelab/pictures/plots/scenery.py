@@ -20,13 +20,12 @@ from chutelab.machine import Machine, build
 from chutelab.pictures.plots import style
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.comparison import scene_of
+from chutelab.util.arrays import Bools, Floats, Ints
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.text import Annotation
 
-
-Floats = NDArray[np.float64]
 
 STRUCK = (Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
 """Kinds of event in which something is hit."""
@@ -35,7 +34,7 @@ STROBES = 10
 """Strobe dots aimed at from separation to the last impact."""
 
 
-def subset(recording: Recording, particles: Sequence[int] | NDArray[np.int64]) -> Recording:
+def subset(recording: Recording, particles: Sequence[int] | Ints) -> Recording:
     """Return the recording of some particles only; its events are left out."""
     tracks = [recording.track(int(i)) for i in particles]
     offsets = np.concatenate([[0], np.cumsum([len(track) for track in tracks])]).astype(np.int64)
@@ -48,7 +47,7 @@ def subset(recording: Recording, particles: Sequence[int] | NDArray[np.int64]) -
     )
 
 
-def spread(count: int, at_most: int) -> NDArray[np.int64]:
+def spread(count: int, at_most: int) -> Ints:
     """Return up to `at_most` particle indices, evenly spread, particle 0 among them."""
     return np.unique(np.linspace(0, count - 1, min(count, at_most)).astype(np.int64))
 
@@ -200,16 +199,14 @@ class Window:
         x, y = 0.5 * (self.left + self.right), 0.5 * (self.bottom + self.top)
         return Window(x - width / 2, x + width / 2, y - height / 2, y + height / 2)
 
-    def holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def holds(self, points: Floats) -> Bools:
         """Tell which points, (..., 2), lie inside."""
         x, y = points[..., 0], points[..., 1]
         return np.asarray(
             (x >= self.left) & (x <= self.right) & (y >= self.bottom) & (y <= self.top)
         )
 
-    def clip(
-        self, start: NDArray[np.float64], end: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    def clip(self, start: Floats, end: Floats) -> tuple[Floats, Floats] | None:
         """Return the ends of the part of a straight line inside, None if it stays outside."""
         along = end - start
         low, high = 0.0, 1.0
@@ -250,7 +247,7 @@ def window_of(recording: Recording, machine: Machine) -> Window:
     return around(np.concatenate(points)).padded(left, right, 0.10, 0.12)
 
 
-def _path(recording: Recording) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _path(recording: Recording) -> tuple[Floats, Floats]:
     """Return particle 0's positions up to landing or last impact, and from there to its end."""
     begin, end = action(recording)
     mine = recording.events[recording.events["particle"] == 0]
@@ -269,7 +266,7 @@ def _path(recording: Recording) -> tuple[NDArray[np.float64], NDArray[np.float64
     return position[times <= last], position[times > last]
 
 
-def _crowd(recording: Recording) -> NDArray[np.float64]:
+def _crowd(recording: Recording) -> Floats:
     """Corners of the box around where the others strike something, or the middle 96 % of many.
 
     Where they are released counts too if no belt carries them from there.
@@ -285,7 +282,7 @@ def _crowd(recording: Recording) -> NDArray[np.float64]:
     return np.asarray(np.quantile(others["position"], [strays, 1.0 - strays], axis=0))
 
 
-def around(points: NDArray[np.float64]) -> Window:
+def around(points: Floats) -> Window:
     """Return the smallest window that holds points, (P, 2), and is not without extent."""
     (left, bottom), (right, top) = points.min(axis=0), points.max(axis=0)
     least = 0.01 * max(right - left, top - bottom) or 0.1
@@ -366,7 +363,7 @@ def _label(
     ax: Axes,
     machine: Machine,
     segment: int,
-    part: tuple[NDArray[np.float64], NDArray[np.float64]],
+    part: tuple[Floats, Floats],
     shown: Window,
 ) -> Annotation:
     """Name a surface at its part that is shown, on the side where no particle is expected."""
@@ -431,7 +428,7 @@ def _motion(speed: float) -> str:
     return f"{abs(speed):.3g} m/s {arrow}" if speed != 0.0 else "at rest"
 
 
-def shown_particles(recording: Recording, at_most: int) -> NDArray[np.int64]:
+def shown_particles(recording: Recording, at_most: int) -> Ints:
     """Return the particles to draw: up to `at_most` released ones, particle 0 among them."""
     chosen = spread(recording.count, at_most)
     released = recording.offsets[1:] > recording.offsets[:-1]

@@ -14,9 +14,10 @@ from chutelab.pictures.plots.figure import draw_view
 from chutelab.pictures.plots.panels import analytic_of
 from chutelab.pictures.plots.scenery import HALO, round_times, strobe_step, subset
 from chutelab.pictures.plots.style import Picture
-from chutelab.results import Floats, Recording
+from chutelab.results import Recording
 from chutelab.results.comparison import scene_of
 from chutelab.theory import Transfer, predict
+from chutelab.util.arrays import Floats
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

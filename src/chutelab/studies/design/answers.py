@@ -14,12 +14,13 @@ from typing import Any, Final
 import numpy as np
 
 from chutelab.engines.simulation import simulate
-from chutelab.results import Floats, Recording
+from chutelab.results import Recording
 from chutelab.scene import Scene
 from chutelab.scene.units import symbol, with_unit, write_size
 from chutelab.studies.design.evaluation import NO_RUN, Span, varied
 from chutelab.studies.design.roots import Change, Scan
 from chutelab.studies.design.sensitivity import Sensitivity
+from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet, Shown, frame
 
 DIGITS: Final = 10

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.engines.simulation import simulate
-from chutelab.results import ENTRIES, REASONS, Floats, Kind, Recording
+from chutelab.results import ENTRIES, REASONS, Kind, Recording
 from chutelab.results.comparison import from_events, never
 from chutelab.results.recorder import StalledError
 from chutelab.scene import Scene, SceneError, overridden, rules, to_dict
@@ -35,8 +35,7 @@ from chutelab.studies.design.quantities import (
     measured,
 )
 from chutelab.studies.sweep.batch import Batch, Block, one_line
-
-Ints = NDArray[np.int64]
+from chutelab.util.arrays import Floats, Ints
 
 FORM: Final = "must be KEY=FROM:TO, such as plate.angle_deg=0:80"
 

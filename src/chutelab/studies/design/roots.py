@@ -14,9 +14,9 @@ from typing import Final, Literal
 
 import numpy as np
 
-from chutelab.results import Floats
 from chutelab.studies.design.evaluation import NO_RUN, Evaluator
 from chutelab.studies.design.quantities import scipy
+from chutelab.util.arrays import Floats
 
 Function = Callable[[float], float]
 

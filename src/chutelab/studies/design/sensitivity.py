@@ -12,9 +12,9 @@ from typing import Final
 
 import numpy as np
 
-from chutelab.results import Floats
 from chutelab.studies.design.evaluation import Evaluator, Span
 from chutelab.studies.design.quantities import scipy
+from chutelab.util.arrays import Floats
 
 RESAMPLES: Final = 200
 """Of the bootstrap, enough for an interval of two digits."""

@@ -13,7 +13,6 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from chutelab.results import Floats
 from chutelab.scene import Scene
 from chutelab.studies.design.answers import Answer, Solution, asked
 from chutelab.studies.design.evaluation import Evaluator, ranges
@@ -27,8 +26,7 @@ from chutelab.studies.design.quantities import (
 )
 from chutelab.studies.design.roots import CLOSE, Change, Scan, level, minima, roots, scan
 from chutelab.studies.design.sensitivity import sensitivities
-
-Progress = Callable[[float], None]
+from chutelab.util.arrays import Floats, Progress
 
 NOWHERE: Final = 1e30
 """Stands for a variant without the quantity: worse than any other, but a number still."""

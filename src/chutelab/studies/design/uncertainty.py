@@ -13,7 +13,6 @@ from typing import Any, Final, Literal
 
 import numpy as np
 
-from chutelab.results import Floats
 from chutelab.scene import Scene, SceneError
 from chutelab.scene.overrides import limits_of, parts_of, rule_at, value_at
 from chutelab.scene.units import read_size, with_unit
@@ -28,6 +27,7 @@ from chutelab.studies.design.evaluation import (
 )
 from chutelab.studies.design.quantities import DesignError, each_once, measured, scipy
 from chutelab.studies.design.sensitivity import Indices, crossed, design, indices
+from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet, Shown, csv_text, frame
 
 FORM: Final = (

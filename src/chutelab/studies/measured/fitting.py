@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.scene import Fault, Scene, SceneError
 from chutelab.studies.measured import result
@@ -22,7 +21,8 @@ from chutelab.studies.measured.parameters import (
 )
 from chutelab.studies.measured.residuals import LEAST, Residuals, best_t0, follow, inside, over, run
 from chutelab.studies.measured.result import Fit
-from chutelab.studies.measured.track import Floats, MeasuredError, Track
+from chutelab.studies.measured.track import MeasuredError, Track
+from chutelab.util.arrays import Bools, Floats
 
 
 class Problem:
@@ -40,9 +40,9 @@ class Problem:
         self.scene, self.track, self.parameters = scene, track, parameters
         self.start = np.array([parameter.start for parameter in parameters])
         self.sizes = np.array([parameter.size for parameter in parameters])
-        self.used: NDArray[np.bool_] = np.ones(len(track), dtype=bool)
+        self.used: Bools = np.ones(len(track), dtype=bool)
 
-    def use(self, used: NDArray[np.bool_]) -> None:
+    def use(self, used: Bools) -> None:
         """Choose the points that count."""
         if 2 * used.sum() <= len(self.start):
             text = f"{2 * used.sum()} coordinates cannot tell {len(self.start)} parameters"
@@ -62,7 +62,7 @@ class Problem:
         scene, track = self.at(values)
         return over(run(scene), track)
 
-    def within(self, values: Floats) -> NDArray[np.bool_]:
+    def within(self, values: Floats) -> Bools:
         """Return which points lie within the simulated time with these values."""
         scene, track = self.at(values)
         return inside(run(scene), track)
@@ -172,7 +172,7 @@ class _Minimum:
     """
 
     values: Floats
-    used: NDArray[np.bool_]
+    used: Bools
     cost: float
     threshold: float
     settled: bool

@@ -17,7 +17,8 @@ import numpy as np
 from chutelab.scene import MISSING, Fault, Scene, SceneError, overridden, shown
 from chutelab.scene.errors import at_path, joined
 from chutelab.scene.overrides import limits_of, rule_at
-from chutelab.studies.measured.track import Floats, MeasuredError, Track
+from chutelab.studies.measured.track import MeasuredError, Track
+from chutelab.util.arrays import Floats
 
 PLACEMENT: Final = {
     "t0": ("s", -np.inf, np.inf),

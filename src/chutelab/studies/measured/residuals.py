@@ -8,13 +8,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.engines.simulation import simulate
 from chutelab.results import Recording
 from chutelab.scene import Fault, Scene, from_dict, to_dict
 from chutelab.scene.units import write_size
-from chutelab.studies.measured.track import Floats, MeasuredError, Track, counted
+from chutelab.studies.measured.track import MeasuredError, Track, counted
+from chutelab.util.arrays import Bools, Floats
 from chutelab.util.tables import Sheet, Shown
 
 ROUNDING = 1e-9
@@ -43,7 +43,7 @@ class Residuals(Shown):
     simulated: Floats
 
     @property
-    def used(self) -> NDArray[np.bool_]:
+    def used(self) -> Bools:
         """Which points lie within the simulated time, shape (P,)."""
         return np.asarray(np.isfinite(self.simulated[:, 0]))
 
@@ -140,7 +140,7 @@ def over(recording: Recording, track: Track) -> Residuals:
     return Residuals(track, recording, simulated)
 
 
-def inside(recording: Recording, track: Track) -> NDArray[np.bool_]:
+def inside(recording: Recording, track: Track) -> Bools:
     """Return which points were measured between release and end of particle 0, shape (P,)."""
     begin, end = ends(recording)
     return np.asarray((track.t >= begin - ROUNDING) & (track.t <= end + ROUNDING))

@@ -16,7 +16,8 @@ from chutelab.scene import Scene
 from chutelab.scene.units import write_size
 from chutelab.studies.measured.parameters import Parameter
 from chutelab.studies.measured.residuals import Residuals, best_t0, over
-from chutelab.studies.measured.track import Floats, MeasuredError
+from chutelab.studies.measured.track import MeasuredError
+from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet, Shown
 
 MAD = 1.4826

@@ -7,13 +7,10 @@ from math import isfinite
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.scene import Fault, SceneError
+from chutelab.util.arrays import Floats, Ints
 from chutelab.util.tables import Sheet, Shown
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 class MeasuredError(SceneError):

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.engines.exact import CornerError, kinds, run
 from chutelab.engines.simulation import simulate
@@ -31,12 +30,12 @@ from chutelab.scene.variants import (
     variant,
 )
 from chutelab.studies.sweep.rows import REASON, Columns, empty, joined, rows
+from chutelab.util.arrays import Bools, Floats, Ints
 
-Ints = NDArray[np.int64]
 Reader = Callable[[Recording, Scene, Ints], None]
 
 
-def screened(block: Block) -> tuple[Scene | None, NDArray[np.int64], dict[int, str]]:
+def screened(block: Block) -> tuple[Scene | None, Ints, dict[int, str]]:
     """Validate the variants of a block.
 
     A value is judged by its key, once for each. The rules between keys judge one variant for each
@@ -78,7 +77,7 @@ def screened(block: Block) -> tuple[Scene | None, NDArray[np.int64], dict[int, s
     return template, sound, faults
 
 
-def _of_bad_values(block: Block, good: NDArray[np.bool_]) -> dict[int, str]:
+def _of_bad_values(block: Block, good: Bools) -> dict[int, str]:
     """Say what is wrong with variants that have a value which its key does not take."""
     bad = np.flatnonzero(~good.all(axis=0))
     asked = set(range(len(block.paths)))
@@ -106,7 +105,7 @@ def _asked(block: Block, row: int) -> set[int]:
     return {k for k, path in enumerate(block.paths) if path in asked}
 
 
-def _groups(values: NDArray[np.float64], keys: list[int]) -> tuple[Ints, Ints]:
+def _groups(values: Floats, keys: list[int]) -> tuple[Ints, Ints]:
     """Return the first variant of each combination of some keys, and the combination of each."""
     if not keys:
         return np.zeros(1, dtype=np.int64), np.zeros(len(values), dtype=np.int64)
@@ -264,7 +263,7 @@ class Block:
     source: str
     keys: tuple[str, ...]
     paths: tuple[str, ...]
-    values: NDArray[np.float64]
+    values: Floats
     engine: str | None
 
 

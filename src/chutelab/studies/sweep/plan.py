@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.engines.simulation import ENGINES
 from chutelab.scene import Scene, to_dict
@@ -24,6 +23,7 @@ from chutelab.scene.variants import (
     parse_range,
     quantities,
 )
+from chutelab.util.arrays import Floats
 
 DESIGNS: Final = {"lhs": "LatinHypercube", "sobol": "Sobol"}
 """Names of the designs, and of the classes of `scipy.stats.qmc` that draw them."""
@@ -40,7 +40,7 @@ def drawn(
     design: str,
     seed: int,
     most: int,
-) -> NDArray[np.float64]:
+) -> Floats:
     """Draw samples, (count, K), between the two values of each `Vary`.
 
     Whole numbers are drawn with both ends, all equally likely. The same seed draws the same
@@ -109,7 +109,7 @@ class Plan:
     varies: tuple[Vary, ...]
     quantities: tuple[Quantity, ...]
     engine: str | None
-    samples: NDArray[np.float64] | None
+    samples: Floats | None
     count: int
 
     @property
@@ -117,7 +117,7 @@ class Plan:
         """The varied keys, as they were written."""
         return tuple(vary.key for vary in self.varies)
 
-    def values(self, first: int, last: int) -> NDArray[np.float64]:
+    def values(self, first: int, last: int) -> Floats:
         """Return the values of the variants from `first` up to `last`, (n, K)."""
         if self.samples is not None:
             return self.samples[first:last] + 0.0

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from chutelab.scene.variants import Quantity
 from chutelab.studies.sweep.plan import Plan
 from chutelab.studies.sweep.rows import NUMBERS, REASON
+from chutelab.util.arrays import Floats
 from chutelab.util.files import whole
 from chutelab.util.tables import Sheet, Shown, frame, number
 from chutelab.util.versions import version_of
@@ -98,7 +99,7 @@ def columns_of(names: Sequence[str], text: str) -> dict[str, NDArray[Any]]:
     }
 
 
-def _numbers(values: NDArray[np.float64]) -> list[str]:
+def _numbers(values: Floats) -> list[str]:
     """Write numbers in as few digits as give them back, whole ones without a point."""
     return ["" if x != x else repr(x).removesuffix(".0") for x in values.tolist()]
 

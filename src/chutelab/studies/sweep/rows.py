@@ -17,10 +17,9 @@ from chutelab.results import ENTRIES, REASONS, Kind, Recording, balance
 from chutelab.results.comparison import QUANTITIES, from_events, never, relative_errors, scales
 from chutelab.scene import Scene
 from chutelab.theory import unbounded
+from chutelab.util.arrays import Bools, Floats
 
 Columns = dict[str, NDArray[Any]]
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 NUMBERS: dict[str, tuple[str, str]] = {
     "landing.x": ("x of the landing on the outgoing belt, mean over the particles", "m"),

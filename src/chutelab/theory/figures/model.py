@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from chutelab.scene import Scene
 from chutelab.theory.paper import FALL
 from chutelab.theory.transfer import transfer
+from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet, Shown, csv_text
-
-Floats = NDArray[np.float64]
 
 Form = Literal["as-printed", "corrected"]
 

@@ -19,7 +19,6 @@ from chutelab.theory.figures.model import (
     POINTS,
     RESTITUTION,
     Flight,
-    Floats,
     Form,
     Line,
     Panel,
@@ -28,6 +27,7 @@ from chutelab.theory.figures.model import (
     path,
 )
 from chutelab.theory.paper import BALL_MASS, FALL, PLATE_AHEAD
+from chutelab.util.arrays import Floats
 
 PULLEY: Final = {11: 0.1, 12: 0.05, 13: 0.05}
 """m; supports have no pulley, so any that is left at the top will do."""

@@ -11,7 +11,6 @@ from chutelab.theory.figures.model import (
     FORMS,
     GRAVITY,
     RESTITUTION,
-    Floats,
     Form,
     Line,
     Panel,
@@ -20,6 +19,7 @@ from chutelab.theory.figures.model import (
 from chutelab.theory.paper import DISTANCES, FALL, RADII
 from chutelab.theory.results import Transfer
 from chutelab.theory.transfer import transfer
+from chutelab.util.arrays import Floats
 
 MASS: Final = 0.008
 """kg; the paper says 7.95 g to 8 g."""

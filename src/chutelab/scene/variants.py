@@ -25,240 +25,16 @@ from chutelab.scene.schema import Scene
 from chutelab.scene.units import read_size
 from chutelab.util.arrays import Bools, Floats
 
-_PATH: Final = re.compile(r"(?:(\w+)(?:\[(\d+)\])?\.)?(\w+)")
-
-_DEPENDENT: Final = {"plate": "pivot_height", "outgoing": "speed"}
-"""Keys whose defaults are other keys."""
-
-
-def _parted(path: str) -> tuple[str | None, int | None, str] | None:
-    """Take ``surface[0].speed`` apart: table, index, key; None if it goes deeper."""
-    match = _PATH.fullmatch(path)
-    if match is None:
-        return None
-    return match[1], None if match[2] is None else int(match[2]), match[3]
-
-
-def is_plain(path: str) -> bool:
-    """Tell whether a key holds a number that is no whole one, nor part of a list."""
-    parts = _parted(path)
-    if parts is None:
-        return False
-    table, index, key = parts
-    if table not in (None, *Scene.tables()) or (index is not None) != (table == "surface"):
-        return False
-    field = (Scene if table is None else Scene.tables()[table]).model_fields.get(key)
-    return (
-        field is not None
-        and "float" in str(field.annotation)
-        and "tuple" not in str(field.annotation)
-    )
-
-
-def accepted(path: str, values: Floats) -> Bools:
-    """Tell which values a key takes, (N,), if nothing else is looked at."""
-    good = np.ones(len(values), dtype=bool)
-    try:
-        _adapter(path).validate_python(values.tolist())
-    except ValidationError as error:
-        good[[int(fault["loc"][0]) for fault in error.errors(include_url=False)]] = False
-    return good
-
-
-@cache
-def _adapter(path: str) -> TypeAdapter[Any]:
-    """Return what validates a list of values of a key as its model does."""
-    parts = _parted(path)
-    assert parts is not None
-    field = (Scene if parts[0] is None else Scene.tables()[parts[0]]).model_fields[parts[2]]
-    kind: Any = field.annotation
-    for limit in field.metadata:
-        kind = Annotated[kind, limit]
-    return TypeAdapter(list[kind])
-
-
-class _Noting(Look):
-    """Notes which keys the rules ask for: they cannot depend on another one."""
-
-    def __init__(self, document: Mapping[str, Any], model: Any) -> None:
-        super().__init__(document, model)
-        self.asked: set[str] = set()
-
-    def __call__(self, table: str, key: str) -> Any:
-        self.asked.add(f"{table}.{key}")
-        return super().__call__(table, key)
-
-
-def judged_by(mapping: Mapping[str, Any], overrides: Sequence[str] = ()) -> set[str]:
-    """Return the keys of tables whose numbers decide whether a scene contradicts itself.
-
-    Another number under any other key makes no contradiction, nor takes one away.
-
-    Parameters
-    ----------
-    mapping, overrides
-        As `chutelab.scene.from_dict` takes them; each key by itself must be right.
-    """
-    document = plain(mapping)
-    apply(document, overrides)
-    look = _Noting(document, Scene)
-    for _ in conflicts(look):
-        pass
-    return look.asked
-
-
-def family(scene: Scene, columns: Mapping[str, Floats]) -> Scene:
-    """Return scenes that differ in plain numbers; they are not validated.
-
-    Parameters
-    ----------
-    scene : Scene
-        What they share, defaults included.
-    columns : mapping of ndarray, (N,)
-        Values of each varied key by its full path, such as ``plate.angle_deg``.
-
-    Returns
-    -------
-    Scene
-        With arrays under these keys, and under those whose defaults they are; `Scene.members` is N.
-    """
-    changes: dict[str, Any] = {}
-    for path, values in columns.items():
-        parts = _parted(path)
-        assert parts is not None
-        table, index, key = parts
-        if table is None:
-            changes[key] = values
-        elif index is None:
-            given = changes.get(table, getattr(scene, table))
-            changes[table] = given.model_copy(update={key: values})
-        else:
-            surfaces = list(changes.get(table, scene.surface))
-            surfaces[index] = surfaces[index].model_copy(update={key: values})
-            changes[table] = tuple(surfaces)
-    for table, key in _DEPENDENT.items():
-        given = changes.get(table, getattr(scene, table))
-        if given is not None and key not in given.model_fields_set:
-            changes[table] = given.model_copy(update={key: None})
-    many = scene.model_copy(update=changes)
-    many._source, many._members = scene.source, len(next(iter(columns.values())))
-    many._fill_defaults()
-    return many
-
-
-_VARIABLE: Final = ("particle", "incoming", "plate", "outgoing", "surface", "stream", "run")
-"""Tables whose numbers change what happens."""
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """What a varied key is.
-
-    Attributes
-    ----------
-    path : str
-        The key as messages have it; free surfaces by index.
-    label : str
-        Its definition, up to the first semicolon or colon; of a free surface, after its name.
-    unit : str
-        "" for a pure number; "degrees" for angles.
-    whole : bool
-        Whether it takes whole numbers only.
-    """
-
-    path: str
-    label: str
-    unit: str
-    whole: bool = False
-
-
-def quantity(scene: Scene, vary: Vary) -> Quantity:
-    """Return what a varied key of a scene is.
-
-    Raises
-    ------
-    VaryError
-        If the scene knows no such key, or it holds no number.
-    """
-    # Through JSON, so that there are lists to lay a value into, as in a file.
-    document = json.loads(json.dumps(to_dict(scene)))
-    faults, given = apply(document, [setting(vary.key, vary.values[0])])
-    if faults:
-        raise VaryError(vary.typed, faults[0].allowed)
-    (path,) = given
-    table, _, name = path.partition(".")
-    home = Scene if table == path else Scene.tables().get(table.partition("[")[0])
-    key = (name or table).partition("[")[0]
-    if home is None or key not in {f.alias or n for n, f in home.model_fields.items()}:
-        raise VaryError(vary.typed, _unknown(document, path))
-    about = home.model_json_schema()["properties"][key]
-    indexed = (name or table) != key
-    if not (indexed or _numeric(about)) or (home is not Scene and not table.startswith(_VARIABLE)):
-        raise VaryError(vary.typed, f"{path} is no number, and only numbers can be varied")
-    unit = str(about.get("x-unit") or "")
-    if vary.unit not in ("", unit) and (vary.unit, unit) != ("%", ""):
-        own = f"is in {unit}" if unit else "is a pure number"
-        raise VaryError(vary.typed, f"{path} {own}, not in {vary.unit}; plain numbers will do")
-    if indexed:
-        return Quantity(path, path, unit)
-    label = re.split("[;:]", str(about.get("description", path)))[0].removesuffix(".")
-    label = label.removesuffix(f" ({unit})").replace("->", "→")
-    if table.startswith("surface["):
-        name = document["surface"][int(table[8:-1])].get("name")
-        label = f"{name}: {label[0].lower()}{label[1:]}"
-    return Quantity(path, label, unit, whole="number" not in _kinds(about))
-
-
-def _numeric(about: dict[str, Any]) -> bool:
-    return bool(_kinds(about) & {"number", "integer"})
-
-
-def _kinds(about: dict[str, Any]) -> set[Any]:
-    return {about.get("type"), *(option.get("type") for option in about.get("anyOf", ()))}
-
-
-def _unknown(document: dict[str, Any], path: str) -> str:
-    """Say what the scene says of a key that it does not know."""
-    try:
-        from_dict(document)
-    except SceneError as error:
-        for fault in error.faults:
-            if fault.value is not MISSING and path.startswith(fault.key):
-                return fault.allowed
-    return "unknown key; `chutelab schema` lists all"
-
-
-def quantities(scene: Scene, varies: Sequence[Vary]) -> tuple[Quantity, ...]:
-    """Return what each of the varied keys is.
-
-    Raises
-    ------
-    VaryError
-        If a key cannot be varied, or two are the same.
-    """
-    found: list[Quantity] = []
-    for vary in varies:
-        one = quantity(scene, vary)
-        if any(one.path == other.path for other in found):
-            raise VaryError(vary.typed, f"{one.path} is varied already")
-        found.append(one)
-    return tuple(found)
-
-
-def setting(key: str, value: float) -> Setting:
-    """Return an override of one key, in digits that give the value back."""
-    # A whole number will do for a float, but not the other way round.
-    whole = value.is_integer() and abs(value) < 2.0**53
-    written = str(int(value)) if whole else repr(value)
-    return Setting(f"{key}={written}", f"--vary {key}={written}")
-
 
 MOST_VALUES: Final = 10_000
 """Values of one key; more would be a slip of the keyboard."""
 
+
 FORM: Final = "must be KEY=FROM:TO:COUNT, such as plate.angle_deg=-20:70:46, or KEY=a,b,c"
 
+
 RANGE_FORM: Final = "must be KEY=FROM:TO, such as plate.angle_deg=-20:70"
+
 
 _WITH_UNIT: Final = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) *([^\s\d].*)?")
 
@@ -409,6 +185,113 @@ def _even(first: float, last: float, count: int) -> tuple[float, ...]:
     return tuple(values)
 
 
+_VARIABLE: Final = ("particle", "incoming", "plate", "outgoing", "surface", "stream", "run")
+"""Tables whose numbers change what happens."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a varied key is.
+
+    Attributes
+    ----------
+    path : str
+        The key as messages have it; free surfaces by index.
+    label : str
+        Its definition, up to the first semicolon or colon; of a free surface, after its name.
+    unit : str
+        "" for a pure number; "degrees" for angles.
+    whole : bool
+        Whether it takes whole numbers only.
+    """
+
+    path: str
+    label: str
+    unit: str
+    whole: bool = False
+
+
+def quantity(scene: Scene, vary: Vary) -> Quantity:
+    """Return what a varied key of a scene is.
+
+    Raises
+    ------
+    VaryError
+        If the scene knows no such key, or it holds no number.
+    """
+    # Through JSON, so that there are lists to lay a value into, as in a file.
+    document = json.loads(json.dumps(to_dict(scene)))
+    faults, given = apply(document, [setting(vary.key, vary.values[0])])
+    if faults:
+        raise VaryError(vary.typed, faults[0].allowed)
+    (path,) = given
+    table, _, name = path.partition(".")
+    home = Scene if table == path else Scene.tables().get(table.partition("[")[0])
+    key = (name or table).partition("[")[0]
+    if home is None or key not in {f.alias or n for n, f in home.model_fields.items()}:
+        raise VaryError(vary.typed, _unknown(document, path))
+    about = home.model_json_schema()["properties"][key]
+    indexed = (name or table) != key
+    if not (indexed or _numeric(about)) or (home is not Scene and not table.startswith(_VARIABLE)):
+        raise VaryError(vary.typed, f"{path} is no number, and only numbers can be varied")
+    unit = str(about.get("x-unit") or "")
+    if vary.unit not in ("", unit) and (vary.unit, unit) != ("%", ""):
+        own = f"is in {unit}" if unit else "is a pure number"
+        raise VaryError(vary.typed, f"{path} {own}, not in {vary.unit}; plain numbers will do")
+    if indexed:
+        return Quantity(path, path, unit)
+    label = re.split("[;:]", str(about.get("description", path)))[0].removesuffix(".")
+    label = label.removesuffix(f" ({unit})").replace("->", "→")
+    if table.startswith("surface["):
+        name = document["surface"][int(table[8:-1])].get("name")
+        label = f"{name}: {label[0].lower()}{label[1:]}"
+    return Quantity(path, label, unit, whole="number" not in _kinds(about))
+
+
+def _numeric(about: dict[str, Any]) -> bool:
+    return bool(_kinds(about) & {"number", "integer"})
+
+
+def _kinds(about: dict[str, Any]) -> set[Any]:
+    return {about.get("type"), *(option.get("type") for option in about.get("anyOf", ()))}
+
+
+def _unknown(document: dict[str, Any], path: str) -> str:
+    """Say what the scene says of a key that it does not know."""
+    try:
+        from_dict(document)
+    except SceneError as error:
+        for fault in error.faults:
+            if fault.value is not MISSING and path.startswith(fault.key):
+                return fault.allowed
+    return "unknown key; `chutelab schema` lists all"
+
+
+def quantities(scene: Scene, varies: Sequence[Vary]) -> tuple[Quantity, ...]:
+    """Return what each of the varied keys is.
+
+    Raises
+    ------
+    VaryError
+        If a key cannot be varied, or two are the same.
+    """
+    found: list[Quantity] = []
+    for vary in varies:
+        one = quantity(scene, vary)
+        if any(one.path == other.path for other in found):
+            raise VaryError(vary.typed, f"{one.path} is varied already")
+        found.append(one)
+    return tuple(found)
+
+
+def setting(key: str, value: float) -> Setting:
+    """Return an override of one key, in digits that give the value back."""
+    # A whole number will do for a float, but not the other way round.
+    whole = value.is_integer() and abs(value) < 2.0**53
+    written = str(int(value)) if whole else repr(value)
+    return Setting(f"{key}={written}", f"--vary {key}={written}")
+
+
 MOST_VARIED: Final = 2
 """Keys varied at once: a slider each, or the two axes of a picture."""
 
@@ -505,3 +388,125 @@ def variant(
 def reason(error: SceneError) -> str:
     """Return the faults of a scene without its file, in one line."""
     return "; ".join(str(fault) for fault in error.faults)
+
+
+_PATH: Final = re.compile(r"(?:(\w+)(?:\[(\d+)\])?\.)?(\w+)")
+
+
+_DEPENDENT: Final = {"plate": "pivot_height", "outgoing": "speed"}
+"""Keys whose defaults are other keys."""
+
+
+def _parted(path: str) -> tuple[str | None, int | None, str] | None:
+    """Take ``surface[0].speed`` apart: table, index, key; None if it goes deeper."""
+    match = _PATH.fullmatch(path)
+    if match is None:
+        return None
+    return match[1], None if match[2] is None else int(match[2]), match[3]
+
+
+def is_plain(path: str) -> bool:
+    """Tell whether a key holds a number that is no whole one, nor part of a list."""
+    parts = _parted(path)
+    if parts is None:
+        return False
+    table, index, key = parts
+    if table not in (None, *Scene.tables()) or (index is not None) != (table == "surface"):
+        return False
+    field = (Scene if table is None else Scene.tables()[table]).model_fields.get(key)
+    return (
+        field is not None
+        and "float" in str(field.annotation)
+        and "tuple" not in str(field.annotation)
+    )
+
+
+def accepted(path: str, values: Floats) -> Bools:
+    """Tell which values a key takes, (N,), if nothing else is looked at."""
+    good = np.ones(len(values), dtype=bool)
+    try:
+        _adapter(path).validate_python(values.tolist())
+    except ValidationError as error:
+        good[[int(fault["loc"][0]) for fault in error.errors(include_url=False)]] = False
+    return good
+
+
+@cache
+def _adapter(path: str) -> TypeAdapter[Any]:
+    """Return what validates a list of values of a key as its model does."""
+    parts = _parted(path)
+    assert parts is not None
+    field = (Scene if parts[0] is None else Scene.tables()[parts[0]]).model_fields[parts[2]]
+    kind: Any = field.annotation
+    for limit in field.metadata:
+        kind = Annotated[kind, limit]
+    return TypeAdapter(list[kind])
+
+
+class _Noting(Look):
+    """Notes which keys the rules ask for: they cannot depend on another one."""
+
+    def __init__(self, document: Mapping[str, Any], model: Any) -> None:
+        super().__init__(document, model)
+        self.asked: set[str] = set()
+
+    def __call__(self, table: str, key: str) -> Any:
+        self.asked.add(f"{table}.{key}")
+        return super().__call__(table, key)
+
+
+def judged_by(mapping: Mapping[str, Any], overrides: Sequence[str] = ()) -> set[str]:
+    """Return the keys of tables whose numbers decide whether a scene contradicts itself.
+
+    Another number under any other key makes no contradiction, nor takes one away.
+
+    Parameters
+    ----------
+    mapping, overrides
+        As `chutelab.scene.from_dict` takes them; each key by itself must be right.
+    """
+    document = plain(mapping)
+    apply(document, overrides)
+    look = _Noting(document, Scene)
+    for _ in conflicts(look):
+        pass
+    return look.asked
+
+
+def family(scene: Scene, columns: Mapping[str, Floats]) -> Scene:
+    """Return scenes that differ in plain numbers; they are not validated.
+
+    Parameters
+    ----------
+    scene : Scene
+        What they share, defaults included.
+    columns : mapping of ndarray, (N,)
+        Values of each varied key by its full path, such as ``plate.angle_deg``.
+
+    Returns
+    -------
+    Scene
+        With arrays under these keys, and under those whose defaults they are; `Scene.members` is N.
+    """
+    changes: dict[str, Any] = {}
+    for path, values in columns.items():
+        parts = _parted(path)
+        assert parts is not None
+        table, index, key = parts
+        if table is None:
+            changes[key] = values
+        elif index is None:
+            given = changes.get(table, getattr(scene, table))
+            changes[table] = given.model_copy(update={key: values})
+        else:
+            surfaces = list(changes.get(table, scene.surface))
+            surfaces[index] = surfaces[index].model_copy(update={key: values})
+            changes[table] = tuple(surfaces)
+    for table, key in _DEPENDENT.items():
+        given = changes.get(table, getattr(scene, table))
+        if given is not None and key not in given.model_fields_set:
+            changes[table] = given.model_copy(update={key: None})
+    many = scene.model_copy(update=changes)
+    many._source, many._members = scene.source, len(next(iter(columns.values())))
+    many._fill_defaults()
+    return many

@@ -25,18 +25,192 @@ from chutelab.scene import Scene, from_dict
 from chutelab.theory import predict, transfer
 from chutelab.util.arrays import Floats
 
+Answer = dict[str, Floats]
+
+
+TRANSFER = ("t2", "y2", "t3", "x3", "v3x", "v3y")
+"""Time and fall to the plate; from there time and way back to the landing, landing velocity."""
+
+
+GRIP = ("t_grip", "x_grip")
+"""Time (s) and way forward (m) from the landing to the end of the slip."""
+
+
+REST = ("t_rest", "y_rest")
+"""Time (s) from the release, and height (m), at which a bouncing particle lies still."""
+
+
+class MissedError(ValueError):
+    """A particle never got to where the case ends."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """What an answer should be, and by what errors are measured.
+
+    Attributes
+    ----------
+    values : dict of ndarray, (N,)
+        By quantity.
+    sizes : dict of float
+        Scale of each quantity, as `chutelab.results.comparison.relative_error` takes it.
+    """
+
+    values: Answer
+    sizes: Mapping[str, float]
+
+
+def of_transfer(recording: Recording) -> Answer:
+    """Read the `TRANSFER` quantities of all particles off a recording."""
+    left, hit, down = (
+        _first(recording, kind, surface)
+        for kind, surface in (
+            (Kind.SEPARATION, "incoming"),
+            (Kind.IMPACT, "plate"),
+            (Kind.LANDING, "outgoing"),
+        )
+    )
+    return {
+        "t2": hit["t"] - left["t"],
+        "y2": left["y"] - hit["y"],
+        "t3": down["t"] - hit["t"],
+        "x3": hit["x"] - down["x"],
+        "v3x": -down["vx"],
+        "v3y": -down["vy"],
+    }
+
+
+def of_grip(recording: Recording) -> Answer:
+    """Read the `TRANSFER` and `GRIP` quantities off a recording of lone particles."""
+    down = _first(recording, Kind.LANDING, "outgoing")
+    held = _last(recording, Kind.STICK, "outgoing")
+    return {
+        **of_transfer(recording),
+        "t_grip": held["t"] - down["t"],
+        "x_grip": held["x"] - down["x"],
+    }
+
+
+def of_rest(recording: Recording) -> Answer:
+    """Read the `REST` quantities off a recording."""
+    begin = _first(recording, Kind.RELEASE, None)
+    still = _last(recording, Kind.STICK, None)
+    return {"t_rest": still["t"] - begin["t"], "y_rest": still["y"]}
+
+
+def _first(recording: Recording, kind: Kind, surface: str | None) -> Answer:
+    return _columns(recording, kind, surface, last=False)
+
+
+def _last(recording: Recording, kind: Kind, surface: str | None) -> Answer:
+    return _columns(recording, kind, surface, last=True)
+
+
+def _columns(recording: Recording, kind: Kind, surface: str | None, *, last: bool) -> Answer:
+    """Return time, place and incoming velocity of one event of each particle, (N,) each."""
+    events = recording.select(kind, surface=surface)
+    if last:
+        events = events[::-1]
+    events = recording.first(events)
+    sources = {
+        "t": events["t"],
+        "x": events["position"][:, 0],
+        "y": events["position"][:, 1],
+        "vx": events["velocity_before"][:, 0],
+        "vy": events["velocity_before"][:, 1],
+    }
+    columns = {name: np.full(recording.count, np.nan) for name in sources}
+    for name, values in sources.items():
+        columns[name][events["particle"]] = values
+    return columns
+
+
+def worst(answer: Answer, reference: Reference) -> tuple[float, str]:
+    """Return the largest relative error of all particles and quantities, and whose it is.
+
+    Raises
+    ------
+    MissedError
+        If a particle has no answer where the reference has one.
+    """
+    largest, name = 0.0, ""
+    for quantity, expected in reference.values.items():
+        found = np.asarray(answer[quantity], dtype=np.float64)
+        lost = int(np.count_nonzero(np.isfinite(expected) & ~np.isfinite(found)))
+        if lost:
+            who = "it" if len(expected) == 1 else f"{lost:,} of {len(expected):,}"
+            raise MissedError(f"{who} never {_MISSED[quantity]}")
+        size = reference.sizes[quantity]
+        for one, other in zip(found.tolist(), expected.tolist(), strict=True):
+            error = relative_error(one, other, size)
+            if not error <= largest:
+                largest, name = error, quantity
+    return largest, name
+
+
+_MISSED = (
+    dict.fromkeys(("t2", "y2"), "met the plate")
+    | dict.fromkeys(("t3", "x3", "v3x", "v3y"), "landed on the belt")
+    | dict.fromkeys(GRIP, "got as fast as the belt")
+    | dict.fromkeys(REST, "came to rest")
+)
+
+
+FRAME = 0.01
+"""s between the frames in which overlaps are looked for."""
+
+
+PERCENTILE = 99.0
+
+
+def frames_of(recording: Recording) -> Floats:
+    """Return places every `FRAME` seconds, (T, N, 2), NaN where a particle is not there."""
+    _, last = recording.ends()
+    end = float(last["t"].max())
+    times = np.arange(1, 1 + round(end / FRAME)) * FRAME
+    return recording.at(np.minimum(times, end))[0]
+
+
+def overlaps(frames: Floats, radius: float) -> Floats:
+    """Return by how much pairs of disks overlap, in radii, over all frames (T, N, 2).
+
+    Only pairs that do are listed, once for each frame in which they do.
+    """
+    found = [np.empty(0)]
+    for frame in frames:
+        there = frame[np.isfinite(frame[:, 0])]
+        there = there[np.argsort(there[:, 0], kind="stable")]
+        # In the order of x, partners are at most a few places apart.
+        for ahead in range(1, len(there)):
+            apart = there[ahead:] - there[:-ahead]
+            apart = apart[apart[:, 0] < 2.0 * radius]
+            if not len(apart):
+                break
+            overlap = 2.0 - np.hypot(apart[:, 0], apart[:, 1]) / radius
+            found.append(overlap[overlap > 0.0])
+    return np.concatenate(found)
+
+
+def typical(overlap: Floats) -> float:
+    """Return the `PERCENTILE` of some overlaps, 0 of none."""
+    return float(np.percentile(overlap, PERCENTILE)) if len(overlap) else 0.0
+
+
 SHIFTS = (0.0, 0.0047, 0.0091, 0.0137, 0.0179)
 """m; how much farther the plate is, or higher the start. With 2 m/s, uneven parts of the way in the
 longest step of 0.01 s."""
 
+
 BELT_SHIFT = 0.7
 """How much longer the belt is, in shifts of the plate; so that no step ends at its end either."""
+
 
 SIZES = {
     "t2": "time", "y2": "length", "t3": "time", "x3": "length", "v3x": "speed", "v3y": "speed",
     "t_grip": "time", "x_grip": "length",
 }  # fmt: skip
 """What kind of quantity each is; see `chutelab.results.comparison.scales`."""
+
 
 CROWD = 1000
 """Particles of the two cases with many."""
@@ -237,170 +411,3 @@ def cases() -> dict[str, Case]:
             ),
         )
     }
-
-
-Answer = dict[str, Floats]
-
-TRANSFER = ("t2", "y2", "t3", "x3", "v3x", "v3y")
-"""Time and fall to the plate; from there time and way back to the landing, landing velocity."""
-
-GRIP = ("t_grip", "x_grip")
-"""Time (s) and way forward (m) from the landing to the end of the slip."""
-
-REST = ("t_rest", "y_rest")
-"""Time (s) from the release, and height (m), at which a bouncing particle lies still."""
-
-
-class MissedError(ValueError):
-    """A particle never got to where the case ends."""
-
-
-@dataclass(frozen=True, eq=False)
-class Reference:
-    """What an answer should be, and by what errors are measured.
-
-    Attributes
-    ----------
-    values : dict of ndarray, (N,)
-        By quantity.
-    sizes : dict of float
-        Scale of each quantity, as `chutelab.results.comparison.relative_error` takes it.
-    """
-
-    values: Answer
-    sizes: Mapping[str, float]
-
-
-def of_transfer(recording: Recording) -> Answer:
-    """Read the `TRANSFER` quantities of all particles off a recording."""
-    left, hit, down = (
-        _first(recording, kind, surface)
-        for kind, surface in (
-            (Kind.SEPARATION, "incoming"),
-            (Kind.IMPACT, "plate"),
-            (Kind.LANDING, "outgoing"),
-        )
-    )
-    return {
-        "t2": hit["t"] - left["t"],
-        "y2": left["y"] - hit["y"],
-        "t3": down["t"] - hit["t"],
-        "x3": hit["x"] - down["x"],
-        "v3x": -down["vx"],
-        "v3y": -down["vy"],
-    }
-
-
-def of_grip(recording: Recording) -> Answer:
-    """Read the `TRANSFER` and `GRIP` quantities off a recording of lone particles."""
-    down = _first(recording, Kind.LANDING, "outgoing")
-    held = _last(recording, Kind.STICK, "outgoing")
-    return {
-        **of_transfer(recording),
-        "t_grip": held["t"] - down["t"],
-        "x_grip": held["x"] - down["x"],
-    }
-
-
-def of_rest(recording: Recording) -> Answer:
-    """Read the `REST` quantities off a recording."""
-    begin = _first(recording, Kind.RELEASE, None)
-    still = _last(recording, Kind.STICK, None)
-    return {"t_rest": still["t"] - begin["t"], "y_rest": still["y"]}
-
-
-def _first(recording: Recording, kind: Kind, surface: str | None) -> Answer:
-    return _columns(recording, kind, surface, last=False)
-
-
-def _last(recording: Recording, kind: Kind, surface: str | None) -> Answer:
-    return _columns(recording, kind, surface, last=True)
-
-
-def _columns(recording: Recording, kind: Kind, surface: str | None, *, last: bool) -> Answer:
-    """Return time, place and incoming velocity of one event of each particle, (N,) each."""
-    events = recording.select(kind, surface=surface)
-    if last:
-        events = events[::-1]
-    events = recording.first(events)
-    sources = {
-        "t": events["t"],
-        "x": events["position"][:, 0],
-        "y": events["position"][:, 1],
-        "vx": events["velocity_before"][:, 0],
-        "vy": events["velocity_before"][:, 1],
-    }
-    columns = {name: np.full(recording.count, np.nan) for name in sources}
-    for name, values in sources.items():
-        columns[name][events["particle"]] = values
-    return columns
-
-
-def worst(answer: Answer, reference: Reference) -> tuple[float, str]:
-    """Return the largest relative error of all particles and quantities, and whose it is.
-
-    Raises
-    ------
-    MissedError
-        If a particle has no answer where the reference has one.
-    """
-    largest, name = 0.0, ""
-    for quantity, expected in reference.values.items():
-        found = np.asarray(answer[quantity], dtype=np.float64)
-        lost = int(np.count_nonzero(np.isfinite(expected) & ~np.isfinite(found)))
-        if lost:
-            who = "it" if len(expected) == 1 else f"{lost:,} of {len(expected):,}"
-            raise MissedError(f"{who} never {_MISSED[quantity]}")
-        size = reference.sizes[quantity]
-        for one, other in zip(found.tolist(), expected.tolist(), strict=True):
-            error = relative_error(one, other, size)
-            if not error <= largest:
-                largest, name = error, quantity
-    return largest, name
-
-
-_MISSED = (
-    dict.fromkeys(("t2", "y2"), "met the plate")
-    | dict.fromkeys(("t3", "x3", "v3x", "v3y"), "landed on the belt")
-    | dict.fromkeys(GRIP, "got as fast as the belt")
-    | dict.fromkeys(REST, "came to rest")
-)
-
-
-FRAME = 0.01
-"""s between the frames in which overlaps are looked for."""
-
-PERCENTILE = 99.0
-
-
-def frames_of(recording: Recording) -> Floats:
-    """Return places every `FRAME` seconds, (T, N, 2), NaN where a particle is not there."""
-    _, last = recording.ends()
-    end = float(last["t"].max())
-    times = np.arange(1, 1 + round(end / FRAME)) * FRAME
-    return recording.at(np.minimum(times, end))[0]
-
-
-def overlaps(frames: Floats, radius: float) -> Floats:
-    """Return by how much pairs of disks overlap, in radii, over all frames (T, N, 2).
-
-    Only pairs that do are listed, once for each frame in which they do.
-    """
-    found = [np.empty(0)]
-    for frame in frames:
-        there = frame[np.isfinite(frame[:, 0])]
-        there = there[np.argsort(there[:, 0], kind="stable")]
-        # In the order of x, partners are at most a few places apart.
-        for ahead in range(1, len(there)):
-            apart = there[ahead:] - there[:-ahead]
-            apart = apart[apart[:, 0] < 2.0 * radius]
-            if not len(apart):
-                break
-            overlap = 2.0 - np.hypot(apart[:, 0], apart[:, 1]) / radius
-            found.append(overlap[overlap > 0.0])
-    return np.concatenate(found)
-
-
-def typical(overlap: Floats) -> float:
-    """Return the `PERCENTILE` of some overlaps, 0 of none."""
-    return float(np.percentile(overlap, PERCENTILE)) if len(overlap) else 0.0

@@ -23,16 +23,23 @@ from chutelab.scene.units import Number, Table, Text, Whole
 from chutelab.scene.variants import VaryError, parse, quantity
 
 LEVELS: Final = ("start", "core", "advanced")
+
+
 MOST: Final = 20
 """Entries of a list at most: a lesson that needs more is two lessons."""
+
 
 LONGEST: Final = 200
 """Characters of a text at most: it has to go on one slide."""
 
+
 VARIED: Final = 2
 """Sliders of a page at most."""
 
+
 Said = Annotated[Text, Field(min_length=1, max_length=LONGEST)]
+
+
 Names = Annotated[tuple[Said, ...], Field(max_length=MOST)]
 
 
@@ -140,54 +147,6 @@ def shipped_lessons() -> list[Lesson]:
         With the faults of the first that is broken.
     """
     return [read(folder) for folder in _folders()]
-
-
-def find(wanted: str | int | Path) -> Lesson:
-    """Return one lesson.
-
-    Parameters
-    ----------
-    wanted
-        A number (3, "3" or "03"), a name ("the-bounce" or "03-the-bounce"), or a folder that holds
-        a ``lesson.toml``.
-
-    Raises
-    ------
-    LessonError
-        If there is none; it suggests shipped lessons. Or with the faults of the lesson.
-    """
-    said = str(wanted).strip().rstrip("/")
-    folders = _folders()
-    for folder in folders:
-        number, name = folder.name.split("-", 1)
-        same_number = said.isdecimal() and int(said) == int(number)
-        if same_number or said.lower() in (name, folder.name):
-            return read(folder)
-    path = Path(said)
-    if (path / PLAN).is_file():
-        return read(path)
-    if path.name == PLAN and path.is_file():
-        return read(path.parent)
-    names = [folder.name.split("-", 1)[1] for folder in folders]
-    listed = ", ".join(folder.name for folder in folders)
-    advice = did_you_mean(said.lower(), names, f"there are {listed}", most=2)
-    text = f"no lesson of this number or name, and no folder with a {PLAN}; {advice}"
-    raise LessonError(said or '""', [Fault("", None, text)])
-
-
-def home() -> Path | None:
-    """Return the folder of the shipped lessons: beside that of the scenes, wherever that is."""
-    for scene in shipped_scenes().values():
-        folder = scene.parent.parent / "lessons"
-        return folder if folder.is_dir() else None
-    return None
-
-
-def _folders() -> list[Path]:
-    folder = home()
-    found = folder.glob("*/" + PLAN) if folder else ()
-    numbered = [path.parent for path in found if re.match(r"\d+-.", path.parent.name)]
-    return sorted(numbered, key=lambda path: (int(path.name.split("-")[0]), path.name))
 
 
 PLAN: Final = "lesson.toml"
@@ -342,3 +301,51 @@ def _table(parts: tuple[str | int, ...]) -> tuple[type[BaseModel], tuple[str | i
     """Return the model that a location is in, and its path without indices."""
     inner = TABLES.get(str(parts[0])) if len(parts) > 1 else None
     return (Lesson, parts[:1]) if inner is None else (inner, parts[:2])
+
+
+def find(wanted: str | int | Path) -> Lesson:
+    """Return one lesson.
+
+    Parameters
+    ----------
+    wanted
+        A number (3, "3" or "03"), a name ("the-bounce" or "03-the-bounce"), or a folder that holds
+        a ``lesson.toml``.
+
+    Raises
+    ------
+    LessonError
+        If there is none; it suggests shipped lessons. Or with the faults of the lesson.
+    """
+    said = str(wanted).strip().rstrip("/")
+    folders = _folders()
+    for folder in folders:
+        number, name = folder.name.split("-", 1)
+        same_number = said.isdecimal() and int(said) == int(number)
+        if same_number or said.lower() in (name, folder.name):
+            return read(folder)
+    path = Path(said)
+    if (path / PLAN).is_file():
+        return read(path)
+    if path.name == PLAN and path.is_file():
+        return read(path.parent)
+    names = [folder.name.split("-", 1)[1] for folder in folders]
+    listed = ", ".join(folder.name for folder in folders)
+    advice = did_you_mean(said.lower(), names, f"there are {listed}", most=2)
+    text = f"no lesson of this number or name, and no folder with a {PLAN}; {advice}"
+    raise LessonError(said or '""', [Fault("", None, text)])
+
+
+def home() -> Path | None:
+    """Return the folder of the shipped lessons: beside that of the scenes, wherever that is."""
+    for scene in shipped_scenes().values():
+        folder = scene.parent.parent / "lessons"
+        return folder if folder.is_dir() else None
+    return None
+
+
+def _folders() -> list[Path]:
+    folder = home()
+    found = folder.glob("*/" + PLAN) if folder else ()
+    numbered = [path.parent for path in found if re.match(r"\d+-.", path.parent.name)]
+    return sorted(numbered, key=lambda path: (int(path.name.split("-")[0]), path.name))

@@ -32,6 +32,31 @@ from chutelab.scene.variants import (
 from chutelab.studies.sweep.rows import REASON, Columns, empty, joined, rows
 from chutelab.util.arrays import Bools, Floats, Ints
 
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Variants to be simulated; plain data, so that it can be sent to another process.
+
+    Attributes
+    ----------
+    document, source : dict, str
+        The scene, as `chutelab.scene.to_dict` has it, and what messages call it.
+    keys, paths : tuple of str
+        What is varied, as it was written, and full paths, with free surfaces by index.
+    values : ndarray, (n, K)
+        The values of each variant.
+    engine : str or None
+        Overrides ``run.engine``.
+    """
+
+    document: dict[str, Any]
+    source: str
+    keys: tuple[str, ...]
+    paths: tuple[str, ...]
+    values: Floats
+    engine: str | None
+
+
 Reader = Callable[[Recording, Scene, Ints], None]
 
 
@@ -241,30 +266,6 @@ def _fits(scene: Scene, paths: tuple[str, ...], engine: str | None) -> bool:
     # Whether such a release lies on the belt is a matter of the last digits.
     at_risk = {"particle.radius", "incoming.pulley_radius", "incoming.length"}
     return scene.stream.at is None or at_risk.isdisjoint(paths)
-
-
-@dataclass(frozen=True, eq=False)
-class Block:
-    """Variants to be simulated; plain data, so that it can be sent to another process.
-
-    Attributes
-    ----------
-    document, source : dict, str
-        The scene, as `chutelab.scene.to_dict` has it, and what messages call it.
-    keys, paths : tuple of str
-        What is varied, as it was written, and full paths, with free surfaces by index.
-    values : ndarray, (n, K)
-        The values of each variant.
-    engine : str or None
-        Overrides ``run.engine``.
-    """
-
-    document: dict[str, Any]
-    source: str
-    keys: tuple[str, ...]
-    paths: tuple[str, ...]
-    values: Floats
-    engine: str | None
 
 
 def swept(block: Block) -> Columns:

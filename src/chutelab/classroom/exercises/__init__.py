@@ -9,7 +9,8 @@
   `progress`; all exercises by name.
 - `exercise`: what an exercise is made of: parameters, drawn from a name, questions, known mistakes.
 - `judging`: a number read and judged: right, a known mistake, or how far off; replies.
-- `the_parabola` … `trust`: the eight lessons, a module each.
+- `the_parabola`, `letting_go`, `the_bounce`, `turning_the_plate`, `landing`, `grip_or_slip`,
+  `a_stream`, `trust`: the eight lessons, a module each.
 
 Answers are computed from `chutelab.theory` for the parameters drawn; none is stored.
 """

@@ -1,9 +1,11 @@
 from __future__ import annotations
 
 import subprocess
+from collections.abc import Sequence
 from io import BytesIO
 from itertools import groupby
-from typing import TYPE_CHECKING, Any, NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
+from numpy.typing import NDArray
 from PIL import Image
 
 from chutelab import scene, theory
@@ -56,12 +59,6 @@ from test_plots import (
     t_impact,
     t_landing,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from numpy.typing import NDArray
 
 WIDTH, HEIGHT = 800, 450
 

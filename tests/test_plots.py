@@ -5,13 +5,15 @@ import sys
 from dataclasses import replace
 from io import BytesIO
 from math import acos, cos, hypot, sin, sqrt
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
@@ -25,11 +27,6 @@ from chutelab.pictures.plots import Window, scenery, style
 from chutelab.results import Kind, Recording
 from chutelab.results.comparison import scene_of
 from chutelab.results.recorder import Recorder
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from matplotlib.axes import Axes
 
 G, V, R, PARTICLE, EPS, DISTANCE, DROP, MASS, MU = 9.81, 2.0, 0.1, 0.004, 0.5, 0.5, 0.5, 0.008, 0.5
 BELT_TIME = 0.5

@@ -1,23 +1,19 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.text import Annotation
 from PIL import Image
 
 from chutelab import scene
 from chutelab.engines.simulation import simulate
 from chutelab.pictures.plots import strobe
 from test_plots import BELT_TIME, EXACT, by_hand, expected, seen
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from matplotlib.figure import Figure
-    from matplotlib.text import Annotation
 
 
 def times_of(figure: Figure) -> list[Annotation]:

@@ -25,7 +25,6 @@ from chutelab.scene.schema import Scene
 from chutelab.scene.units import read_size
 from chutelab.util.arrays import Bools, Floats
 
-
 MOST_VALUES: Final = 10_000
 """Values of one key; more would be a slip of the keyboard."""
 

@@ -10,20 +10,15 @@ outside.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from time import perf_counter
-from typing import TYPE_CHECKING
 
 from chutelab.engines.pymunk.lone import Lone
 from chutelab.engines.pymunk.shared import Shared
 from chutelab.engines.pymunk.world import World
-from chutelab.machine import moved, origin
+from chutelab.machine import Machine, moved, origin
+from chutelab.results import Recording
 from chutelab.results.recorder import Recorder, StalledError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from chutelab.machine import Machine
-    from chutelab.results import Recording
 
 
 def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Recording:

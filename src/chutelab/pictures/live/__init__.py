@@ -17,15 +17,14 @@ No physics is in the page: it draws the cubic Hermite curves through the knots t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from chutelab.scene import Scene, load
+
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
     import ipywidgets
-
-    from chutelab.scene import Scene
 
 
 def sliders(scene: Scene | str | Path, overrides: Sequence[str] = ()) -> ipywidgets.VBox:
@@ -50,8 +49,6 @@ def sliders(scene: Scene | str | Path, overrides: Sequence[str] = ()) -> ipywidg
     ImportError
         Without ipywidgets.
     """
-    from chutelab.scene import Scene, load
-
     try:
         from chutelab.pictures.live.board import Board
     except ModuleNotFoundError as error:

@@ -28,12 +28,9 @@ from chutelab.util.arrays import Bools, Floats
 MOST_VALUES: Final = 10_000
 """Values of one key; more would be a slip of the keyboard."""
 
-
 FORM: Final = "must be KEY=FROM:TO:COUNT, such as plate.angle_deg=-20:70:46, or KEY=a,b,c"
 
-
 RANGE_FORM: Final = "must be KEY=FROM:TO, such as plate.angle_deg=-20:70"
-
 
 _WITH_UNIT: Final = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) *([^\s\d].*)?")
 
@@ -390,7 +387,6 @@ def reason(error: SceneError) -> str:
 
 
 _PATH: Final = re.compile(r"(?:(\w+)(?:\[(\d+)\])?\.)?(\w+)")
-
 
 _DEPENDENT: Final = {"plate": "pivot_height", "outgoing": "speed"}
 """Keys whose defaults are other keys."""

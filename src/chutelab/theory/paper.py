@@ -82,7 +82,6 @@ HEIGHTS = {
 }
 """Tables 4 (2 m/s) and 5 (4 m/s): d3, m, a row per radius, a column per distance."""
 
-
 TABLES = (1, 3, 4, 5)
 """Numbers of the tables that hold results (Table 2 lists the simulated model's dimensions)."""
 

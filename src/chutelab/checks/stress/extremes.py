@@ -208,7 +208,6 @@ def _weightless() -> list[Case]:
 CASES = (*_fast(), *_radii(), *_masses(), *_materials(), *_belts(), *_weightless())
 """Speed, size, mass, materials, belts, gravity."""
 
-
 G = 9.81
 LONG = 1e6
 """s; the longest a scene may last, and the latest release."""

@@ -71,7 +71,6 @@ def bounded(seconds: float) -> Iterator[Callable[[float], None]]:
 RUNS = "runs to its end"
 """Law of a run that raised instead."""
 
-
 REFUSED = "refused"
 """Law of a scene that an engine must refuse."""
 

@@ -27,14 +27,11 @@ from chutelab.util.arrays import Floats
 
 Answer = dict[str, Floats]
 
-
 TRANSFER = ("t2", "y2", "t3", "x3", "v3x", "v3y")
 """Time and fall to the plate; from there time and way back to the landing, landing velocity."""
 
-
 GRIP = ("t_grip", "x_grip")
 """Time (s) and way forward (m) from the landing to the end of the slip."""
-
 
 REST = ("t_rest", "y_rest")
 """Time (s) from the release, and height (m), at which a bouncing particle lies still."""
@@ -155,10 +152,8 @@ _MISSED = (
     | dict.fromkeys(REST, "came to rest")
 )
 
-
 FRAME = 0.01
 """s between the frames in which overlaps are looked for."""
-
 
 PERCENTILE = 99.0
 
@@ -200,17 +195,14 @@ SHIFTS = (0.0, 0.0047, 0.0091, 0.0137, 0.0179)
 """m; how much farther the plate is, or higher the start. With 2 m/s, uneven parts of the way in the
 longest step of 0.01 s."""
 
-
 BELT_SHIFT = 0.7
 """How much longer the belt is, in shifts of the plate; so that no step ends at its end either."""
-
 
 SIZES = {
     "t2": "time", "y2": "length", "t3": "time", "x3": "length", "v3x": "speed", "v3y": "speed",
     "t_grip": "time", "x_grip": "length",
 }  # fmt: skip
 """What kind of quantity each is; see `chutelab.results.comparison.scales`."""
-
 
 CROWD = 1000
 """Particles of the two cases with many."""

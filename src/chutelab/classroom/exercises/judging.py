@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 
 from chutelab.classroom.exercises.exercise import Case, shown
-from chutelab.pictures.plots import style
+from chutelab.pictures import colours
 from chutelab.util.tables import Sheet
 
-GOOD, WRONG, WARN = style.GREEN, style.VERMILION, style.ORANGE
-INFO, QUIET = style.SKY, style.GREY
+GOOD, WRONG, WARN = colours.GREEN, colours.VERMILION, colours.ORANGE
+INFO, QUIET = colours.SKY, colours.GREY
 
 BAR, HEIGHT, GAP = 150, 12, 4
 """Pixels: length and height of a part of the progress bar, and what is between two."""

@@ -31,15 +31,11 @@ from chutelab.util.files import whole
 from chutelab.util.versions import own_version, version_of
 
 HEAD: Final = "chutelab lesson"
-
-
 TRAILER: Final = b"\x3b"
 """Last byte of every GIF."""
 
-
 _COMMENT: Final = b"\x21\xfe"
 """Begin of a comment extension; sub-blocks of at most 255 bytes follow, then an empty one."""
-
 
 _FORM: Final = re.compile(rf"{HEAD}; inputs ([0-9a-f]{{32}}); (.+)")
 
@@ -89,8 +85,6 @@ class Stamp:
 
 
 PICTURE: Final = "lesson.gif"
-
-
 LIBRARIES: Final = ("chutelab", "numpy", "pymunk", "matplotlib", "pillow")
 """What decides on the bytes of a picture, besides its inputs."""
 
@@ -180,7 +174,6 @@ def stamp_of(lesson: Lesson, scene: Scene) -> Stamp:
 PAGE: Final = "index.html"
 """What a link to another lesson's worksheet becomes."""
 
-
 _WORKSHEET: Final = re.compile(r"(^|/)README\.md(?=$|#)")
 
 
@@ -238,11 +231,7 @@ def _body(tokens: list[Token]) -> list[Token]:
 
 
 _TEMPLATE: Final = ("lesson.toml", "README.md", "scene.toml")
-
-
 _NAME: Final = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
-
-
 _MOST: Final = 60
 
 
@@ -301,14 +290,8 @@ def _fill_in(folder: Path) -> None:
 
 
 LIVE: Final = "page.html"
-
-
 STILL: Final = "still.png"
-
-
 INDEX: Final = "index.html"
-
-
 _SHARED: Final = ("style.css", "picture.js")
 
 

@@ -23,23 +23,16 @@ from chutelab.scene.units import Number, Table, Text, Whole
 from chutelab.scene.variants import VaryError, parse, quantity
 
 LEVELS: Final = ("start", "core", "advanced")
-
-
 MOST: Final = 20
 """Entries of a list at most: a lesson that needs more is two lessons."""
-
 
 LONGEST: Final = 200
 """Characters of a text at most: it has to go on one slide."""
 
-
 VARIED: Final = 2
 """Sliders of a page at most."""
 
-
 Said = Annotated[Text, Field(min_length=1, max_length=LONGEST)]
-
-
 Names = Annotated[tuple[Said, ...], Field(max_length=MOST)]
 
 

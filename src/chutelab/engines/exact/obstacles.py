@@ -22,10 +22,8 @@ from chutelab.util.many import Value, at, of
 
 NONE = -1
 
-
 FOLDED = 1e-9
 """Difference of two directions below which one segment lies on the other."""
-
 
 PER_PARTICLE = (
     "faces", "length", "center", "rho", "material", "low", "high",
@@ -269,18 +267,14 @@ FOOT = 1e-12
 """Share of a segment's length by which its face reaches past its ends, so that no particle slips
 through the joint of two segments by rounding."""
 
-
 JOINT = 1e-12
 """Share of the scene's size within which two ends are one joint."""
-
 
 TOUCH_ULPS = 256.0
 """Rounding of a coordinate, in units of the last place of the scene's size: closer is touching."""
 
-
 GIVEN_ULPS = 1.0
 """The same of a coordinate in the scene file, for one far from the origin."""
-
 
 BOX_TOUCHES = 64.0
 """Width, in `Obstacles.touch`, by which the boxes of faces are larger than they need be."""

@@ -6,9 +6,10 @@ energy ledger is two stacked bars of equal height: what was put in, and where it
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon, Rectangle
 
 from chutelab.machine import Machine
@@ -17,12 +18,6 @@ from chutelab.pictures.plots import style
 from chutelab.pictures.plots.scenery import round_times, strobe_step, subset, track_times
 from chutelab.results import Recording
 from chutelab.util.arrays import Floats
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from matplotlib.lines import Line2D
-
 
 LONGEST = 0.10
 """Share of the picture's width that the arrow of the highest speed is long."""

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from textwrap import shorten
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from chutelab.machine import Machine
@@ -19,11 +22,6 @@ from chutelab.pictures.plots.scenery import around, energies, round_step, subset
 from chutelab.results import Recording
 from chutelab.theory import Transfer
 from chutelab.util.arrays import Floats
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.lines import Line2D
-    from matplotlib.text import Text
 
 Box = tuple[float, float, float, float]
 

@@ -12,14 +12,14 @@ from math import degrees, isfinite, nan
 import numpy as np
 
 from chutelab.machine import Machine
-from chutelab.pictures.plots import style
+from chutelab.pictures import colours
 from chutelab.results import Kind, Recording
 from chutelab.results.comparison import observed
 from chutelab.scene import Scene
 from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet
 
-TRACK, GHOST, STRIKE = style.BLUE, style.GREY, style.VERMILION
+TRACK, GHOST, STRIKE = colours.BLUE, colours.GREY, colours.VERMILION
 """The track, the one before, and places of impacts."""
 
 WIDTH, TALLEST = 660, 460

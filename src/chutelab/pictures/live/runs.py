@@ -34,18 +34,14 @@ from chutelab.util.arrays import Floats
 MOST_VARIANTS: Final = 1_000
 """Variants on one page: two sliders of some 30 positions each."""
 
-
 MOST_STEPPED: Final = 24
 """Variants on one page of a scene that is stepped, because each may take seconds."""
-
 
 MOST_PARTICLES: Final = 200
 """Particles on one page: a phone draws all of them 60 times a second."""
 
-
 MOST_KNOTS: Final = 100_000
 """Knots of all variants together: a page of about 10 MB."""
-
 
 _PLAYERS: Final = ("title", "gravity", "particle", "incoming", "plate", "surface", "stream")
 
@@ -248,7 +244,6 @@ LABELS = {
 }
 """Of particle 0, under the names of `chutelab.scene.rules`."""
 
-
 CROWD = {
     "landing.count": "Particles landed",
     "landing.t.mean": "Lands at time, mean",
@@ -258,7 +253,6 @@ CROWD = {
 }
 """Of a stream."""
 
-
 BOOKS = {
     "contacts": "Contacts",
     "ledger.belt_work": "Belt work in the run",
@@ -267,7 +261,6 @@ BOOKS = {
     "ledger.residual": "Residual",
 }
 """Of all particles together."""
-
 
 MOST_FREE = 3
 """Free surfaces whose first impact is listed."""
@@ -355,23 +348,18 @@ def _analytic(run: Run | None) -> dict[str, float]:
 
 FORMAT: Final = 1
 
-
 MOST_WORDS: Final = 60
 """Events of particle 0 that are told in each variant, the first ones."""
-
 
 MOST: Final = 0.9
 """Share of the runs whose windows reach no farther, on each side, than what is shown at first."""
 
-
 SPREAD: Final = 0.4
 """Share of its larger side by which that may be larger than the median window, on each side."""
-
 
 WORTH: Final = 0.01
 """Share of the largest impulse that an impact needs to be told: the last of the bounces to rest
 come too fast to be read."""
-
 
 LEAD: Final = 0.25
 """Share of the action's length that is shown before it begins: the particle comes riding."""

@@ -8,10 +8,12 @@ from __future__ import annotations
 from collections import Counter
 from pathlib import Path
 from textwrap import fill, shorten
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.style import DPI, Picture
@@ -19,11 +21,6 @@ from chutelab.scene.units import symbol, with_unit
 from chutelab.studies.design import Solution, Uncertainty
 from chutelab.studies.sweep import NUMBERS, REASON, Sweep
 from chutelab.util.arrays import Floats
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 SIZE = (9.0, 5.6)
 BARS = (style.TRACK, style.STREAM)

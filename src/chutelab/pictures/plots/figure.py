@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.panels import (
@@ -28,11 +29,6 @@ from chutelab.results import Recording
 from chutelab.results.comparison import scene_of
 from chutelab.theory import Transfer, predict
 from chutelab.theory.figures import Line, Panel, PaperFigure
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 SIZE = (13.0, 7.6)
 """Width and height of the figure, inches."""

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.figure import SIZE
@@ -28,11 +29,6 @@ from chutelab.studies.measured import Fit, Residuals
 from chutelab.studies.measured.result import plus_minus
 from chutelab.studies.measured.track import counted
 from chutelab.theory import predict
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 
 PARAMETERS = 6
 """Fitted parameters that are written into the figure."""

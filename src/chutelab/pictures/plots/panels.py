@@ -8,9 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import ceil, cos, isfinite, log10, sin, sqrt
 from textwrap import fill, shorten
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from numpy.typing import ArrayLike
 
@@ -33,9 +33,6 @@ from chutelab.scene import Incoming, Scene
 from chutelab.theory import Transfer
 from chutelab.theory.separation import separation
 from chutelab.util.arrays import Floats
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import floor, log10
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
+from matplotlib.text import Annotation
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.machine import Machine, build
@@ -21,11 +23,6 @@ from chutelab.pictures.plots import style
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.comparison import scene_of
 from chutelab.util.arrays import Bools, Floats, Ints
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.text import Annotation
-
 
 STRUCK = (Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
 """Kinds of event in which something is hit."""

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from math import floor, log10
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.path import Path as MplPath
+from matplotlib.text import Annotation
 from matplotlib.transforms import Bbox
 
 from chutelab.pictures.plots import style
@@ -18,13 +21,6 @@ from chutelab.results import Recording
 from chutelab.results.comparison import scene_of
 from chutelab.theory import Transfer, predict
 from chutelab.util.arrays import Floats
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-    from matplotlib.path import Path as MplPath
-    from matplotlib.text import Annotation
-
 
 SIZE = (9.0, 5.6)
 """Width and height of the figure, inches."""

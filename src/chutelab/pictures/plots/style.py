@@ -10,48 +10,36 @@ from io import BytesIO
 from math import floor, isfinite, log10
 from pathlib import Path
 from textwrap import shorten
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any
 
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from chutelab.pictures import colours
 from chutelab.util.files import whole
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-
-BLUE: Final = "#0072B2"
-SKY: Final = "#56B4E9"
-GREEN: Final = "#009E73"
-ORANGE: Final = "#E69F00"
-VERMILION: Final = "#D55E00"
-PURPLE: Final = "#CC79A7"
-GREY: Final = "#8C8C8C"
-"""Not theirs: seen on white and on black."""
-
 
 INK = "#000000"
 MUTED = "#595959"
 GRID = "#E3E3E3"
-STEEL = GREY
+STEEL = colours.GREY
 STEEL_LIGHT = "#E6E6E6"
 
-TRACK = BLUE
-ANALYTIC = ORANGE
-BELT = GREEN
-STRIKE = VERMILION
-STREAM = SKY
+TRACK = colours.BLUE
+ANALYTIC = colours.ORANGE
+BELT = colours.GREEN
+STRIKE = colours.VERMILION
+STREAM = colours.SKY
 
-VELOCITY = {"vx": BLUE, "vy": VERMILION}
+VELOCITY = {"vx": colours.BLUE, "vy": colours.VERMILION}
 
 ENERGY = {
     "start": "#BFBFBF",
-    "kinetic": ORANGE,
-    "potential": SKY,
-    "belt_work": GREEN,
-    "restitution_loss": VERMILION,
-    "friction_loss": PURPLE,
+    "kinetic": colours.ORANGE,
+    "potential": colours.SKY,
+    "belt_work": colours.GREEN,
+    "restitution_loss": colours.VERMILION,
+    "friction_loss": colours.PURPLE,
     "residual": "#000000",
 }
 ENERGY_LABEL = {

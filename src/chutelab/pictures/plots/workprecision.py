@@ -6,23 +6,20 @@ from collections.abc import Mapping, Sequence
 from math import ceil, floor, log10, sqrt
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib.patheffects as pe
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from chutelab.checks.workprecision import METHODS, Record, Size, cases
 from chutelab.checks.workprecision.claims import exponent, points, work_slope
+from chutelab.pictures import colours
 from chutelab.pictures.plots import style
-from chutelab.pictures.plots import style as colours
 from chutelab.pictures.plots.style import DPI, Picture
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.axis import Axis
-    from matplotlib.figure import Figure
-
 
 WIDTH, PANEL = 10.0, 2.35
 """Width of a figure and height of a panel, inches."""

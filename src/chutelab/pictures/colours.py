@@ -1,0 +1,18 @@
+"""The colours of all pictures, pages and notebooks.
+
+Those of Okabe and Ito (2008), "Color Universal Design": told apart by readers with any common
+colour blindness.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+BLUE: Final = "#0072B2"
+SKY: Final = "#56B4E9"
+GREEN: Final = "#009E73"
+ORANGE: Final = "#E69F00"
+VERMILION: Final = "#D55E00"
+PURPLE: Final = "#CC79A7"
+GREY: Final = "#8C8C8C"
+"""Not theirs: seen on white and on black."""

@@ -34,6 +34,7 @@ from chutelab.machine import Machine
 from chutelab.results import REASONS, Kind
 from chutelab.results.recorder import Recorder, StalledError
 
+# Of a surface and its normal: its restitution, None where it is to be passed.
 Law = Callable[[Face, Vec2d], float | None]
 
 WEDGED = 1000

@@ -218,7 +218,6 @@ WITHIN_A_STEP = np.linspace(0.7, 1.0, 25)
 """Shares of a step, so that phases end everywhere within one."""
 
 
-@pytest.mark.xfail(reason="core: may be held a step too long, or told to leave a step early")
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_over_the_end_of_a_face_in_second_order(friction):
     # A disk that rolls over an edge at v² > g r leaves it at once: y - r = -g t²/2 from there on.
@@ -244,7 +243,6 @@ def test_over_the_end_of_a_face_in_second_order(friction):
         assert abs(fall + 0.5 * G * (0.79 - leaves) ** 2) < 20.0 * dt**2, dt
 
 
-@pytest.mark.xfail(reason="core: of first order with endless friction")
 def test_carried_by_endless_friction_after_a_blow_it_leaves_where_gravity_takes_it():
     # It drops on the pulley, has the belt's speed from there on, and leaves at cos φ = v²/(g ρ).
     r, wheel, v = 0.02, 0.3, 1.0
@@ -263,7 +261,6 @@ def test_carried_by_endless_friction_after_a_blow_it_leaves_where_gravity_takes_
         assert left["t"][-1] == pytest.approx(met["t"][0] + rho * (to - from_) / v, abs=0.1 * dt)
 
 
-@pytest.mark.xfail(reason="core: it is that in the middle of a hop, off by up to g dt/2")
 def test_a_separation_tells_the_velocity_without_the_hop():
     # A belt at v² > g ρ throws at the end of its level part.
     machine = scene_of(

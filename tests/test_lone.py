@@ -90,11 +90,21 @@ def told(recording, soft, until, surfaces):
     ]  # fmt: skip
 
 
+def chafed(recording):
+    """Whether a belt works at the end on what is at rest: a surface that is at rest, too, holds it,
+    with a share of friction that rigid bodies leave open (the exact engine takes none)."""
+    end = recording.track(0)[-1]
+    work = recording.energy_at([end["t"] - 1e-3, end["t"]])["belt_work"]
+    return np.hypot(*end["velocity"]) < 1e-9 and work[0] != work[1]
+
+
 def difference(found, reference, soft, until):
     """Return how far a run is from the reference, relative; inf if other things happen."""
     runs = found, reference
     left = [set(run.select(Kind.SEPARATION)["surface"].tolist()) for run in runs]
     mine, its = (told(run, soft, until, left[0] & left[1]) for run in runs)
+    if chafed(reference):
+        mine, its = ([a for a in some if a.kind != "energy"] for some in (mine, its))
     return apart(mine, its, sizes(reference), "relative")[0]
 
 
@@ -124,13 +134,16 @@ def growth(scene, reference):
 def left_out(engine, machine, reference, dt):
     """Return the error that an engine may keep, whatever the order (relative).
 
-    In the contact engine what begins and ends within one step: g dt², by the size of places. In
+    In the contact engine what begins and ends within one step: g dt², by the size L of places; and
+    what rounding of places, 2e-16 L, does to a load of about g that wears off: 2e-16 L/(g dt²). In
     pymunk bounces lower than two hairs h, which take 2 √(2 h/g) (1 + ε + ε² + ...), by what moves
     on in that time (see `chutelab.engines.pymunk.lone`).
     """
     size = sizes(reference)
     if engine is contact:
-        return max(BLOWS[engine], machine.gravity * dt**2 / size["place"])
+        fall = machine.gravity * dt**2 / size["place"]
+        rounding = 2e-16 / (fall * min(PHASES) ** 2) if fall > 0.0 else 0.0
+        return max(BLOWS[engine], fall, rounding)
     blows = reference.select(Kind.IMPACT, Kind.LANDING)
     if not len(blows):
         return BLOWS[engine]
@@ -166,18 +179,7 @@ def check(engine, seed):
 
 
 FAULTS = {
-    contact: {
-        "over the end of a face it may be held a step too long": (
-            28, 42, 63, 70, 124, 134, 143, 184, 193, 210, 249, 282, 288, 310, 358, 404, 406, 430,
-            435, 462, 498,
-        ),
-        "the slip that endless friction leaves on the pulley is of first order": (5, 309, 365),
-        "before the end of the belt the pulley pushes as well": (
-            35, 44, 68, 125, 236, 256, 279, 304, 486,
-        ),
-        "what is struck at the instant of landing counts too": (295,),
-        "a blow leaves the hop on the surface below": (420,),
-    },
+    contact: {},
     pymunk: {
         "misses a low bounce 0.1 mm before the end of a belt": (19,),
         "stalls: it slides past a surface": (313,),

@@ -45,6 +45,7 @@ void describe(Contact *c, int i, int j) {
     c->mass[2] = spin_mass > 0 ? 1 / spin_mass : 0;
     c->rest = pair->restitution;
     c->share = 1;
+    c->pull = j < 0 ? W.gx * c->ny - W.gy * c->nx : 0;
     c->change = 0;
     c->friction = pair->friction;
     c->arm = pair->rolling * reach;

@@ -184,7 +184,7 @@ static void support(int i, int k, double t) {
     double press = press_on(d, W.surfaces + k, c.nx, c.ny), left = W.step_end - t, u[3];
     if (press <= 0 || !W.interact) return;
     relative(&c, 0, u);
-    c.drift = 0.5 * left * (W.gx * c.ny - W.gy * c.nx);
+    c.drift = 0.5 * left * c.pull;
     give(&c, 0.5 * press * d->mass * left);
     /* Friction that need not slow it can hold it from now on. */
     if (fabs(u[1]) <= 1e-12 * W.g * W.dt && fabs(c.impulse[1]) < c.friction * c.impulse[0]) {
@@ -251,7 +251,7 @@ static void jam(Contact *struck, double t) {
     }
     struck->impulse[0] = struck->impulse[1] = 0;
     double left = 0.5 * (MOST_SKIP / SKIP) * W.skip * W.disks[i].radius;
-    sweep_contacts(list, count, 4 * W.sweeps, 0.1 * left, left);
+    sweep_contacts(list, count, 2 * W.sweeps, 0.1 * left, left);
     for (int n = 0; n < count; n++) {
         const Contact *c = list + n;
         Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
@@ -398,6 +398,7 @@ void shock(int i, int j, double t) {
         int m = W.queue[head];
         head = (head + 1) % (W.disk_count + 1);
         W.disks[m].queued = 0;
+        if (W.disks[m].landed && W.until == UNTIL_LANDED) continue;
         for (int link = W.disks[m].links; link >= 0; link = W.links[link]) {
             const Contact *c = W.contacts + link / 2;
             if (budget <= 0 || !struck_too(c, t)) continue;

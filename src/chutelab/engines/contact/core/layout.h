@@ -88,7 +88,6 @@ typedef struct {
     double past[6];       /* the state before `held` */
     double load[3];       /* normal impulse per time of the last three steps, newest first */
     double load_t[3];
-    double end_of_face;   /* s; when it left the end of a face */
     int bent, open;       /* bend is known; `held` is no knot yet */
     int lasted;           /* steps of this contact since the last blow, 0 in flight */
     int stays;            /* steps on one surface, blows or not */
@@ -120,7 +119,8 @@ typedef struct {
     double nx, ny;          /* unit normal towards i */
     double gap;             /* m */
     double need;            /* m/s; least change of normal velocity that keeps the gap closed */
-    double drift;           /* m/s; by which slip grows by the middle of the step */
+    double pull;            /* m/s2; by which gravity makes it slip on a surface */
+    double drift;           /* m/s; the slip that it makes by the middle of the step */
     double impulse[3];      /* on i: normal, tangential (N s), rolling (N m s) */
     double mass[3];         /* what the contact feels of masses and inertias, in the same order */
     double friction, arm;   /* coefficient; rolling friction as an arm, m */

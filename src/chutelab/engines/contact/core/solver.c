@@ -19,6 +19,8 @@
 #define ROUGH 4.0
 /* Of the greatest change where sweeps diverge: contacts that change by so much are lowered. */
 #define FOLLOWS 0.01
+/* Times that friction is lowered, to a quarter and at last to nothing. */
+#define TRIES 4
 /* Sine of the angle between surfaces that count as one: of less nothing is left by rounding. */
 #define PARALLEL 1e-7
 /* Steps that a contact in a crowd lasts at least if its end is told as a separation. */
@@ -52,6 +54,11 @@ static double time_on_face(const Contact *c) {
     return (run > 0 ? s->length - along : along) / fabs(run);
 }
 
+/* When a load (N s of impulse per time, newest first) falls to nothing, by the line through two. */
+static double time_unloaded(const double *load, const double *t) {
+    return load[1] > load[0] ? t[0] + load[0] / (load[1] - load[0]) * (t[0] - t[1]) : INFINITY;
+}
+
 /* Add a contact if it touches and hardly approaches; `least` is the smaller radius. */
 static int add(int i, int j, double least, double bound, double h) {
     if (W.contact_count >= W.contact_room) return 0;
@@ -72,7 +79,7 @@ static int add(int i, int j, double least, double bound, double h) {
         aim = -SLOP * least + (1 - part) * (c->gap + SLOP * least);
     }
     c->need = (aim - later) / h;
-    c->drift = j < 0 ? 0.5 * h * (W.gx * c->ny - W.gy * c->nx) : 0;
+    c->drift = 0.5 * h * c->pull;
     c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
     for (int k = d->before; k >= 0; k = W.earlier[k].next)
         if (W.earlier[k].j == j)
@@ -80,18 +87,27 @@ static int add(int i, int j, double least, double bound, double h) {
     int pressed = c->impulse[0] > 0;
     for (int n = 0; n < d->held_count; n++) pressed |= d->held[n] == -1 - j;
     /* What was pressed came down from its last hop: it may leave along the surface, not into it, and
-       above the face while that lasts. */
-    double floor = -u[0], until = j < 0 ? time_on_face(c) : INFINITY;
+       above the face while that lasts. Beyond, the end presses it only if it is slow enough. */
+    double floor = -u[0], until = j < 0 ? time_on_face(c) : INFINITY, least_need = floor;
     if (until < h) {
         double press = press_on(d, W.surfaces + (-1 - j), c->nx, c->ny);
+        double along = d->vx * c->ny - d->vy * c->nx;
         floor += 0.5 * until * MAX(press, 0);
-    }
-    if (j < 0 && W.surfaces[-1 - j].there == LEAVING) {
-        if (!pressed) return 1;
-        c->need = -INFINITY;
-    }
-    c->leaves = pressed && c->gap <= LEAVE * least && c->need < floor;
+        least_need = press > along * along / d->radius ? floor : -u[0] + until * MAX(press, 0);
+    } else least_need = floor;
+    int gone = j < 0 && W.surfaces[-1 - j].there == LEAVING, ends = until < h || gone;
+    if (gone && !pressed) return 1;
+    if (gone) c->need = -INFINITY;
+    /* A load that wears off leaves nothing to stop; friction goes on as long as the load does, not to
+       the middle of the step. */
+    const Track *track = W.tracks + i;
+    double wears = W.interact || ends ? INFINITY : time_unloaded(track->load, track->load_t) - W.t;
+    /* In a corner the other surface may press it on this one. */
+    int alone = d->supports <= 1 || gone;
+    c->leaves = pressed && alone && wears > 3 * h && c->gap <= LEAVE * least && c->need < least_need;
     if (c->leaves) c->need = floor;
+    if (c->leaves) c->drift = (until < h ? until : 0) * c->pull;
+    else if (pressed && wears < h) c->drift = MAX(wears, -0.5 * W.length_before) * c->pull;
     W.contact_count++;
     return 1;
 }
@@ -117,11 +133,12 @@ static void carry_to_end(int i, int first, double h) {
     double x = d->x + (d->vx - u[0] * last->nx) * h + fall * W.gx;
     double y = d->y + (d->vy - u[0] * last->ny) * h + fall * W.gy;
     for (int k = 0; k < W.surface_count; k++)
-        if (is_near(W.surfaces + k, d) && gap_to(W.surfaces + k, x, y, d->radius, &nx, &ny) < 0)
+        if (is_near(W.surfaces + k, d)
+                && gap_to(W.surfaces + k, x, y, d->radius, &nx, &ny)
+                    < MIN(0, gap_to(W.surfaces + k, d->x, d->y, d->radius, &nx, &ny)))
             return;
     double press = press_on(d, W.surfaces + (-1 - last->j), last->nx, last->ny);
     last->need += 0.5 * MAX(press, 0) * until;
-    W.tracks[i].end_of_face = W.t + until;
 }
 
 /* List the contacts of the step, waking sleepers that are touched; 0 if there is no room. */
@@ -278,10 +295,9 @@ static double sweep(Contact *list, int count, int sweeps, double accurate) {
    belts drive disks into a wedge that locks itself, rigid bodies with all of the friction have no
    solution: there the friction is lowered until they have one. */
 void sweep_contacts(Contact *list, int count, int sweeps, double accurate, double enough) {
-    int lowered = 1;
-    for (;;) {
+    for (int left = TRIES;; left--) {
         double worst = sweep(list, count, sweeps, accurate);
-        if (worst <= accurate || !lowered) break;
+        if (worst <= accurate || left == 0) break;
         if (worst < INFINITY) {
             worst = 0;
             for (int n = 0; n < count; n++) {
@@ -293,16 +309,12 @@ void sweep_contacts(Contact *list, int count, int sweeps, double accurate, doubl
             }
         }
         if (worst <= enough) break;
-        lowered = 0;
         worst = 0;
         for (int n = 0; n < count; n++) worst = MAX(worst, list[n].change);
         for (int n = 0; n < count; n++) {
             Contact *c = list + n;
             Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
-            if (c->share > 0 && c->change >= FOLLOWS * worst) {
-                c->share = c->share > 0.01 ? 0.25 * c->share : 0;
-                lowered = 1;
-            }
+            if (c->change >= FOLLOWS * worst) c->share = left > 1 ? 0.25 * c->share : 0;
             a->vx = a->ux;
             a->vy = a->uy;
             a->spin = a->uspin;
@@ -320,11 +332,11 @@ void sweep_contacts(Contact *list, int count, int sweeps, double accurate, doubl
    friction turns too. The sweeps would bring the slip to zero, which is wrong in first order. */
 static void turn_slip(Contact *c) {
     double h = W.step_end - W.t, past = W.tracks[c->i].lasted ? 0.5 * W.length_before : 0, u[3], v[3];
-    double span = past + 0.5 * h, pull = 2 * c->drift / h, hold = c->friction * c->impulse[0];
+    double span = past + 0.5 * h, pull = c->pull, hold = c->friction * c->impulse[0];
     relative(c, 1, u);
     relative(c, 0, v);
     double from = u[1] - pull * past, to = v[1] + c->drift, rate = hold / (c->mass[1] * span);
-    if (c->j >= 0 || fabs(pull) <= rate || from * pull >= 0 || to * from > 1e-12 * from * from)
+    if (c->j >= 0 || c->leaves || fabs(pull) <= rate || from * pull >= 0 || to * from > 1e-12 * from * from)
         return;
     double slow = pull + (pull > 0 ? rate : -rate), fast = pull - (pull > 0 ? rate : -rate);
     double change[3] = {0, c->mass[1] * (fast * (span + from / slow) - to), 0};
@@ -372,7 +384,7 @@ static void note_grip(Disk *d, const Contact *c, const double *u, const double *
     }
     if (grips && d->slips) {
         /* Friction slows the slip evenly; it is used up so long after the last mid-step. */
-        double s = u[1] - c->drift * 2 * past / h, pull = 2 * c->drift / h;
+        double s = u[1] - c->pull * past, pull = c->pull;
         double rate = most / (c->mass[1] * span) - (s > 0 ? pull : -pull);
         double t = d->t - past + (rate > 0 ? fabs(s) / rate : 0);
         t = MAX(t, d->since);
@@ -391,7 +403,7 @@ static int lies(const Disk *d, const Contact *c) {
     if (s->speed != 0 && c->owner != W.landing) return 0;
     if (bending(s, d->x, d->y, d->radius) != 0 && (d->vx != 0 || c->other[1] != 0)) return 0;
     if (c->arm > 0 && d->spin != c->other[2]) return 0;
-    return d->inertia == 0 || c->drift == 0;
+    return d->inertia == 0 || c->pull == 0;
 }
 
 /* End the track of a disk that came to rest on one surface, when its slip was used up: `d->since`.
@@ -425,8 +437,7 @@ static void settle(int i, const Contact *last, double h) {
     finish(i, BY_SETTLING);
 }
 
-/* Write the separation of a disk that no surface presses any more. The load fell to nothing between
-   the last steps: where its line through two full ones crosses zero the contact ended. */
+/* Write the separation of a disk that no surface presses any more. */
 static void tell_separation(int i) {
     const Disk *d = W.disks + i;
     const Track *track = W.tracks + i;
@@ -434,15 +445,18 @@ static void tell_separation(int i) {
         event_here(SEPARATION, i, d->on);
         return;
     }
-    double t = track->load_t[1], fall = track->load[2] - track->load[1];
-    if (fall > 0) t += track->load[1] / fall * (t - track->load_t[2]);
-    if (track->end_of_face >= track->held[0]) t = track->end_of_face;
+    double t = time_unloaded(track->load + 1, track->load_t + 1);
+    if (t > 2 * d->t - track->load_t[0]) {
+        /* It was not worn off, the face ended: the last impulse tells how long the load went on. */
+        double past = 0.5 * (track->load_t[0] - track->load_t[1]);
+        double span = past + 0.5 * (d->t - track->load_t[0]);
+        t = track->load_t[0] - past + track->load[0] / track->load[1] * span;
+    }
     t = MIN(MAX(t, track->load_t[1]), d->t);
-    const double *from = t < track->held[0] ? track->past : track->held;
-    double s = t - from[0], span = d->t - from[0], place[2], after[3];
-    for (int n = 0; n < 3; n++) after[n] = from[3 + n] + s / span * ((&d->vx)[n] - from[3 + n]);
-    for (int n = 0; n < 2; n++) place[n] = from[1 + n] + 0.5 * s * (from[3 + n] + after[n]);
-    write_event(SEPARATION, i, -1, d->on, t, place, after, after, 0, 0);
+    /* It has flown since. */
+    Disk then = *d;
+    advance(&then, t);
+    write_event(SEPARATION, i, -1, d->on, t, &then.x, &then.vx, &then.vx, 0, 0);
 }
 
 /* After the solve: entries, supports, timers, tracks. */
@@ -473,8 +487,9 @@ void close_step(double h) {
         if (b) {
             W.links[2 * n + 1] = b->links;
             b->links = 2 * n + 1;
-        } else if (a->held_count < MAX_HELD) a->held[a->held_count++] = -1 - c->j;
+        }
         if (c->impulse[0] == 0) continue;
+        if (!b && a->held_count < MAX_HELD) a->held[a->held_count++] = -1 - c->j;
         relative(c, 1, u);
         relative(c, 0, v);
         share_out(c, u, v, 0, entries, given);

@@ -12,7 +12,7 @@ chute with the damping plate", Mech. Sci. 7, 167-177, 2016, doi:10.5194/ms-7-167
 - `paper`: the paper's tables beside what the equations give.
 - `figures`: the paper's figures.
 
-Only NumPy and `chutelab.scene` are imported.
+Only NumPy, `chutelab.scene` and `chutelab.util` are imported.
 """
 
 from chutelab.theory.paper import TABLES, Table, table

@@ -211,12 +211,10 @@ class Lone:
 
     # Distances
 
-    def _on_end(self, face: Face, x: Vec2d) -> bool:
-        """Tell whether the nearest point of a segment is one of its ends."""
-        if face.tangent is None:
-            return False
+    def _curved(self, face: Face, x: Vec2d) -> bool:
+        """Tell whether what is nearest is the pulley or the end of a segment."""
         point = face.shape.point_query(x).point
-        return min((point - end).length for end in face.ends) <= self.world.hair
+        return not face.ends or min((point - e).length for e in face.ends) <= self.world.hair
 
     def _touching(self) -> dict[Face, Vec2d]:
         """Return the surfaces in touch and their normals."""
@@ -265,10 +263,9 @@ class Lone:
     def _meets(self, face: Face, span: float, leaving: bool) -> float:
         """Return when (s from now) the parabola meets a surface, inf if not within `span`.
 
-        All surfaces are convex: along a straight line the distance from one is a convex function,
-        so from where gap and rate of change are known it stays above gap + rate τ - g τ²/2.
-        Stepping from root to root of that bound never passes a contact, and converges like Newton's
-        method.
+        All surfaces are convex, and so lie behind the plane through their nearest point: the gap
+        stays above gap + rate τ + a τ²/2, a the part of gravity along the normal there. Stepping
+        from root to root of that bound never passes a contact, and converges like Newton's method.
         A surface that the flight is leaving along its tangent gives no bound; it is looked at after
         times that grow by half.
         """
@@ -277,28 +274,31 @@ class Lone:
         if g == 0.0 and self.v.length == 0.0:
             return inf
 
-        def gap_at(t: float) -> tuple[float, Vec2d]:
-            return face.gap(self.x + t * (self.v + 0.5 * t * self.pull))
+        def place(t: float) -> Vec2d:
+            return self.x + t * (self.v + 0.5 * t * self.pull)
 
         for _ in range(WINDOW):
             v = self.v + t * self.pull
-            gap, normal = gap_at(t)
+            gap, normal = face.gap(place(t))
             rate = v.dot(normal)
             slow = self.tiny * (1.0 + v.length)
             if leaving:
                 if gap < -hair and t > 0.0:
-                    return longest(lambda t: gap_at(t)[0] >= -0.5 * hair, t, last)
+                    return longest(lambda t: face.gap(place(t))[0] >= -0.5 * hair, t, last)
                 leaving = gap <= hair and (rate <= slow or rate * rate <= 2.0 * LOW * g * hair)
             elif gap <= self.world.rounding:
-                if rate < -slow:
+                # A hair deep or less a curve is grazed, not met.
+                graze = v.length * sqrt(2.0 * hair / self.r)
+                if rate < -slow and (rate < -graze or not self._curved(face, place(t))):
                     return t
                 leaving = True
-            ahead = max(gap, 0.0)
-            root = sqrt(rate * rate + 2.0 * g * ahead)
-            if rate <= 0.0:
-                tau = 2.0 * ahead / (root - rate) if root > rate else inf
-            else:
-                tau = (rate + root) / g if g > 0.0 else inf
+            ahead, pull = max(gap, 0.0), self.pull.dot(normal)
+            square = rate * rate - 2.0 * pull * ahead
+            tau = inf
+            if square >= 0.0 and rate < 0.0:
+                tau = 2.0 * ahead / (sqrt(square) - rate)
+            elif pull < 0.0:
+                tau = (rate + sqrt(square)) / -pull
             if leaving:
                 tau = max(tau, min(0.5 * t + FIRST * self.dt, self.r / (v.length + g * self.dt)))
             if t + tau == t:
@@ -366,7 +366,7 @@ class Lone:
             return False
         h = min(self.dt, self.machine.end_time - self.t)
         speed = self.v.length + self.g * self.dt
-        rims = {face for face in touching if self._on_end(face, self.x)}
+        rims = {face for face in touching if self._curved(face, self.x)}
         h = min(h, self._room(touching, rims) / speed) if speed > 0.0 else h
 
         def trial(span: float) -> Ridden:
@@ -375,7 +375,7 @@ class Lone:
         def holds(span: float) -> bool:
             end = trial(span)
             return bool(end.pushed) and not any(
-                self._on_end(c.face, end.middle) for c in end.pushed if c.face not in rims
+                self._curved(c.face, end.middle) for c in end.pushed if c.face not in rims
             )
 
         def clear(end: Ridden) -> bool:
@@ -413,7 +413,7 @@ class Lone:
     def _room(self, touching: Collection[Face], rims: Collection[Face]) -> float:
         """Return the way (m) of a step on which it meets every end and every other surface."""
         room = STRIDE * self.r
-        if rims or any(face.tangent is None for face in touching):
+        if rims:
             return room
         ends = [(self.x - end).length - self.r for face in touching for end in face.ends]
         others = [face.gap(self.x)[0] for face in self.world.faces if face not in touching]
@@ -437,8 +437,8 @@ class Lone:
             return turn if self.v.dot(normal) > 0.0 else 0.0
 
         contacts = self._step(middle - h * self.v, self.v, h, self.pull, law, wedged)
-        if self.v.dot(normal) > SEAM * self.v.length:
-            turn = self.body.velocity.dot(self.body.velocity) / self.v.dot(self.v)
+        if self.v.dot(normal) > SEAM * (1.0 + self.v.length):
+            turn = (self.body.velocity.length / self.v.length) ** 2
             contacts = self._step(middle - h * self.v, self.v, h, self.pull, law, wedged)
         v, omega = self.body.velocity, self.body.angular_velocity
         x = middle + 0.5 * h * v
@@ -446,7 +446,7 @@ class Lone:
         for face in pushed:
             gap, normal = face.gap(x)
             x -= gap * normal
-            if len(pushed) == 1 and (face.tangent is None or self._on_end(face, middle)):
+            if len(pushed) == 1 and self._curved(face, middle):
                 v -= v.dot(normal) * normal
         return Ridden(x, v, omega, contacts, middle)
 

@@ -402,7 +402,7 @@ class Lone:
             end = trial(h)
         if self.machine.until == "settled" and self._lies(end, h):
             surface = end.pushed[0].face.surface
-            if self.slipping:
+            if self.slipping != 0:
                 self._tell(Kind.STICK, surface)
             self._tell(Kind.SETTLE, surface)
             self._end("settled")
@@ -454,16 +454,18 @@ class Lone:
         """Take a step that was tried."""
         before, entries = self._row(), self.entries[:, None].copy()
         motion = self.v, self.omega
+        pushed = end.pushed
+        slips, on = end.slips, pushed[0].face.surface if pushed else self.on
+        began, changed = self.slipping is None, bool(slips) != bool(self.slipping)
+        self.on, self.slipping = on, slips
+        if began and not slips:
+            self._tell(Kind.STICK, on)
         self.x, self.v, self.omega = end.x, end.v, end.omega
         self.t += h
-        pushed = end.pushed
+        if changed and not began:
+            self._tell(Kind.SLIP if slips else Kind.STICK, on)
         for contact in pushed:
             self._book(contact, motion)
-        slips, on = end.slips, pushed[0].face.surface if pushed else self.on
-        if self.slipping is not None and bool(slips) != bool(self.slipping):
-            kind = Kind.SLIP if slips else Kind.STICK
-            self._tell(kind, on)
-        self.on, self.slipping = on, slips
         state = np.array([before, self._row()])[:, :, None]
         self.tracks.step(ALONE, (self.t - h, self.t), state, entries)
         if self.t >= self.machine.end_time:

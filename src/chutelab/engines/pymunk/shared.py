@@ -394,6 +394,13 @@ class Shared:
         together = self.machine.interact and (self.waiting or (self.inside & ~calm).any())
         if until == "settled" and not together:
             for i in np.flatnonzero(calm).tolist():
+                if i not in self.rides:
+                    # It was calm at the end of this step first.
+                    late = self.calm[i] - self.h
+                    x, v = self.state[1, :2, i], self.state[1, 2:4, i]
+                    self.recorder.events(
+                        Kind.STICK, i, self.t - late, x - late * v, v, surface=self.on[i]
+                    )
                 self._end(i, "settled", self.t, Kind.SETTLE)
 
     def _end(self, i: int, reason: str, t: float | None = None, kind: Kind | None = None) -> None:

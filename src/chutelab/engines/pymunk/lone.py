@@ -54,10 +54,6 @@ TINY = 1e-12
 SEAM = 1e-6
 """The same in a lasting contact, where a surface goes on in the next one."""
 
-LATE, HOP = 1e-3, 1e-6
-"""Shares of a step: bounces are over when all that are left take less than the first, or the next
-one less than the second."""
-
 STRIDE = 0.5
 """Share of the radius that a step of a lasting contact may always be long: it meets every end."""
 
@@ -87,9 +83,6 @@ LOW = 2.0
 
 TURNS = 200
 """Blows at one instant, one surface after the other, before all are solved together."""
-
-ALONE = np.ones(1, dtype=bool)
-"""Row of the only particle in its `Tracks`."""
 
 
 class Contact(NamedTuple):
@@ -151,9 +144,8 @@ class Lone:
         self.contacts: list[Contact] = []
         self.on = -1
         self.slipping: int | None = None
-        self.ended = False
+        self.ended = self.landed = False
         self.steps, self.last = 0, 0.0
-        self.landed = False
         self.blows, self.struck = 0, -inf
 
     def run(self) -> None:
@@ -230,7 +222,10 @@ class Lone:
 
     def _fly(self, touching: dict[Face, Vec2d]) -> None:
         """Fly to the next contact, the exit or the end."""
-        self._part()
+        if self.on >= 0:
+            self.tracks.knot(0, self.t, self.x, self.v, self.omega)
+            self._tell(Kind.SEPARATION, self.on)
+        self.on, self.slipping = -1, None
         span, reason = self.machine.end_time - self.t, "time"
         out = time_out(self.machine, self.x, self.v)
         if out < span and self.machine.until != "time":
@@ -345,17 +340,12 @@ class Lone:
             )
 
     def _restitution(self, face: Face, normal: Vec2d) -> float:
-        """Return ε, or 0 where the bounces that would follow are over within a step."""
+        """Return ε, or 0 where a rebound would be too slow or too low."""
         approach, weight = -self.v.dot(normal), -self.pull.dot(normal)
-        e = face.restitution
-        if approach <= self.tiny * (1.0 + self.v.length):
-            return 0.0
-        if weight > 0.0:
-            hop = 2.0 * e * approach / weight
-            height = 0.5 * (e * approach) ** 2 / weight
-            if hop < self.dt * max(LATE * (1.0 - e), HOP) or height < LOW * self.world.hair:
-                return 0.0
-        return e
+        rebound = face.restitution * approach
+        touch = approach <= self.tiny * (1.0 + self.v.length)
+        low = rebound * rebound < 2.0 * LOW * self.world.hair * weight
+        return 0.0 if touch or low else face.restitution
 
     # Lasting contact
 
@@ -374,17 +364,12 @@ class Lone:
 
         def holds(span: float) -> bool:
             end = trial(span)
-            return bool(end.pushed) and not any(
-                self._curved(c.face, end.middle) for c in end.pushed if c.face not in rims
-            )
+            faces = {c.face for c in end.pushed}
+            return bool(faces) and not any(self._curved(f, end.middle) for f in faces - rims)
 
         def clear(end: Ridden) -> bool:
-            pushed = {c.face for c in end.pushed}
-            return all(
-                face.gap(end.x)[0] >= -0.25 * self.world.hair
-                for face in self.world.faces
-                if face not in pushed
-            )
+            others = set(self.world.faces).difference(c.face for c in end.pushed)
+            return all(face.gap(end.x)[0] >= -0.25 * self.world.hair for face in others)
 
         # What half of a step twice as long finds goes for the end of this one.
         floor = SHORT * h
@@ -452,7 +437,7 @@ class Lone:
 
     def _accept(self, end: Ridden, h: float) -> None:
         """Take a step that was tried."""
-        before, entries = self._row(), self.entries[:, None].copy()
+        before, entries = (*self.x, *self.v, self.omega), self.entries[:, None].copy()
         motion = self.v, self.omega
         pushed = end.pushed
         slips, on = end.slips, pushed[0].face.surface if pushed else self.on
@@ -466,13 +451,10 @@ class Lone:
             self._tell(Kind.SLIP if slips else Kind.STICK, on)
         for contact in pushed:
             self._book(contact, motion)
-        state = np.array([before, self._row()])[:, :, None]
-        self.tracks.step(ALONE, (self.t - h, self.t), state, entries)
+        state = np.array([before, (*self.x, *self.v, self.omega)])[:, :, None]
+        self.tracks.step(np.array([True]), (self.t - h, self.t), state, entries)
         if self.t >= self.machine.end_time:
             self._end("time")
-
-    def _row(self) -> tuple[float, ...]:
-        return (*self.x, *self.v, self.omega)
 
     def _lies(self, end: Ridden, h: float) -> bool:
         """Tell whether a step without slip changed nothing, on a surface to settle on.
@@ -492,13 +474,6 @@ class Lone:
             )
         )
 
-    def _part(self) -> None:
-        """Write that a lasting contact has ended."""
-        if self.on >= 0:
-            self.tracks.knot(0, self.t, self.x, self.v, self.omega)
-            self._tell(Kind.SEPARATION, self.on)
-        self.on, self.slipping = -1, None
-
     def _carry(self) -> None:
         """Ride by adhesion, see `Carriage`."""
         belt = self.machine.pulley
@@ -508,8 +483,8 @@ class Lone:
             self._end("settled")
             return
         ride = Carriage(self.machine, self.world, self.particle, self.t)
-        ride.write(self.recorder, ride.until)
         self.t, (self.x, self.v) = ride.until, ride.state(ride.until)
+        ride.write(self.recorder, self.t)
         if self.t >= self.machine.end_time:
             self._end("time")
         else:

@@ -103,13 +103,8 @@ class Ridden(NamedTuple):
     x: Vec2d
     v: Vec2d
     omega: float
-    contacts: list[Contact]
+    pushed: list[Contact]
     middle: Vec2d
-
-    @property
-    def pushed(self) -> list[Contact]:
-        """Contacts at which a surface pushed."""
-        return [c for c in self.contacts if c.push > 0.0]
 
     @property
     def slips(self) -> int:
@@ -182,12 +177,13 @@ class Lone:
     def _after(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
         face, normal = self.world.by_shape[arbiter.shapes[1]], -arbiter.normal
         j = arbiter.total_impulse
-        self.contacts.append(Contact(face, normal, float(j.dot(normal)), float(j.cross(normal))))
+        if (push := float(j.dot(normal))) > 0.0:
+            self.contacts.append(Contact(face, normal, push, float(j.cross(normal))))
 
     def _step(
         self, x: Vec2d, v: Vec2d, h: float, pull: Vec2d, law: Law, wedged: bool = False
     ) -> list[Contact]:
-        """Let Chipmunk step by h (s); return the contacts that it solved."""
+        """Let Chipmunk step by h (s); return the contacts that pushed."""
         body, space = self.body, self.world.space
         if h != self.last:
             # Chipmunk keeps impulses for the next step, but right ones only if it is as long.
@@ -320,16 +316,15 @@ class Lone:
         def law(face: Face, normal: Vec2d) -> float | None:
             return self._restitution(face, normal) if together or face is struck else None
 
-        contacts = self._step(self.x, self.v, INSTANT, Vec2d(0, 0), law, together)
+        pushed = self._step(self.x, self.v, INSTANT, Vec2d(0, 0), law, together)
         self.v, self.omega = self.body.velocity, self.body.angular_velocity
-        for contact in contacts:
-            if contact.push > 0.0:
-                self._book(contact, before)
-                lands = contact.face.surface == self.machine.landing and not self.landed
-                self.landed |= lands
-                kind = Kind.LANDING if lands else Kind.IMPACT
-                self._tell(kind, contact.face.surface, before, contact)
-                self.recorder.contacts += 1
+        for contact in pushed:
+            self._book(contact, before)
+            lands = contact.face.surface == self.machine.landing and not self.landed
+            self.landed |= lands
+            kind = Kind.LANDING if lands else Kind.IMPACT
+            self._tell(kind, contact.face.surface, before, contact)
+            self.recorder.contacts += 1
         self.tracks.knot(0, self.t, self.x, self.v, self.omega)
         if self.landed and self.machine.until == "landed":
             self._end("landed")
@@ -427,11 +422,10 @@ class Lone:
             contacts = self._step(middle - h * self.v, self.v, h, self.pull, law, wedged)
         v, omega = self.body.velocity, self.body.angular_velocity
         x = middle + 0.5 * h * v
-        pushed = [c.face for c in contacts if c.push > 0.0]
-        for face in pushed:
-            gap, normal = face.gap(x)
+        for contact in contacts:
+            gap, normal = contact.face.gap(x)
             x -= gap * normal
-            if len(pushed) == 1 and self._curved(face, middle):
+            if len(contacts) == 1 and self._curved(contact.face, middle):
                 v -= v.dot(normal) * normal
         return Ridden(x, v, omega, contacts, middle)
 

@@ -396,11 +396,11 @@ class Shared:
             for i in np.flatnonzero(calm).tolist():
                 if i not in self.rides:
                     # It was calm at the end of this step first.
-                    late = self.calm[i] - self.h
-                    x, v = self.state[1, :2, i], self.state[1, 2:4, i]
+                    late, place, speed = self.calm[i] - self.h, *self.state[1, :4, i].reshape(2, 2)
                     self.recorder.events(
-                        Kind.STICK, i, self.t - late, x - late * v, v, surface=self.on[i]
-                    )
+                        Kind.STICK, i, self.t - late, place - late * speed, speed,
+                        surface=self.on[i],
+                    )  # fmt: skip
                 self._end(i, "settled", self.t, Kind.SETTLE)
 
     def _end(self, i: int, reason: str, t: float | None = None, kind: Kind | None = None) -> None:

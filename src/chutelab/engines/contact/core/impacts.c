@@ -60,12 +60,12 @@ double soft_approach(const Disk *d, double radius) {
 }
 
 /* Approach up to which a contact is left to the next step, m/s. What lies on a surface comes back to
-   it at the end of each step, as fast as gravity makes it in one; not what is pressed into it. */
+   it at the end of each step, as fast as gravity makes it in one; not what has sunk into it. */
 double left_over(const Disk *d, int impacts, int surface, double radius) {
     double skip = W.skip * radius, least = soft_approach(d, radius), nx, ny;
     for (int n = 0; n < d->held_count; n++)
         if (d->held[n] == surface
-                && gap_to(W.surfaces + surface, d->x, d->y, d->radius, &nx, &ny) > -SLOP * radius)
+                && gap_to(W.surfaces + surface, d->x, d->y, d->radius, &nx, &ny) > -SUNK * radius)
             least = MAX(least, 1.000001 * W.g * W.step);
     if (impacts <= MANY || surface >= 0) return least;
     double most = skip * (MOST_SKIP / SKIP);

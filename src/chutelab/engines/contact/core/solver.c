@@ -8,8 +8,9 @@
 
 #include "core.h"
 
-/* Of an overlap beyond SLOP a tenth is parted in each step: gently,
+/* Overlap that is left alone, in radii; of what is beyond, a tenth is parted in each step: gently,
    since parting does work. Of an overlap as deep as DEEP more, up to all. */
+#define SLOP 1e-3
 #define PART 0.1
 #define DEEP 0.03
 /* Gap, in radii, up to which what was pressed still touches: what sweeps leave open. */

@@ -209,7 +209,7 @@ def test_contact_comes_to_what_exact_says(seed):
     check(contact, seed)
 
 
-@pytest.mark.parametrize("seed", (2, 3, 4, 5, 6, 9, 10, 13))
+@pytest.mark.parametrize("seed", [2, 3, 4, 5, 6, 9, 10, 13])
 def test_pymunk_comes_to_what_exact_says(seed):
     check(pymunk, seed)
 

@@ -11,7 +11,9 @@ ledger. With three reservations, which are the same for every scene:
 - A particle that slides where nothing presses it may be told to leave or not to leave: separations
   count where both tell them. Their velocity does not count (see `test_contact.py`).
 - Where two surfaces are struck at once, or so soon one after the other that a step cannot tell,
-  rigid bodies have no answer, and engines choose one. A run counts up to there.
+  rigid bodies have no answer, and engines choose one. A run counts up to there. So it does to where
+  a particle lies still against a moving surface and another one: two forces and two frictions
+  balance the weight, one equation too few for the work of the belt.
 """
 
 from __future__ import annotations
@@ -64,6 +66,37 @@ def together(recording, least):
     return float(struck["t"][at[0]]) if len(at) else inf
 
 
+def jammed(recording, machine):
+    """Return when it comes to lie for good between two surfaces of which one moves, or inf."""
+    knots, parts = recording.knots, machine.segments
+    still = ~knots["velocity"].any(axis=1)
+    if not still[-1]:
+        return inf
+    way = knots["position"][-1] - parts.start
+    along = np.clip((way * parts.tangent).sum(axis=1), 0.0, parts.length)
+    gaps = np.hypot(*(way - along[:, None] * parts.tangent).T) - machine.particle.radius
+    touched = parts.speed[gaps < 1e-9 * machine.particle.radius]
+    moves = np.flatnonzero(~still)
+    return knots["t"][moves[-1] + 1] if len(touched) > 1 and touched.any() else inf
+
+
+def flies_back(recording, machine):
+    """Return when, without gravity, it flies back over the pulley as low as the belt carried it.
+
+    Then it grazes the pulley. Chipmunk's normal of a blow is off by the rounding of coordinates
+    over the radius, by which it may come so much lower as to touch.
+    """
+    if machine.gravity != 0.0 or machine.pulley is None:
+        return inf
+    height = machine.pulley.radius + machine.particle.radius
+    blows = recording.select(Kind.IMPACT, Kind.LANDING)["t"]
+    knots = recording.knots[recording.knots["t"] >= min(blows, default=inf)]
+    (x, y), (vx, _) = knots["position"].T, knots["velocity"].T
+    tilt = DIGITS * np.abs(x) / machine.particle.radius
+    back = (x * vx < 0.0) & (np.abs(y - height) <= tilt * np.abs(x))
+    return min(knots["t"][back] - x[back] / vx[back], default=inf)
+
+
 def normal_of(recording, blow):
     """Return the normal of a blow: m Δv = J_n n + J_t (n_y, -n_x), solved for n."""
     change = recording.particle.mass * (blow["velocity_after"] - blow["velocity_before"])
@@ -90,28 +123,19 @@ def told(recording, soft, until, surfaces):
     ]  # fmt: skip
 
 
-def chafed(recording):
-    """Whether a belt works at the end on what is at rest: a surface that is at rest, too, holds it,
-    with a share of friction that rigid bodies leave open (the exact engine takes none)."""
-    end = recording.track(0)[-1]
-    work = recording.energy_at([end["t"] - 1e-3, end["t"]])["belt_work"]
-    return np.hypot(*end["velocity"]) < 1e-9 and work[0] != work[1]
-
-
 def difference(found, reference, soft, until):
     """Return how far a run is from the reference, relative; inf if other things happen."""
     runs = found, reference
     left = [set(run.select(Kind.SEPARATION)["surface"].tolist()) for run in runs]
     mine, its = (told(run, soft, until, left[0] & left[1]) for run in runs)
-    if chafed(reference):
-        mine, its = ([a for a in some if a.kind != "energy"] for some in (mine, its))
     return apart(mine, its, sizes(reference), "relative")[0]
 
 
 def errors(engine, machine, reference, levels, phases=(1.0,)):
     """Return the largest error of a lone run at each level of steps, and the last step (s)."""
     first = step_of(engine, machine)
-    until = together(reference, 2.0 * first) - 2.0 * first
+    back = flies_back(reference, machine) if engine is pymunk else inf
+    until = min(together(reference, 2.0 * first), jammed(reference, machine), back) - 2.0 * first
     machine = replace(machine, end_time=min(machine.end_time, until))
     found = []
     for level in range(levels):
@@ -145,7 +169,7 @@ def left_out(engine, machine, reference, dt):
         rounding = 2e-16 / (fall * min(PHASES) ** 2) if fall > 0.0 else 0.0
         return max(BLOWS[engine], fall, rounding)
     blows = reference.select(Kind.IMPACT, Kind.LANDING)
-    if not len(blows):
+    if not len(blows) or machine.gravity == 0.0:
         return BLOWS[engine]
     lengths = np.abs([*machine.segments.start.ravel(), *machine.segments.end.ravel()]).max()
     hair = max(HAIR * machine.particle.radius, 4.0 * DIGITS * float(lengths))
@@ -161,59 +185,41 @@ def check(engine, seed):
         reference = exact.run(machine)
     except exact.CornerError:
         pytest.skip("a belt and a wall hold it: the exact engine has no answer")
-    if engine is pymunk and machine.gravity == 0.0:
-        pytest.skip("without gravity it flies along the belt: a hair decides whether it touches")
     # A rebound as slow as what gravity does in a step is over within two: it is no blow.
     if only_blows(reference, 2.0 * step_of(engine, machine)):
         (error,), _ = errors(engine, machine, reference, 1)
         assert error <= BLOWS[engine] * growth(scene, reference)
         return
-    levels, phases = (4, PHASES) if engine is contact else (3, (1.0,))
-    found, dt = errors(engine, machine, reference, levels, phases)
-    # An error may be small by luck: that counts which is the largest at a step or any finer one.
-    coarse, fine = max(found), found[-1]
-    assert fine < inf
-    if fine > left_out(engine, machine, reference, dt):
-        order = log(coarse / fine) / log(RATIO ** (levels - 1))
-        assert order >= ORDERS[engine], found
+    # Pymunk's steps on a curve are half a radius' way at most: three levels may differ too little.
+    for levels in (4,) if engine is contact else (3, 4):
+        phases = PHASES if engine is contact else (1.0,)
+        found, dt = errors(engine, machine, reference, levels, phases)
+        # An error may be small by luck: that counts which is the largest at any step.
+        coarse, fine = max(found), found[-1]
+        order = log(coarse / fine) / log(RATIO ** (levels - 1)) if 0.0 < fine < inf else 0.0
+        if fine <= left_out(engine, machine, reference, dt) or order >= ORDERS[engine]:
+            return
+    raise AssertionError(found)
 
 
-FAULTS = {
-    contact: {},
-    pymunk: {
-        "misses a low bounce 0.1 mm before the end of a belt": (19,),
-        "stalls: it slides past a surface": (313,),
-    },
-}  # fmt: skip
-"""Seeds that are not kept to, by what is wrong with them."""
-
-
-def drawn(engine, seeds):
-    reasons = {seed: why for why, known in FAULTS[engine].items() for seed in known}
-    return [
-        pytest.param(seed, marks=pytest.mark.xfail(reason=reasons[seed]) if seed in reasons else ())
-        for seed in seeds
-    ]
-
-
-@pytest.mark.parametrize("seed", drawn(contact, range(16)))
+@pytest.mark.parametrize("seed", range(16))
 def test_contact_comes_to_what_exact_says(seed):
     check(contact, seed)
 
 
-@pytest.mark.parametrize("seed", drawn(pymunk, (2, 3, 4, 5, 6, 9, 10, 13)))
+@pytest.mark.parametrize("seed", [2, 3, 4, 5, 6, 9, 10, 13])
 def test_pymunk_comes_to_what_exact_says(seed):
     check(pymunk, seed)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", drawn(contact, range(16, 500)))
+@pytest.mark.parametrize("seed", range(16, 500))
 def test_contact_comes_to_what_exact_says_everywhere(seed):
     check(contact, seed)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", drawn(pymunk, range(500)))
+@pytest.mark.parametrize("seed", range(500))
 def test_pymunk_comes_to_what_exact_says_everywhere(seed):
     check(pymunk, seed)
 

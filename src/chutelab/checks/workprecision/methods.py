@@ -108,6 +108,7 @@ UNABLE = {
 }
 """Reasons why a method cannot do a case."""
 
+# Disks of 4 mm that land with 4.4 m/s pass through a belt in longer steps than the fixed ones here.
 _STEPS = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
 
 METHODS = {
@@ -124,7 +125,7 @@ METHODS = {
         ),
         Method(
             "fixed", "pymunk, fixed step", "dt", "chutelab.engines.pymunk",
-            _STEPS[:5], (1e-2, 1e-3), (1e-3, 1e-2, 3e-3),
+            (8e-4, 3e-4, 1e-4), (8e-4, 1e-4), (8e-4, 3e-4),
         ),
         Method(
             "plain", "plain Pymunk", "dt", "chutelab.checks.workprecision.plain",

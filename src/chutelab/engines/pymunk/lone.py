@@ -50,10 +50,6 @@ TINY = 1e-12
 SEAM = 1e-6
 """The same in a lasting contact, where a surface goes on in the next one."""
 
-LATE, HOP = 1e-3, 1e-6
-"""Shares of a step: bounces are over when all that are left take less than the first, or the next
-one less than the second."""
-
 STRIDE = 0.5
 """Share of the radius that a step of a lasting contact may always be long: it meets every end."""
 
@@ -84,9 +80,6 @@ LOW = 2.0
 TURNS = 200
 """Blows at one instant, one surface after the other, before all are solved together."""
 
-ALONE = np.ones(1, dtype=bool)
-"""Row of the only particle in its `Tracks`."""
-
 
 class Contact(NamedTuple):
     """What Chipmunk did at one contact in one step.
@@ -106,13 +99,8 @@ class Ridden(NamedTuple):
     x: Vec2d
     v: Vec2d
     omega: float
-    contacts: list[Contact]
+    pushed: list[Contact]
     middle: Vec2d
-
-    @property
-    def pushed(self) -> list[Contact]:
-        """Contacts at which a surface pushed."""
-        return [c for c in self.contacts if c.push > 0.0]
 
     @property
     def slips(self) -> int:
@@ -147,9 +135,8 @@ class Lone:
         self.contacts: list[Contact] = []
         self.on = -1
         self.slipping: int | None = None
-        self.ended = False
+        self.ended = self.landed = False
         self.steps, self.last = 0, 0.0
-        self.landed = False
         self.blows, self.struck = 0, -inf
 
     def run(self) -> None:
@@ -186,12 +173,13 @@ class Lone:
     def _after(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
         face, normal = self.world.by_shape[arbiter.shapes[1]], -arbiter.normal
         j = arbiter.total_impulse
-        self.contacts.append(Contact(face, normal, float(j.dot(normal)), float(j.cross(normal))))
+        if (push := float(j.dot(normal))) > 0.0:
+            self.contacts.append(Contact(face, normal, push, float(j.cross(normal))))
 
     def _step(
         self, x: Vec2d, v: Vec2d, h: float, pull: Vec2d, law: Law, wedged: bool = False
     ) -> list[Contact]:
-        """Let Chipmunk step by h (s); return the contacts that it solved."""
+        """Let Chipmunk step by h (s); return the contacts that pushed."""
         body, space = self.body, self.world.space
         if h != self.last:
             # Chipmunk keeps impulses for the next step, but right ones only if it is as long.
@@ -207,12 +195,10 @@ class Lone:
 
     # Distances
 
-    def _on_end(self, face: Face, x: Vec2d) -> bool:
-        """Tell whether the nearest point of a segment is one of its ends."""
-        if face.tangent is None:
-            return False
+    def _curved(self, face: Face, x: Vec2d) -> bool:
+        """Tell whether what is nearest is the pulley or the end of a segment."""
         point = face.shape.point_query(x).point
-        return min((point - end).length for end in face.ends) <= self.world.hair
+        return not face.ends or min((point - e).length for e in face.ends) <= self.world.hair
 
     def _touching(self) -> dict[Face, Vec2d]:
         """Return the surfaces in touch and their normals."""
@@ -228,7 +214,10 @@ class Lone:
 
     def _fly(self, touching: dict[Face, Vec2d]) -> None:
         """Fly to the next contact, the exit or the end."""
-        self._part()
+        if self.on >= 0:
+            self.tracks.knot(0, self.t, self.x, self.v, self.omega)
+            self._tell(Kind.SEPARATION, self.on)
+        self.on, self.slipping = -1, None
         span, reason = self.machine.end_time - self.t, "time"
         out = time_out(self.machine, self.x, self.v)
         if out < span and self.machine.until != "time":
@@ -261,10 +250,9 @@ class Lone:
     def _meets(self, face: Face, span: float, leaving: bool) -> float:
         """Return when (s from now) the parabola meets a surface, inf if not within `span`.
 
-        All surfaces are convex: along a straight line the distance from one is a convex function,
-        so from where gap and rate of change are known it stays above gap + rate τ - g τ²/2.
-        Stepping from root to root of that bound never passes a contact, and converges like Newton's
-        method.
+        All surfaces are convex, and so lie behind the plane through their nearest point: the gap
+        stays above gap + rate τ + a τ²/2, a the part of gravity along the normal there. Stepping
+        from root to root of that bound never passes a contact, and converges like Newton's method.
         A surface that the flight is leaving along its tangent gives no bound; it is looked at after
         times that grow by half.
         """
@@ -273,28 +261,31 @@ class Lone:
         if g == 0.0 and self.v.length == 0.0:
             return inf
 
-        def gap_at(t: float) -> tuple[float, Vec2d]:
-            return face.gap(self.x + t * (self.v + 0.5 * t * self.pull))
+        def place(t: float) -> Vec2d:
+            return self.x + t * (self.v + 0.5 * t * self.pull)
 
         for _ in range(WINDOW):
             v = self.v + t * self.pull
-            gap, normal = gap_at(t)
+            gap, normal = face.gap(place(t))
             rate = v.dot(normal)
             slow = self.tiny * (1.0 + v.length)
             if leaving:
                 if gap < -hair and t > 0.0:
-                    return longest(lambda t: gap_at(t)[0] >= -0.5 * hair, t, last)
+                    return longest(lambda t: face.gap(place(t))[0] >= -0.5 * hair, t, last)
                 leaving = gap <= hair and (rate <= slow or rate * rate <= 2.0 * LOW * g * hair)
             elif gap <= self.world.rounding:
-                if rate < -slow:
+                # A hair deep or less a curve is grazed, not met.
+                graze = v.length * sqrt(2.0 * hair / self.r)
+                if rate < -slow and (rate < -graze or not self._curved(face, place(t))):
                     return t
                 leaving = True
-            ahead = max(gap, 0.0)
-            root = sqrt(rate * rate + 2.0 * g * ahead)
-            if rate <= 0.0:
-                tau = 2.0 * ahead / (root - rate) if root > rate else inf
-            else:
-                tau = (rate + root) / g if g > 0.0 else inf
+            ahead, pull = max(gap, 0.0), self.pull.dot(normal)
+            square = rate * rate - 2.0 * pull * ahead
+            tau = inf
+            if square >= 0.0 and rate < 0.0:
+                tau = 2.0 * ahead / (sqrt(square) - rate)
+            elif pull < 0.0:
+                tau = (rate + sqrt(square)) / -pull
             if leaving:
                 tau = max(tau, min(0.5 * t + FIRST * self.dt, self.r / (v.length + g * self.dt)))
             if t + tau == t:
@@ -321,16 +312,15 @@ class Lone:
         def law(face: Face, normal: Vec2d) -> float | None:
             return self._restitution(face, normal) if together or face is struck else None
 
-        contacts = self._step(self.x, self.v, INSTANT, Vec2d(0, 0), law, together)
+        pushed = self._step(self.x, self.v, INSTANT, Vec2d(0, 0), law, together)
         self.v, self.omega = self.body.velocity, self.body.angular_velocity
-        for contact in contacts:
-            if contact.push > 0.0:
-                self._book(contact, before)
-                lands = contact.face.surface == self.machine.landing and not self.landed
-                self.landed |= lands
-                kind = Kind.LANDING if lands else Kind.IMPACT
-                self._tell(kind, contact.face.surface, before, contact)
-                self.recorder.contacts += 1
+        for contact in pushed:
+            self._book(contact, before)
+            lands = contact.face.surface == self.machine.landing and not self.landed
+            self.landed |= lands
+            kind = Kind.LANDING if lands else Kind.IMPACT
+            self._tell(kind, contact.face.surface, before, contact)
+            self.recorder.contacts += 1
         self.tracks.knot(0, self.t, self.x, self.v, self.omega)
         if self.landed and self.machine.until == "landed":
             self._end("landed")
@@ -341,17 +331,12 @@ class Lone:
             )
 
     def _restitution(self, face: Face, normal: Vec2d) -> float:
-        """Return ε, or 0 where the bounces that would follow are over within a step."""
+        """Return ε, or 0 where a rebound would be too slow or too low."""
         approach, weight = -self.v.dot(normal), -self.pull.dot(normal)
-        e = face.restitution
-        if approach <= self.tiny * (1.0 + self.v.length):
-            return 0.0
-        if weight > 0.0:
-            hop = 2.0 * e * approach / weight
-            height = 0.5 * (e * approach) ** 2 / weight
-            if hop < self.dt * max(LATE * (1.0 - e), HOP) or height < LOW * self.world.hair:
-                return 0.0
-        return e
+        rebound = face.restitution * approach
+        touch = approach <= self.tiny * (1.0 + self.v.length)
+        low = rebound * rebound < 2.0 * LOW * self.world.hair * weight
+        return 0.0 if touch or low else face.restitution
 
     # Lasting contact
 
@@ -362,7 +347,7 @@ class Lone:
             return False
         h = min(self.dt, self.machine.end_time - self.t)
         speed = self.v.length + self.g * self.dt
-        rims = {face for face in touching if self._on_end(face, self.x)}
+        rims = {face for face in touching if self._curved(face, self.x)}
         h = min(h, self._room(touching, rims) / speed) if speed > 0.0 else h
 
         def trial(span: float) -> Ridden:
@@ -370,17 +355,12 @@ class Lone:
 
         def holds(span: float) -> bool:
             end = trial(span)
-            return bool(end.pushed) and not any(
-                self._on_end(c.face, end.middle) for c in end.pushed if c.face not in rims
-            )
+            faces = {c.face for c in end.pushed}
+            return bool(faces) and not any(self._curved(f, end.middle) for f in faces - rims)
 
         def clear(end: Ridden) -> bool:
-            pushed = {c.face for c in end.pushed}
-            return all(
-                face.gap(end.x)[0] >= -0.25 * self.world.hair
-                for face in self.world.faces
-                if face not in pushed
-            )
+            others = set(self.world.faces).difference(c.face for c in end.pushed)
+            return all(face.gap(end.x)[0] >= -0.25 * self.world.hair for face in others)
 
         # What half of a step twice as long finds goes for the end of this one.
         floor = SHORT * h
@@ -398,7 +378,7 @@ class Lone:
             end = trial(h)
         if self.machine.until == "settled" and self._lies(end, h):
             surface = end.pushed[0].face.surface
-            if self.slipping:
+            if self.slipping != 0:
                 self._tell(Kind.STICK, surface)
             self._tell(Kind.SETTLE, surface)
             self._end("settled")
@@ -409,7 +389,7 @@ class Lone:
     def _room(self, touching: Collection[Face], rims: Collection[Face]) -> float:
         """Return the way (m) of a step on which it meets every end and every other surface."""
         room = STRIDE * self.r
-        if rims or any(face.tangent is None for face in touching):
+        if rims:
             return room
         ends = [(self.x - end).length - self.r for face in touching for end in face.ends]
         others = [face.gap(self.x)[0] for face in self.world.faces if face not in touching]
@@ -433,40 +413,38 @@ class Lone:
             return turn if self.v.dot(normal) > 0.0 else 0.0
 
         contacts = self._step(middle - h * self.v, self.v, h, self.pull, law, wedged)
-        if self.v.dot(normal) > SEAM * self.v.length:
-            turn = self.body.velocity.dot(self.body.velocity) / self.v.dot(self.v)
+        if self.v.dot(normal) > SEAM * (1.0 + self.v.length):
+            turn = (self.body.velocity.length / self.v.length) ** 2
             contacts = self._step(middle - h * self.v, self.v, h, self.pull, law, wedged)
         v, omega = self.body.velocity, self.body.angular_velocity
         x = middle + 0.5 * h * v
-        pushed = [c.face for c in contacts if c.push > 0.0]
-        for face in pushed:
-            gap, normal = face.gap(x)
+        for contact in contacts:
+            gap, normal = contact.face.gap(x)
             x -= gap * normal
-            if len(pushed) == 1 and (face.tangent is None or self._on_end(face, middle)):
+            if len(contacts) == 1 and self._curved(contact.face, middle):
                 v -= v.dot(normal) * normal
         return Ridden(x, v, omega, contacts, middle)
 
     def _accept(self, end: Ridden, h: float) -> None:
         """Take a step that was tried."""
-        before, entries = self._row(), self.entries[:, None].copy()
+        before, entries = (*self.x, *self.v, self.omega), self.entries[:, None].copy()
         motion = self.v, self.omega
+        pushed = end.pushed
+        slips, on = end.slips, pushed[0].face.surface if pushed else self.on
+        began, changed = self.slipping is None, bool(slips) != bool(self.slipping)
+        self.on, self.slipping = on, slips
+        if began and not slips:
+            self._tell(Kind.STICK, on)
         self.x, self.v, self.omega = end.x, end.v, end.omega
         self.t += h
-        pushed = end.pushed
+        if changed and not began:
+            self._tell(Kind.SLIP if slips else Kind.STICK, on)
         for contact in pushed:
             self._book(contact, motion)
-        slips, on = end.slips, pushed[0].face.surface if pushed else self.on
-        if self.slipping is not None and bool(slips) != bool(self.slipping):
-            kind = Kind.SLIP if slips else Kind.STICK
-            self._tell(kind, on)
-        self.on, self.slipping = on, slips
-        state = np.array([before, self._row()])[:, :, None]
-        self.tracks.step(ALONE, (self.t - h, self.t), state, entries)
+        state = np.array([before, (*self.x, *self.v, self.omega)])[:, :, None]
+        self.tracks.step(np.array([True]), (self.t - h, self.t), state, entries)
         if self.t >= self.machine.end_time:
             self._end("time")
-
-    def _row(self) -> tuple[float, ...]:
-        return (*self.x, *self.v, self.omega)
 
     def _lies(self, end: Ridden, h: float) -> bool:
         """Tell whether a step without slip changed nothing, on a surface to settle on.
@@ -486,13 +464,6 @@ class Lone:
             )
         )
 
-    def _part(self) -> None:
-        """Write that a lasting contact has ended."""
-        if self.on >= 0:
-            self.tracks.knot(0, self.t, self.x, self.v, self.omega)
-            self._tell(Kind.SEPARATION, self.on)
-        self.on, self.slipping = -1, None
-
     def _carry(self) -> None:
         """Ride by adhesion, see `Carriage`."""
         belt = self.machine.pulley
@@ -502,8 +473,8 @@ class Lone:
             self._end("settled")
             return
         ride = Carriage(self.machine, self.world, self.particle, self.t)
-        ride.write(self.recorder, ride.until)
         self.t, (self.x, self.v) = ride.until, ride.state(ride.until)
+        ride.write(self.recorder, self.t)
         if self.t >= self.machine.end_time:
             self._end("time")
         else:

@@ -390,6 +390,13 @@ class Shared:
         together = self.machine.interact and (self.waiting or (self.inside & ~calm).any())
         if until == "settled" and not together:
             for i in np.flatnonzero(calm).tolist():
+                if i not in self.rides:
+                    # It was calm at the end of this step first.
+                    late, place, speed = self.calm[i] - self.h, *self.state[1, :4, i].reshape(2, 2)
+                    self.recorder.events(
+                        Kind.STICK, i, self.t - late, place - late * speed, speed,
+                        surface=self.on[i],
+                    )  # fmt: skip
                 self._end(i, "settled", self.t, Kind.SETTLE)
 
     def _end(self, i: int, reason: str, t: float | None = None, kind: Kind | None = None) -> None:

@@ -141,17 +141,8 @@ class World:
         assert shape.body is not None
         shape.collision_type = SURFACE
         self.space.add(shape.body, shape)
-        self.faces.append(
-            Face(
-                shape,
-                self.machine.particle.radius,
-                surface,
-                tangent,
-                speed,
-                restitution,
-                min(friction, GRIP),
-            )
-        )
+        radius, friction = self.machine.particle.radius, min(friction, GRIP)
+        self.faces.append(Face(shape, radius, surface, tangent, speed, restitution, friction))
 
     def disk(self) -> tuple[pymunk.Body, pymunk.Circle]:
         """Return a new body with its shape, not yet in the Space."""

@@ -14,6 +14,8 @@ extern World W;
 /* Contacts are looked for where a gap is below this share of the radius: what lasts stays a
    thousandth of it apart at most, and nothing crosses the rest within a step unseen. */
 #define TOUCH 5e-3
+/* Overlap with a surface, in radii, from which on nothing may sink further, not even by a hop. */
+#define SUNK 1e-2
 /* Approach, in radii per step, that is left to the next step instead of an impact at its instant:
    a tenth of TOUCH, so that what is left is in reach of the contacts before it overlaps. */
 #define SKIP 5e-4

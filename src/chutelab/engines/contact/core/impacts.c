@@ -1,5 +1,6 @@
 /* Impacts at their own instants: foreseen for each disk, resolved in the order of time. */
 
+#include <string.h>
 #include "core.h"
 
 /* ------------------------------------------------------------------ the next event of each disk */
@@ -59,12 +60,14 @@ double soft_approach(const Disk *d, double radius) {
 }
 
 /* Approach up to which a contact is left to the next step, m/s. What lies on a surface comes back to
-   it at the end of each step, as fast as gravity makes it in one. */
+   it at the end of each step, as fast as gravity makes it in one; not what has sunk into it. */
 double left_over(const Disk *d, int impacts, int surface, double radius) {
-    double skip = W.skip * radius, least = soft_approach(d, radius);
+    double skip = W.skip * radius, least = soft_approach(d, radius), nx, ny;
     for (int n = 0; n < d->held_count; n++)
-        if (d->held[n] == surface) least = MAX(least, 1.000001 * W.g * W.step);
-    if (impacts <= MANY) return least;
+        if (d->held[n] == surface
+                && gap_to(W.surfaces + surface, d->x, d->y, d->radius, &nx, &ny) > -SUNK * radius)
+            least = MAX(least, 1.000001 * W.g * W.step);
+    if (impacts <= MANY || surface >= 0) return least;
     double most = skip * (MOST_SKIP / SKIP);
     return MAX(least, MIN(skip * pow(GROW, MIN(impacts - MANY, 1000)), most));
 }
@@ -215,7 +218,6 @@ static void jam(Contact *struck, double t) {
     W.disks[i].jam_next = -1;
     for (int m = i; m >= 0; m = W.disks[m].jam_next) {
         Disk *a = W.disks + m;
-        was_moved(m);
         found = reachable(m);
         a->jam = -W.jams;
         for (int n = 0; n < found; n++) {
@@ -236,26 +238,37 @@ static void jam(Contact *struck, double t) {
             last = k;
         }
         for (int k = 0; k < W.surface_count; k++)
-            if (W.surfaces[k].there == THERE && is_near(W.surfaces + k, a)
-                    && add_touching(m, -1 - k, a->radius, &count))
-                hold(a, k);
+            if (W.surfaces[k].there == THERE && is_near(W.surfaces + k, a))
+                add_touching(m, -1 - k, a->radius, &count);
         a->ux = a->vx;
         a->uy = a->vy;
         a->uspin = a->spin;
     }
     for (int n = 0; n < count; n++) {
-        /* No approach afterwards; separating is allowed. */
-        double u[3];
-        relative(list + n, 0, u);
-        list[n].need = -u[0];
+        /* No approach afterwards but what would be left to the next step; separating is allowed. */
+        Contact *c = list + n;
+        const Disk *a = W.disks + c->i;
+        double u[3], r = c->j >= 0 ? MIN(a->radius, W.disks[c->j].radius) : a->radius;
+        relative(c, 0, u);
+        c->need = -u[0] <= left_over(a, 0, -1 - c->j, r) ? MIN(-u[0], 0) : -u[0];
     }
     struck->impulse[0] = struck->impulse[1] = 0;
     double left = 0.5 * (MOST_SKIP / SKIP) * W.skip * W.disks[i].radius;
     sweep_contacts(list, count, 2 * W.sweeps, 0.1 * left, left);
+    for (int m = i; m >= 0; m = W.disks[m].jam_next) {
+        Disk *d = W.disks + m;
+        double v[3] = {d->vx, d->vy, d->spin};
+        if (v[0] == d->ux && v[1] == d->uy && v[2] == d->uspin) continue;
+        memcpy(&d->vx, &d->ux, 2 * sizeof(double));
+        d->spin = d->uspin;
+        was_moved(m);
+        memcpy(&d->vx, v, sizeof v);
+    }
     for (int n = 0; n < count; n++) {
         const Contact *c = list + n;
         Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
         double u[3], v[3], entries[3], given[3];
+        if (c->j < 0 && c->impulse[0] > 0) hold(a, -1 - c->j);
         relative(c, 1, u);
         relative(c, 0, v);
         share_out(c, u, v, 0, entries, given);

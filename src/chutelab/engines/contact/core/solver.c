@@ -269,8 +269,9 @@ static double sweep(Contact *list, int count, int sweeps, double accurate) {
     for (int n = 0; n < sweeps; n++) {
         worst = 0;
         for (int m = 0, size; m < count; m += size) {
-            /* To and fro, so that what one end of a pile does reaches the other in one sweep. */
-            int to = n % 2 == 0;
+            /* To and fro, so that what one end of a pile does reaches the other in one sweep; in the
+               last one surfaces come last, which do not give way. */
+            int to = (sweeps - n) % 2;
             Contact *c = list + (to ? m : count - 1 - m), *last = c;
             for (size = 1; c->j < 0 && m + size < count; size++, last += to ? 1 : -1)
                 if ((to ? last + 1 : last - 1)->i != c->i || (to ? last + 1 : last - 1)->j >= 0) break;

@@ -1,6 +1,11 @@
 from __future__ import annotations
 
+import signal
+
 from hypothesis import settings
+
+# What runs in the background of a shell ignores Ctrl-C, and so would the commands that tests start.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # The same draws everywhere: a red run is red again, on any machine.
 settings.register_profile("chutelab", derandomize=True, deadline=None)

@@ -75,7 +75,7 @@ double free_span(const Disk *d, double least);
 
 /* grid.c */
 int list_near(double end);
-void enter_again(int i, double end);
+int enter_again(int i, double end);
 int reachable(int i);
 int place_is_free(int i, double x, double y, double t);
 

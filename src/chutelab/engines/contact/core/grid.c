@@ -113,17 +113,18 @@ int list_near(double end) {
     return 1;
 }
 
-/* Enter a disk once more whose path changed within the step. */
-void enter_again(int i, double end) {
+/* Enter a disk once more whose path changed within the step; 1 if it reaches further now. */
+int enter_again(int i, double end) {
     Disk *d = W.disks + i;
     double box[4];
     box_of(d, end, box);
-    if (box[0] >= d->left && box[1] >= d->bottom && box[2] <= d->right && box[3] <= d->top) return;
+    if (box[0] >= d->left && box[1] >= d->bottom && box[2] <= d->right && box[3] <= d->top) return 0;
     d->left = MIN(d->left, box[0]);
     d->bottom = MIN(d->bottom, box[1]);
     d->right = MAX(d->right, box[2]);
     d->top = MAX(d->top, box[3]);
     if (W.interact) enter(i);
+    return 1;
 }
 
 /* Put the disks that disk i may meet in what is left of the step into `W.found`. */

@@ -67,9 +67,11 @@ double left_over(const Disk *d, int impacts, int surface, double radius) {
         if (d->held[n] == surface
                 && gap_to(W.surfaces + surface, d->x, d->y, d->radius, &nx, &ny) > -SUNK * radius)
             least = MAX(least, 1.000001 * W.g * W.step);
-    if (impacts <= MANY || surface >= 0) return least;
+    /* Surfaces do not give way: with them it grows only if jams do not help. */
+    int many = surface >= 0 ? 2 * JAM : MANY;
+    if (impacts <= many) return least;
     double most = skip * (MOST_SKIP / SKIP);
-    return MAX(least, MIN(skip * pow(GROW, MIN(impacts - MANY, 1000)), most));
+    return MAX(least, MIN(skip * pow(GROW, MIN(impacts - many, 1000)), most));
 }
 
 static void foresee_pair(int i, int j, double *due, int *partner) {
@@ -136,6 +138,8 @@ void foresee_all(void) {
     }
     for (int i = W.low; i < W.high; i++)
         if (W.disks[i].due < W.step_end) expect(i, W.disks[i].due, W.disks[i].partner);
+    for (int i = W.low; i < W.high; i++)
+        if (W.disks[i].far) foresee(i);
 }
 
 /* ----------------------------------------------------------------------------------- the blow */

@@ -73,6 +73,7 @@ typedef struct {
     int reason;                 /* [out] why the track ended */
     int waited;                 /* [out] 1 if its place was taken when it was due */
     int wide;                   /* 1 if it is asked by all in this step, see grid.c */
+    int far;                    /* 1 if the step's impulses take it further than was foreseen */
 } Disk;
 
 /* The track of a disk between the knots that are written. */

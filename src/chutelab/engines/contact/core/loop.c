@@ -304,6 +304,9 @@ static int begin_step(void) {
     } while (woke);
     W.length = h;
     if (W.contact_count) solve_contacts();
+    /* A fast belt may have thrown a disk further than the list of who is near foresaw. */
+    for (int i = W.low; i < W.high; i++)
+        W.disks[i].far = W.disks[i].mode == FREE && enter_again(i, W.step_end);
     close_step(h);
     return DONE;
 }

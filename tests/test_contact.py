@@ -278,7 +278,7 @@ def test_a_separation_tells_the_velocity_without_the_hop():
 # A heap
 
 
-def heap(count, end, rolling):
+def heap(count, end, rolling, seed=2):
     """Pour spinning disks on a rough floor, from a spout that is a few radii wide."""
     r = 0.005
     machine = scene_of(
@@ -289,7 +289,7 @@ def heap(count, end, rolling):
                 "interact": True, "restitution": 0.1, "friction": 0.6, "seed": 1},
         run={"until": end, "max_time": 100.0},
     )  # fmt: skip
-    rng = np.random.default_rng(2)
+    rng = np.random.default_rng(seed)
     place = machine.releases.position.copy()
     place[:, 0] = rng.uniform(-2.0 * r, 2.0 * r, count)
     machine = replace(machine, releases=replace(machine.releases, position=place))
@@ -313,25 +313,26 @@ def repose(place, r):
     return degrees(atan2(np.mean(slopes), 1.0))
 
 
-def check_heap(count, calm):
-    poured = count / 60.0 + 3.0
-    machine, recording = heap(count, poured + calm, 0.3)
-    r = machine.particle.radius
-    before, after = recording.at([poured, poured + 0.999 * calm])[0]
-    assert np.isfinite(after).all()
-    assert np.hypot(*(after - before).T).max() < 0.01 * r
-    angle = repose(after, r)
-    assert 20.0 < angle < 40.0, angle
-    return angle
+def check_heaps(count, calm, seeds):
+    """Pour heaps, which must lie still; angles scatter by 5°, so their mean counts."""
+    poured, angles = count / 60.0 + 3.0, []
+    for seed in seeds:
+        machine, recording = heap(count, poured + calm, 0.3, seed)
+        r = machine.particle.radius
+        before, after = recording.at([poured, poured + 0.999 * calm])[0]
+        assert np.isfinite(after).all()
+        assert np.hypot(*(after - before).T).max() < 0.01 * r
+        angles.append(repose(after, r))
+    assert 20.0 < np.mean(angles) < 40.0, angles
 
 
 def test_a_heap_keeps_an_angle_and_lies_still():
-    check_heap(100, 1.0)
+    check_heaps(100, 1.0, [2, 3])
 
 
 @pytest.mark.slow
-def test_a_larger_heap_keeps_an_angle_and_lies_still_for_ten_seconds():
-    check_heap(400, 10.0)
+def test_larger_heaps_keep_an_angle_and_lie_still_for_ten_seconds():
+    check_heaps(400, 10.0, [2, 3, 4])
 
 
 def test_without_rolling_friction_on_a_smooth_floor_there_is_no_heap():

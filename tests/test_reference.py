@@ -12,12 +12,12 @@ import pytest
 from scipy.optimize import brentq
 
 from chutelab import scene
-from chutelab.checks.stress.cases import machine as drawn
 from chutelab.engines import exact, reference
 from chutelab.machine import build
 from chutelab.results import REASONS, Kind
 from chutelab.results.ledger import ledger
 from chutelab.studies.accuracy import apart, each, sizes
+from stress.cases import machine as drawn
 
 G = 9.81
 

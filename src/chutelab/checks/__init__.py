@@ -2,6 +2,6 @@
 
 - `agreement`: ``verify``: the answers beside each other, and beside what a scene expects.
 - `preflight`: ``check``: the look at a scene before it runs.
-- `stress`: hard scenes, and the laws that engines must keep.
+- `stress`: the laws that every run must keep.
 - `workprecision`: ``bench``: run time against error.
 """

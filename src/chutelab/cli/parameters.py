@@ -83,6 +83,28 @@ set_option = click.option(
     help="Change a key of the scene, such as plate.angle_deg=20. May be repeated.",
 )
 
+engine_option = click.option(
+    "--engine",
+    type=click.Choice(["auto", "exact", "contact", "pymunk"]),
+    help="Same as --set run.engine=...",
+)
+dt_option = click.option("--dt", metavar="S", type=float, help="Same as --set run.dt=S.")
+
+
+def loaded_as_told(
+    name: str, overrides: Sequence[str], engine: str | None, dt: float | None
+) -> Scene:
+    """Load a scene with what ``--set``, ``--engine`` and ``--dt`` change; its title says so."""
+    from chutelab.scene import load
+    from chutelab.scene.overrides import Setting
+
+    settings = list(overrides)
+    if engine is not None:
+        settings.append(Setting(f"run.engine={engine}", f"--engine {engine}"))
+    if dt is not None:
+        settings.append(Setting(f"run.dt={dt}", f"--dt {dt:.12g}"))
+    return retitled(load(name, settings), overrides)
+
 
 def retitled(scene: Scene, changes: Sequence[str]) -> Scene:
     """Return a scene whose title says what was changed of its machine, each ``KEY=VALUE``.

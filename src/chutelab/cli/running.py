@@ -14,8 +14,10 @@ from chutelab.cli.parameters import (
     KINDS,
     chosen,
     complete_scene,
+    dt_option,
+    engine_option,
+    loaded_as_told,
     output_options,
-    retitled,
     set_option,
 )
 from chutelab.cli.program import RefusedError
@@ -52,12 +54,8 @@ def _accuracy(_ctx: click.Context, _parameter: click.Parameter, text: str | None
 
 @click.command(short_help="Simulate a scene and print a summary; write its files.")
 @click.argument("scene", shell_complete=complete_scene)
-@click.option(
-    "--engine",
-    type=click.Choice(["auto", "exact", "contact", "pymunk"]),
-    help="Same as --set run.engine=...",
-)
-@click.option("--dt", metavar="S", type=float, help="Same as --set run.dt=S.")
+@engine_option
+@dt_option
 @click.option(
     "--accuracy",
     metavar="A",
@@ -90,18 +88,11 @@ def run(
     from chutelab.cli.console import progress
     from chutelab.cli.output import destination, files_of, write
     from chutelab.engines.simulation import simulate
-    from chutelab.scene import load
-    from chutelab.scene.overrides import Setting
 
     kinds = chosen(out, only, film)
     if partial and out is None:
         raise click.UsageError("--partial keeps files of --out DIR: give --out too.")
-    settings = list(overrides)
-    if engine is not None:
-        settings.append(Setting(f"run.engine={engine}", f"--engine {engine}"))
-    if dt is not None:
-        settings.append(Setting(f"run.dt={dt}", f"--dt {dt:.12g}"))
-    loaded = retitled(load(scene, settings), overrides)
+    loaded = loaded_as_told(scene, overrides, engine, dt)
     reached: Accuracy | None = None
 
     def simulated() -> Recording:

@@ -1,170 +1,122 @@
-"""``stress``: hard scenes on every engine, judged by laws."""
+"""``stress``: one scene run and judged by the laws that every run must keep."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from math import isfinite
+from typing import TYPE_CHECKING, Any
 
 import click
-from click.shell_completion import CompletionItem
 
-from chutelab.cli.program import RefusedError
+from chutelab.cli.parameters import (
+    complete_scene,
+    dt_option,
+    engine_option,
+    loaded_as_told,
+    set_option,
+)
 
 if TYPE_CHECKING:
     from rich.text import Text
 
-    from chutelab.checks.stress import Result
-    from chutelab.checks.stress.harness import Run
+    from chutelab.checks.stress import Evidence, Finding
+
+COLUMNS = "  {:<7} {:<22} {:>8} {:>8}  "
+"""Whether a law is kept, its name, figure and bound; unit and place stand beside them."""
 
 
-ENGINES = ("exact", "contact", "pymunk", "fixed")
-
-HEAD = " {:<22} {:<7} {:>6} {:>5} {:>7} {:>7}  {}"
-"""A line of at most 80 columns."""
-
-
-def _complete_case(
-    _ctx: click.Context, _parameter: click.Parameter, incomplete: str
-) -> list[CompletionItem]:
-    from chutelab.checks.stress import all_cases
-
-    names = [case.name for case in all_cases(full=True)]
-    return [CompletionItem(name) for name in names if name.startswith(incomplete)]
-
-
-@click.command(short_help="Put the engines through scenes that are hard on them.")
-@click.option(
-    "--case",
-    "names",
-    metavar="NAME",
-    multiple=True,
-    shell_complete=_complete_case,
-    help="Only this case; * stands for anything. May be repeated.",
-)
-@click.option(
-    "--engine",
-    "engines",
-    type=click.Choice(ENGINES),
-    multiple=True,
-    help="Only this engine; fixed is pymunk with run.align = false. May be repeated.",
-)
-@click.option("--full", is_flag=True, help="Also what takes longer than a minute.")
-@click.option("--list", "listed", is_flag=True, help="List the cases and run nothing.")
+@click.command(short_help="Run a scene and judge it by laws that every run must keep.")
+@click.argument("scene", shell_complete=complete_scene)
+@engine_option
+@dt_option
+@set_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-@click.option(
-    "--out",
-    metavar="FILE",
-    type=click.Path(path_type=Path, dir_okay=False),
-    help="Write all figures into this file, tab-separated.",
-)
-@click.option("--quiet", "-q", is_flag=True, help="Print no progress, and only what fails.")
 @click.pass_context
 def stress(
     ctx: click.Context,
-    names: tuple[str, ...],
-    engines: tuple[str, ...],
-    full: bool,
-    listed: bool,
+    scene: str,
+    engine: str | None,
+    dt: float | None,
+    overrides: tuple[str, ...],
     as_json: bool,
-    out: Path | None,
-    quiet: bool,
 ) -> None:
-    """Run scenes that are hard on the engines, and judge each run by laws that it must keep.
+    """Run SCENE and judge the run by laws that it must keep, whatever the scene.
 
-    Exit code 1 if one is broken.
+    Nobody passes a surface, sinks into one or bounces off nothing; energy never rises but by a
+    belt's work; ledger and momentum close. Each law that has something to say about the scene is a
+    line, with what was found and what it must not exceed. What the engine does not promise for
+    such a scene is told with the reason. Exit code 1 if a law is broken.
     """
-    from chutelab.checks.stress import chosen, results
-    from chutelab.checks.stress.harness import plain, write
+    from chutelab.checks.stress import Evidence, judge
     from chutelab.cli import console
-    from chutelab.cli.console import progress
-    from chutelab.cli.output import check_file, writing
+    from chutelab.engines.simulation import simulate
+    from chutelab.machine import build
+    from chutelab.results.recorder import StalledError
 
+    loaded = loaded_as_told(scene, overrides, engine, dt)
     try:
-        cases = chosen(names, full=full)
-    except ValueError as error:
-        raise click.BadParameter(str(error), param_hint="--case") from error
-    if listed:
-        for case in cases:
-            click.echo(f"{case.name}\t{case.group}")
-        return
-    check_file("--out", out)
-    found: list[Result] = []
-    with progress("stressing", quiet=quiet) as update:
-        for done, result in results(cases, engines or ENGINES):
-            found.append(result)
-            if update is not None:
-                update(done / len(cases))
-    if not found:
-        raise RefusedError("none of these cases is for that engine")
-    if out is not None:
-        with writing(f"--out {out}"):
-            write(found, out)
-    failed = sum(result.broken for result in found)
-    unpromised = sum(bool(result.unpromised) for result in found)
+        with console.progress("simulating") as update:
+            recording = simulate(loaded, progress=update)
+    except StalledError as stalled:
+        raise console.StuckError(str(stalled)) from stalled
+    run = Evidence(build(loaded), recording)
+    found = judge(run)
+    broken = sum(one.broken for one in found)
     if as_json:
-        shown = {"format": 1, "results": [plain(result) for result in found]}
-        console.show_json({**shown, "failed": failed, "unpromised": unpromised})
+        console.show_json(
+            {
+                "format": 1,
+                "scene": scene,
+                "title": recording.title,
+                "engine": run.engine,
+                "dt": run.dt,
+                "broken": broken,
+                "laws": [_plain(one) for one in found],
+            }
+        )
     else:
-        _print(found, quiet=quiet)
-        broken = f"{failed} broken" if failed else "all laws kept"
-        broken += f", {unpromised} not promised" if unpromised else ""
-        ran = len({result.case for result in found})
-        click.echo(f"{ran} case{'s' if ran > 1 else ''}, {len(found)} figures: {broken}")
-    if failed:
+        console.show(*_shown(run, found))
+        click.echo(f"{broken} of {len(found)} laws broken" if broken else _kept(found))
+    if broken:
         ctx.exit(1)
 
 
-def _print(results: Sequence[Result], *, quiet: bool) -> None:
+def _plain(one: Finding) -> dict[str, Any]:
+    return {
+        "law": one.law,
+        "figure": float(one.verdict.figure) if isfinite(one.verdict.figure) else None,
+        "bound": float(one.verdict.bound) if isfinite(one.verdict.bound) else None,
+        "detail": one.verdict.detail,
+        "holds": bool(one.verdict.holds),
+        "unpromised": one.unpromised,
+    }
+
+
+def _shown(run: Evidence, found: list[Finding]) -> Iterator[Text]:
     from rich.text import Text
 
-    from chutelab.checks.stress.harness import runs
-    from chutelab.cli import console
+    from chutelab.util.tables import WIDTH, wrapped
 
-    lines: list[Text] = []
-    group, case = "", ""
-    for run in runs(results):
-        if quiet and not run.failed:
-            continue
-        if run.worst.group != group:
-            group = run.worst.group
-            lines += [Text(), Text(group, style="bold")]
-        lines.append(_line(run, run.worst.case if run.worst.case != case else ""))
-        case = run.worst.case
-    if lines:
-        head = HEAD.format("case", "engine", "dt, s", "kept", "figure", "bound", "nearest law")
-        console.show(Text(head, style="dim"), *lines, Text())
-    for result in results:
-        where = f"{result.engine} at dt = {result.dt:.4g} s" if result.dt else result.engine
-        if result.broken:
-            click.echo(f"FAILED {result.case}, {where}: {result.law}: {_said(result)}")
-        elif result.unpromised:
-            said = f"{_said(result)}; {result.unpromised}"
-            click.echo(f"not promised {result.case}, {where}: {result.law}: {said}")
+    steps = "" if run.dt is None else f", steps of {run.dt:.4g} s"
+    yield Text(run.recording.title, style="bold")
+    yield Text(f"engine {run.engine}{steps}")
+    yield Text(COLUMNS.format("", "law", "figure", "bound").rstrip(), style="dim")
+    for one in found:
+        kept = "ok" if one.verdict.holds else "FAILED" if one.broken else "-"
+        figure, bound = f"{one.verdict.figure:.2g}", f"{one.verdict.bound:.2g}"
+        columns = COLUMNS.format(kept, one.law, figure, bound)
+        said = one.verdict.detail
+        if one.unpromised:
+            said += f"; not promised: {one.unpromised}"
+        for number, line in enumerate(wrapped(said, WIDTH - len(columns))):
+            style = "bold red" if one.broken else ""
+            yield Text((" " * len(columns) if number else columns) + line, style=style)
 
 
-def _line(run: Run, case: str) -> Text:
-    from rich.text import Text
-
-    worst = run.worst
-    line = HEAD.format(
-        case,
-        worst.engine,
-        "-" if worst.dt is None else f"{worst.dt:.2g}",
-        f"{run.kept}/{run.laws}",
-        _number(worst.figure),
-        _number(worst.bound),
-        worst.law,
+def _kept(found: list[Finding]) -> str:
+    unpromised = sum(bool(one.unpromised) for one in found)
+    return (
+        f"all {len(found)} laws kept"
+        if not unpromised
+        else (f"{len(found) - unpromised} laws kept, {unpromised} not promised")
     )
-    return Text(line, style="bold red" if run.failed else "")
-
-
-def _number(value: float | None) -> str:
-    return "-" if value is None else f"{value:.1e}"
-
-
-def _said(result: Result) -> str:
-    if result.figure is None or result.bound is None:
-        return result.detail
-    relation = "less than" if result.least else "more than"
-    return f"{result.figure:.3g}, {relation} {result.bound:.3g} {result.detail}"

@@ -1,34 +1,24 @@
-"""Numerical stability: scenes that are hard on an engine, and the laws that they must keep.
+"""Numerical stability: the laws that a run must keep, whatever the scene.
 
 ===============  ==================================================================================
-`case`           `Case`: a scene, its engines and steps, and what is asked of it
-`extremes`       speed, mass, materials and belts at their limits; what lasts, piles, coarse steps
-`geometry`       grazing, critical speed, ends, corners, contact from the start
-`cases`          all cases, and how they are chosen; far away, in a mirror, drawn at random
 `evidence`       what a law looks at, and how it answers
-`laws`           the laws for all, one function each, and what single cases ask for
 `barriers`       laws on where nobody may be
-`conservation`   laws on energy, ledger and momentum
-`harness`        run, judge, yield a `Result` a line; results as a table
+`laws`           laws on energy, ledger, momentum and the record; all by name, `judge`
 ===============  ==================================================================================
+
+The scenes that are hard on an engine, and what each asks for besides, are in ``tests/stress``.
 """
 
-from chutelab.checks.stress.case import ENGINES, Case, Ladder, Twin
-from chutelab.checks.stress.cases import all_cases, chosen
-from chutelab.checks.stress.evidence import Evidence, Verdict
-from chutelab.checks.stress.harness import Result, results
-from chutelab.checks.stress.laws import LAWS
+from chutelab.checks.stress.evidence import EPS, ROUNDINGS, Evidence, Verdict
+from chutelab.checks.stress.laws import A_CONTACT, LAWS, Finding, judge
 
 __all__ = [
-    "ENGINES",
+    "A_CONTACT",
+    "EPS",
     "LAWS",
-    "Case",
+    "ROUNDINGS",
     "Evidence",
-    "Ladder",
-    "Result",
-    "Twin",
+    "Finding",
     "Verdict",
-    "all_cases",
-    "chosen",
-    "results",
+    "judge",
 ]

@@ -65,16 +65,20 @@ class Evidence:
         The scene, resolved.
     recording : Recording
         What an engine made of it.
-    engine : str
-        One of `chutelab.checks.stress.case.ENGINES`.
-    dt : float or None
-        The step, s; None for the exact engine.
     """
 
     machine: Machine
     recording: Recording
-    engine: str
-    dt: float | None
+
+    @property
+    def engine(self) -> str:
+        """Engine that ran."""
+        return self.recording.engine
+
+    @property
+    def dt(self) -> float | None:
+        """Its step, s; None for the exact engine."""
+        return None if self.engine == "exact" else self.machine.dt
 
     @property
     def stepped(self) -> bool:
@@ -89,7 +93,7 @@ class Evidence:
     @property
     def alike(self) -> bool:
         """Whether all is left to Chipmunk, in steps that are all alike."""
-        return self.engine == "fixed" or (self.crowd and self.engine == "pymunk")
+        return self.engine == "pymunk" and (self.crowd or not self.machine.align)
 
     @cached_property
     def samples(self) -> Samples:
@@ -182,19 +186,16 @@ class Verdict:
     figure : float
         The worst there was.
     bound : float
-        What it must not exceed; with `least`, what it must reach.
+        What it must not exceed.
     detail : str
         Unit, and where it was.
-    least : bool
-        Whether the bound is one from below.
     """
 
     figure: float
     bound: float
     detail: str = ""
-    least: bool = False
 
     @property
     def holds(self) -> bool:
         """Whether the law is kept; it never is by a figure that is no number."""
-        return self.figure >= self.bound if self.least else self.figure <= self.bound
+        return self.figure <= self.bound

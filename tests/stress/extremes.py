@@ -10,10 +10,9 @@ from math import sqrt
 
 import numpy as np
 
-from chutelab.checks.stress.case import CROWD, TRANSFER, Case, Twin, merged, surface, thrown
-from chutelab.checks.stress.conservation import A_CONTACT
-from chutelab.checks.stress.evidence import EPS, ROUNDINGS, Evidence, Verdict
+from chutelab.checks.stress import A_CONTACT, EPS, ROUNDINGS, Evidence, Verdict
 from chutelab.scene import load, to_dict
+from stress.case import CROWD, TRANSFER, Case, Twin, merged, surface, thrown
 
 ALIGNED = 1e-8
 """Relative error that a lone particle may have where only its lasting contacts are stepped."""
@@ -112,7 +111,7 @@ def _masses() -> list[Case]:
         lone = merged(TRANSFER, {"particle": {"mass": mass}})
         pair = merged(swarm(20), {"particle": {"mass": mass}})
         out.append(Case(f"mass-{mass:g}", group, lone, ends=("landed",)))
-        out.append(Case(f"mass-{mass:g}-swarm", group, pair, engines=CROWD))
+        out.append(Case(f"mass-{mass:g}-swarm", group, pair, engines=CROWD, slow=CROWD))
     return out
 
 
@@ -149,9 +148,10 @@ def _materials() -> list[Case]:
         }
         crowd = merged(swarm(20), {"stream": {"restitution": restitution}})
         name, group = f"restitution-{restitution:g}", "restitution"
-        out.append(Case(f"{name}-drop", group, drop))
+        out.append(Case(f"{name}-drop", group, drop, slow=() if restitution else ("pymunk",)))
         out.append(Case(f"{name}-box", group, box, inside=(-0.5, 0.5, -0.5, 0.5)))
-        out.append(Case(f"{name}-swarm", group, crowd, engines=CROWD))
+        slow = CROWD if restitution else ()
+        out.append(Case(f"{name}-swarm", group, crowd, engines=CROWD, slow=slow))
     for friction in (0.0, 1e6):
         for spin in (False, True):
             materials = {"friction": friction, "restitution": 0.5}
@@ -163,7 +163,8 @@ def _materials() -> list[Case]:
             turning = "-spin" if spin else ""
             out.append(Case(f"friction-{friction:g}{turning}", "friction", machine))
         crowd = merged(swarm(20), {"stream": {"friction": friction}})
-        out.append(Case(f"friction-{friction:g}-swarm", "friction", crowd, engines=CROWD))
+        name = f"friction-{friction:g}-swarm"
+        out.append(Case(name, "friction", crowd, engines=CROWD, slow=CROWD))
     return out
 
 
@@ -185,7 +186,8 @@ def _belts() -> list[Case]:
             turning = "-spin" if spin else ""
             formula = None if spin else carried
             name = f"belt-{speed:g}{turning}"
-            out.append(Case(name, group, tables, ends=("settled",), formula=formula))
+            slow = ("pymunk",) if speed == 100.0 else ()
+            out.append(Case(name, group, tables, ends=("settled",), formula=formula, slow=slow))
     still = merged(TRANSFER, {"incoming": {"speed": 0.0}, "run": {"until": 2.0}})
     slips = merged(TRANSFER, {"incoming": {"speed": 100.0, "friction": 0.3}})
     return [
@@ -200,8 +202,8 @@ def _weightless() -> list[Case]:
     machine = merged(TRANSFER, {"gravity": 0.0, "run": {"until": 3.0}})
     return [
         Case("weightless", group, machine),
-        Case("weightless-swarm", group, swarm(40), engines=CROWD),
-        Case("weightless-swarm-still", group, swarm(40, spin=False), engines=CROWD),
+        Case("weightless-swarm", group, swarm(40), engines=CROWD, slow=CROWD),
+        Case("weightless-swarm-still", group, swarm(40, spin=False), engines=CROWD, slow=CROWD),
     ]
 
 
@@ -240,7 +242,10 @@ def _bounces() -> list[Case]:
         tables,
         {"surface": [{**floor, "restitution": 1.0}], "run": {"until": 900.0, "max_time": 900.0}},
     )
-    return [once, Case("bounces-10000-elastic", group, for_ever, engines=("exact",))]
+    return [
+        once,
+        Case("bounces-10000-elastic", group, for_ever, engines=("exact",), slow=("exact",)),
+    ]
 
 
 def _flights() -> list[Case]:
@@ -279,7 +284,7 @@ def _late() -> list[Case]:
     pair = merged(late, {"stream": {"interact": True}})
     return [
         Case("late-1e6", group, TRANSFER, twin=twin),
-        Case("late-1e6-interacting", group, pair, engines=CROWD),
+        Case("late-1e6-interacting", group, pair, engines=CROWD, slow=("pymunk",)),
     ]
 
 
@@ -316,6 +321,7 @@ def _piles() -> list[Case]:
         at_rest=True,
         steps=(1e-3, 1.0 / 120.0),
         inside=(-0.2, 0.2, 0.0, 4.0),
+        slow=CROWD,
         patience=60.0,
     )
     large = small.but(
@@ -323,7 +329,6 @@ def _piles() -> list[Case]:
         tables=_pile(2000, 1.2, 0.01, 60.0),
         steps=(1e-3,),
         inside=(-0.6, 0.6, 0.0, 4.0),
-        full=True,
         patience=7200.0,
     )
     return [small, large]
@@ -343,7 +348,7 @@ def _coarse() -> list[Case]:
         *(
             Case(
                 f"coarse-{name}", group, tables, engines=CROWD, steps=steps,
-                full=name == "stream-whole", patience=120.0,
+                slow=CROWD if name == "stream-whole" else (), patience=120.0,
             )
             for name, tables in streams.items()
         ),

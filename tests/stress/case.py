@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from chutelab.checks.stress.evidence import Evidence, Verdict
+from chutelab.checks.stress import Evidence, Verdict
 from chutelab.results import Recording
-from chutelab.scene import Scene
+from chutelab.scene import Scene, from_dict
 from chutelab.util.arrays import Floats
 
 Tables = Mapping[str, Any]
@@ -85,12 +85,12 @@ class Ladder:
 
 @dataclass(frozen=True)
 class Case:
-    """One row of the table's left side.
+    """A scene, its engines and steps, and what is asked of it besides the laws for all.
 
     Attributes
     ----------
     name : str
-        Short, for ``--case``.
+        Short: it is part of test ids.
     group : str
         What is being stressed.
     tables : mapping
@@ -106,7 +106,7 @@ class Case:
     may_refuse : mapping of str to str
         Engines that may do so instead of keeping the laws.
     unpromised : mapping of str to str
-        Engines that do not promise to keep the laws here, and why: they are not run.
+        Engines that do not promise to keep the laws here, and why: the test is skipped.
     ends : tuple of str
         How particles may end, empty: in any way.
     inside : tuple of float or None
@@ -115,8 +115,8 @@ class Case:
         Whether everything must lie still, not sunk in, at the end.
     twin, ladder
         See there.
-    full : bool
-        Whether it takes too long for the quick set.
+    slow : tuple of str
+        Engines on which it takes too long for the default run, at its finest step.
     patience : float
         s of wall time that one run may take.
     """
@@ -135,7 +135,7 @@ class Case:
     at_rest: bool = False
     twin: Twin | None = None
     ladder: Ladder | None = None
-    full: bool = False
+    slow: tuple[str, ...] = ()
     patience: float = PATIENCE
 
     def but(self, **changes: Any) -> Case:
@@ -150,8 +150,6 @@ def by_name(engine: str) -> str:
 
 def scene_of(tables: Tables, name: str, engine: str, dt: float | None) -> Scene:
     """Validate a scene for an engine and a step."""
-    from chutelab.scene import from_dict
-
     run = {**tables.get("run", {})}
     run["engine"] = by_name(engine)
     if dt is not None:

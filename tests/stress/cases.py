@@ -1,4 +1,4 @@
-"""All cases, and how they are chosen.
+"""All cases.
 
 Defined here are the cases that run twice (the machine far away, or in a mirror), those at ever
 smaller steps, and machines drawn at random: a particle thrown into surfaces that cross, fold, move
@@ -7,16 +7,14 @@ and grip.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from difflib import get_close_matches
-from fnmatch import fnmatch
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from chutelab.checks.stress import extremes, geometry
-from chutelab.checks.stress.case import LONE, TRANSFER, Case, Ladder, Twin, merged, surface, thrown
 from chutelab.results import Kind, Recording
+from stress import extremes, geometry
+from stress.case import LONE, TRANSFER, Case, Ladder, Twin, merged, surface, thrown
 
 FAR = 1e6
 """m that machines are moved by; a double's ulp there is 1.2e-10 m."""
@@ -79,8 +77,12 @@ def _twins() -> list[Case]:
             there = moved(tables, *shift)
             back = _shifted_back(shift)
             twin = Twin("shift symmetry", there, back, FAR_BOUND)
+            # What stays in contact takes longest.
+            lasts = name in {"lying", "edge"} and axis != "xy"
+            slow = ("pymunk",) if lasts else ()
+            named = f"shift-{name}-{axis}"
             out.append(
-                Case(f"shift-{name}-{axis}", "shifted by 10^6 m", tables, steps=(1e-3,), twin=twin)
+                Case(named, "shifted by 10^6 m", tables, steps=(1e-3,), twin=twin, slow=slow)
             )
         twin = Twin("mirror symmetry", mirrored(tables), lambda p: p * [-1.0, 1.0])
         out.append(Case(f"mirror-{name}", "mirrored", tables, twin=twin))
@@ -93,6 +95,12 @@ def _shifted_back(shift: tuple[float, float]) -> Any:
 
 COARSE = tuple(1.0 / 60.0 / 2**n for n in range(6))
 """s; from a frame of a game to half a millisecond, for steps that end at contacts."""
+
+LONGEST = (
+    *(("fixed", name) for name in ("pulley", "slide", "roll", "belt", "transfer")),
+    ("pymunk", "roll"), ("pymunk", "belt"),
+)  # fmt: skip
+"""Ladders that are left out of the default run."""
 
 FINE = tuple(2e-3 / 2**n for n in range(5))
 """s; for what touches. Where steps are all alike the first is left out: at 2 ms what falls on the
@@ -140,14 +148,14 @@ def _ladders() -> list[Case]:
             claimed = 2.0 if engine == "contact" else 1.0
             fine = FINE[1:] if engine == "fixed" else FINE
             ladder = Ladder(COARSE if blows else fine, quantity, floor_of, claimed)
-            suffix = "" if engine == "pymunk" else f"-{engine}"
             out.append(
                 Case(
-                    f"order-{name}{suffix}",
+                    f"order-{name}",
                     "steps halved until rounding takes over",
                     tables,
                     (engine,),
                     ladder=ladder,
+                    slow=(engine,) if (engine, name) in LONGEST else (),
                 )
             )
     return out
@@ -159,7 +167,7 @@ def symmetric_cases() -> tuple[Case, ...]:
 
 
 QUICK, MANY = 20, 500
-"""Machines in the quick set, and in all."""
+"""Machines in the default run, and in all."""
 
 RESOLVED = 1e-3
 """m; smaller disks than this are left to the exact engine here: `extremes` has them for all."""
@@ -223,47 +231,18 @@ def drawn_cases() -> tuple[Case, ...]:
                 steps=(1e-3,),
                 # A spinning disk held between a moving surface and another.
                 may_refuse={"exact": "run.engine"},
-                full=seed >= QUICK,
+                slow=() if seed < QUICK else LONE,
             )
         )
     return tuple(out)
 
 
-def all_cases(*, full: bool = False) -> tuple[Case, ...]:
-    """Return the quick set, or all."""
-    found = (
+def all_cases() -> tuple[Case, ...]:
+    """Return the cases."""
+    return (
         *extremes.CASES,
         *geometry.CASES,
         *extremes.lasting_cases(),
         *symmetric_cases(),
         *drawn_cases(),
     )
-    return found if full else tuple(case for case in found if not case.full)
-
-
-def chosen(names: Collection[str], *, full: bool = False) -> tuple[Case, ...]:
-    """Return the cases whose names match one of some patterns (``*`` for anything).
-
-    A case that is named is run, whether it is one of the quick set or not.
-
-    Raises
-    ------
-    ValueError
-        If a pattern matches nothing.
-    """
-    if not names:
-        return all_cases(full=full)
-    known = all_cases(full=True)
-    for pattern in names:
-        if not any(_matches(case, pattern) for case in known):
-            near = get_close_matches(pattern, [case.name for case in known], n=3)
-            advice = f"did you mean {' or '.join(near)}? " if near else ""
-            raise ValueError(
-                f"no case is called {pattern!r}; {advice}chutelab stress --full --list"
-                f" names all {len(known)}, and * stands for anything"
-            )
-    return tuple(c for c in known if any(_matches(c, pattern) for pattern in names))
-
-
-def _matches(case: Case, pattern: str) -> bool:
-    return case.name == pattern or fnmatch(case.name, pattern)

@@ -6,10 +6,10 @@ from math import atan2, degrees, sqrt
 
 import numpy as np
 
-from chutelab.checks.stress.case import CROWD, LONE, TRANSFER, Case, merged, surface, thrown
-from chutelab.checks.stress.evidence import EPS, ROUNDINGS, Evidence, Verdict
-from chutelab.checks.stress.extremes import place_error
+from chutelab.checks.stress import EPS, ROUNDINGS, Evidence, Verdict
 from chutelab.results import Kind
+from stress.case import CROWD, LONE, TRANSFER, Case, merged, surface, thrown
+from stress.extremes import place_error
 
 G = 9.81
 
@@ -145,8 +145,8 @@ def _contact() -> list[Case]:
         *out,
         Case("contact-corner", group, nook),
         # All at one place and time: they wait for each other.
-        Case("contact-crowd", group, crowded, engines=CROWD),
-        Case("contact-crowd-tight", group, tight, engines=CROWD),
+        Case("contact-crowd", group, crowded, engines=CROWD, slow=("pymunk",)),
+        Case("contact-crowd-tight", group, tight, engines=CROWD, slow=("pymunk",)),
     ]
 
 
@@ -195,10 +195,10 @@ def _corners() -> list[Case]:
     return [
         Case("corner-square", group, square, formula=back),
         Case("corner-square-joined", group, one, formula=back),
-        Case("corner-vee", group, vee, inside=(-0.5, 0.5, 0.0, 0.5)),
+        Case("corner-vee", group, vee, inside=(-0.5, 0.5, 0.0, 0.5), slow=("pymunk",)),
         Case("corner-vee-sharp", group, sharp, inside=(-0.02, 0.02, 0.0, 0.5)),
         Case("corner-pegs", group, pegs),
-        Case("corner-nip", group, nip, refusals={"exact": "run.engine"}),
+        Case("corner-nip", group, nip, refusals={"exact": "run.engine"}, slow=("pymunk",)),
     ]
 
 

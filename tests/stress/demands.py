@@ -1,0 +1,127 @@
+"""What single cases ask for besides the laws: endings, boxes, rest, twins, convergence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from chutelab.checks.stress import EPS, Evidence, Verdict
+from chutelab.checks.stress.barriers import closest, gaps
+from chutelab.results import REASONS
+from stress.case import Case, Ladder, Twin
+
+UNSEEN = ("nobody leaves", "nobody sinks", "lies still")
+"""Demands that are lost, as some laws are, once a disk is on the wrong side of something."""
+
+SUNK = 0.02
+"""Share of the radius that a disk at rest may lie in another or in a surface: what a stream may
+overlap at worst while it moves."""
+
+STILL = 1e-2
+"""m/s that a disk in a pile at rest may still move at: ten times the speed below which a run that
+waits for rest calls itself settled."""
+
+AMPLIFIED = 10.0
+"""Factor by which a contact may magnify what rounding did before: the reach of a flight over the
+radius of what it met, for flights of a few times that radius."""
+
+
+def ended(e: Evidence, reasons: Sequence[str]) -> Verdict:
+    """Particles end as they must; the figure counts the others."""
+    wrong = [i for i, k in enumerate(e.recording.ended) if REASONS[k] not in reasons]
+    detail = "particles"
+    if wrong:
+        detail += f": {wrong[0]} ended with {REASONS[e.recording.ended[wrong[0]]]}"
+    return Verdict(len(wrong), 0.0, detail)
+
+
+def inside(e: Evidence, box: tuple[float, float, float, float]) -> Verdict:
+    """Nobody leaves a box (left, right, bottom, top, m); the figure counts those who do."""
+    left, right, bottom, top = box
+    x, y = e.samples.position.T
+    out = (x < left) | (x > right) | (y < bottom) | (y > top)
+    gone = np.unique(e.samples.particle[out])
+    return Verdict(len(gone), 0.0, f"particles: {gone[0]}" if len(gone) else "particles")
+
+
+def sunk(e: Evidence) -> Verdict:
+    """At rest nobody lies deeper in anything than `SUNK`; the figure is a share of the radius."""
+    r = e.machine.particle.radius
+    _, last = e.recording.ends()
+    position = last["position"]
+    deepest, of = 0.0, "r"
+    for name, gap in gaps(e.machine, position):
+        i = int(np.argmin(gap))
+        if -gap[i] > deepest:
+            deepest, of = -float(gap[i]), f"r, particle {i} in {name}"
+    found, i, j = closest(position, r)
+    if found > deepest:
+        deepest, of = found, f"r, particles {i} and {j}"
+    return Verdict(deepest / r, SUNK, of)
+
+
+def still(e: Evidence) -> Verdict:
+    """At the end nobody moves; the figure is the largest speed, m/s."""
+    _, last = e.recording.ends()
+    speed = np.hypot(*last["velocity"].T) + e.machine.particle.radius * np.abs(last["omega"])
+    i = int(np.argmax(speed))
+    return Verdict(float(speed[i]), STILL, f"m/s, particle {i}")
+
+
+def symmetric(e: Evidence, other: Evidence, twin: Twin) -> Verdict:
+    """Judge whether a run and its twin's, moved back, are one; the figure is the distance, m."""
+    one, two = e.recording, other.recording
+    worst, where = 0.0, "m"
+    pairs = [(0, twin.particle)] if twin.particle >= 0 else [(i, i) for i in range(one.count)]
+    for i, j in pairs:
+        mine, its = one.track(i), two.track(j)
+        span = min(np.ptp(mine["t"]), np.ptp(its["t"]))
+        ages = np.unique(np.concatenate([mine["t"] - mine["t"][0], np.linspace(0.0, span, 200)]))
+        ages = ages[ages <= span]
+        late = np.minimum(its["t"][0] + ages, its["t"][-1])
+        p = one.at(np.minimum(mine["t"][0] + ages, mine["t"][-1]))[0][:, i]
+        q = twin.back(two.at(late)[0][:, j])
+        apart = np.hypot(*(p - q).T)
+        at = int(np.argmax(apart))
+        if not apart[at] <= worst:
+            worst = float(apart[at])
+            where = f"m, particle {i} at t = {mine['t'][0] + ages[at]:.6g} s"
+        # One that lasts longer than the other has done something else, unless it is rounding.
+        lasted = abs(np.ptp(mine["t"]) - np.ptp(its["t"])) * e.speed
+        if lasted > worst:
+            worst, where = lasted, f"m, the way of what particle {i} lasts longer"
+    bound = twin.bound
+    if bound is None:
+        bound = EPS * max(e.length, other.length) * AMPLIFIED ** min(e.recording.contacts + 1, 6)
+    return Verdict(worst, bound, where)
+
+
+def order(ladder: Ladder, errors: Sequence[float]) -> float:
+    """Return the order at which errors fall with the step until rounding takes over, as fitted.
+
+    An error depends on where a step happens to fall, so what is fitted is the largest error at this
+    step or any finer one. The first at the floor is the last one counted; a method that is at the
+    floor from the first step on has nothing to converge: infinity. NaN if a run did not get there.
+    """
+    if not np.isfinite(errors).all():
+        return np.nan
+    worst = np.maximum(np.maximum.accumulate(np.array(errors)[::-1])[::-1], ladder.floor)
+    if worst[0] == ladder.floor:
+        return np.inf
+    count = np.count_nonzero(worst > ladder.floor) + 1
+    return float(np.polyfit(np.log2(ladder.steps[:count]), np.log2(worst[:count]), 1)[0])
+
+
+def demands(case: Case, e: Evidence) -> dict[str, Verdict]:
+    """Judge a run by all that its case asks for and that needs no second run."""
+    out: dict[str, Verdict] = {}
+    if case.ends:
+        out["ends as it must"] = ended(e, case.ends)
+    if case.inside is not None:
+        out["nobody leaves"] = inside(e, case.inside)
+    if case.at_rest:
+        out["nobody sinks"], out["lies still"] = sunk(e), still(e)
+    if case.formula is not None and (verdict := case.formula(e)) is not None:
+        out["closed formula"] = verdict
+    return out

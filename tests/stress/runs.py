@@ -1,0 +1,155 @@
+"""A case run within its time and judged; small runs with a number in them moved.
+
+A watchdog bounds the wall time of each run, whatever the run does.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from time import perf_counter
+from types import FrameType
+from typing import Any
+
+from chutelab.checks.stress import Evidence, Finding, judge
+from chutelab.checks.stress.laws import unseen
+from chutelab.engines.simulation import simulate
+from chutelab.machine import build
+from chutelab.scene import SceneError
+from stress.case import PATIENCE, Case, Tables, by_name, scene_of, surface, thrown
+from stress.demands import UNSEEN, demands, symmetric
+
+
+class OverdueError(RuntimeError):
+    """A run took longer than it may."""
+
+
+@contextmanager
+def bounded(seconds: float) -> Iterator[Callable[[float], None]]:
+    """Give a progress callback that raises `OverdueError` when the time is up.
+
+    An engine that has stopped to report progress is ended too, by an alarm of the operating system;
+    where there is none (Windows, another thread than the main one) the callback alone has to do.
+
+    Parameters
+    ----------
+    seconds : float
+        Wall time, s.
+    """
+    end = perf_counter() + seconds
+
+    def overdue() -> OverdueError:
+        return OverdueError(f"not done after {seconds:g} s of wall time")
+
+    def report(_share: float) -> None:
+        if perf_counter() > end:
+            raise overdue()
+
+    def ring(_number: int, _frame: FrameType | None) -> None:
+        raise overdue()
+
+    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "SIGALRM"):
+        yield report
+        return
+    before = signal.signal(signal.SIGALRM, ring)
+    # Later than the callback's own time, which tells more about where the engine was; and again,
+    # because what is raised in a callback from C is lost.
+    signal.setitimer(signal.ITIMER_REAL, 1.1 * seconds + 0.1, 0.1)
+    try:
+        yield report
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def run(
+    tables: Tables, engine: str, dt: float | None, patience: float = PATIENCE, name: str = "test"
+) -> Evidence:
+    """Simulate a scene on one of `stress.case.ENGINES`; dt is None for the exact one."""
+    scene = scene_of(tables, name, engine, dt)
+    with bounded(patience) as progress:
+        recording = simulate(scene, by_name(engine), progress)
+    return Evidence(build(scene), recording)
+
+
+def findings(case: Case, engine: str, dt: float | None) -> list[Finding]:
+    """Run a case and judge it by all laws and by what it asks for besides.
+
+    Returns nothing if the engine refuses the scene, and may.
+
+    Raises
+    ------
+    AssertionError
+        If the engine runs what it must refuse.
+    SceneError
+        If it refuses what it must run, or for another reason.
+    """
+    expected = case.refusals.get(engine, "")
+    try:
+        e = run(case.tables, engine, dt, case.patience, case.name)
+    except SceneError as error:
+        allowed = expected or case.may_refuse.get(engine, "")
+        if any(fault.key == allowed for fault in error.faults):
+            return []
+        raise
+    assert not expected, f"it runs, but ought to be refused for {expected}"
+    found = judge(e)
+    for name, verdict in demands(case, e).items():
+        excused = name in UNSEEN and not verdict.holds
+        found.append(Finding(name, verdict, unseen(e) if excused else ""))
+    if case.twin is not None:
+        other = run(case.twin.tables, engine, dt, case.patience, case.name)
+        found.append(Finding(case.twin.law, symmetric(e, other, case.twin)))
+    return found
+
+
+def errors(case: Case, engine: str) -> list[float]:
+    """Return a case's error at each step of its ladder, the exact engine being the reference."""
+    ladder = case.ladder
+    assert ladder is not None
+    reference = ladder.quantity(run(case.tables, "exact", None, case.patience).recording)
+    return [
+        abs(ladder.quantity(run(case.tables, engine, dt, case.patience).recording) - reference)
+        for dt in ladder.steps
+    ]
+
+
+FLOOR = surface("floor", (-1.0, 0.0), (2.0, 0.0), restitution=0.5, friction=0.3)
+HOP = {
+    "surface": [FLOOR],
+    **thrown((0.0, 0.3), (0.5, 0.0), count=2, rate=10.0),
+    "run": {"until": 1.0},
+}
+PAIR = {
+    "gravity": 0.0,
+    "particle": {"radius": 0.02, "spin": True},
+    **thrown((0.0, 0.0), (1.0, 0.0), count=2, rate=5.0, bed_height=0.03, speed_spread=0.9,
+             interact=True, seed=8),
+    "run": {"until": 2.0},
+}  # fmt: skip
+
+
+def evidence(
+    tables: Tables = HOP,
+    engine: str = "exact",
+    dt: float | None = None,
+    **changes: Callable[[Any], object],
+) -> Evidence:
+    """Return a run, with the arrays named in `changes` handed to a function that may spoil them."""
+    e = run(tables, engine, dt)
+    spoilt = {name: getattr(e.recording, name).copy() for name in changes}
+    for name, change in changes.items():
+        change(spoilt[name])
+    return replace(e, recording=replace(e.recording, **spoilt))
+
+
+def adder(field: str, row: int, amount: Any) -> Callable[[Any], None]:
+    """Return a function that moves one number of a structured array."""
+
+    def change(array: Any) -> None:
+        array[field][row] += amount
+
+    return change

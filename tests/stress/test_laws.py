@@ -1,0 +1,330 @@
+"""Every law is kept by a run as it is, and broken by one with a number in it moved."""
+
+from dataclasses import replace
+from math import nan
+
+import numpy as np
+import pytest
+
+from chutelab import machine
+from chutelab.checks.stress import Evidence, Verdict, barriers, judge, laws
+from chutelab.results import Kind
+from stress.case import TRANSFER, merged, scene_of, surface, thrown
+from stress.runs import FLOOR, HOP, PAIR, adder, evidence
+
+
+def teller(law, name, row, field, amount, tables=HOP):
+    """What a law says of a run as it is, and of one with a number in it moved."""
+    return law(evidence(tables)), law(evidence(tables, **{name: adder(field, row, amount)}))
+
+
+@pytest.mark.parametrize(
+    ("name", "field"),
+    [("knots", "velocity"), ("knots", "omega"), ("events", "normal_impulse"), ("events", "t")],
+)
+def test_a_number_that_is_none_breaks_finite(name, field):
+    good, bad = teller(laws.finite, name, 1, field, nan)
+    assert good.holds
+    assert not bad.holds
+    assert bad.figure >= 1
+
+
+def test_a_knot_before_the_last_breaks_the_order_of_time():
+    good, bad = teller(laws.ordered, "knots", 1, "t", -1.0)
+    assert (good.figure, good.bound) == (0.0, 0.0)
+    assert bad.figure == pytest.approx(1.0, abs=0.5)
+
+
+def test_a_particle_without_a_track_is_lost():
+    def forget(offsets):
+        offsets[1] = 0
+
+    assert laws.released(evidence()).holds
+    assert laws.released(evidence(offsets=forget)).figure == 1
+
+
+def test_a_track_that_ends_early_does_not_last():
+    good, bad = teller(laws.lasting, "knots", -1, "t", -1e-9)
+    assert good.holds
+    assert bad.figure == pytest.approx(1e-9, rel=1e-3)
+    assert not bad.holds
+
+
+def test_a_hair_below_the_surface_is_too_deep():
+    good, bad = teller(barriers.depth, "knots", 1, "position", [0.0, -1e-8])
+    assert good.holds
+    assert bad.figure == pytest.approx(1e-8, rel=1e-3)
+    assert not bad.holds
+    assert "particle 0 in floor" in bad.detail
+
+
+def test_what_starts_in_a_surface_may_stay_but_not_sink():
+    lying = merged(HOP, {"stream": {"at": [0.0, 0.004], "velocity": [0.1, 0.0], "count": 1}})
+
+    def sink(knots):
+        knots["position"][:, 1] -= 1e-3
+
+    def sink_on(knots):
+        knots["position"][:, 1] -= 1e-3
+        knots["position"][-1, 1] -= 1e-6
+
+    assert barriers.depth(evidence(lying, knots=sink)).holds
+    assert barriers.depth(evidence(lying, knots=sink_on)).figure == pytest.approx(1e-6, rel=1e-6)
+
+
+def test_the_pulley_is_a_surface_too():
+    tables = {
+        "incoming": {"speed": 0.5, "pulley_radius": 0.1, "length": 0.1},
+        "run": {"until": 0.4},
+    }
+    assert barriers.depth(evidence(tables)).holds
+
+    def inside(knots):
+        on_top = np.argmax(knots["position"][:, 0] > 0.0)
+        knots["position"][on_top] *= 0.99
+
+    bad = barriers.depth(evidence(tables, knots=inside))
+    assert not bad.holds
+    assert "pulley" in bad.detail
+
+
+@pytest.mark.parametrize("place", [0.3, 0.999])
+def test_a_centre_on_the_other_side_went_through(place):
+    wall = surface("wall", (1.0, 0.0), (1.0, 1.0))
+    flight = {
+        "gravity": 0.0,
+        "particle": {"radius": 0.0},
+        "surface": [wall],
+        **thrown((0.0, place), (1.0, 0.0)),
+        "run": {"until": 0.5},
+    }
+
+    def jump(knots):
+        knots["position"][-1, 0] = 1.5
+        knots["velocity"][-1] = knots["velocity"][0] = [3.0, 0.0]
+
+    assert barriers.no_one_through(evidence(flight)).holds
+    bad = barriers.no_one_through(evidence(flight, knots=jump))
+    assert bad.figure == 1
+    assert "particle 0 through wall" in bad.detail
+    past = merged(flight, {"stream": {"at": [0.0, 1.0 + place]}})
+    assert barriers.no_one_through(evidence(past, knots=jump)).holds
+
+
+def test_a_passage_there_and_back_within_one_interval_is_seen():
+    # A flight of one interval whose middle lies beyond the ceiling.
+    ceiling = surface("ceiling", (-1.0, 0.3), (2.0, 0.3))
+    thrown_up = {**thrown((0.0, 0.0), (0.5, 2.0)), "run": {"until": 0.4}}
+    hidden = merged(thrown_up, {"surface": [surface("away", (5.0, 0.5), (6.0, 0.5))]})
+    recording = evidence(hidden).recording
+    built = machine.build(scene_of({**thrown_up, "surface": [ceiling]}, "test", "exact", None))
+    assert np.count_nonzero(np.abs(recording.knots["position"][:, 1]) < 0.02) == 2
+    under = replace(recording, knots=recording.knots.copy())
+    assert barriers.no_one_through(Evidence(built, under)).holds
+    up = recording.knots.copy()
+    up["velocity"][:, 1] *= 2.0
+    over = Evidence(built, replace(recording, knots=up))
+    assert barriers.no_one_through(over).figure == 2
+
+
+def test_energy_from_nothing_is_seen():
+    good, bad = teller(laws.energy, "knots", 3, "velocity", [0.0, -1e-9])
+    assert good.holds
+    # ½ m ((v + δ)² - v²) of what is in play.
+    v = -evidence().recording.knots["velocity"][3, 1]
+    assert bad.figure == pytest.approx(0.008 * v * 1e-9 / evidence().energy, rel=0.05)
+    assert not bad.holds
+
+
+def test_a_belt_may_raise_energy_only_by_its_work():
+    belt = merged(HOP, {"surface": [{**FLOOR, "speed": 3.0}]})
+
+    def unpaid(knots):
+        knots["entries"][:, 0] *= 0.4  # half of it is heat
+
+    assert np.ptp(evidence(belt).recording.knots["entries"][:, 0]) > 1e-3
+    assert laws.energy(evidence(belt)).holds
+    assert not laws.energy(evidence(belt, knots=unpaid)).holds
+
+
+@pytest.mark.parametrize(
+    ("field", "amount"), [("velocity", [0.0, 1e-4]), ("entries", [0, 0, 1e-11])]
+)
+def test_a_perturbed_end_opens_the_ledger(field, amount):
+    good, bad = teller(laws.residual, "knots", -1, field, amount)
+    assert good.holds
+    assert not bad.holds
+
+
+def crowd(**changes):
+    return evidence(PAIR, "contact", 1e-3, **changes)
+
+
+def test_a_crowd_keeps_the_laws_and_meets():
+    whole = crowd()
+    assert whole.recording.contacts == 1
+    found = {name: law(whole) for name, law in laws.LAWS.items()}
+    assert {"momentum", "angular momentum", "no overlap"} <= {n for n, v in found.items() if v}
+    assert [name for name, verdict in found.items() if verdict and not verdict.holds] == []
+
+
+@pytest.mark.parametrize("law", [laws.momentum, laws.spin, laws.energy])
+def test_one_faster_particle_breaks_the_laws_of_a_crowd(law):
+    def push(knots):
+        knots["velocity"][-1] *= 2.0
+
+    assert law(crowd()).holds
+    assert not law(crowd(knots=push)).holds
+
+
+def test_a_turn_more_breaks_angular_momentum_only():
+    change = adder("omega", -1, 400.0)
+    assert not laws.spin(crowd(knots=change)).holds
+    assert laws.momentum(crowd(knots=change)).holds
+
+
+def test_two_in_one_place_overlap():
+    def together(knots):
+        half = len(knots) // 2
+        knots["position"][half:] = knots["position"][half - 1] + [0.001, 0.0]
+        knots["position"][:half] = knots["position"][half - 1]
+        knots["velocity"] = 0.0
+
+    good, bad = barriers.overlap(crowd()), barriers.overlap(crowd(knots=together))
+    assert good.holds
+    assert bad.figure == pytest.approx(0.039, rel=1e-9)
+    assert not bad.holds
+
+
+def test_nobody_stays_in_another_for_longer_than_a_step():
+    """Two disks of 2 cm, 4 mm deep in each other from the middle on: 0.2 r, and more than 5 %."""
+
+    def still(knots):
+        knots["velocity"] = 0.0
+        half = len(knots) // 2
+        knots["position"][:half] = knots["position"][half - 1]
+        knots["position"][half:] = knots["position"][half - 1] + [0.036, 0.0]
+
+    good, bad = barriers.pressed(crowd()), barriers.pressed(crowd(knots=still))
+    assert good.holds
+    assert bad.figure == pytest.approx(0.2, rel=1e-9)
+    assert not bad.holds
+
+
+def test_slow_disks_whose_centres_come_within_a_radius_went_through_each_other():
+    """One at rest, one that passes 15 mm from its centre at 1 m/s: a 20th of the radius a step."""
+
+    def ghosts(knots):
+        half = len(knots) // 2
+        first, second = knots[:half], knots[half:]
+        first["velocity"], second["velocity"] = [0.0, 0.0], [1.0, 0.0]
+        first["position"] = [1.0, 0.0]
+        second["position"][:, 0] = 0.5 + second["t"] - second["t"][0]
+        second["position"][:, 1] = 0.015
+
+    good, bad = (barriers.no_one_through_another(e) for e in (crowd(), crowd(knots=ghosts)))
+    assert (good.figure, good.bound) == (0, 0.0)
+    assert bad.figure == 1
+    assert "0 and 1" in bad.detail
+
+
+def test_a_bounce_beside_the_surface_is_off_nothing():
+    """An impact 1 nm above the floor, or one that names another surface."""
+    hits = np.flatnonzero(evidence().recording.events["kind"] == Kind.IMPACT)
+    good, bad = teller(barriers.on_something, "events", hits[0], "position", [0.0, 1e-9])
+    assert good.holds
+    assert bad.figure == pytest.approx(1e-9, rel=1e-3)
+    assert not bad.holds
+    assert "off floor" in bad.detail
+    wall = merged(HOP, {"surface": [FLOOR, surface("wall", (2.0, 0.0), (2.0, 1.0))]})
+    hits = np.flatnonzero(evidence(wall).recording.events["kind"] == Kind.IMPACT)
+    other = barriers.on_something(evidence(wall, events=adder("surface", hits[0], 1)))
+    assert other.figure > 1.0
+
+
+def test_a_collision_with_one_that_is_elsewhere_is_off_nothing():
+    (hit,) = crowd().recording.select(Kind.COLLISION)
+    row = np.flatnonzero(crowd().recording.events["kind"] == Kind.COLLISION)[0]
+    good = barriers.on_something(crowd())
+    away = hit["position"] - crowd().recording.at([hit["t"]])[0][0][hit["other"]]
+    bad = barriers.on_something(crowd(events=adder("position", row, 0.2 * away)))
+    assert good.holds
+    # 20 % farther from its partner than two radii of 2 cm.
+    assert bad.figure == pytest.approx(0.2 * 0.04, rel=1e-3)
+    assert not bad.holds
+
+
+def test_one_released_in_another_or_in_a_surface_has_no_room():
+    starts = np.flatnonzero(crowd().recording.events["kind"] == Kind.RELEASE)
+    there = crowd().recording.at([crowd().recording.events["t"][starts[1]]])[0][0][0]
+    here = crowd().recording.events["position"][starts[1]]
+
+    def inside(events):
+        events["position"][starts[1]] += (1.0 - 0.03 / np.hypot(*(there - here))) * (there - here)
+
+    assert barriers.released_free(crowd()).holds
+    bad = barriers.released_free(crowd(events=inside))
+    assert bad.figure == pytest.approx(0.01, rel=1e-9)
+    assert "particle 1 in 0" in bad.detail
+    good, low = teller(barriers.released_free, "events", 0, "position", [0.0, -0.297])
+    assert good.holds
+    assert low.figure == pytest.approx(0.001, rel=1e-9)
+    assert "in floor" in low.detail
+
+
+def test_what_rides_on_a_belt_that_will_throw_it_has_not_settled():
+    """Of the surfaces that move, only the outgoing belt is one to settle on."""
+    lying = merged(HOP, {
+        "surface": [{**FLOOR, "speed": 0.0}],
+        "stream": {"at": [0.0, 0.004], "velocity": [0.1, 0.0], "count": 1},
+        "run": {"until": "settled"},
+    })  # fmt: skip
+    assert barriers.settled_to_stay(evidence()) is None
+    e = evidence(lying)
+    assert barriers.settled_to_stay(e).holds
+    moving = scene_of(merged(lying, {"surface": [{**FLOOR, "speed": 1.0}]}), "test", "exact", None)
+    bad = barriers.settled_to_stay(replace(e, machine=machine.build(moving)))
+    assert bad.figure == 1
+    assert "0 on floor" in bad.detail
+    carried = evidence(merged(TRANSFER, {"run": {"until": "settled"}}))
+    assert carried.machine.segments.speed[-1] != 0.0
+    assert barriers.settled_to_stay(carried).holds
+
+
+def test_momentum_on_a_frictionless_floor_holds_along_it_only():
+    slides = merged(
+        PAIR, {"surface": [{**FLOOR, "friction": 0.0, "points": [[-9.0, -0.5], [9.0, -0.5]]}]}
+    )
+
+    def pushed(direction):
+        return lambda knots: np.add.at(knots["velocity"], -1, direction)
+
+    verdicts = [
+        laws.momentum(evidence(slides, "contact", 1e-3, knots=pushed(direction)))
+        for direction in ([0.0, 0.0], [0.0, 0.1], [0.1, 0.0])
+    ]
+    assert [verdict.holds for verdict in verdicts] == [True, True, False]
+    rough = merged(slides, {"surface": [{**slides["surface"][0], "friction": 0.1}]})
+    assert laws.momentum(evidence(rough, "contact", 1e-3)) is None
+
+
+def test_fast_disks_in_steps_all_alike_are_promised_no_surface():
+    """Who goes farther than its radius in a step may be beyond a surface before it is seen."""
+    slow, fast = (evidence(PAIR, "pymunk", dt) for dt in (1e-3, 0.1))
+    radii = np.hypot(*fast.recording.knots["velocity"].T).max() * 0.1 / 0.02
+    assert laws.unseen(slow) == ""
+    assert laws.unseen(fast).startswith(f"up to {radii:.2g} radii in a step")
+    assert laws.unseen(evidence(PAIR, "contact", 0.1)) == ""
+    assert laws.unseen(evidence(HOP, "pymunk", 0.1)) == ""
+    assert laws.unseen(evidence(HOP, "fixed", 0.1)).startswith("up to ")
+
+
+def test_only_what_such_disks_may_break_is_not_promised(monkeypatch):
+    for name in ("no one through", "ledger closes"):
+        monkeypatch.setitem(laws.LAWS, name, lambda e: Verdict(1.0, 0.0))
+    found = {one.law: one for one in judge(evidence(PAIR, "pymunk", 0.1))}
+    assert not found["no one through"].broken
+    assert "radii in a step" in found["no one through"].unpromised
+    assert found["ledger closes"].broken
+    kept = {one.law: one for one in judge(evidence(PAIR, "pymunk", 1e-3))}
+    assert kept["no one through"].broken

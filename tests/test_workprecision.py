@@ -1,4 +1,4 @@
-"""`chutelab bench`: errors against formulas written here, fits on made-up rows, what is shown."""
+"""benchmarks/work_precision.py: errors against formulas written here, fits on made-up rows."""
 
 from __future__ import annotations
 
@@ -16,7 +16,12 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
-from chutelab.checks.workprecision import (
+from chutelab.engines.simulation import simulate
+from chutelab.machine.releases import draw as draw_releases
+from chutelab.util.tables import tsv_text
+from chutelab.util.versions import environment
+from work_precision import main
+from workprecision import (
     METHODS,
     Record,
     Size,
@@ -25,10 +30,9 @@ from chutelab.checks.workprecision import (
     from_tsv,
     measure,
     scaling,
-    to_tsv,
     whole_process,
 )
-from chutelab.checks.workprecision.cases import (
+from workprecision.cases import (
     FRAME,
     MissedError,
     Reference,
@@ -37,21 +41,17 @@ from chutelab.checks.workprecision.cases import (
     typical,
     worst,
 )
-from chutelab.checks.workprecision.claims import exponent, order, slope, time_at, work_slope
-from chutelab.checks.workprecision.measure import COMMANDS, size, stream
-from chutelab.checks.workprecision.methods import Method
-from chutelab.cli import benching, main
-from chutelab.engines.simulation import simulate
-from chutelab.machine.releases import draw as draw_releases
-from chutelab.pictures.plots.workprecision import LOOKS
-from chutelab.pictures.plots.workprecision import scaling as draw_scaling
-from chutelab.pictures.plots.workprecision import workprecision as draw
-from chutelab.util.versions import environment
+from workprecision.claims import exponent, order, slope, time_at, work_slope
+from workprecision.measure import COMMANDS, size, stream
+from workprecision.methods import Method
+from workprecision.picture import LOOKS
+from workprecision.picture import scaling as draw_scaling
+from workprecision.picture import workprecision as draw
 
 G, R, RADIUS, V, EPS, MU, DROP = 9.81, 0.1, 0.004, 2.0, 0.5, 0.3, 1.0
 KNOWN = cases()
-# Functions of the package hide these modules.
-MEASURE = import_module("chutelab.checks.workprecision.measure")
+# A function of the package hides this module.
+MEASURE = import_module("workprecision.measure")
 
 
 def one(case, method, value=None):
@@ -219,7 +219,7 @@ def test_dop853_is_as_accurate_as_it_is_asked_to_be(case, rtol, bound):
 
 
 def test_dop853_solves_many_one_by_one():
-    ode = pytest.importorskip("chutelab.checks.workprecision.ode")
+    ode = pytest.importorskip("workprecision.ode")
     scene = stream("independent", 5)
     found = ode.independent(scene, 1e-9)
     assert worst(found, KNOWN["independent"].reference(scene))[0] < 1e-13
@@ -251,7 +251,7 @@ def test_plain_pymunk_passes_the_plate_with_long_steps():
 
 
 def test_plain_pymunk_with_many():
-    from chutelab.checks.workprecision import plain
+    from workprecision import plain
 
     scene = stream("independent", 30)
     known = KNOWN["independent"].reference(scene)
@@ -303,47 +303,9 @@ def test_a_method_that_breaks_costs_nobody_else_his_row(monkeypatch):
 # Clocks and memory.
 
 
-def test_repeats_end_when_patience_does(monkeypatch):
-    clock = iter(np.arange(0.0, 1000.0))
-    monkeypatch.setattr(MEASURE, "perf_counter", lambda: float(next(clock)))
-    calls = []
-    # Every call takes one second on this clock.
-    assert MEASURE.repeated(lambda: calls.append(1), 1.0, 9, 3.5) == [1.0, 1.0, 1.0]
-    assert len(calls) == 3
-    assert MEASURE.repeated(lambda: None, 1.0, 2, 100.0) == [1.0, 1.0]
-    assert MEASURE.repeated(lambda: None, 5.0, 9, 3.5) == []
-
-
-def test_what_is_over_at_once_is_measured_several_times_in_a_row(monkeypatch):
-    clock = iter(np.arange(0.0, 1000.0, 0.5))
-    monkeypatch.setattr(MEASURE, "perf_counter", lambda: float(next(clock)))
-    calls = []
-    # Half a second on this clock, whatever is called.
-    assert MEASURE.clocked(lambda: calls.append(1) or "last", 4) == (0.125, "last")
-    assert len(calls) == 4
-    trial = MEASURE.Trial(KNOWN["transfer"], METHODS["exact"], None, patience=2.0)
-    runs = []
-    monkeypatch.setattr(MEASURE, "clocked", lambda run, number: (runs.append(number) or 0.004, 0))
-    for _ in range(3):
-        trial.repeat()
-    # 20 ms each, whatever the last one took: 0.5 s, then 4 ms, and 4 ms again.
-    assert runs == [1, 5, 5]
-
-
 def test_memory_is_the_peak_of_a_run():
     peak = MEASURE.traced(lambda: np.ones(1_000_000).sum())
     assert 8_000_000 < peak < 8_200_000
-
-
-def test_the_first_run_is_told_apart(monkeypatch):
-    times = iter([7.0, 1.0, 2.0, 9.0])
-    monkeypatch.setattr(MEASURE, "clocked", lambda run, number=1: (next(times), run()))
-    trial = MEASURE.Trial(KNOWN["transfer"], METHODS["exact"], None, patience=12.0)
-    for _ in range(5):
-        trial.repeat()
-    found = trial.record()
-    # The 7 s are not in it; and after 1 + 2 + 9 s of 12 s there is no patience for another.
-    assert (found.first, found.repeats, found.median) == (7.0, 3, 2.0)
 
 
 def test_mean_places_are_compared_with_the_finest_run():
@@ -451,10 +413,10 @@ def test_rows_come_back_from_a_file_to_the_last_bit():
         Record("bounce", "exact", failed='said "no", and left'),
     ]
     about = {"processor": "Some: CPU, 2 cores", "numpy": "2.4"}
-    text = to_tsv(rows, Record, about)
+    text = tsv_text(rows, Record, about)
     assert from_tsv(text, Record) == (rows, about)
     sizes = [Size("independent", "exact", 10, 40, 0.1, 3, 0.2, 99)]
-    assert from_tsv(to_tsv(sizes, Size, {}), Size) == (sizes, {})
+    assert from_tsv(tsv_text(sizes, Size, {}), Size) == (sizes, {})
     with pytest.raises(ValueError, match="expected the columns"):
         from_tsv(text, Size)
 
@@ -641,21 +603,13 @@ def test_every_method_has_its_own_look():
 
 
 def call(*arguments, code=0):
-    result = CliRunner().invoke(main, ["bench", *map(str, arguments)])
+    result = CliRunner().invoke(main, [*map(str, arguments)])
     assert result.exit_code == code, result.output
     assert "Traceback" not in result.output
     return result
 
 
-def test_the_command_knows_all_cases_and_methods():
-    assert (*KNOWN, "process") == benching.CASES
-    assert tuple(METHODS) == benching.METHODS
-    assert MEASURE.REPEATS == benching.REPEATS
-    assert tuple(MEASURE.COUNTS) == benching.MANY
-    assert {m for runs in MEASURE.RUNS.values() for m in runs} == set(benching.STREAMED)
-
-
-def test_bench_prints_tables_and_writes_both_files(tmp_path):
+def test_the_script_prints_tables_and_writes_both_files(tmp_path):
     out = tmp_path / "new" / "out"
     said = call(
         "transfer", "interacting", "--quick", "--repeats", 1, "--method", "exact", "--out", out
@@ -676,7 +630,7 @@ def test_bench_prints_tables_and_writes_both_files(tmp_path):
     assert about == environment()
 
 
-def test_bench_json(tmp_path, monkeypatch):
+def test_the_scripts_json(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     said = json.loads(call("transfer", "--quick", "--repeats", 1, "--method", "exact",
                            "--method", "dop853", "--json").stdout)  # fmt: skip
@@ -686,7 +640,7 @@ def test_bench_json(tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
-def test_bench_scaling(tmp_path, monkeypatch):
+def test_the_scripts_scaling(tmp_path, monkeypatch):
     monkeypatch.setitem(MEASURE.QUICK, "independent", 100)
     said = call("--scaling", "independent", "--quick", "--repeats", 1, "--out", tmp_path).stdout
     assert "Independent, exact: time ∝ N^" in said
@@ -707,22 +661,8 @@ def test_bench_scaling(tmp_path, monkeypatch):
         (["--out", ""], "the name of a folder is empty"),
     ],
 )
-def test_what_bench_cannot_use_is_refused(arguments, allowed, tmp_path, monkeypatch):
+def test_what_the_script_cannot_use_is_refused(arguments, allowed, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     result = call(*arguments, code=2)
     assert allowed in " ".join(result.output.split())
-    assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize("where", ["measure", "draw"])
-def test_an_interrupt_leaves_no_files(where, tmp_path, monkeypatch):
-    def interrupt(*_, **__):
-        raise KeyboardInterrupt
-
-    if where == "measure":
-        monkeypatch.setattr("chutelab.checks.workprecision.measure", interrupt)
-    else:
-        monkeypatch.setattr("chutelab.pictures.plots.workprecision.workprecision", interrupt)
-    out = tmp_path / "out"
-    call("transfer", "--quick", "--repeats", 1, "--method", "exact", "--out", out, code=130)
     assert not list(tmp_path.iterdir())

@@ -350,17 +350,19 @@ def reach(
     """
     if not isinstance(wanted, Wanted):
         wanted = parse(wanted if isinstance(wanted, str) else repr(float(wanted)))
-    return _Search(scene, wanted, progress).result()
+    return Search(scene, wanted, progress).result()
 
 
-class _Search:
+class Search:
     """Runs a scene and its witness, counts the runs, and passes the progress on."""
 
-    def __init__(self, scene: Scene, wanted: Wanted, progress: Progress | None) -> None:
+    def __init__(self, scene: Scene, wanted: Wanted, progress: Progress | None = None) -> None:
         self.scene, self.wanted, self.progress = scene, wanted, progress
         self.runs = 0
+        self.witnesses: dict[str, tuple[Recording | None, str]] = {}
 
     def result(self) -> tuple[Recording, Accuracy]:
+        """Return what `reach` does."""
         found = self.run(self.scene)
         known = self.by_theory(found, found.engine)
         if known is not None and (known.met or found.engine == "exact"):
@@ -368,6 +370,23 @@ class _Search:
         if self.scene.stream.interact and self.scene.stream.count > 1:
             return found, self.crowd(found)
         return self.refine(found, known)
+
+    def judged(self, found: Recording) -> Accuracy:
+        """Say how wrong a run is, one of the scene with any engine and step.
+
+        A witness runs once for each engine, with the step of `scene`.
+        """
+        known = self.by_theory(found, found.engine)
+        if known is not None:
+            return known
+        if self.scene.stream.interact and self.scene.stream.count > 1:
+            return self.crowd(found)
+        if found.engine not in self.witnesses:
+            self.witnesses[found.engine] = self.witness(found)
+        other, none = self.witnesses[found.engine]
+        if other is None:
+            return self.said(found, inf, "every answer", none, None)
+        return self.held(found, other)
 
     def run(self, scene: Scene, engine: str | None = None) -> Recording:
         """Run a scene once more."""
@@ -379,7 +398,10 @@ class _Search:
         return found
 
     def share(self, share: float) -> None:
-        # Half of what is left for each run, because nobody knows how many there will be.
+        """Pass on the share of this run that is done.
+
+        Half of what is left goes to each run, because nobody knows how many there will be.
+        """
         if self.progress is not None:
             self.progress(1.0 - 0.5**self.runs * (1.0 - 0.5 * share))
 
@@ -482,11 +504,12 @@ class _Search:
         collisions, and so, less, the mean: differences smaller than that would be luck.
         """
         engine = "pymunk" if found.engine == "contact" else "contact"
-        moved = stirred(self.scene, STIR)
+        scene = scene_of(found)
+        moved = stirred(scene, STIR)
         runs = [
             found,
             self.run(moved, found.engine),
-            self.run(self.scene, engine),
+            self.run(scene, engine),
             self.run(moved, engine),
         ]
         tables = [list(together(one)) for one in runs]
@@ -496,7 +519,7 @@ class _Search:
         what = "mean landing point" + ("" if self.wanted.unit == "m" else " and ledger")
         how = (
             f"a crowd as a whole: the {what} of {found.engine} and {engine} at dt ="
-            f" {self.scene.run.dt:.3g} s, each with and without a change of the inputs by {STIR:g}"
+            f" {scene.run.dt:.3g} s, each with and without a change of the inputs by {STIR:g}"
         )
         return self.said(found, error, which, how, engine, chaotic=True)
 

@@ -1,4 +1,4 @@
-"""A small table for terminal and notebook; columns as a pandas DataFrame and as CSV.
+"""A small table for terminal and notebook; columns as a pandas DataFrame and as CSV, rows as TSV.
 
 pandas is imported only where a DataFrame is asked for.
 """
@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 from html import escape
 from importlib import import_module
 from math import isfinite, isnan
@@ -145,3 +145,21 @@ def csv_text(columns: Mapping[str, NDArray[Any]]) -> str:
     for row in zip(*(column.tolist() for column in columns.values()), strict=True):
         writer.writerow("" if isinstance(one, float) and isnan(one) else one for one in row)
     return out.getvalue()
+
+
+def tsv_text(rows: Sequence[object], kind: type, about: Mapping[str, str]) -> str:
+    """Return rows of a dataclass as tab-separated values.
+
+    Lines of ``# key: value`` come first and say where the figures are from; then the names of the
+    columns. What is None is empty. Numbers come back to the last bit.
+    """
+    text = io.StringIO()
+    for key, value in about.items():
+        text.write(f"# {key}: {value}\n")
+    writer = csv.writer(text, dialect="excel-tab", lineterminator="\n")
+    names = [field.name for field in fields(kind)]
+    writer.writerow(names)
+    for row in rows:
+        values = (getattr(row, name) for name in names)
+        writer.writerow(["" if value is None else value for value in values])
+    return text.getvalue()

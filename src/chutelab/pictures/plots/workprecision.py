@@ -1,190 +1,107 @@
-"""Pictures of measurements: run time against error, and time and memory against particles."""
+"""Run time against error of one scene: a point for each run, a line for each engine."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import ceil, floor, log10, sqrt
+from math import ceil, floor, log10
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
-import matplotlib.patheffects as pe
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
-from chutelab.checks.workprecision import METHODS, Record, Size, cases
-from chutelab.checks.workprecision.claims import exponent, points, work_slope
+from chutelab.checks.workprecision import METHODS, Timing
 from chutelab.pictures import colours
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.style import DPI, Picture
+from chutelab.util.versions import PACKAGES
 
-WIDTH, PANEL = 10.0, 2.35
-"""Width of a figure and height of a panel, inches."""
+WIDTH, PANEL = 8.5, 3.6
+"""Width of the figure and height of the panel, inches."""
 
-TITLE, LABEL, LINE, FOOT = 0.42, 0.62, 0.19, 0.42
-"""Height over a panel, under it, of a line of text below that, and of the foot, inches."""
+LINE, HEAD, FOOT = 0.19, 0.5, 0.9
+"""Height of a line of text, over the panel and under it, inches."""
 
-LEFT, GAP, RIGHT = 0.8, 0.85, 0.2
-"""Room left of panels, between them and right of them, inches."""
+LEFT, RIGHT = 0.9, 2.1
+"""Room left of the panel, and right of it for the legend, inches."""
 
-CHARACTERS = 14.0
-"""Characters of small text that go into an inch."""
-
-ERRORS = 1e-17, 0.2
-"""Where the axes of relative errors end, the same for all cases."""
-
-LEAST = 1e-16
-"""Errors are drawn no smaller: that is the last digit of a double."""
+CHARACTERS = 105
+"""Characters of small text that go into a line."""
 
 LOOKS: dict[str, dict[str, Any]] = {
-    "plain": {"color": colours.VERMILION, "marker": "^", "markersize": 8.0},
-    "dop853": {"color": colours.PURPLE, "marker": "D", "markersize": 6.5},
     "fixed": {"color": colours.ORANGE, "marker": "s", "markersize": 9.0},
-    "aligned": {"color": colours.GREEN, "marker": "o", "markersize": 6.5},
+    "pymunk": {"color": colours.GREEN, "marker": "o", "markersize": 6.5},
     "contact": {"color": colours.SKY, "marker": "P", "markersize": 8.0},
     "exact": {"color": colours.BLUE, "marker": "*", "markersize": 15.0},
 }
 """Colour and marker of each method: two signs, for readers who tell colours apart
 badly. In the order of drawing: of two at one place, the upper is the smaller."""
 
-HALO = [pe.withStroke(linewidth=3.0, foreground="white")]
-
-STEEP = 0.5
-"""Slope from which on a line leaves room beside it rather than under it."""
-
-MEMORY = 1e6
-"""Bytes in a megabyte."""
+TITLES = {"pymunk": "pymunk, aligned", "fixed": "pymunk, fixed step"}
 
 
 def workprecision(
-    records: Sequence[Record], about: Mapping[str, str], *, path: Path | None = None
+    timings: Sequence[Timing], title: str, about: Mapping[str, str], *, path: Path | None = None
 ) -> Figure:
-    """Draw run time against error, a panel for each case.
+    """Draw run time against error.
 
     Parameters
     ----------
-    records : sequence of Record
-        From `chutelab.checks.workprecision.measure`; rows of other cases are left out.
+    timings : sequence of Timing
+        From `chutelab.checks.workprecision.measure`.
+    title : str
+        Of the scene.
     about : mapping
         The machine and the versions, from `chutelab.util.versions`.
     path : Path, optional
         Also write the figure there, whole or not at all.
     """
-    shown = [case for case in cases().values() if any(one.case == case.name for one in records)]
-    columns = min(3, len(shown) + 1)
-    rows = {case.name: [one for one in records if one.case == case.name] for case in shown}
-    width = round(CHARACTERS * (_width(columns) + 0.7 * GAP))
-    failed = [_failures(rows[case.name], width) for case in shown]
-    figure, cells = _page([*map(len, failed), 0], columns, about)
-    for ax, case, lines in zip(cells, shown, failed, strict=False):
-        crowd = case.reference is None
-        what = "overlap of particles, radii" if crowd else "relative error"
-        style.dress(ax, what, "run time, s", case.title)
-        draw_case(ax, rows[case.name], case.name, None if crowd else ERRORS)
-        ax.text(
-            0.0, -LABEL / PANEL, "\n".join(lines), transform=ax.transAxes, fontsize=style.SMALL,
-            color=style.MUTED, verticalalignment="top", gid="failed",
-        )  # fmt: skip
-    used = [name for name in METHODS if any(one.method == name for one in records)]
-    _explain(cells[-1], used)
+    below = failures(timings, CHARACTERS)
+    said = [f"{key} {value}" if key in PACKAGES else value for key, value in about.items()]
+    below += wrap(" · ".join(said), CHARACTERS)
+    height = HEAD + PANEL + FOOT + LINE * len(below)
+    figure = Picture(figsize=(WIDTH, height), dpi=DPI)
+    width = WIDTH - LEFT - RIGHT
+    box = (LEFT / WIDTH, 1.0 - (HEAD + PANEL) / height, width / WIDTH, PANEL / height)
+    ax = style.dress(figure.add_axes(box), "relative error", "run time, s", title)
+    draw_timings(ax, timings)
+    figure.text(
+        0.2 / WIDTH, (0.2 + LINE * len(below)) / height, "\n".join(below), fontsize=style.SMALL,
+        color=style.MUTED, verticalalignment="top", gid="below",
+    )  # fmt: skip
     figure.write(path)
     return figure
 
 
-def draw_case(
-    ax: Axes, records: Sequence[Record], case: str, errors: tuple[float, float] | None = None
-) -> Axes:
-    """Draw the rows of one case, a line for each method, with its slope.
-
-    The axis of errors ends where it is said, or around the errors.
-    """
+def draw_timings(ax: Axes, timings: Sequence[Timing]) -> Axes:
+    """Draw a line for each method; left is more accurate, down is faster."""
     ax.set(xscale="log", yscale="log")
-    for method, look in LOOKS.items():
-        xy = points(records, case, method)
-        if not xy:
-            continue
-        xy.sort(key=lambda point: point[1])
-        x, y = [max(e, LEAST) for e, _ in xy], [t for _, t in xy]
-        ax.plot(
-            x, y, **look, linewidth=1.8, markeredgecolor="white", markeredgewidth=0.8, gid=method,
-            zorder=5.0 if method == "exact" else 3.0,
-        )  # fmt: skip
-        power = work_slope(records, case, method)
-        if power is not None:
-            _mark(ax, power, x, y, method)
-    drawn = [point for method in LOOKS for point in points(records, case, method)]
-    _decades(ax.xaxis, [max(e, LEAST) for e, _ in drawn], 5, errors)
-    _decades(ax.yaxis, [t for _, t in drawn], 5)
-    return ax
-
-
-def scaling(sizes: Sequence[Size], about: Mapping[str, str], *, path: Path | None = None) -> Figure:
-    """Draw time and memory against the number of particles, a row for each case.
-
-    Parameters are those of `workprecision`, the rows those of `measure`.
-    """
-    shown = [case for case in cases().values() if any(one.case == case.name for one in sizes)]
-    figure, cells = _page([0] * (2 * len(shown)), 2, about)
-    for row, case in enumerate(shown):
-        kind = "Independent" if case.name == "independent" else "Interacting"
-        for ax, what, unit in (
-            (cells[2 * row], "median", "run time, s"),
-            (cells[2 * row + 1], "memory", "peak memory, MB"),
-        ):
-            style.dress(ax, "particles", unit, f"{kind} particles: {unit.partition(',')[0]}")
-            draw_sizes(ax, [one for one in sizes if one.case == case.name], case.name, what)
-    figure.write(path)
-    return figure
-
-
-def draw_sizes(ax: Axes, sizes: Sequence[Size], case: str, what: str) -> Axes:
-    """Draw one quantity (``"median"`` or ``"memory"``) against particles, with its exponent."""
-    ax.set(xscale="log", yscale="log")
-    per = MEMORY if what == "memory" else 1.0
     drawn: list[tuple[float, float]] = []
     for method, look in LOOKS.items():
-        xy = sorted(
-            (one.particles, getattr(one, what) / per)
-            for one in sizes
-            if one.method == method and getattr(one, what) is not None
-        )
-        if not xy:
-            continue
+        xy = [
+            (one.error, one.median)
+            for one in timings
+            if one.method == method and one.error is not None and one.median is not None
+        ]
+        if xy:
+            ax.plot(
+                *zip(*xy, strict=True), **look, linewidth=1.8, markeredgecolor="white",
+                markeredgewidth=0.8, gid=method, label=TITLES.get(method, method),
+            )  # fmt: skip
         drawn += xy
-        power = exponent(sizes, case, method, what)
-        label = METHODS[method].title + ("" if power is None else f", ∝ N$^{{{power:.2f}}}$")
-        ax.plot(
-            *zip(*xy, strict=True), **look, linewidth=1.8, markeredgecolor="white",
-            markeredgewidth=0.8, gid=method, label=label,
-        )  # fmt: skip
-    _decades(ax.xaxis, [x for x, _ in drawn], 7)
-    _decades(ax.yaxis, [y for _, y in drawn], 6)
+    decades(ax.xaxis, [error for error, _ in drawn], 7)
+    decades(ax.yaxis, [time for _, time in drawn], 6)
     if drawn:
-        ax.legend(loc="upper left", fontsize=style.SMALL, frameon=False, borderaxespad=0.2)
+        ax.legend(
+            loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=style.SMALL, frameon=False,
+        )  # fmt: skip
     return ax
 
 
-def _mark(ax: Axes, power: float, x: Sequence[float], y: Sequence[float], method: str) -> None:
-    """Write a slope beside the upper end of a steep line, under the middle of a flat one."""
-    k = len(x) // 2
-    where = x[-1], y[-1]
-    if abs(power) < STEEP:
-        where = sqrt(x[k - 1] * x[k]), sqrt(y[k - 1] * y[k])
-    text = f"{round(power, 1) + 0.0:.1f}"  # no -0
-    right = method == "fixed"
-    ax.annotate(
-        text.replace("-", "−"), where, xytext=(8.0, 3.0) if right else (-8.0, -3.0),
-        textcoords="offset points", fontsize=style.SMALL, color=LOOKS[method]["color"],
-        horizontalalignment="left" if right else "right",
-        verticalalignment="bottom" if right else "top",
-        fontweight="bold", path_effects=HALO, zorder=6.0, gid=f"slope {method}",
-    )  # fmt: skip
-
-
-def _decades(
+def decades(
     axis: Axis, values: Sequence[float], ticks: int, limits: tuple[float, float] | None = None
 ) -> None:
     """Set limits a bit around values, with powers of ten as ticks, at most so many."""
@@ -217,69 +134,14 @@ def _power(value: float) -> str:
     return f"{10.0**power:g}" if -3 <= power <= 3 else f"$10^{{{power}}}$"
 
 
-def _failures(records: Sequence[Record], width: int) -> list[str]:
-    """Name what failed, a line for each method: why, if it always did, or with which parameter."""
+def failures(timings: Sequence[Timing], width: int) -> list[str]:
+    """Name what failed, in lines of at most `width` characters: with which steps, and why."""
     lines = []
-    for name, method in METHODS.items():
-        mine = [one for one in records if one.method == name]
-        failed = [one for one in mine if one.failed]
-        if not failed:
-            continue
-        if len(failed) == len(mine):
-            how = f": {failed[0].failed.partition(', in')[0]}"
-        else:
-            values = ", ".join(f"{one.value:.2g}" for one in failed)
-            how = f": {failed[0].parameter} {values}"
-        lines += wrap(f"✕ {method.title}{how}", width, subsequent_indent="    ")
+    for method in METHODS:
+        failed = [one for one in timings if one.method == method and one.failed]
+        for why in dict.fromkeys(one.failed for one in failed):
+            steps = [f"{one.value:.2g}" for one in failed if one.failed == why and one.value]
+            at = f" at dt {', '.join(steps)}" if steps else ""
+            line = f"✕ {TITLES.get(method, method)}{at}: {why}"
+            lines += wrap(line, width, subsequent_indent="    ")
     return lines
-
-
-def _width(columns: int) -> float:
-    """Return the width of a panel, inches."""
-    return (WIDTH - LEFT - RIGHT - (columns - 1) * GAP) / columns
-
-
-def _page(
-    lines: Sequence[int], columns: int, about: Mapping[str, str]
-) -> tuple[Picture, list[Axes]]:
-    """Return a figure with axes that have so many lines of text under them, and its foot."""
-    below = [max(lines[k : k + columns]) for k in range(0, len(lines), columns)]
-    heights = [TITLE + PANEL + LABEL + LINE * count for count in below]
-    height = sum(heights) + FOOT
-    figure = Picture(figsize=(WIDTH, height), dpi=DPI)
-    width = _width(columns)
-    cells = []
-    for k in range(len(lines)):
-        row, column = divmod(k, columns)
-        left, top = LEFT + column * (width + GAP), height - sum(heights[:row]) - TITLE
-        box = (left / WIDTH, (top - PANEL) / height, width / WIDTH, PANEL / height)
-        cells.append(figure.add_axes(box))
-    said = [about[key] for key in ("processor", "python") if key in about]
-    said += [f"{key} {about[key]}" for key in about if key not in ("processor", "system", "python")]
-    figure.text(
-        LEFT / WIDTH, 0.5 * FOOT / height, " · ".join(said), fontsize=style.SMALL,
-        color=style.MUTED, verticalalignment="center", gid="environment",
-    )  # fmt: skip
-    return figure, cells
-
-
-def _explain(ax: Axes, used: Sequence[str]) -> None:
-    """Turn a cell into the legend and how to read the panels."""
-    ax.set_axis_off()
-    handles = [
-        Line2D([], [], **LOOKS[name], linewidth=1.8, markeredgecolor="white", label=method.title)
-        for name, method in METHODS.items()
-        if name in used
-    ]
-    ax.legend(
-        handles=handles, loc="upper left", bbox_to_anchor=(-0.05, 1.05), fontsize=style.NORMAL,
-        frameon=False, borderaxespad=0.0, handlelength=2.4, labelspacing=0.55,
-    )  # fmt: skip
-    ax.text(
-        -0.02, 0.40,
-        "Left is more accurate, down is faster.\n"
-        "Numbers at lines are slopes: with −1,\nten times the accuracy costs\nten times the time.\n"
-        "✕ is what failed.",
-        transform=ax.transAxes, fontsize=style.SMALL, color=style.MUTED, verticalalignment="top",
-        linespacing=1.35,
-    )  # fmt: skip

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-from chutelab.checks.workprecision.cases import Answer
 from chutelab.results import Recording
 from chutelab.scene import Scene, from_dict, to_dict
 from chutelab.util.arrays import Floats
+from workprecision.cases import Answer
 
 
 class UnableError(RuntimeError):
@@ -128,11 +128,11 @@ METHODS = {
             (8e-4, 3e-4, 1e-4), (8e-4, 1e-4), (8e-4, 3e-4),
         ),
         Method(
-            "plain", "plain Pymunk", "dt", "chutelab.checks.workprecision.plain",
+            "plain", "plain Pymunk", "dt", "workprecision.plain",
             _STEPS, (1e-3, 1e-4, 1e-5), (1e-3, 1e-2, 3e-3, 3e-4, 1e-4),
         ),
         Method(
-            "dop853", "SciPy DOP853", "rtol", "chutelab.checks.workprecision.ode",
+            "dop853", "SciPy DOP853", "rtol", "workprecision.ode",
             (1e-3, 1e-6, 1e-9, 1e-12), (1e-3, 1e-12), (1e-3, 1e-12),
         ),
     )

@@ -21,10 +21,10 @@ from typing import Any
 import numpy as np
 import pymunk
 
-from chutelab.checks.workprecision.cases import FRAME, Answer
 from chutelab.machine.releases import draw
 from chutelab.scene import Scene
 from chutelab.util.arrays import Floats
+from workprecision.cases import FRAME, Answer
 
 SLOP = 0.01
 """Overlap, in radii, that is left alone."""

@@ -11,9 +11,9 @@ from math import exp, log
 
 import numpy as np
 
-from chutelab.checks.workprecision.measure import COMMANDS, PROCESS
-from chutelab.checks.workprecision.methods import METHODS
-from chutelab.checks.workprecision.records import Record, Size
+from workprecision.measure import COMMANDS, PROCESS
+from workprecision.methods import METHODS
+from workprecision.records import Record, Size
 
 Point = tuple[float, float]
 

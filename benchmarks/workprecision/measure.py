@@ -15,15 +15,18 @@ import tracemalloc
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from math import ceil
 from pathlib import Path
-from statistics import median
 from time import perf_counter
 from typing import cast
 
 import numpy as np
 
-from chutelab.checks.workprecision.cases import (
+from chutelab.checks.workprecision import REPEATS, Stopwatch, clocked
+from chutelab.results import Recording
+from chutelab.results.ledger import ledger
+from chutelab.scene import Scene, from_dict, to_dict
+from chutelab.util.arrays import Floats
+from workprecision.cases import (
     Answer,
     Case,
     MissedError,
@@ -33,12 +36,8 @@ from chutelab.checks.workprecision.cases import (
     typical,
     worst,
 )
-from chutelab.checks.workprecision.methods import METHODS, Method, UnableError
-from chutelab.checks.workprecision.records import Record, Size
-from chutelab.results import Recording
-from chutelab.results.ledger import ledger
-from chutelab.scene import Scene, from_dict, to_dict
-from chutelab.util.arrays import Floats
+from workprecision.methods import METHODS, Method, UnableError
+from workprecision.records import Record, Size
 
 PATIENCE = 2.0
 """s of repeats of one measurement, after which no further one is begun."""
@@ -49,12 +48,6 @@ QUICK_PATIENCE = 0.5
 TRACEABLE = 4.0
 """Runs that take longer than so many times the patience are not repeated under `tracemalloc`, which
 takes two to three times as long."""
-
-REPEATS = 9
-
-LEAST = 0.02
-"""s that a repeat takes at least: what is faster runs several times in a row, and the mean counts,
-as with `timeit`. A single run of a millisecond would measure what others left in the caches."""
 
 
 def measure(
@@ -122,40 +115,38 @@ class Trial:
     """
 
     def __init__(self, case: Case, method: Method, value: float | None, *, patience: float) -> None:
-        self._case, self._method, self._patience = case, method, patience
-        self._times: list[float] = []
-        self._first = self._spent = 0.0
+        self._case, self._patience = case, patience
+        self._watch: Stopwatch | None = None
         parameter = "" if value is None else method.parameter
         self._said = Record(case.name, method.name, parameter, value)
         try:
             method.load()
             scenes = [method.prepare(scene, value) for scene in case.scenes]
-            self._run = partial(method.run, case.name, scenes[0], value)
-            self._first, found = clocked(self._run)
+            run = partial(method.run, case.name, scenes[0], value)
+            first, found = clocked(run)
             # What a run says is looked at before it is repeated: who fails is not worth the time.
             others = [method.run(case.name, scene, value) for scene in scenes[1:]]
             self._said = judge(case, [found, *others], self._said)
+            self._watch = Stopwatch(run, first, patience)
         except Exception as error:  # one method that breaks must not cost the others' figures
             self._said = replace(self._said, failed=reason(error))
 
     def repeat(self) -> None:
         """Measure once more, unless it failed or patience is at its end."""
-        last = self._times[-1] if self._times else self._first
-        if not self._said.failed and self._spent + last <= self._patience:
-            number = ceil(LEAST / max(last, 1e-6))
-            self._times.append(clocked(self._run, number)[0])
-            self._spent += number * self._times[-1]
+        if self._watch is not None:
+            self._watch.repeat()
 
     def record(self) -> Record:
         """Return what is known, with the memory of one more run."""
-        if self._said.failed:
+        watch = self._watch
+        if watch is None:
             return self._said
         return replace(
             self._said,
-            first=self._first,
-            repeats=len(self._times),
-            median=median(self._times or [self._first]),
-            memory=traced(self._run) if self._first <= TRACEABLE * self._patience else None,
+            first=watch.first,
+            repeats=len(watch.times),
+            median=watch.median,
+            memory=traced(watch.run) if watch.first <= TRACEABLE * self._patience else None,
         )
 
 
@@ -164,23 +155,6 @@ def reason(error: Exception) -> str:
     said = " ".join(str(error).split())
     expected = isinstance(error, (UnableError, MissedError))
     return said if expected else f"{type(error).__name__}: {said}"
-
-
-def clocked(run: Callable[[], object], number: int = 1) -> tuple[float, object]:
-    """Return the seconds that a call takes, the mean of a number, and what the last returns."""
-    gc.collect()
-    begin = perf_counter()
-    for _ in range(number):
-        found = run()
-    return (perf_counter() - begin) / number, found
-
-
-def repeated(run: Callable[[], object], first: float, repeats: int, patience: float) -> list[float]:
-    """Return the seconds of up to `repeats` further calls, fewer where patience ends before."""
-    times: list[float] = []
-    while len(times) < repeats and sum(times) + (times[-1] if times else first) <= patience:
-        times.append(clocked(run)[0])
-    return times
 
 
 def traced(run: Callable[[], object]) -> int:
@@ -278,7 +252,7 @@ def whole_process(repeats: int) -> list[Record]:
                 name,
                 first=times[0],
                 repeats=len(times) - 1,
-                median=median(times[1:] or times),
+                median=float(np.median(times[1:] or times)),
                 error=error,
             )
         )
@@ -287,7 +261,7 @@ def whole_process(repeats: int) -> list[Record]:
 
 def _clocked(name: str) -> tuple[float, float | None, str]:
     """Return the seconds of a process, the error it reports, and why it failed."""
-    sources = str(Path(__file__).parents[3])
+    sources = str(Path(__file__).parents[2] / "src")
     path = os.pathsep.join([sources, *filter(None, [os.environ.get("PYTHONPATH")])])
     begin = perf_counter()
     done = subprocess.run(
@@ -337,7 +311,7 @@ def scaling(
 ) -> list[Size]:
     """Measure the `RUNS` among some cases and methods for all `COUNTS`.
 
-    Parameters are those of `chutelab.checks.workprecision.measure`.
+    Parameters are those of `workprecision.measure`.
     """
     tasks = [
         (case, method, count)
@@ -372,15 +346,17 @@ def size(case: str, method: str, count: int, *, repeats: int = REPEATS) -> Size:
         def run() -> object:
             return METHODS[method].run(case, scene, STEP)
 
-        times = repeated(run, first, repeats, SCALING_PATIENCE)
+        watch = Stopwatch(run, first, SCALING_PATIENCE)
+        for _ in range(repeats):
+            watch.repeat()
         return Size(
             case,
             method,
             count,
             events=events,
             first=first,
-            repeats=len(times),
-            median=median(times) if times else first,
+            repeats=len(watch.times),
+            median=watch.median,
             memory=traced(run) if first <= TRACEABLE_SIZE else None,
         )
     except Exception as error:  # a size too many must not cost the others' figures

@@ -1,11 +1,9 @@
-"""`Record`, one measurement, and its way to a TSV file and back."""
+"""`Record`, one measurement, and its way back from a TSV file."""
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
-from io import StringIO
 from typing import TypeVar
 
 R = TypeVar("R")
@@ -86,26 +84,8 @@ class Size:
     failed: str = ""
 
 
-def to_tsv(rows: Sequence[object], kind: type, about: Mapping[str, str]) -> str:
-    """Return rows of a dataclass as tab-separated values.
-
-    Lines of ``# key: value`` come first and say where the figures are from; then the names of the
-    columns. What is None is empty. Numbers come back to the last bit.
-    """
-    text = StringIO()
-    for key, value in about.items():
-        text.write(f"# {key}: {value}\n")
-    writer = csv.writer(text, dialect="excel-tab", lineterminator="\n")
-    names = [field.name for field in fields(kind)]
-    writer.writerow(names)
-    for row in rows:
-        values = (getattr(row, name) for name in names)
-        writer.writerow(["" if value is None else value for value in values])
-    return text.getvalue()
-
-
 def from_tsv(text: str, kind: type[R]) -> tuple[list[R], dict[str, str]]:
-    """Return the rows and what is said about them, as `to_tsv` wrote them.
+    """Return the rows and what is said about them, as `chutelab.util.tables.tsv_text` wrote them.
 
     Raises
     ------

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from chutelab.checks.workprecision.cases import Answer
 from chutelab.machine.releases import draw
 from chutelab.scene import Scene
+from workprecision.cases import Answer
 
 
 def _until(

@@ -1,0 +1,216 @@
+"""``bench``: run time against error of one scene, a row for each engine and step.
+
+A time without an error is no figure. So each run is held against an answer that its engine had no
+part in, as ``--accuracy`` does (`chutelab.studies.accuracy`), and what has no such answer has no
+row of figures, but says why.
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from importlib import import_module
+from math import ceil
+from statistics import median
+from time import perf_counter
+from typing import TypeVar
+
+from chutelab.engines.simulation import simulate
+from chutelab.results.recorder import StalledError
+from chutelab.scene import Scene, SceneError
+from chutelab.studies.accuracy import SMALLEST, STIR, Search, Wanted, changed
+from chutelab.util.arrays import Progress
+
+T = TypeVar("T")
+
+METHODS = ("exact", "contact", "pymunk", "fixed")
+"""The engines; "fixed" is pymunk with ``run.align = false``."""
+
+STEPS = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4)
+"""s; of the engines that step."""
+
+MANY_STEPS = (3e-3, 1e-3, 3e-4)
+"""s; of many particles, whose runs take long."""
+
+CROWD = (
+    "of the crowd as a whole, its mean landing point and ledger: the largest difference between"
+    f" this engine and another with the same step, each with and without a change of the inputs by"
+    f" {STIR:g}"
+)
+"""How the error is known where particles meet."""
+
+REPEATS = 9
+
+PATIENCE = 0.5
+"""s of repeats of one row, after which no further one is begun."""
+
+LEAST = 0.02
+"""s that a repeat takes at least: what is faster runs several times in a row, and the mean counts,
+as with `timeit`. A single run of a millisecond would measure what others left in the caches."""
+
+
+@dataclass(frozen=True)
+class Timing:
+    """One engine on the scene with one step; None is what it has not.
+
+    Attributes
+    ----------
+    method : str
+        One of `METHODS`.
+    parameter, value : str, float
+        ``"dt"`` and the step, s; "" and None for the exact engine.
+    first : float
+        s of the first run, imports excluded.
+    repeats : int
+        Runs after it.
+    median : float
+        s, their median; the first run where it was so long that it was not repeated.
+    error : float
+        Relative, the largest of all answers of the run; see `chutelab.studies.accuracy`.
+    quantity : str
+        Which answer it is the error of.
+    against : str
+        What it is the difference from: "theory", "dop853" or an engine.
+    how : str
+        How the error is known, in words.
+    failed : str
+        Why there are no figures, "" if there are.
+    """
+
+    method: str
+    parameter: str = ""
+    value: float | None = None
+    first: float | None = None
+    repeats: int = 0
+    median: float | None = None
+    error: float | None = None
+    quantity: str = ""
+    against: str = ""
+    how: str = ""
+    failed: str = ""
+
+
+def clocked(run: Callable[[], T], number: int = 1) -> tuple[float, T]:
+    """Return the seconds that a call takes, the mean of a number, and what the last returns."""
+    gc.collect()
+    begin = perf_counter()
+    found = run()
+    for _ in range(number - 1):
+        found = run()
+    return (perf_counter() - begin) / number, found
+
+
+class Stopwatch:
+    """Repeats of a call whose first run took `first` seconds: that one filled caches.
+
+    Parameters
+    ----------
+    patience : float
+        s of repeats, after which no further one is begun.
+    """
+
+    def __init__(self, run: Callable[[], object], first: float, patience: float) -> None:
+        self.run, self.first, self.patience = run, first, patience
+        self.times: list[float] = []
+        self._spent = 0.0
+
+    def repeat(self) -> None:
+        """Measure once more, unless patience is at its end."""
+        last = self.times[-1] if self.times else self.first
+        if self._spent + last <= self.patience:
+            number = ceil(LEAST / max(last, 1e-6))
+            self.times.append(clocked(self.run, number)[0])
+            self._spent += number * self.times[-1]
+
+    @property
+    def median(self) -> float:
+        """Median of the repeats, s; the first run without any."""
+        return median(self.times or [self.first])
+
+
+def measure(
+    scene: Scene,
+    methods: Sequence[str] = (),
+    steps: Sequence[float] = (),
+    *,
+    repeats: int = REPEATS,
+    progress: Progress | None = None,
+) -> list[Timing]:
+    """Measure the engines on a scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        From `chutelab.load`.
+    methods : sequence of str
+        Of `METHODS`; by default all, of many particles all but "fixed".
+    steps : sequence of float
+        ``run.dt``, s; by default `STEPS` or `MANY_STEPS`. A witness that steps takes the shortest.
+    repeats : int
+        Timed runs after the first, at most; fewer where they take longer than `PATIENCE`.
+    progress : callable, optional
+        Called with the share that is done.
+
+    Returns
+    -------
+    list of Timing
+        Nothing is left out: what failed says why.
+    """
+    many = scene.stream.count > 1
+    steps = sorted(set(steps or (MANY_STEPS if many else STEPS)), reverse=True)
+    methods = methods or (METHODS[:-1] if many else METHODS)
+    search = Search(changed(scene, f"run.dt={steps[-1]!r}"), Wanted(SMALLEST, "relative"))
+    tasks = [
+        (method, step)
+        for method in METHODS
+        if method in methods
+        for step in ([None] if method == "exact" else steps)
+    ]
+    rows: list[tuple[Timing, Stopwatch | None]] = []
+    for method, step in tasks:
+        if progress is not None:
+            progress(len(rows) / len(tasks))
+        rows.append(_judged(scene, method, step, search))
+    # In turn, so that a machine that gets busy is busy for all.
+    watches = [watch for _, watch in rows if watch is not None]
+    for _ in range(repeats):
+        for watch in watches:
+            watch.repeat()
+    return [
+        row
+        if watch is None
+        else replace(row, first=watch.first, repeats=len(watch.times), median=watch.median)
+        for row, watch in rows
+    ]
+
+
+def _judged(
+    scene: Scene, method: str, step: float | None, search: Search
+) -> tuple[Timing, Stopwatch | None]:
+    """Run once and tell the error, before any repeat: who fails is not worth the time."""
+    blank = Timing(method, "" if step is None else "dt", step)
+    engine = "pymunk" if method == "fixed" else method
+    if step is not None:
+        aligned = "false" if method == "fixed" else "true"
+        scene = changed(scene, f"run.dt={step!r}", f"run.align={aligned}")
+    import_module(f"chutelab.engines.{engine}")  # or its import would be timed
+    run = partial(simulate, scene, engine)
+    try:
+        first, found = clocked(run)
+        known = search.judged(found)
+    except SceneError as error:
+        return replace(blank, failed=error.faults[0].allowed), None
+    except StalledError as error:
+        return replace(blank, failed=str(error)), None
+    if known.reached is None:
+        return replace(blank, failed=known.method.removeprefix("none: ")), None
+    row = replace(
+        blank,
+        error=known.reached,
+        quantity=known.worst,
+        against=known.against or "",
+        how=CROWD if known.chaotic else known.method,
+    )
+    return row, Stopwatch(run, first, PATIENCE)

@@ -21,7 +21,7 @@ GREATEST = 1e300
 SLICE = 0.05
 """s of wall time between two looks at Ctrl-C and reports of progress."""
 
-SWEEPS, SWEEPS_ALONE = 60, 500
+SWEEPS, SWEEPS_ALONE = 200, 500
 """Most sweeps of the contact solver in a step."""
 
 

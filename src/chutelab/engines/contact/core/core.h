@@ -14,7 +14,7 @@ extern World W;
 /* Contacts are looked for where a gap is below this share of the radius: what lasts stays a
    thousandth of it apart at most, and nothing crosses the rest within a step unseen. */
 #define TOUCH 5e-3
-/* Overlap with a surface, in radii, from which on nothing may sink further, not even by a hop. */
+/* Overlap, in radii, from which on nothing may sink further, not even by a hop. */
 #define SUNK 1e-2
 /* Approach, in radii per step, that is left to the next step instead of an impact at its instant:
    a tenth of TOUCH, so that what is left is in reach of the contacts before it overlaps. */
@@ -27,10 +27,14 @@ extern World W;
    step) has no restitution: the infinitely many of an inelastic collapse end. */
 #define FEW 10
 #define SLOW 20.0
-/* ... and from which on it counts as jammed, with all it touches; ENDLESS where all is elastic: a
-   fast one in a dense gas has hundreds. */
+/* ... from which on what rattles between surfaces is jammed: it is solved with all it touches ... */
 #define JAM 40
-#define ENDLESS 1000
+/* ... and from which on the step ends, so that the whole crowd round it is solved at once; or, where
+   that has just been done, the jam. */
+#define CROWDED 50
+/* Disks that a jam is solved for, with all they touch: what goes on beyond are impacts of their own,
+   and a pile of thousands is not solved at each of them. */
+#define JAMMED 30
 /* Contacts per disk that a jam may have: disks in a plane have three pairs each at most. */
 #define TOUCHES 8
 /* Of the speed; a slower approach grazes, and rounding may well have made it. */

@@ -212,16 +212,20 @@ static int add_touching(int i, int j, double radius, int *count) {
 }
 
 /* Bring to rest what rattles without end, as far as it can: a disk, all that it touches and what
-   touches that are solved at once, without restitution. The contacts of the step before, which
-   nobody needs within a step, make room for the list. */
+   touches that, out to JAMMED of them, are solved at once, without restitution. The contacts of the
+   step before, which nobody needs within a step, make room for the list. */
 static void jam(Contact *struck, double t) {
-    int i = struck->i, count = 0, last = i, found;
+    int i = struck->i, count = 0, last = i, found, reached = 0;
     Contact *list = W.earlier;
     W.jams++;
     W.disks[i].jam = W.jams;
     W.disks[i].jam_next = -1;
     for (int m = i; m >= 0; m = W.disks[m].jam_next) {
         Disk *a = W.disks + m;
+        a->ux = a->vx;
+        a->uy = a->vy;
+        a->uspin = a->spin;
+        if (reached++ >= JAMMED) continue;
         found = reachable(m);
         a->jam = -W.jams;
         for (int n = 0; n < found; n++) {
@@ -244,9 +248,6 @@ static void jam(Contact *struck, double t) {
         for (int k = 0; k < W.surface_count; k++)
             if (W.surfaces[k].there == THERE && is_near(W.surfaces + k, a))
                 add_touching(m, -1 - k, a->radius, &count);
-        a->ux = a->vx;
-        a->uy = a->vy;
-        a->uspin = a->spin;
     }
     for (int n = 0; n < count; n++) {
         /* No approach afterwards but what would be left to the next step; separating is allowed. */
@@ -258,7 +259,7 @@ static void jam(Contact *struck, double t) {
     }
     struck->impulse[0] = struck->impulse[1] = 0;
     double left = 0.5 * (MOST_SKIP / SKIP) * W.skip * W.disks[i].radius;
-    sweep_contacts(list, count, 2 * W.sweeps, 0.1 * left, left);
+    sweep_contacts(list, count, W.sweeps / 2, 0.1 * left, left);
     for (int m = i; m >= 0; m = W.disks[m].jam_next) {
         Disk *d = W.disks + m;
         double v[3] = {d->vx, d->vy, d->spin};
@@ -345,7 +346,7 @@ static void strike(int i, int j, double t) {
     if (u[0] >= 0) return;
     double back = -c.rest * u[0];
     if (j >= 0 && -u[0] < W.soft && (a->supports || b->supports || !c.two)) back = 0;
-    int jammed = impacts >= (c.rest < 1 ? JAM : ENDLESS);
+    int jammed = impacts >= (j >= 0 ? CROWDED : c.rest < 1 ? JAM : CROWDED);
     if (jammed || (c.rest < 1 && impacts >= FEW && -u[0] < SLOW * W.g * W.dt)) back = 0;
     double press = j < 0 ? press_on(a, W.surfaces + (-1 - j), c.nx, c.ny) : 0, later = 0;
     int rests = j < 0 && back <= press * W.step;

@@ -193,6 +193,7 @@ typedef struct {
     int stamp, shocks, jams; /* numbers of the latest query, shock and jam, for marks */
     double t, now, step, step_end, cell;
     double length, length_before; /* s; of this step and of the one before */
+    double again;        /* what lasts needs so many times the impulses of the step before */
     double before;       /* share of this step's impulses that belongs to the one before */
     double g;            /* m/s2; size of gravity */
     double soft;         /* m/s; twice what gravity does in a step: supported disks meet softly */

@@ -8,6 +8,8 @@ World W;
 #define SETTLED 0.1
 /* Of the radius: a hop under gravity stays below it, else the step is shorter than asked for. */
 #define HOP 1e-3
+/* After two steps that were cut short impulses may grow by so much; noise grows, too. */
+#define MOST_AGAIN 2.0
 /* rad; between knots round the pulley. A cubic through them is off by rho angle^4 / 384, 9e-10 rho. */
 #define ARC_ANGLE 0.024
 /* Knots that one impact may write per disk. */
@@ -274,8 +276,11 @@ static int begin_step(void) {
         stride = MIN(free_span(W.disks + W.low, h), stop - W.t);
     if (stride > h) W.step_end = W.t + stride < stop ? W.t + stride : stop;
     W.now = W.t;
-    W.length_before = W.length;
     h = W.step_end - W.t;
+    /* Impulses stand for half of the step before and half of this one. */
+    double span = W.length_before + W.length;
+    W.again = span > 0 ? MIN((W.length + h) / span, MOST_AGAIN) : 1;
+    W.length_before = W.length;
     do {
         for (int i = W.low; i < W.high; i++) {
             Disk *d = W.disks + i;
@@ -333,6 +338,10 @@ static int go_through(void) {
         }
         W.now = t;
         if (j != ALARM) {
+            if (W.interact && d->impacts > CROWDED && t > W.t) {
+                W.step_end = t;
+                return DONE;
+            }
             shock(i, j, t);
             continue;
         }

@@ -72,7 +72,8 @@ static int add(int i, int j, double least, double bound, double h) {
     later = gap_later(c, h);
     if (far && later > 0) return 1;
     relative(c, 0, u);
-    if (-u[0] > bound || u[0] > W.soft) return 1;
+    /* What has sunk in counts even if it parts: else what parts others would press it. */
+    if (-u[0] > bound || (u[0] > W.soft && c->gap > -SUNK * least)) return 1;
     double aim = MIN(c->gap, 0);
     if (c->gap < -SLOP * least) {
         double part = MIN(MAX(PART, -c->gap / (DEEP * least)), 1);
@@ -83,7 +84,7 @@ static int add(int i, int j, double least, double bound, double h) {
     c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
     for (int k = d->before; k >= 0; k = W.earlier[k].next)
         if (W.earlier[k].j == j)
-            for (int n = 0; n < 3; n++) c->impulse[n] = W.earlier[k].impulse[n];
+            for (int n = 0; n < 3; n++) c->impulse[n] = W.again * W.earlier[k].impulse[n];
     int pressed = c->impulse[0] > 0;
     for (int n = 0; n < d->held_count; n++) pressed |= d->held[n] == -1 - j;
     /* What was pressed came down from its last hop: it may leave along the surface, not into it, and
@@ -152,7 +153,7 @@ int find_contacts(double h, int *woke) {
         if (square(a->x - b->x) + square(a->y - b->y) > reach * reach) continue;
         /* What the step before left over is taken up here. */
         int impacts = MAX(a->impacts, b->impacts);
-        double bound = left_over(a, impacts, -1, least);
+        double bound = impacts > CROWDED ? INFINITY : left_over(a, impacts, -1, least);
         if (a->supports || b->supports || a->mode != FREE || b->mode != FREE)
             bound = MAX(bound, MAX(W.soft, W.skip * least));
         if (a->mode == ASLEEP || b->mode == ASLEEP) {
@@ -167,7 +168,7 @@ int find_contacts(double h, int *woke) {
         Disk *d = W.disks + i;
         if (d->mode != FREE) continue;
         int first = W.contact_count;
-        double bound = left_over(d, d->impacts, -1, d->radius);
+        double bound = d->impacts > CROWDED ? INFINITY : left_over(d, d->impacts, -1, d->radius);
         if (d->supports) bound = MAX(bound, W.interact ? MAX(W.soft, W.skip * d->radius) : W.soft);
         for (int k = 0; k < W.surface_count; k++)
             if (is_near(W.surfaces + k, d) && !add(i, -1 - k, d->radius, bound, h)) return 0;

@@ -329,6 +329,17 @@ def test_a_scene_that_is_nowhere_is_answered_with_similar_names(name, says, tmp_
     assert len(said) < 500
 
 
+def test_a_decimal_comma_is_told_how_it_is_written(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text("[incoming]\nspeed = 2,5\n")
+    for name, settings, written in (
+        (path, [], "2.5"),
+        ("slip", ["incoming.speed=1,25 m/s"], "1.25"),
+    ):
+        with pytest.raises(scene.SceneError, match=f"write {written}, with a decimal point"):
+            scene.load(name, settings)
+
+
 def test_a_directory_is_no_scene(tmp_path):
     assert message(scene.load, tmp_path) == (
         f"{tmp_path}: a directory; give a scene file, or the name of a shipped scene"

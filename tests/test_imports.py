@@ -6,6 +6,9 @@ import os
 import re
 import subprocess
 import sys
+from contextlib import suppress
+from functools import reduce
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -128,3 +131,23 @@ def test_a_package_says_what_is_in_it(package):
     inside |= {path.parent.name for path in package.glob("*/__init__.py")}
     named = set(re.findall(r"`(\w+)`", docstring))
     assert not inside - {"__init__", "__main__"} - named
+
+
+def named(text):
+    return set(re.findall(r"`(chutelab(?:\.\w+)+)`", text))
+
+
+def resolved(name):
+    """Import as much of a dotted name as can be, and get the rest."""
+    parts = name.split(".")
+    for count in range(len(parts), 0, -1):
+        with suppress(ModuleNotFoundError):
+            return reduce(getattr, parts[count:], import_module(".".join(parts[:count])))
+    raise ModuleNotFoundError(name)
+
+
+def test_what_docstrings_and_texts_name_is_there():
+    root = Path(__file__).parents[1]
+    texts = [*(root / "src").rglob("*.py"), *(root / "docs").glob("*.md"), *root.glob("*.md")]
+    for name in sorted(set().union(*(named(path.read_text("utf-8")) for path in texts))):
+        resolved(name)

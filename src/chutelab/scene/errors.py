@@ -33,6 +33,7 @@ _LISTED: Final = 40
 """Most faults spelled out in one message; `SceneError.faults` always holds all of them."""
 
 _BARE_KEY: Final = re.compile(r"[\w-]+")
+_DECIMAL_COMMA: Final = re.compile(r"(?:^|=\s*)([-+]?\d+),(\d+)\s*\S*$")
 
 
 class _Missing:
@@ -76,6 +77,9 @@ class Fault:
             return f"{key} is missing: {allowed}"
         if self.value is None:
             return f"{key}: {allowed}"
+        comma = _DECIMAL_COMMA.search(self.value) if isinstance(self.value, str) else None
+        if comma:
+            allowed += f"; write {comma[1]}.{comma[2]}, with a decimal point"
         return f"{key} = {shown(self.value)}: {allowed}"
 
 

@@ -234,7 +234,7 @@ def transfer(
     """Carry a particle from the incoming belt over the plate to the outgoing belt.
 
     Plate and outgoing belt are unbounded here, and after the rebound neither pulley nor incoming
-    belt are in the way; `chutelab.theory.prediction` takes the finite machine into account.
+    belt are in the way; `chutelab.theory.predict` takes the finite machine into account.
 
     Parameters
     ----------

@@ -69,7 +69,7 @@ def arcs(prediction: Transfer, scene: Scene) -> tuple[Arc, ...]:
     Parameters
     ----------
     prediction : Transfer
-        Of the scene, see `chutelab.theory.prediction`; what is NaN in it is left out.
+        Of the scene, see `chutelab.theory.predict`; what is NaN in it is left out.
     scene : Scene
         For the radius R + r of the separation point, and for gravity.
     """

@@ -56,7 +56,7 @@ def strobe(
     recording : Recording
         From either engine.
     prediction : Transfer, optional
-        By default `chutelab.theory.prediction` of the recording's scene.
+        By default `chutelab.theory.predict` of the recording's scene.
     path : path, optional
         Also write the figure there, whole or not at all; the suffix says the format.
 

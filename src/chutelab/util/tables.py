@@ -17,6 +17,9 @@ from typing import Any
 WIDTH = 80
 """Columns of a line of prose in a terminal, at most."""
 
+LONG = 55
+"""Characters from which the first cell of a row may be broken, as a path may have to be."""
+
 UNBOUNDED = 10_000
 """Columns of a table that is no wider than its cells."""
 
@@ -71,7 +74,7 @@ class Sheet:
             widest = max((len(row[index]) for row in rows), default=0)
             if self._has_words(index):
                 # What a row is about stays on one line, unless it is a long path.
-                table.add_column(name, no_wrap=index == 0 and widest < WIDTH // 2, overflow="fold")
+                table.add_column(name, no_wrap=index == 0 and widest < LONG, overflow="fold")
             else:
                 table.add_column(name, justify="right", min_width=widest)
         for number, row in enumerate(rows):

@@ -12,6 +12,7 @@ others.
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 import unicodedata
@@ -21,9 +22,7 @@ from functools import cache, cached_property
 from hashlib import sha256
 from importlib.resources.abc import Traversable
 from itertools import combinations
-from math import (
-    acos, asin, atan, atan2, cos, degrees, hypot, inf, isfinite, log, log10, radians, sin, sqrt,
-)  # fmt: skip
+from math import degrees, isfinite, radians
 from types import CodeType, SimpleNamespace
 from typing import Any, Final
 
@@ -98,13 +97,17 @@ def _carried(**arguments: Any) -> SimpleNamespace:
     return SimpleNamespace(**{f.name: getattr(found, f.name).tolist() for f in fields(found)})
 
 
+_OF_MATH: Final = (
+    "acos", "asin", "atan", "atan2", "cos", "degrees", "hypot", "inf", "log", "log10", "radians",
+    "sin", "sqrt",
+)  # fmt: skip
 FUNCTIONS: Final[dict[str, Any]] = {
-    one.__name__: one
-    for one in (
-        abs, acos, asin, atan, atan2, cos, degrees, dict, hypot, log, log10, radians, round, sin,
-        sqrt,
-    )
-} | {"__builtins__": {}, "g": 9.81, "inf": inf, "transfer": _carried}  # fmt: skip
+    "__builtins__": {},
+    "g": 9.81,
+    "transfer": _carried,
+    **{one.__name__: one for one in (abs, dict, round)},
+    **{name: getattr(math, name) for name in _OF_MATH},
+}
 """What formulas know besides the exercise's own names; g in m/s²."""
 
 
@@ -274,8 +277,14 @@ def read(file: Traversable) -> Exercise:
         title=found["title"],
         story=_folded(found["story"]),
         parameters=tuple(
-            Parameter(*words, _steps(**values) if isinstance(values, dict) else tuple(values))
-            for *words, values in found["parameters"]
+            Parameter(
+                name,
+                symbol,
+                unit,
+                meaning,
+                _steps(**values) if isinstance(values, dict) else tuple(map(float, values)),
+            )
+            for name, symbol, unit, meaning, values in found["parameters"]
         ),
         questions=questions,
         formulas=found["formulas"],
@@ -291,7 +300,8 @@ def _folded(text: str) -> str:
 def _steps(**ends: float) -> tuple[float, ...]:
     """Return round numbers from first to last, both included."""
     first, last, step = ends["from"], ends["to"], ends["step"]
-    return tuple(round(first + i * step, 9) for i in range(round((last - first) / step) + 1))
+    count = round((last - first) / step) + 1
+    return tuple(round(float(first + i * step), 9) for i in range(count))
 
 
 @dataclass(frozen=True)
@@ -391,7 +401,7 @@ def attempt(exercise: Exercise, student: str, number: int) -> tuple[Case, ...] |
     for parameter in exercise.parameters:
         key = "\n".join((exercise.name, plain(student), parameter.name, str(number)))
         random = int.from_bytes(sha256(key.encode("utf-8", "replace")).digest()[:8])
-        drawn[parameter.name] = float(parameter.values[random % len(parameter.values)])
+        drawn[parameter.name] = parameter.values[random % len(parameter.values)]
     numbers = Numbers(drawn, exercise.formulas)
     cases = tuple(Case(question, numbers) for question in exercise.questions)
     try:

@@ -4,5 +4,4 @@
 - `files`: files that are written whole or not at all.
 - `tables`: tables for people, and columns as CSV and as a DataFrame.
 - `versions`: what is installed, and on what figures were measured.
-- `many`: numbers and arrays by the same formulas.
 """

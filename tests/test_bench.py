@@ -20,7 +20,7 @@ from chutelab.engines.simulation import simulate
 from chutelab.pictures.plots.workprecision import LOOKS
 from chutelab.pictures.plots.workprecision import workprecision as draw
 from chutelab.scene import load
-from chutelab.util.tables import tsv_text
+from chutelab.util.files import tsv_text
 from chutelab.util.versions import environment
 
 

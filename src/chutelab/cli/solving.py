@@ -184,13 +184,10 @@ def _tell(found: Solution) -> None:
     from rich.text import Text
 
     from chutelab.cli import console
-    from chutelab.cli.report import drawn
 
-    sheet = found.sheet()
-    notes = [Text(f"\n{note}" if i == 0 else note) for i, note in enumerate(sheet.notes)]
-    console.show(Text(found.base.title, style="bold"), drawn(sheet), *notes)
+    console.show(Text(found.base.title, style="bold"), found.sheet())
     if found.solved:
-        console.show(drawn(found.slopes()))
+        console.show(found.slopes())
 
 
 def propagate(
@@ -232,7 +229,7 @@ def propagate(
     if as_json:
         console.show_json(as_dict(found))
     elif not quiet:
-        click.echo(str(found))
+        console.show(found)
         for path in (out, plot):
             if path is not None:
                 click.echo(f"wrote {path}")

@@ -180,7 +180,7 @@ def sweep(
     if as_json:
         console.show_json(_plain(found))
     elif not quiet:
-        click.echo(str(found))
+        console.show(found)
         for path in (out, plot):
             if path is not None:
                 click.echo(f"wrote {path}")

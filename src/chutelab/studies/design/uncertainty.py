@@ -28,7 +28,8 @@ from chutelab.studies.design.evaluation import (
 from chutelab.studies.design.quantities import DesignError, each_once, measured, scipy
 from chutelab.studies.design.sensitivity import Indices, crossed, design, indices
 from chutelab.util.arrays import Floats
-from chutelab.util.tables import Sheet, Shown, csv_text, frame
+from chutelab.util.files import csv_text
+from chutelab.util.tables import Sheet, Shown, frame
 
 FORM: Final = (
     "must be KEY=MEAN±SPREAD, such as restitution=0.5±0.05 or incoming.speed=2+-1% (or ±SPREAD"

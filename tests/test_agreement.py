@@ -237,9 +237,9 @@ def test_a_wrong_formula_is_caught_from_outside(where, wrong, until, monkeypatch
 
 def test_a_wrong_formula_that_places_the_belt_is_caught_by_the_theory(monkeypatch):
     """The machine's own arrays are shared by all engines; only the theory has none of them."""
-    right = ballistics.crossing
+    right = ballistics.descent
     monkeypatch.setattr(
-        "chutelab.machine.nominal.crossing", lambda *gap: right(*gap) * (1.0 + WRONG)
+        "chutelab.machine.nominal.descent", lambda *gap: right(*gap) * (1.0 + WRONG)
     )
     drawn = scene.load("perpendicular")
     failed = [row.pair for row in agreement(drawn) if not row.holds]

@@ -19,7 +19,6 @@ from numpy.typing import ArrayLike
 
 from chutelab.machine.releases import Releases
 from chutelab.util.arrays import Floats, Ints
-from chutelab.util.many import Value, larger, smaller
 
 FIRST_WINS = "; surfaces may cross, the first contact wins"
 
@@ -245,11 +244,11 @@ class Machine:
         return (*self.plate_warnings, *crossings(self.surfaces, ends, owner, radius))
 
     @property
-    def exit_box(self) -> tuple[Value, Value, Value, Value]:
+    def exit_box(self) -> tuple[float, float, float, float]:
         """Left, right, bottom and top (m) beyond which a particle has left the scene.
 
-        With gravity only the bottom is finite: what flies up comes back. In a family, all have
-        gravity or none.
+        With gravity only the bottom is finite: what flies up comes back. In a family these are
+        arrays (N,), and all have gravity or none.
         """
         start, end = self.segments.start, self.segments.end
         if not start.size:
@@ -257,8 +256,8 @@ class Machine:
         wheel = self.pulley.radius if self.pulley is not None else -inf
         ends = np.concatenate([start, end], axis=-2)
         low, high = ends.min(axis=-2), ends.max(axis=-2)
-        left, bottom = (smaller(low[..., axis], -wheel) for axis in (0, 1))
-        right, top = (larger(high[..., axis], wheel) for axis in (0, 1))
+        left, bottom = (np.minimum(low[..., axis], -wheel) for axis in (0, 1))
+        right, top = (np.maximum(high[..., axis], wheel) for axis in (0, 1))
         if np.all(np.greater(self.gravity, 0.0)):
             return -inf, inf, bottom - EXIT_MARGIN, inf
         return left - EXIT_MARGIN, right + EXIT_MARGIN, bottom - EXIT_MARGIN, top + EXIT_MARGIN

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import pairwise
 from math import ceil, cos, hypot, inf, radians, sin
 from sys import float_info
@@ -358,8 +357,7 @@ class _Builder:
         bound = float(releases.t[-1]) + scene.run.max_time
         until = scene.run.until
         return Machine(
-            title=scene.title,
-            text=partial(scene.model_dump_json, by_alias=True),
+            scene=scene,
             surfaces=tuple(self.names),
             gravity=scene.gravity,
             particle=particle,

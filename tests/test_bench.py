@@ -21,7 +21,7 @@ from chutelab.machine import build
 from chutelab.pictures.plots.workprecision import LOOKS
 from chutelab.pictures.plots.workprecision import workprecision as draw
 from chutelab.scene import load
-from chutelab.util.tables import tsv_text
+from chutelab.util.files import tsv_text
 from chutelab.util.versions import environment
 
 

@@ -7,7 +7,6 @@ of the student's name. `write_csv` writes the marks of a class.
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 import secrets
@@ -23,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 from chutelab.classroom.exercises import ExerciseError, Task, lesson
 from chutelab.classroom.exercises.catalogue import UNNAMED
 from chutelab.classroom.exercises.exercise import plain
-from chutelab.util.files import whole
+from chutelab.util.files import csv_lines, write_lines
 
 if TYPE_CHECKING:
     from nbclient import NotebookClient
@@ -295,19 +294,14 @@ def write_csv(grades: Sequence[Grade], path: str | Path) -> Path:
     """
     most = max((len(row.marks) for row in grades), default=0)
     heads = [f"q{i + 1}" for i in range(most)]
-    with (
-        whole(path) as unfinished,
-        unfinished.open("w", encoding="utf-8", errors="replace", newline="") as file,
-    ):
-        out = csv.writer(file)
-        out.writerow(["file", "student", "lesson", *heads, "total", "out_of", "revealed", "reason"])
-        for row in grades:
-            marks = [*row.marks, *[""] * (most - len(row.marks))]
-            revealed = " ".join(map(str, row.revealed))
-            texts = [_harmless(text) for text in (row.file, row.student, row.lesson)]
-            end = [row.total, row.out_of, revealed, _harmless(row.reason)]
-            out.writerow([*texts, *marks, *end])
-    return Path(path)
+    rows = [["file", "student", "lesson", *heads, "total", "out_of", "revealed", "reason"]]
+    for row in grades:
+        texts = [_harmless(text) for text in (row.file, row.student, row.lesson)]
+        marks = [*map(str, row.marks), *[""] * (most - len(row.marks))]
+        revealed = " ".join(map(str, row.revealed))
+        end = [str(row.total), str(row.out_of), revealed, _harmless(row.reason)]
+        rows.append([*texts, *marks, *end])
+    return write_lines(path, csv_lines(rows, end="\r\n"), errors="replace")
 
 
 def _grade(file: str, time_limit: float) -> Grade:

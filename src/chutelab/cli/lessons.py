@@ -56,16 +56,14 @@ def list_lessons(as_json: bool) -> None:
     if as_json:
         console.show_json({"format": 1, "lessons": [_plain(one) for one in found]})
         return
-    from rich.text import Text
+    from chutelab.util.tables import Sheet
 
-    from chutelab.cli.report import plain_table
-
-    table = plain_table(["", "lesson", "level", "minutes", "what it is about"], texts=5)
-    for one in found:
-        about = Text(one.title, style="bold")
-        about.append(f"\n{one.question}", style="not bold")
-        table.add_row(str(one.number), one.name, one.level, str(one.minutes), about)
-    console.show(table)
+    rows = [
+        (str(one.number), one.name, one.level, str(one.minutes), f"{one.title}\n{one.question}")
+        for one in found
+    ]
+    heads = ("", "lesson", "level", "minutes", "what it is about")
+    console.show(Sheet("", heads, tuple(rows), texts=5))
 
 
 @lesson.command(short_help="Show one lesson, with its worksheet.")
@@ -214,22 +212,20 @@ def _shown(lesson: Lesson) -> list[RenderableType]:
     from chutelab.classroom.lessons import scene_of
     from chutelab.classroom.lessons.building import plain_of
     from chutelab.classroom.lessons.reading import unit_in
-    from chutelab.cli.report import plain_table, titled
+    from chutelab.util.tables import Sheet
 
     number = "" if lesson.number is None else f"{lesson.number}  "
     head = Text(f"{number}{lesson.title}", style="bold")
     head.append(
         f"\n{lesson.question}\n{lesson.level}, about {lesson.minutes} minutes", style="not bold"
     )
-    scenes = plain_table(["scene", "what it shows"], texts=2)
-    for name in lesson.scenes:
-        scenes.add_row(name, scene_of(lesson, name).title)
-    looked_at = plain_table(["quantity", "unit", "what it is"], texts=3)
-    for name, words in lesson.quantities.items():
-        looked_at.add_row(name, unit_in(lesson, name), words)
-    parts: list[RenderableType] = [head, titled("Scenes", scenes)]
+    rows = [(name, scene_of(lesson, name).title) for name in lesson.scenes]
+    scenes = Sheet("Scenes", ("scene", "what it shows"), tuple(rows), texts=2)
+    parts: list[RenderableType] = [head, scenes]
     if lesson.quantities:
-        parts.append(titled("Quantities", looked_at))
+        read = [(name, unit_in(lesson, name), what) for name, what in lesson.quantities.items()]
+        heads = ("quantity", "unit", "what it is")
+        parts.append(Sheet("Quantities", heads, tuple(read), texts=3))
     parts.append(Text(f"\nFiles in {lesson.folder}\n"))
     if lesson.worksheet.is_file():
         worksheet = plain_of(lesson.worksheet.read_text(encoding="utf-8"))
@@ -310,16 +306,14 @@ def _notebooks(path: Path) -> list[Path]:
 
 
 def _marks(grades: list[Grade]) -> RenderableType:
-    from chutelab.cli.report import plain_table
+    from chutelab.util.tables import Sheet
 
-    table = plain_table(["file", "student", "lesson", "marks", "remarks"], texts=5)
-    table.columns[0].no_wrap = False
-    table.columns[0].overflow = "fold"  # a long path must leave room for the remarks
+    rows = []
     for one in grades:
         marks = " ".join(str(mark) for mark in one.marks)
         total = f"{one.total} of {one.out_of} ({marks})" if one.marks else "-"
-        table.add_row(one.file, one.student, one.lesson, total, one.reason)
-    return table
+        rows.append((one.file, one.student, one.lesson, total, one.reason))
+    return Sheet("", ("file", "student", "lesson", "marks", "remarks"), tuple(rows), texts=5)
 
 
 lesson.add_command(grade)

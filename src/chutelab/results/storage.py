@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict
 from math import inf
 from pathlib import Path
@@ -14,7 +14,7 @@ import numpy as np
 from chutelab.machine import build
 from chutelab.results.recording import ENTRIES, EVENT, KNOT, REASONS, Kind, Recording
 from chutelab.scene import from_dict
-from chutelab.util.files import whole
+from chutelab.util.files import csv_lines, whole, write_lines
 
 FORMAT = 1
 """Version of the file; a reader refuses what it does not know."""
@@ -160,36 +160,29 @@ def to_csv(
     if step is not None and not 0.0 < step < inf:
         raise ValueError(f"step = {step!r}: a finite number above 0 s")
     written = []
-    for name, lines in (("events", _events), ("trajectory", _trajectory)):
+    for name, rows in (("events", _events), ("trajectory", _trajectory)):
         if name in only:
             path = Path(folder) / f"{name}.csv"
-            with whole(path) as unfinished, unfinished.open("w", encoding="utf-8") as file:
-                file.writelines(f"{line}\n" for line in lines(recording, step))
-            written.append(path)
+            written.append(write_lines(path, csv_lines(rows(recording, step))))
     return written
 
 
-def _events(recording: Recording, _step: float | None) -> Iterable[str]:
-    yield (
-        "t,particle,other,kind,surface,x,y,vx_before,vy_before,vx_after,vy_after,"
-        "omega_before,omega_after,normal_impulse,tangential_impulse"
-    )
-    events, kinds = recording.events, [kind.name.lower() for kind in Kind]
-    names = (*recording.surfaces, "")
+def _events(recording: Recording, _step: float | None) -> Iterator[Sequence[object]]:
+    places = ("x", "y", "vx_before", "vy_before", "vx_after", "vy_after")
     vectors = ("position", "velocity_before", "velocity_after")
     scalars = ("omega_before", "omega_after", "normal_impulse", "tangential_impulse")
+    yield *COLUMNS, *places, *scalars
+    events, kinds = recording.events, [kind.name.lower() for kind in Kind]
+    names = (*recording.surfaces, "")
     numbers = [column for name in vectors for column in events[name].T.tolist()]
     numbers += [events[name].tolist() for name in scalars]
     heads = zip(*(events[name].tolist() for name in COLUMNS), strict=True)
     for (t, particle, other, kind, surface), *row in zip(heads, *numbers, strict=True):
-        partner = "" if other < 0 else str(other)
-        yield ",".join(
-            [repr(t), str(particle), partner, kinds[kind], names[surface], *map(repr, row)]
-        )
+        yield t, particle, None if other < 0 else other, kinds[kind], names[surface], *row
 
 
-def _trajectory(recording: Recording, step: float | None) -> Iterable[str]:
-    yield "t,particle,x,y,vx,vy"
+def _trajectory(recording: Recording, step: float | None) -> Iterator[Sequence[object]]:
+    yield "t", "particle", "x", "y", "vx", "vy"
     if not len(recording.knots):
         return
     begin, end = float(recording.knots["t"].min()), float(recording.knots["t"].max())
@@ -203,5 +196,4 @@ def _trajectory(recording: Recording, step: float | None) -> Iterable[str]:
     for t in times:
         (position,), (velocity,) = recording.at([t])
         for i in np.flatnonzero(np.isfinite(position[:, 0])).tolist():
-            (x, y), (vx, vy) = position[i].tolist(), velocity[i].tolist()
-            yield f"{t!r},{i},{x!r},{y!r},{vx!r},{vy!r}"
+            yield t, i, *position[i].tolist(), *velocity[i].tolist()

@@ -122,7 +122,7 @@ def advice(
 
 def _waiting(scene: Scene, tried: Recording) -> Iterator[Advice]:
     """Yield how many of the trial's particles found their place taken, and how long they waited."""
-    waited = waits(scene, tried)
+    waited = waits(tried)
     if waited is not None and waited.particles:
         # Each waits for all that waited before it.
         period = 1.0 / scene.stream.rate + waited.longest / max(1, tried.count - 1)

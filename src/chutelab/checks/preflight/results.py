@@ -9,7 +9,7 @@ from math import isfinite
 import numpy as np
 
 from chutelab.machine import Machine
-from chutelab.results.comparison import QUANTITIES
+from chutelab.results.quantities import QUANTITIES
 from chutelab.scene import Scene
 from chutelab.theory import Reason, predict
 

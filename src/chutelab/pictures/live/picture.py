@@ -14,7 +14,7 @@ import numpy as np
 from chutelab.machine import Machine
 from chutelab.pictures import colours
 from chutelab.results import Kind, Recording
-from chutelab.results.comparison import observed
+from chutelab.results.quantities import observed
 from chutelab.scene import Scene
 from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet
@@ -155,7 +155,7 @@ def numbers(scene: Scene, recording: Recording) -> dict[str, float]:
     Work and heat are counted until nothing slips, as `chutelab.theory` does: m* v_b and m*/2 times
     the slip at the landing, with m* = m/3 for a free disk.
     """
-    seen = observed(recording, scene)
+    seen = observed(recording)
     found = {
         "phi1": degrees(seen["phi1"]),
         "v2": seen["v2"],

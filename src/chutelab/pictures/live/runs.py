@@ -321,7 +321,7 @@ def _free(surfaces: Sequence[str]) -> list[str]:
 
 
 def _simulated(run: Run | None, name: str) -> float | None:
-    value = nan if run is None else measure(run.recording, name, run.scene)
+    value = nan if run is None else measure(run.recording, name)
     return value if isfinite(value) else None
 
 

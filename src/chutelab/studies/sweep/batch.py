@@ -8,7 +8,7 @@ does not fit is left over, to be run alone: that is never wrong, only slower.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -243,8 +243,9 @@ class Batch:
 
     def _together(self, machine: Machine, which: Ints, template: Scene) -> None:
         """Run machines that are alike; one that does not get through is left over."""
+        scenes = self._scenes(template, which)
         try:
-            recording = run(machine, apart=True)
+            recording = run(replace(machine, scene=scenes), apart=True)
         except (CornerError, StalledError):
             if len(which) == 1:
                 self.left += which.tolist()
@@ -252,7 +253,7 @@ class Batch:
             for half in np.array_split(np.arange(len(which)), 2):
                 self._together(members(machine, half), which[half], template)
             return
-        self.read(recording, self._scenes(template, which), which)
+        self.read(recording, scenes, which)
 
 
 def _fits(scene: Scene, paths: tuple[str, ...], engine: str | None) -> bool:

@@ -215,7 +215,7 @@ class _Builder:
         self.names: list[str] = []
         self.rows: list[tuple[Value, ...]] = []
         self.owner: list[int] = []
-        self.warnings: list[str] = []
+        self.warnings: list[Caution] = []
 
     def add(
         self,
@@ -278,7 +278,7 @@ class _Builder:
         low, high = ((x - reach * sine, y + reach * cosine) for reach in (-below, plate.above))
         self.add("plate", [low, high], 0.0, plate.restitution, plate.friction)
         if some(missed):
-            self.warnings.append("plate: the nominal particle never meets the plate's line")
+            self.warnings.append(Caution("plate"))
         self._check_hit((y - hit[1]) * -cosine + (x - hit[0]) * sine, below)
         return height
 
@@ -291,17 +291,11 @@ class _Builder:
         if not some(off):
             return
 
-        def told(place: int) -> str:
-            where = at(along, place)
-            return (
-                f"the nominal particle meets the plate's line {abs(where):.4g} m"
-                f" {'above' if where > 0 else 'below'} the pivot, off the finite plate"
-            )
-
         def allowed(place: int) -> str:
-            enough = ceil(1e4 * abs(at(along, place))) / 1e4
+            hit = at(along, place)
             return (
-                f"{told(place)}: lengthen it to at least {enough:g} m,"
+                f"{Caution('plate', hit=hit).text}: lengthen it to at least"
+                f" {ceil(1e4 * abs(hit)) / 1e4:g} m,"
                 ' or set outgoing.drop_from = "top"'
             )
 
@@ -309,7 +303,7 @@ class _Builder:
             self._refuse(off & (along > 0.0), "plate.above", above, allowed)
             self._refuse(off & (along < 0.0), "plate.below", below, allowed)
         elif scene.members is None:
-            self.warnings.append(f"plate: {told(0)}")
+            self.warnings.append(Caution("plate", hit=along))
 
     def _refuse(self, bad: Value, key: str, value: Value, allowed: Callable[[int], str]) -> None:
         """Raise if something is wrong; of a family, with those of which it is."""

@@ -17,7 +17,6 @@ from typing import Literal
 
 import numpy as np
 
-from chutelab import scene as scenes
 from chutelab.engines import reference
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
@@ -481,7 +480,7 @@ class Search:
                 last = replace(best[1], runs=self.runs, method=f"{best[1].method}; {reason}")
                 return best[0], last
             dt *= 0.5
-            finer = changed(self.scene, f"run.dt={dt!r}")
+            finer = self.scene.with_values({"run.dt": dt, "expect": None})
             if found.engine in STEPPED:
                 found = self.run(finer, found.engine)
             if other is not None and other.engine in STEPPED:
@@ -541,13 +540,6 @@ def _size(found: Accuracy) -> float:
     return inf if found.reached is None else found.reached
 
 
-def changed(scene: Scene, *settings: str) -> Scene:
-    """Return a scene with some keys set, ``KEY=VALUE`` each, and without its expectations."""
-    tables = scenes.to_dict(scene)
-    tables.pop("expect", None)
-    return scenes.from_dict(tables, scene.source, settings)
-
-
 def stirred(scene: Scene, share: float) -> Scene:
     """Return a scene with gravity and speeds lower by a share, a tiny one.
 
@@ -555,9 +547,9 @@ def stirred(scene: Scene, share: float) -> Scene:
     what is released on it keep the same speed.
     """
     less = 1.0 - share
-    settings = [f"gravity={scene.gravity * less!r}"]
+    values: dict[str, object] = {"gravity": scene.gravity * less, "expect": None}
     if scene.incoming is not None:
-        settings.append(f"incoming.speed={scene.incoming.speed * less!r}")
+        values["incoming.speed"] = scene.incoming.speed * less
     if scene.stream.velocity is not None:
-        settings.append(f"stream.velocity={[part * less for part in scene.stream.velocity]}")
-    return changed(scene, *settings)
+        values["stream.velocity"] = [part * less for part in scene.stream.velocity]
+    return scene.with_values(values)

@@ -22,8 +22,6 @@ from chutelab.studies.design.evaluation import (
     INSIDE,
     Evaluator,
     Outcomes,
-    varied,
-    without_source,
 )
 from chutelab.studies.design.quantities import DesignError, each_once, measured, scipy
 from chutelab.studies.design.sensitivity import Indices, crossed, design, indices
@@ -136,9 +134,9 @@ def _read(scene: Scene, text: str) -> Spread:
     low, high = limits_of(rule_at(parts_of(about.path)) or {}) or (-np.inf, np.inf)
     for value in (mean, float(np.clip(mean + INSIDE * spread, low, high))):
         try:
-            varied(scene, [about.path], [value])
+            scene.with_values({about.path: value})
         except SceneError as error:
-            raise DesignError(typed, without_source(reason(error))) from None
+            raise DesignError(typed, reason(error)) from None
     return Spread(
         about.path, about.unit, mean, spread, "uniform" if law == "uniform" else "normal", low, high
     )

@@ -7,7 +7,16 @@
 """
 
 from chutelab.machine.builder import RefusedError, build, members
-from chutelab.machine.parts import DRIVE_PULLEY, Caution, Machine, Particle, Pulley, Segments, moved, origin
+from chutelab.machine.parts import (
+    DRIVE_PULLEY,
+    Caution,
+    Machine,
+    Particle,
+    Pulley,
+    Segments,
+    moved,
+    origin,
+)
 
 __all__ = [
     "DRIVE_PULLEY",

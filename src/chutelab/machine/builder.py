@@ -18,7 +18,7 @@ from sys import float_info
 import numpy as np
 
 from chutelab.machine.nominal import Discharge, discharge, plate_hit
-from chutelab.machine.parts import Machine, Particle, Pulley, Segments
+from chutelab.machine.parts import Caution, Machine, Particle, Pulley, Segments
 from chutelab.machine.releases import ON_BELT, Releases, draw, release_point
 from chutelab.scene import Fault, Scene, SceneError
 from chutelab.util.arrays import Floats, Ints

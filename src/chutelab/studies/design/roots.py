@@ -33,16 +33,17 @@ def bracketed(function: Function, low: float, high: float) -> float:
     return float(found)
 
 
-def bounded(function: Function, low: float, high: float) -> tuple[float, float]:
-    """Return where a function is least between two values, and how much it is there.
+def bounded(function: Function, low: float, high: float, sign: float = 1.0) -> tuple[float, float]:
+    """Return where `sign` times a function is least between two values, and how much that is.
 
     Near a smooth minimum the place is only known to about the square root of a rounding, because
     the function does not change over it.
     """
     options = {"xatol": 1e-10 * (high - low), "maxiter": 200}
     found = scipy("optimize").minimize_scalar(
-        function, bounds=(float(low), float(high)), method="bounded", options=options
-    )
+        lambda x: sign * function(x), bounds=(float(low), float(high)), method="bounded",
+        options=options,
+    )  # fmt: skip
     return float(found.x), float(found.fun)
 
 
@@ -337,7 +338,7 @@ def _turning(x: Floats, f: Floats, function: Function) -> tuple[Floats, Floats]:
         size, sign = np.abs(f[near]), float(np.sign(f[i]))
         if (np.sign(f[near]) == sign).all() and abs(f[i]) == size.min() < size.max():
             low, high = x[near][0], x[near][-1]
-            place, value = bounded(lambda at, sign=sign: sign * function(at), low, high)
+            place, value = bounded(function, low, high, sign)
             points.setdefault(place, sign * value)
     ascending = sorted(points.items())
     return np.array([at for at, _ in ascending]), np.array([value for _, value in ascending])
@@ -432,7 +433,7 @@ def minima(found: Scan, function: Function, sign: float = 1.0) -> tuple[Least, .
             one = Least(float(x[i]), float(f[i]), kind)
             if len(x) > 1:
                 a, b = x[max(i - 1, 0)], x[min(i + 1, len(x) - 1)]
-                place, value = bounded(lambda at: sign * function(at), a, b)
+                place, value = bounded(function, a, b, sign)
                 # The minimiser never reaches an end itself: only a true minimum is lower than it.
                 if value < one.value - (0.0 if inside else step):
                     one = Least(place, value, "inside")

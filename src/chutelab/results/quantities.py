@@ -8,6 +8,7 @@ as a whole: who waited for a place, who rode into others, who rolls where it sho
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import nan
 from typing import Any
@@ -36,7 +37,9 @@ ALONG = 1e-14
 CARRIED = 1e-3
 """m/s from the belt's speed, up to which a particle rides with it: the slip that counts as none."""
 
-_STATISTICS = {"mean": np.mean, "spread": np.std, "min": np.min, "max": np.max}
+_STATISTICS: dict[str, Callable[[Floats], Any]] = {
+    "mean": np.mean, "spread": np.std, "min": np.min, "max": np.max,
+}  # fmt: skip
 
 
 def first(recording: Recording, event: str, surface: str | None = None) -> NDArray[Any]:

@@ -18,10 +18,8 @@ from PIL import Image
 from chutelab.pictures import colours
 from chutelab.pictures.animation.moments import film, frame_delay, slowness, span
 from chutelab.pictures.animation.stage import SHOWS, Stage, lay_out
-from chutelab.pictures.plots import machine_of, style
+from chutelab.pictures.plots import style
 from chutelab.results import Recording
-from chutelab.results.comparison import scene_of
-from chutelab.theory import predict
 from chutelab.util.files import whole
 
 GREYS = (style.MUTED, style.STEEL, style.STEEL_LIGHT, style.ENERGY["start"])
@@ -206,7 +204,7 @@ def animate(
         raise ValueError(f"{width} x {height} pixels: allowed in a video are even numbers")
     frame_delay(fps)
     shows = frozenset([show] if isinstance(show, str) else show)
-    machine = machine_of(recording)
+    machine = recording.machine
     layout = lay_out(
         recording,
         machine,
@@ -219,7 +217,7 @@ def animate(
     begin, end = span(recording, layout.window)
     pace = slowness(end - begin) if slow is None else slow
     moments = film(recording, begin, end, fps=fps, slow=pace)
-    stage = Stage(recording, machine, predict(scene_of(recording)), layout, moments, slow=pace)
+    stage = Stage(recording, machine, recording.prediction, layout, moments, slow=pace)
     pictures = map(stage.frame, range(len(moments)))
     delays = [moment.delay for moment in moments]
     with whole(path) as unfinished:

@@ -17,7 +17,6 @@ from chutelab.engines.exact import contacts
 from chutelab.mechanics import ballistics, impact
 from chutelab.results import REASONS, Kind
 from chutelab.results.comparison import QUANTITIES, compare
-from chutelab.results.comparison import scene_of as scene_from
 from chutelab.studies.accuracy import reach
 from drawn import draw
 
@@ -31,7 +30,7 @@ def contacts_of(recording):
 
 
 def plate_normal(recording):
-    alpha = radians(scene_from(recording).plate.angle_deg)
+    alpha = radians(recording.scene.plate.angle_deg)
     return np.array([-cos(alpha), -sin(alpha)])
 
 

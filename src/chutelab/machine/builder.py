@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import pairwise
 from math import ceil, inf, prod
 from sys import float_info
@@ -331,8 +330,7 @@ class _Builder:
         bound = releases.t[-1].item() + scene.run.max_time
         until = scene.run.until
         return Machine(
-            title=scene.title,
-            text=partial(scene.model_dump_json, by_alias=True),
+            scene=scene,
             surfaces=tuple(self.names),
             gravity=scene.gravity,
             particle=particle,

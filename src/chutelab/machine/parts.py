@@ -7,7 +7,7 @@ few digits left.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chutelab.machine.releases import Releases
+from chutelab.scene import Scene
 from chutelab.util.arrays import Floats, Ints
 
 FIRST_WINS = "; surfaces may cross, the first contact wins"
@@ -170,10 +171,8 @@ class Machine:
 
     Attributes
     ----------
-    title : str
-        Of the scene, passed on to the recording.
-    text : callable
-        Writes the scene as canonical JSON, for `scene`.
+    scene : Scene
+        What it was built from; a family of scenes for a family of machines.
     surfaces : tuple of str
         Names; several segments, or a segment and the pulley, may share one.
     gravity : float
@@ -206,8 +205,7 @@ class Machine:
         What is to be said of a nominal particle that misses the plate.
     """
 
-    title: str
-    text: Callable[[], str]
+    scene: Scene
     surfaces: tuple[str, ...]
     gravity: float
     particle: Particle
@@ -229,11 +227,6 @@ class Machine:
     def count(self) -> int:
         """Number of particles."""
         return len(self.releases.t)
-
-    @cached_property
-    def scene(self) -> str:
-        """The scene in canonical JSON."""
-        return self.text()
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:

@@ -131,19 +131,11 @@ def run(
     if machine.interact:
         raise ValueError("the exact engine has no contacts between particles")
     begin = perf_counter() if began is None else began
-    recorder = Recorder(machine.count, machine.surfaces, apart=apart)
+    recorder = Recorder(machine, apart=apart)
     rounds = 0
 
     def recording() -> Recording:
-        return recorder.finish(
-            scene=machine.text,
-            title=machine.title,
-            engine="exact",
-            particle=machine.particle,
-            gravity=machine.gravity,
-            steps=rounds,
-            seconds=perf_counter() - begin,
-        )
+        return recorder.finish(engine="exact", steps=rounds, seconds=perf_counter() - begin)
 
     world = World.of(machine)
     size = _block(len(world.obstacles.surface))

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 from chutelab.classroom.exercises import ExerciseError, Task, lesson
 from chutelab.classroom.exercises.catalogue import UNNAMED
 from chutelab.classroom.exercises.exercise import plain
+from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, write_lines
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ LARGEST = 50 << 20
 """Bytes; a notebook with its pictures is a tenth of it."""
 
 
-class NotebookError(ValueError):
+class NotebookError(InputError):
     """A file that is no notebook; its text says why."""
 
 

@@ -179,15 +179,10 @@ def page(wanted: tuple[str, ...], out: Path, quiet: bool) -> None:
     from chutelab.classroom.lessons.reading import shipped_lessons
     from chutelab.cli.console import progress
     from chutelab.cli.output import writing
-    from chutelab.pictures.live.runs import PageError
-    from chutelab.scene.variants import VaryError
 
     lessons = [find(name) for name in wanted] or shipped_lessons()
-    try:
-        with writing(instead="another folder"), progress("making the pages", quiet=quiet) as update:
-            made = bundle(lessons, out, update)
-    except (PageError, VaryError) as error:
-        raise RefusedError(str(error)) from error
+    with writing(instead="another folder"), progress("making the pages", quiet=quiet) as update:
+        made = bundle(lessons, out, update)
     if not quiet:
         size = sum(path.stat().st_size for path in made)
         click.echo(f"wrote {len(made)} files, {size / 1e6:.1f} MB; open {out / 'index.html'}")

@@ -13,6 +13,7 @@ import numpy as np
 
 from chutelab.machine.parts import Particle
 from chutelab.results.recording import ENTRIES, EVENT, KNOT, REASONS, Kind, Recording
+from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, whole, write_lines
 
 FORMAT = 1
@@ -37,7 +38,7 @@ MOST_SAMPLES = 1_000_000
 so many particles get fewer instants."""
 
 
-class RecordingError(ValueError):
+class RecordingError(InputError):
     """A file is not a recording that this version can read."""
 
 

@@ -31,6 +31,7 @@ from chutelab.classroom.exercises.judging import (
     number_of,
     unread,
 )
+from chutelab.util.errors import InputError
 
 OPENED: deque[Task] = deque(maxlen=64)
 """The tasks of this process, the last one last: where grading looks for what was answered."""
@@ -249,7 +250,7 @@ EXERCISES: dict[str, Exercise] = {
 """All exercises by name, in the order of the lessons."""
 
 
-class ExerciseError(LookupError):
+class ExerciseError(InputError):
     """There is no exercise of such a lesson."""
 
 

@@ -17,10 +17,11 @@ from pydantic import BaseModel, Field, PrivateAttr, ValidationError
 
 from chutelab.scene import MISSING, Fault, Scene, SceneError, load, shipped
 from chutelab.scene import shipped as shipped_scenes
-from chutelab.scene.errors import at_path, did_you_mean, joined
+from chutelab.scene.overrides import at_path, joined
 from chutelab.scene.rules import suggestion, unit_of
 from chutelab.scene.units import Number, Table, Text, Whole
 from chutelab.scene.variants import VaryError, parse, quantity
+from chutelab.util.errors import did_you_mean
 
 LEVELS: Final = ("start", "core", "advanced")
 MOST: Final = 20
@@ -223,7 +224,7 @@ def _judged(lesson: Lesson) -> Iterator[Fault]:
             scenes[name] = scene_of(lesson, name)
         except SceneError as error:
             for fault in error.faults:
-                yield Fault(here, name, f"{error.source}: {fault}")
+                yield Fault(here, name, f"{error.file}: {fault}")
     yield from _measured(lesson, scenes)
     for table in TABLES:
         part = getattr(lesson, table)

@@ -10,7 +10,7 @@ from rich.text import Text
 
 from chutelab.machine.releases import Squeeze, squeeze
 from chutelab.results import REASONS, Kind, Recording
-from chutelab.results.comparison import compare, scene_of
+from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import Waits, waits
 from chutelab.results.summary import rolling
@@ -28,10 +28,10 @@ def report(recording: Recording, accuracy: Accuracy | None = None) -> list[Rende
     if compared.notes and (way := _way(recording)).rows:
         parts.append(way)
     parts.append(ledger(recording))
-    if (late := waits(scene_of(recording), recording)) is not None:
+    if (late := waits(recording.scene, recording)) is not None:
         parts.append(Text("\n" + "\n".join(wrapped(_waited(late)))))
     released = recording.select(Kind.RELEASE)
-    pressed = squeeze(scene_of(recording), released["t"], released["position"])
+    pressed = squeeze(recording.scene, released["t"], released["position"])
     if pressed is not None:
         parts.append(Text("\n" + "\n".join(wrapped(_squeezed(pressed)))))
     if (left := rolling(recording)) is not None:

@@ -172,7 +172,7 @@ def _names(found: PaperFigure) -> list[str]:
 
 def _write(found: PaperFigure, place: Path) -> None:
     from chutelab.pictures.plots.figure import paper_figure
-    from chutelab.studies.design.quantities import to_toml
+    from chutelab.scene import to_toml
 
     picture, table, *scenes = _names(found)
     paper_figure(found, path=place / picture)

@@ -155,8 +155,8 @@ def _write(found: Solution, place: Path) -> None:
     from chutelab.engines.simulation import simulate
     from chutelab.pictures.plots import overlay
     from chutelab.pictures.plots.design import scan
+    from chutelab.scene import to_toml
     from chutelab.studies.design.answers import as_dict
-    from chutelab.studies.design.quantities import to_toml
 
     text = json.dumps(as_dict(found), indent=1, allow_nan=False)
     (place / "solve.json").write_text(text + "\n", encoding="utf-8")

@@ -149,14 +149,13 @@ class _Run:
         self.t0, self.base = float(releases.t[0]), releases.position[0].copy()
         self.state = np.zeros(7)
         self.state[V] = releases.velocity[0]
-        self.log = Recorder(1, machine.surfaces)
+        self.log = Recorder(machine)
         self.things = _obstacles(machine)
         # Face of each segment that was struck last: of a point on a line there is no telling.
         self.sides: dict[int, float] = {}
         self.steps, self.landed, self.reason = 0, False, ""
 
     def result(self) -> Recording:
-        m = self.machine
         self.tell(Kind.RELEASE, -1)
         self.knot()
         lasting = self.first()
@@ -167,10 +166,7 @@ class _Run:
         else:
             raise UnableError(f"more than {MOST_PHASES} phases")
         self.log.ended[0] = ("time", "landed", "settled", "exit").index(self.reason)
-        return self.log.finish(
-            scene=m.text, title=m.title, engine="dop853", particle=m.particle, gravity=m.gravity,
-            steps=self.steps, seconds=0.0,
-        )  # fmt: skip
+        return self.log.finish(engine="dop853", steps=self.steps)
 
     # What touches.
 

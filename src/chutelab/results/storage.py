@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from math import inf
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from chutelab.machine.parts import Particle
+from chutelab.machine import build
 from chutelab.results.recording import ENTRIES, EVENT, KNOT, REASONS, Kind, Recording
+from chutelab.scene import from_dict
 from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, whole, write_lines
 
@@ -45,13 +46,7 @@ class RecordingError(InputError):
 def save(recording: Recording, path: str | Path) -> Path:
     """Write a recording to an npz file, whole or not at all."""
     path = Path(path)
-    about = {
-        field.name: getattr(recording, field.name)
-        for field in fields(recording)
-        if field.name not in ARRAYS
-    }
-    about["particle"] = asdict(recording.particle)
-    header = json.dumps({"format": FORMAT, **about})
+    header = json.dumps(_about(recording))
     arrays = {name: getattr(recording, name) for name in ARRAYS}
     with whole(path) as unfinished, unfinished.open("wb") as file:
         np.savez_compressed(file, about=np.array(header), **arrays)
@@ -70,14 +65,14 @@ def load(path: str | Path) -> Recording:
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
             about: dict[str, Any] = json.loads(str(data["about"]))
-            version = about.pop("format", None)
+            version = about.get("format")
             arrays = {name: data[name] for name in ARRAYS} if version == FORMAT else {}
         recording = None
         if arrays:
-            about["particle"] = Particle(**about["particle"])
-            about["surfaces"] = tuple(about["surfaces"])
-            recording = Recording(**about, **arrays)
-            _check(recording)
+            scene = from_dict(json.loads(about["scene"]), about["title"])
+            told = {name: about[name] for name in ("engine", "steps", "contacts", "seconds")}
+            recording = Recording(machine=build(scene), **told, **arrays)
+            _check(recording, about)
     except FileNotFoundError:
         raise RecordingError(f"{path}: no such file") from None
     except OSError as error:
@@ -96,8 +91,29 @@ def load(path: str | Path) -> Recording:
     return recording
 
 
-def _check(recording: Recording) -> None:
-    """Raise a ValueError if the arrays contradict each other: every index has to lead somewhere."""
+def _about(recording: Recording) -> dict[str, Any]:
+    """Return the header of the file."""
+    return {
+        "format": FORMAT,
+        "scene": recording.scene.model_dump_json(by_alias=True),
+        "title": recording.title,
+        "engine": recording.engine,
+        "particle": asdict(recording.particle),
+        "gravity": recording.gravity,
+        "surfaces": list(recording.surfaces),
+        "steps": recording.steps,
+        "contacts": recording.contacts,
+        "seconds": recording.seconds,
+    }
+
+
+def _check(recording: Recording, about: dict[str, Any]) -> None:
+    """Raise a ValueError if header and arrays contradict each other, or the scene.
+
+    Every index has to lead somewhere. The scene's text may be an older one, without later keys.
+    """
+    if _about(recording) | {"scene": about["scene"]} != about:
+        raise ValueError("the header is of another scene")
     offsets, events = recording.offsets, recording.events
     sizes, surfaces = np.diff(offsets), len(recording.surfaces)
     sound = (

@@ -4,7 +4,7 @@
 - `rules`: conflicts between keys and between tables; ``[[expect]]``.
 - `schema`: the tables of a scene as frozen Pydantic models, with the defaults.
 - `overrides`: keys by their full path: JSON Schema, limits, ``KEY=VALUE`` texts.
-- `loading`: read, parse, override, validate; the shipped scenes.
+- `loading`: read, parse, override, validate, write; the shipped scenes.
 - `variants`: one scene with other values: ``--vary``, combinations, families.
 """
 
@@ -19,6 +19,7 @@ from chutelab.scene.loading import (
     shipped,
     template,
     to_dict,
+    to_toml,
 )
 from chutelab.scene.overrides import schema
 from chutelab.scene.rules import Expect
@@ -51,4 +52,5 @@ __all__ = [
     "shown",
     "template",
     "to_dict",
+    "to_toml",
 ]

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 
+import tomli_w
 from annotated_types import Ge, Gt, Le, Lt, MaxLen
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
@@ -374,6 +375,34 @@ def from_dict(
 def to_dict(scene: Scene) -> dict[str, Any]:
     """Return the keys that were set, nested as in the file: `from_dict` makes the scene again."""
     return scene.model_dump(by_alias=True, exclude_unset=True)
+
+
+_POINT: Final = re.compile(r"\[\n\s+([-+\w.]+),\n\s+([-+\w.]+),\n\s*\]")
+
+
+def to_toml(scene: Scene, comment: str = "") -> str:
+    """Return the keys of a scene that were set, as the text of a scene file.
+
+    Its ``[[expect]]`` are left out: they were promised for another scene.
+
+    Parameters
+    ----------
+    comment : str
+        Lines to begin with.
+
+    Examples
+    --------
+    >>> scene = load("perpendicular")
+    >>> parse(to_toml(scene)).plate == scene.plate
+    True
+    """
+    tables = scene.model_dump(
+        by_alias=True, exclude_unset=True, exclude_none=True, exclude={"expect"}
+    )
+    # tomli-w writes a line for each number of a list; no text holds a line break as it stands.
+    text = _POINT.sub(r"[\1, \2]", tomli_w.dumps(tables))
+    remark = "".join(f"# {line}".rstrip() + "\n" for line in comment.splitlines())
+    return f"{remark}\n{text}" if remark else text
 
 
 def plain(value: object) -> Any:

@@ -228,7 +228,7 @@ class Scene(Table):
     expect: tuple[Expect, ...] = Field((), max_length=MOST_EXPECTATIONS)
 
     _source: str = PrivateAttr("<scene>")
-    _members: int | None = PrivateAttr(None)
+    _shape: tuple[int, ...] = PrivateAttr(())
 
     @classmethod
     def tables(cls) -> dict[str, type[Table]]:
@@ -256,10 +256,11 @@ class Scene(Table):
         return (*tables, *(free.name for free in self.surface))
 
     @property
-    def members(self) -> int | None:
-        """How many scenes a family holds, see `chutelab.scene.variants`; None for one scene."""
-        # As `self._members`, for which pydantic takes ten times as long.
-        return (self.__pydantic_private__ or {}).get("_members")
+    def shape(self) -> tuple[int, ...]:
+        """(N,) of a family of scenes, see `chutelab.scene.variants.family`; () of one scene."""
+        # As `self._shape`, for which pydantic takes ten times as long.
+        private: dict[str, tuple[int, ...]] = self.__pydantic_private__ or {}
+        return private.get("_shape", ())
 
     def with_values(self, values: Mapping[str, object]) -> Scene:
         """Return the scene with other values, validated, and with defaults filled in anew.

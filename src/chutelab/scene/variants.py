@@ -479,7 +479,8 @@ def family(scene: Scene, columns: Mapping[str, Floats]) -> Scene:
     Returns
     -------
     Scene
-        With arrays under these keys, and under those whose defaults they are; `Scene.members` is N.
+        With arrays under these keys, and under those whose defaults they are; its `shape` is
+        (N,).
     """
     changes: dict[str, Any] = {}
     for path, values in columns.items():
@@ -500,6 +501,6 @@ def family(scene: Scene, columns: Mapping[str, Floats]) -> Scene:
         if given is not None and key not in given.model_fields_set:
             changes[table] = given.model_copy(update={key: None})
     many = scene.model_copy(update=changes)
-    many._source, many._members = scene.source, len(next(iter(columns.values())))
+    many._source, many._shape = scene.source, next(iter(columns.values())).shape
     many._fill_defaults()
     return many

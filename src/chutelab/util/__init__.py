@@ -5,5 +5,4 @@
 - `files`: files that are written whole or not at all, CSV and TSV in them.
 - `tables`: tables for people, plain data for JSON, columns as a DataFrame.
 - `versions`: what is installed, and on what figures were measured.
-- `many`: numbers and arrays by the same formulas.
 """

@@ -338,7 +338,7 @@ def preflight(scene: Scene) -> Preflight:
     steps = None if engine == "exact" else stepping(machine, engine, tried.lone, recording)
     cost = effort(scene, engine, tried)
     return Preflight(
-        title=machine.title,
+        title=machine.scene.title,
         built=tuple(built(machine)),
         skipped=tuple(skipped(scene, machine, engine)),
         engine=engine,

@@ -37,6 +37,7 @@ from chutelab.studies.sweep.result import (
     write_csv,
 )
 from chutelab.studies.sweep.rows import NUMBERS, REASON, Columns, joined
+from chutelab.util.errors import InputError
 
 Job = tuple[int, Any]
 
@@ -51,7 +52,7 @@ ADDRESS: Final = re.compile(r"(\w+://)?[^\s:/]+:\d{1,5}")
 """A host and a port."""
 
 
-class WorkersError(ValueError):
+class WorkersError(InputError):
     """Nobody is there to do the work; the text says what is wrong with what was asked for."""
 
 

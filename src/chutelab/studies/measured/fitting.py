@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -26,6 +25,7 @@ from chutelab.studies.measured.residuals import LEAST, Residuals, best_t0, follo
 from chutelab.studies.measured.result import Fit
 from chutelab.studies.measured.track import MeasuredError, Track
 from chutelab.util.arrays import Bools, Floats
+from chutelab.util.versions import library
 
 
 class Problem:
@@ -119,10 +119,10 @@ def fit(scene: Scene, track: Track, keys: Sequence[str], *, robust: bool = False
         tell the parameters, or nothing is found.
     SceneError
         If the scene cannot be run.
-    ImportError
+    MissingLibraryError
         Without SciPy; says what to install.
     """
-    _scipy()
+    _scipy("optimize")
     parameters = resolve(scene, track, keys)
     if scene.stream.interact and scene.stream.count > 1:
         text = "must be false for a fit, which follows one particle that meets no others"
@@ -179,7 +179,7 @@ def _descended(problem: Problem, values: Floats, *, robust: bool) -> _Minimum | 
             return None
         problem.use(used)
         # Its own derivatives would take steps that the scene refuses, and no other way then.
-        solved = _scipy().least_squares(
+        solved = _scipy("optimize").least_squares(
             problem.tried,
             values,
             jac=problem.derivatives,
@@ -244,7 +244,7 @@ def _judged(problem: Problem, best: _Minimum, before: Residuals, *, robust: bool
     inverse = np.linalg.inv((derivatives / lengths).T @ (derivatives / lengths))
     spread = np.sqrt(np.diag(inverse))
     errors = np.sqrt(variance) * spread / lengths
-    reach = float(import_module("scipy.special").stdtrit(freedom, 0.975)) * errors
+    reach = float(_scipy("special").stdtrit(freedom, 0.975)) * errors
     wide = problem.derivatives(values, errors)
     after = over(*problem.run(values))
     scene, _ = changed(problem.scene, problem.track, parameters, values.tolist())
@@ -267,9 +267,5 @@ def _judged(problem: Problem, best: _Minimum, before: Residuals, *, robust: bool
     return replace(found, notes=tuple(result.notes(found, bent, settled=best.settled)))
 
 
-def _scipy() -> Any:
-    try:
-        return import_module("scipy.optimize")
-    except ImportError as error:
-        text = 'a fit needs SciPy: pip install "chutelab[fit]"'
-        raise ImportError(text, name=error.name) from error
+def _scipy(name: str) -> Any:
+    return library(f"scipy.{name}", "a fit needs SciPy", "fit")

@@ -25,8 +25,8 @@ from chutelab.scene import MISSING, Scene, rules
 from chutelab.scene.overrides import value_at
 from chutelab.scene.units import read_size
 from chutelab.scene.variants import Vary, VaryError, quantity
-from chutelab.util.versions import library
 from chutelab.util.errors import InputError
+from chutelab.util.versions import library
 
 
 class Keyed(Protocol):

@@ -6,7 +6,6 @@ import json
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -147,9 +146,8 @@ def write(
             else:
                 from chutelab.results.summary import summary
 
-                write_json(
-                    summary(recording, accuracy and asdict(accuracy)), folder / "summary.json"
-                )
+                reached = None if accuracy is None else vars(accuracy)
+                write_json(summary(recording, reached), folder / KINDS[kind][0])
 
 
 def write_json(value: Any, path: Path) -> None:

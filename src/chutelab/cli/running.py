@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -156,7 +155,7 @@ def _tell(
     if as_json:
         from chutelab.results.summary import summary
 
-        console.show_json(summary(recording, accuracy and asdict(accuracy)))
+        console.show_json(summary(recording, None if accuracy is None else vars(accuracy)))
     elif not quiet:
         from chutelab.cli.report import report
 

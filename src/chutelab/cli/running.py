@@ -167,12 +167,9 @@ def _tell(
 def _varies(
     _ctx: click.Context, _parameter: click.Parameter, texts: tuple[str, ...]
 ) -> tuple[Vary, ...]:
-    from chutelab.scene.variants import VaryError, parse
+    from chutelab.scene.variants import parse
 
-    try:
-        return tuple(parse(text) for text in texts)
-    except VaryError as error:
-        raise RefusedError(str(error)) from error
+    return tuple(parse(text) for text in texts)
 
 
 @click.command(short_help="Write a page with sliders that any browser opens.")
@@ -212,9 +209,7 @@ def page(
     from chutelab.cli.console import progress
     from chutelab.cli.output import writing
     from chutelab.pictures.live.page import write
-    from chutelab.pictures.live.runs import PageError
     from chutelab.scene import load
-    from chutelab.scene.variants import VaryError
 
     path = output or Path(f"{Path(scene).name.removesuffix('.toml')}.html")
     if path.is_dir():
@@ -222,11 +217,8 @@ def page(
     if not path.parent.is_dir():
         raise RefusedError(f"{path}: there is no folder {path.parent}")
     loaded = load(scene, overrides)
-    try:
-        with writing(str(path)), progress(f"simulating {scene}", quiet=quiet) as update:
-            written = write(loaded, varies, path, progress=update)
-    except (VaryError, PageError) as error:
-        raise RefusedError(str(error)) from error
+    with writing(str(path)), progress(f"simulating {scene}", quiet=quiet) as update:
+        written = write(loaded, varies, path, progress=update)
     if not quiet:
         variants = "1 variant" if written.variants == 1 else f"{written.variants} variants"
         click.echo(f"wrote {written.path}, {written.size / 1000:.0f} kB: {variants}")

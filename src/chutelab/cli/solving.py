@@ -138,7 +138,6 @@ def _solved(
     seed: int,
     meter: Callable[[float], None] | None,
 ) -> Solution:
-    from chutelab.scene.variants import VaryError
     from chutelab.studies import design
 
     try:
@@ -148,7 +147,7 @@ def _solved(
             (design.minimize, minimize) if minimize else (design.maximize, maximize or "")
         )
         return extremum(scene, vary, quantity, points=points, seed=seed, progress=meter)
-    except (design.DesignError, VaryError, ImportError) as error:
+    except ImportError as error:
         raise RefusedError(str(error)) from error
 
 
@@ -242,12 +241,11 @@ def _found(
     seed: int,
     meter: Callable[[float], None] | None,
 ) -> Uncertainty:
-    from chutelab.scene.variants import VaryError
-    from chutelab.studies.design import DesignError, uncertainty
+    from chutelab.studies.design import uncertainty
 
     try:
         return uncertainty(scene, given, samples=samples, seed=seed, progress=meter)
-    except (DesignError, VaryError, ImportError) as error:
+    except ImportError as error:
         raise RefusedError(str(error)) from error
 
 

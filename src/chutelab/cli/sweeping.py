@@ -134,14 +134,9 @@ def sweep(
     from chutelab.cli.output import PICTURES, check_file, writing
     from chutelab.scene import load
     from chutelab.scene.overrides import Override
-    from chutelab.scene.variants import VaryError
     from chutelab.studies.sweep import (
         NUMBERS,
         LostWorkersError,
-        PartError,
-        SampleError,
-        TableError,
-        WorkersError,
         crew,
         planned,
         sweep_to,
@@ -185,8 +180,6 @@ def sweep(
                 found = swept_by(plan, team, progress=update)
             else:
                 found = sweep_to(plan, out, team, resume=resume, progress=update)
-    except (VaryError, SampleError, TableError, PartError, WorkersError) as error:
-        raise RefusedError(str(error)) from error
     except LostWorkersError as error:
         raise click.ClickException(f"{error} {_kept(out)}".strip()) from error
     except KeyboardInterrupt:

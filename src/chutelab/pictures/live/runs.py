@@ -30,6 +30,7 @@ from chutelab.scene.units import symbol
 from chutelab.scene.variants import Quantity, Variant, Vary, parse, quantities, reason, variants
 from chutelab.theory import predict
 from chutelab.util.arrays import Floats
+from chutelab.util.errors import InputError
 
 MOST_VARIANTS: Final = 1_000
 """Variants on one page: two sliders of some 30 positions each."""
@@ -44,7 +45,7 @@ MOST_KNOTS: Final = 100_000
 """Knots of all variants together: a page of about 10 MB."""
 
 
-class PageError(ValueError):
+class PageError(InputError):
     """What cannot be made a page of; the text says why, and what can."""
 
 

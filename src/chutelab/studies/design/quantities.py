@@ -26,6 +26,7 @@ from chutelab.scene import MISSING, Scene, rules
 from chutelab.scene.overrides import value_at
 from chutelab.scene.units import read_size
 from chutelab.scene.variants import Vary, VaryError, quantity
+from chutelab.util.errors import InputError
 
 
 class Keyed(Protocol):
@@ -39,11 +40,12 @@ class Keyed(Protocol):
 T = TypeVar("T", bound=Keyed)
 
 
-class DesignError(ValueError):
+class DesignError(InputError):
     """A question that makes no sense for the scene; says what was typed, and what is allowed."""
 
     def __init__(self, typed: str, allowed: str) -> None:
-        super().__init__(f"{typed}: {allowed}")
+        super().__init__(allowed, typed)
+        self.args = typed, allowed
 
 
 def each_once(

@@ -22,9 +22,9 @@ from typing import Final
 import numpy as np
 
 from chutelab.scene import Fault, Scene, load, shipped
-from chutelab.scene.errors import did_you_mean
 from chutelab.studies.measured.residuals import LEAST, ends, follow, run
 from chutelab.studies.measured.track import MeasuredError, Placement, Track
+from chutelab.util.errors import did_you_mean
 
 LARGEST_FILE: Final = 20_000_000
 """Bytes; an hour of film at 50 frames a second is a quarter of it."""

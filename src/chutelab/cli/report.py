@@ -9,12 +9,10 @@ import numpy as np
 from rich.console import RenderableType
 from rich.text import Text
 
-from chutelab.machine.releases import squeeze
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
-from chutelab.results.quantities import waits
-from chutelab.results.summary import rolling
+from chutelab.results.quantities import rolling, squeezed, waits
 from chutelab.studies.accuracy import Accuracy, Wanted
 from chutelab.util.tables import Sheet, number, wrapped
 
@@ -73,8 +71,7 @@ def _way(recording: Recording) -> Sheet:
 
 def _notes(recording: Recording) -> Iterator[str]:
     """Yield what happened that is easily overlooked."""
-    late = waits(recording.scene, recording)
-    if late is not None:
+    if (late := waits(recording)) is not None:
         said = []
         if late.particles:
             said.append(
@@ -84,9 +81,7 @@ def _notes(recording: Recording) -> Iterator[str]:
         if late.never:
             said.append(f"{late.never} found no free place until the end")
         yield "; ".join(said) + "."
-    released = recording.select(Kind.RELEASE)
-    pressed = squeeze(recording.scene, released["t"], released["position"])
-    if pressed is not None:
+    if (pressed := squeezed(recording)) is not None:
         yield (
             f"{pressed.particles} particles rode into others round the pulley,"
             f" {number(pressed.deepest)} m deep at most: adhesion carries all layers at one speed,"
@@ -94,10 +89,10 @@ def _notes(recording: Recording) -> Iterator[str]:
             " highest there past the top."
         )
     if (left := rolling(recording)) is not None:
-        disks = "1 disk rolls" if left["particles"] == 1 else f"{left['particles']} disks roll"
+        disks = "1 disk rolls" if left.particles == 1 else f"{left.particles} disks roll"
         yield (
             f"{disks} on the outgoing belt: nothing slips, and nothing is carried along. The belt"
-            f" has paid {number(left['belt_work'])} J, loads that are carried take"
-            f" {number(left['belt_work_carried'])} J (a disk that arrives without turning takes a"
+            f" has paid {number(left.belt_work)} J, loads that are carried take"
+            f" {number(left.belt_work_carried)} J (a disk that arrives without turning takes a"
             " third of a carried load's work)."
         )

@@ -23,7 +23,7 @@ import pymunk
 from numpy.typing import NDArray
 from pymunk import Vec2d, batch
 
-from chutelab.engines.pymunk.world import PARTICLE, Carriage, Tracks, World, time_out
+from chutelab.engines.pymunk.world import PARTICLE, Carriage, Flight, Tracks, World
 from chutelab.machine import Machine
 from chutelab.results import REASONS, Kind
 from chutelab.results.recorder import Recorder
@@ -52,7 +52,12 @@ friction hops for some steps at a time; the ride ends with its last push."""
 CALM, STILL = 0.1, 1e-3
 """s and m/s: who slips and moves less for that long has settled."""
 
-_BODY = batch.BodyFields.POSITION | batch.BodyFields.VELOCITY | batch.BodyFields.ANGULAR_VELOCITY
+_BODY = (
+    batch.BodyFields.BODY_ID
+    | batch.BodyFields.POSITION
+    | batch.BodyFields.VELOCITY
+    | batch.BodyFields.ANGULAR_VELOCITY
+)
 _ARBITER = (
     batch.ArbiterFields.BODY_A_ID
     | batch.ArbiterFields.BODY_B_ID
@@ -145,7 +150,6 @@ class Shared:
         ids = np.array([body.id for body in bodies], dtype=np.uintp)
         self.row = ids.argsort()
         self.ids = ids[self.row]
-        self.order: NDArray[np.int64] | None = None
 
     def _round_end(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
         """Have the end of a belt move along its rim; beside the face it is not met."""
@@ -203,14 +207,14 @@ class Shared:
         starts = self.machine.releases
         x, v = Vec2d(*starts.position[i].tolist()), Vec2d(*starts.velocity[i].tolist())
         self.recorder.events(Kind.RELEASE, i, t, tuple(x), tuple(v))
-        self.inside[i], self.order = True, None
+        self.inside[i] = True
         body, circle = self.disks[i]
         self.world.space.add(body, circle)
         if starts.carried[i]:
             ride = self.rides[i] = Carriage(self.machine, self.world, i, t)
             body.body_type = pymunk.Body.KINEMATIC
-            body.position, body.velocity = ride.state(self.t - 0.5 * self.h)
-            self.state[1, :2, i], self.state[1, 2:4, i] = ride.state(self.t)
+            body.position, body.velocity = ride.at(self.t - 0.5 * self.h - t)
+            self.state[1, :2, i], self.state[1, 2:4, i] = ride.at(self.t - t)
             # A belt that stands holds it for good.
             self.calm[i] = -inf if ride.speed else inf
         else:
@@ -237,7 +241,7 @@ class Shared:
             body, circle = self.disks[i]
             if ride.until <= self.t:
                 ride.write(self.recorder, ride.until)
-                x, v = ride.state(ride.until)
+                x, v = ride.at(ride.until - ride.t)
                 self.recorder.events(
                     Kind.SEPARATION, i, ride.until, tuple(x), tuple(v), surface=ride.surface
                 )
@@ -248,10 +252,9 @@ class Shared:
                 body.body_type = pymunk.Body.DYNAMIC
                 body.mass, body.moment = p.mass, p.inertia or inf
                 self.world.space.add(body, circle)
-                self.order = None
                 self._free(i, ride.until, x, v)
             elif ahead > ride.top:
-                body.velocity = (ride.state(ahead)[0] - body.position) / self.h
+                body.velocity = (ride.at(ahead - ride.t)[0] - body.position) / self.h
 
     # Steps
 
@@ -271,15 +274,11 @@ class Shared:
 
     def _states(self) -> None:
         """Read the state of all bodies."""
-        space, buffer = self.world.space, self.buffer
-        if self.order is None:
-            buffer.clear()
-            batch.get_space_bodies(space, batch.BodyFields.BODY_ID, buffer)
-            self.order = self._rows(np.frombuffer(buffer.int_buf(), dtype=np.uintp))
-        buffer.clear()
-        batch.get_space_bodies(space, _BODY, buffer)
+        self.buffer.clear()
+        batch.get_space_bodies(self.world.space, _BODY, self.buffer)
+        rows = self._rows(np.frombuffer(self.buffer.int_buf(), dtype=np.uintp))
         self.state[0], after = self.state[1], self.state[1]
-        after[:, self.order] = np.frombuffer(buffer.float_buf()).reshape(-1, 5).T
+        after[:, rows] = np.frombuffer(self.buffer.float_buf()).reshape(-1, 5).T
         after[:2] += (0.5 * self.h) * after[2:4]
         after[:, self.count :] = 0.0
 
@@ -375,7 +374,7 @@ class Shared:
         for i in np.flatnonzero(out & self.free).tolist():
             begin = Vec2d(*self.state[0, :2, i].tolist())
             v = Vec2d(*self.state[0, 2:4, i].tolist())
-            late = time_out(self.machine, begin, v)
+            late = Flight(begin, v, self.pull).leaves(self.machine.exit_box)
             if late < self.h and (entries[:, i] == self.entries[:, i]).all():
                 # It flew, and left within the step.
                 after = v + late * self.pull
@@ -413,4 +412,3 @@ class Shared:
         self.recorder.ended[i] = REASONS.index(reason)
         self.world.space.remove(*self.disks[i])
         self.inside[i] = self.free[i] = False
-        self.order = None

@@ -19,10 +19,8 @@ from chutelab.engines.simulation import simulate
 from chutelab.pictures.animation import Stage, animate, film
 from chutelab.pictures.animation.moments import span
 from chutelab.pictures.animation.stage import lay_out
-from chutelab.pictures.plots import machine_of, style
-from chutelab.results.comparison import scene_of
+from chutelab.pictures.plots import style
 from chutelab.scene import load, shipped
-from chutelab.theory import predict
 
 FRAMES, PARTICLES, FPS = 120, 60, 25
 REPEATS = 3
@@ -40,7 +38,7 @@ def timed(make, path):
 
 def slowed(recording):
     """Return the slowness at which the film has `FRAMES` frames."""
-    layout = lay_out(recording, machine_of(recording), width=800, height=450)
+    layout = lay_out(recording, recording.machine, width=800, height=450)
     begin, end = span(recording, layout.window)
     low, high = 0.1, 100.0
     while True:
@@ -55,7 +53,7 @@ def usual(recording, slow, layout, moments):
     """Return a function that writes the film by FuncAnimation, every frame drawn as a figure."""
 
     def make(path):
-        machine, prediction = machine_of(recording), predict(scene_of(recording))
+        machine, prediction = recording.machine, recording.prediction
         stage = Stage(recording, machine, prediction, layout, moments, slow=slow)
         figure, high = stage.figure, stage.figure.bbox.height
         bars = []

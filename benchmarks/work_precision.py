@@ -22,8 +22,8 @@ from chutelab.cli.benching import duration, environment_line
 from chutelab.cli.console import progress, show, show_json
 from chutelab.cli.output import destination
 from chutelab.cli.parameters import folder
-from chutelab.cli.report import plain_table, titled
-from chutelab.util.tables import tsv_text
+from chutelab.util.files import tsv_text
+from chutelab.util.tables import Sheet
 from chutelab.util.versions import environment
 from workprecision import picture
 from workprecision.claims import exponent
@@ -56,14 +56,12 @@ def record_tables(rows: Sequence[wp.Record], said: Sequence[wp.Claim]) -> Iterat
 
 def _table(title: str, rows: Sequence[wp.Record], *, crowd: bool) -> RenderableType:
     beside = ["worst", "residual", "shift"] if crowd else ["of", "runs"]
-    table = plain_table(["method", "at", "first", "median", "error", "memory", *beside])
-    for column in table.columns:
-        column.no_wrap = True
+    cells = []
     for one, before in zip(rows, [None, *rows], strict=False):
         last = [_digits(one.overlap), _digits(one.residual), _length(one.place_shift)]
         if not crowd:
             last = [one.quantity, "" if one.median is None else str(one.repeats)]
-        table.add_row(
+        row = (
             "" if before is not None and before.method == one.method else one.method,
             _at(one),
             duration(one.first),
@@ -72,7 +70,9 @@ def _table(title: str, rows: Sequence[wp.Record], *, crowd: bool) -> RenderableT
             _bytes(one.memory),
             *last,
         )
-    return titled(title, table)
+        cells.append(row)
+    heads = ("method", "at", "first", "median", "error", "memory", *beside)
+    return Sheet(title, heads, tuple(cells))
 
 
 def _at(one: wp.Record, lead: str = "") -> str:
@@ -91,14 +91,12 @@ def _length(value: float | None) -> str:
 def size_tables(rows: Sequence[wp.Size]) -> Iterator[RenderableType]:
     """Return a table for each case and method of ``--scaling``, with the fitted exponents."""
     for case, method in dict.fromkeys((one.case, one.method) for one in rows):
-        table = plain_table(
-            ["particles", "events", "first", "median", "runs", "an event", "memory", ""], texts=0
-        )
+        cells = []
         for one in rows:
             if (one.case, one.method) != (case, method):
                 continue
             each = one.median / one.events if one.median and one.events else None
-            table.add_row(
+            row = (
                 f"{one.particles:,}",
                 "" if one.events is None else f"{one.events:,}",
                 duration(one.first),
@@ -108,15 +106,16 @@ def size_tables(rows: Sequence[wp.Size]) -> Iterator[RenderableType]:
                 _bytes(one.memory),
                 one.failed,
             )
+            cells.append(row)
         powers = (exponent(rows, case, method, what) for what in ("median", "memory"))
         fitted = ", ".join(
             f"{name} ∝ N^{power:.2f}"
             for name, power in zip(("time", "memory"), powers, strict=True)
             if power is not None
         )
-        yield titled(
-            f"{case.capitalize()}, {wp.METHODS[method].title}: {fitted or 'too few'}", table
-        )
+        title = f"{case.capitalize()}, {wp.METHODS[method].title}: {fitted or 'too few'}"
+        heads = ("particles", "events", "first", "median", "runs", "an event", "memory", "")
+        yield Sheet(title, heads, tuple(cells), texts=0, tail=1)
 
 
 def _bytes(size: int | None) -> str:

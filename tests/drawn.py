@@ -6,7 +6,6 @@ import numpy as np
 
 from chutelab.machine import build
 from chutelab.results import Kind
-from chutelab.results.comparison import scene_of
 from chutelab.scene import SceneError, from_dict
 
 LASTING = (Kind.SLIP, Kind.STICK, Kind.SETTLE)
@@ -42,7 +41,7 @@ def only_blows(recording, apart=0.0):
     """
     if np.isin(recording.events["kind"], LASTING).any():
         return False
-    carried = build(scene_of(recording)).releases.carried
+    carried = recording.machine.releases.carried
     for particle in range(recording.count):
         own = recording.events[recording.events["particle"] == particle]
         knots = recording.track(particle)

@@ -20,9 +20,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial import cKDTree
 from scipy.stats import kstest
 
-from chutelab.machine import build
 from chutelab.results import Kind
-from chutelab.results.comparison import scene_of
 
 # First impacts
 
@@ -653,7 +651,7 @@ def inside_surfaces(recording, machine, times):
 
 def _free(recording, times):
     """Yield places (k, 2) of the disks that are there, and not carried, at each time."""
-    carried = build(scene_of(recording)).releases.carried
+    carried = recording.machine.releases.carried
     free_from = np.where(carried, inf, -inf)
     for event in recording.select(Kind.SEPARATION)[::-1]:
         if carried[event["particle"]]:

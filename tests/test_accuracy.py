@@ -12,6 +12,7 @@ from chutelab import scene as sc
 from chutelab import theory
 from chutelab.engines.reference import UnableError
 from chutelab.engines.simulation import simulate
+from chutelab.machine import build
 from chutelab.results import Kind
 from chutelab.results.comparison import QUANTITIES, compare
 from chutelab.studies.accuracy import (
@@ -153,7 +154,7 @@ def made_up(scene, order, size=0.05, steps=0.1):
         events["position"][landed, 0] += size * (asked.run.dt / 1e-3) ** order
         return replace(
             plain, events=events, engine="pymunk", knots=plain.knots.copy(),
-            scene=asked.model_dump_json(by_alias=True), steps=round(steps / asked.run.dt),
+            machine=build(asked), steps=round(steps / asked.run.dt),
         )  # fmt: skip
 
     return run

@@ -17,7 +17,6 @@ from chutelab.engines.exact import contacts
 from chutelab.mechanics import ballistics, impact
 from chutelab.results import REASONS, Kind
 from chutelab.results.comparison import QUANTITIES, compare
-from chutelab.results.comparison import scene_of as scene_from
 from chutelab.studies.accuracy import reach
 from drawn import draw
 
@@ -31,7 +30,7 @@ def contacts_of(recording):
 
 
 def plate_normal(recording):
-    alpha = radians(scene_from(recording).plate.angle_deg)
+    alpha = radians(recording.scene.plate.angle_deg)
     return np.array([-cos(alpha), -sin(alpha)])
 
 
@@ -237,9 +236,9 @@ def test_a_wrong_formula_is_caught_from_outside(where, wrong, until, monkeypatch
 
 def test_a_wrong_formula_that_places_the_belt_is_caught_by_the_theory(monkeypatch):
     """The machine's own arrays are shared by all engines; only the theory has none of them."""
-    right = ballistics.crossing
+    right = ballistics.descent
     monkeypatch.setattr(
-        "chutelab.machine.nominal.crossing", lambda *gap: right(*gap) * (1.0 + WRONG)
+        "chutelab.machine.nominal.descent", lambda *gap: right(*gap) * (1.0 + WRONG)
     )
     drawn = scene.load("perpendicular")
     failed = [row.pair for row in agreement(drawn) if not row.holds]

@@ -18,7 +18,7 @@ from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 from PIL import Image
 
-from chutelab import scene, theory
+from chutelab import scene
 from chutelab.cli import main
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
@@ -36,10 +36,9 @@ from chutelab.pictures.animation.moments import (
 )
 from chutelab.pictures.animation.palette import BITS, CLEAR, Lettering, Palette, colours, tint
 from chutelab.pictures.animation.stage import Layout, lay_out
-from chutelab.pictures.plots import machine_of, style, window_of
+from chutelab.pictures.plots import style, window_of
 from chutelab.pictures.plots.scenery import energies
 from chutelab.results import Kind, Recording
-from chutelab.results.comparison import scene_of
 from chutelab.results.recorder import Recorder
 from test_plots import (
     BELT_TIME,
@@ -68,7 +67,7 @@ def moments_at(times: Sequence[float]) -> tuple[Moment, ...]:
 
 
 def laid_out(recording: Recording, width: int = WIDTH, height: int = HEIGHT, **more: Any) -> Layout:
-    return lay_out(recording, machine_of(recording), width=width, height=height, **more)
+    return lay_out(recording, recording.machine, width=width, height=height, **more)
 
 
 def stage_of(
@@ -76,8 +75,8 @@ def stage_of(
 ) -> Stage:
     return Stage(
         recording,
-        machine_of(recording),
-        theory.predict(scene_of(recording)),
+        recording.machine,
+        recording.prediction,
         layout or laid_out(recording),
         at,
         slow=slow,
@@ -99,15 +98,12 @@ def filmed(recording: Recording) -> tuple[tuple[Moment, ...], float]:
 def recorded(*events: tuple[Kind, float, float, float]) -> Recording:
     """Particle 0 with events of (kind, s, m/s along x, N s) on the incoming belt."""
     machine = build(scene.parse(TEXT))
-    recorder = Recorder(1, machine.surfaces)
+    recorder = Recorder(machine)
     for kind, t, speed, push in events:
         velocity = np.array([speed, 0.0])
         recorder.knots([0], [t], np.zeros(2), velocity, 0.0)
         recorder.events(kind, [0], [t], np.zeros(2), velocity, surface=0, normal_impulse=push)
-    return recorder.finish(
-        scene=machine.scene, title="Told", engine="exact", particle=machine.particle,
-        gravity=G, steps=0, seconds=0.0,
-    )  # fmt: skip
+    return recorder.finish(engine="exact", steps=0)
 
 
 # Which moments
@@ -189,7 +185,7 @@ def test_loops_take_five_to_ten_seconds(runs: dict[str, Recording]) -> None:
 
 def test_film_begins_as_the_particle_comes_into_view(runs: dict[str, Recording]) -> None:
     recording = runs["perpendicular"]
-    window = window_of(recording, machine_of(recording))
+    window = window_of(recording, recording.machine)
     begin, end = span(recording, window)
     x = -1.0 + 2.0 * begin
     inset = moments.EDGE * max(window.width, window.height)
@@ -294,7 +290,7 @@ def test_contact_normal_is_that_of_the_plate(name: str, angle: float, overrides:
     recording = simulate(scene.load(name, [*overrides, "plate.restitution=0.4"]))
     (hit,) = recording.select(Kind.IMPACT, surface="plate")
     normal = -np.cos(np.radians(angle)), -np.sin(np.radians(angle))
-    assert contact_normal(machine_of(recording), hit) == pytest.approx(normal, abs=1e-14)
+    assert contact_normal(recording.machine, hit) == pytest.approx(normal, abs=1e-14)
     said = float(sentence(recording, hit).partition(", ε = ")[2].partition("\n")[0])
     # A fixed step mixes a step's gravity into the velocities.
     assert said == pytest.approx(0.4, abs=0.02 if "run.align=false" in overrides else 0.0)
@@ -313,7 +309,7 @@ def test_contact_normal_points_away_from_a_clipped_end() -> None:
     end = np.array([0.6, -0.3])
     assert np.hypot(*(hit["position"] - end)) == pytest.approx(0.02, rel=1e-9)
     expected = (hit["position"] - end) / 0.02
-    assert contact_normal(machine_of(recording), hit) == pytest.approx(expected, abs=1e-14)
+    assert contact_normal(recording.machine, hit) == pytest.approx(expected, abs=1e-14)
 
 
 def test_separation_is_told_by_its_angle(runs: dict[str, Recording]) -> None:
@@ -416,7 +412,7 @@ def test_everything_that_moves_and_its_arrow_is_in_the_window(runs: dict[str, Re
         position, velocity = (values[:, 0] for values in recording.at(times))
         aspect = layout.view[2] * WIDTH / (layout.view[3] * HEIGHT)
         # What leaves the window for good takes its arrow with it.
-        inside = window_of(recording, machine_of(recording)).fitted(aspect).holds(position)
+        inside = window_of(recording, recording.machine).fitted(aspect).holds(position)
         tips = position + layout.arrow * velocity
         assert layout.window.holds(tips[inside]).all(), name
         fastest = np.hypot(*(layout.arrow * velocity[inside]).T).max()

@@ -17,10 +17,11 @@ from chutelab.checks import workprecision as bench
 from chutelab.checks.workprecision import METHODS, Stopwatch, Timing, clocked, measure
 from chutelab.cli import benching, main
 from chutelab.engines.simulation import simulate
+from chutelab.machine import build
 from chutelab.pictures.plots.workprecision import LOOKS
 from chutelab.pictures.plots.workprecision import workprecision as draw
 from chutelab.scene import load
-from chutelab.util.tables import tsv_text
+from chutelab.util.files import tsv_text
 from chutelab.util.versions import environment
 
 
@@ -104,7 +105,7 @@ def test_a_planted_error_is_told(monkeypatch):
 
     def wrong(scene, engine=None, progress=None):
         faster = scene.model_copy(update={"gravity": scene.gravity * 1.001})
-        return replace(simulate(faster, engine, progress), scene=simulate(scene, engine).scene)
+        return replace(simulate(faster, engine, progress), machine=build(scene))
 
     monkeypatch.setattr(bench, "simulate", wrong)
     (row,) = measure(load("perpendicular"), ("exact",), repeats=0)

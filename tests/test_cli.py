@@ -18,6 +18,8 @@ import chutelab
 from chutelab import scene as sc
 from chutelab.checks.agreement import BLOWS
 from chutelab.cli import console, main
+from chutelab.machine import build
+from chutelab.theory import predict
 from test_bad_scenes import BROKEN
 
 SOURCES = str(Path(chutelab.__file__).parent.parent)
@@ -64,6 +66,23 @@ def refused(*arguments):
     assert result.stdout == ""
     assert sorted(Path().rglob("*")) == before
     return result.stderr
+
+
+def calls(functions, *arguments):
+    """Call, and count how often functions are entered on the way."""
+    codes = {function.__code__: function.__name__ for function in functions}
+    found = dict.fromkeys(codes.values(), 0)
+
+    def entered(frame, event, _):
+        if event == "call" and frame.f_code in codes:
+            found[codes[frame.f_code]] += 1
+
+    sys.setprofile(entered)
+    try:
+        call(*arguments)
+    finally:
+        sys.setprofile(None)
+    return found
 
 
 def process(*arguments, **options):
@@ -306,6 +325,13 @@ def test_a_run_writes_the_whole_set():
     for row in (rows[7], rows[-1]):
         (position,), (velocity,) = (at[0] for at in recording.at([float(row["t"])]))
         assert [float(row[key]) for key in ("x", "y", "vx", "vy")] == [*position, *velocity]
+
+
+def test_a_run_works_everything_out_once():
+    found = calls([sc.Scene.model_validate.__func__, build, predict],
+                  "run", "perpendicular", "--out", "once")  # fmt: skip
+    # The theory answers twice: as corrected and as printed.
+    assert found == {"model_validate": 1, "build": 1, "predict": 2}
 
 
 def test_a_run_says_what_it_wrote_and_only_chooses():

@@ -11,7 +11,7 @@ import pytest
 from chutelab import scene, theory
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind
-from chutelab.results.comparison import QUANTITIES, compare, relative_error, scene_of
+from chutelab.results.comparison import QUANTITIES, compare, relative_error
 
 M, R, r = 0.008, 0.1, 0.004
 
@@ -32,7 +32,7 @@ def first(recording, kind, surface):
 
 def from_events(recording):
     """The paper's quantities of particle 0, from separation, impact and landing."""
-    drawn = scene_of(recording)
+    drawn = recording.scene
     alpha, belt, rate = radians(drawn.plate.angle_deg), drawn.outgoing.speed, drawn.stream.rate
     left = first(recording, Kind.SEPARATION, "incoming")
     hit = first(recording, Kind.IMPACT, "plate")
@@ -85,7 +85,7 @@ def test_an_error_is_a_difference_over_the_larger_of_theory_and_scale(engine, na
     if engine == "pymunk" and "stream" in name:
         overrides = ("stream.count=1",)
     recording = run(name, *overrides, engine=engine)
-    compared, drawn = compare(recording), scene_of(recording)
+    compared, drawn = compare(recording), recording.scene
     predicted = theory.predict(drawn)
     v2, t2, t3 = (float(getattr(predicted, key)) for key in ("v2", "t2", "t3"))
     energy = 0.5 * drawn.particle.mass * v2**2
@@ -173,7 +173,7 @@ def test_a_stream_takes_its_power_steadily():
     work = ledger(recording).by_surface["outgoing"]["belt_work"]
     assert work / (100 / 50.0) == pytest.approx(power, rel=1e-13)
     # and the theory's dEk over the time per particle, Eq. (15)
-    predicted = theory.predict(scene_of(recording))
+    predicted = recording.prediction
     assert float(predicted.P) == pytest.approx(0.5 * M * (vx[0] ** 2 + 9.0) * 50.0, rel=1e-13)
     # the books of many are no particle's own
     assert isnan(compare(recording).simulated["belt_work"])

@@ -24,7 +24,7 @@ from chutelab.pictures.plots.design import draw_scan, scan, spread
 from chutelab.scene.variants import VaryError
 from chutelab.studies.design import sensitivity
 from chutelab.studies.design.evaluation import Evaluator, suits
-from chutelab.studies.design.quantities import SHORT, measured, target, to_toml
+from chutelab.studies.design.quantities import SHORT, measured, target
 from chutelab.studies.design.uncertainty import spreads
 
 G, V, R, D, DROP, M = 9.81, 2.0, 0.1, 0.5, 0.5, 0.008
@@ -465,9 +465,9 @@ def test_a_scene_survives_as_text():
         "stream": {"at": [0.0, 1.0], "velocity": [2.0, 0.0], "interact": False},
     }
     given = scene.from_dict(document)
-    again = scene.parse(to_toml(given, "A comment\nof two lines"))
+    again = scene.parse(scene.to_toml(given, "A comment\nof two lines"))
     assert again == given
-    assert to_toml(chutelab.load("perpendicular")).count("expect") == 0
+    assert scene.to_toml(chutelab.load("perpendicular")).count("expect") == 0
 
 
 # x2 = d1 = R + d_okr for a point that leaves at the top: linear in both.

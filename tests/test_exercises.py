@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from chutelab.classroom.exercises import EXERCISES, ExerciseError, Values, Verdict, find, lesson
-from chutelab.classroom.exercises.exercise import draw, draws, shown, solved
+from chutelab.classroom.exercises.exercise import attempt, draw, shown
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind
 from chutelab.scene import from_dict
@@ -85,7 +85,7 @@ def test_students_differ_and_so_do_the_lessons_of_one():
 @pytest.mark.parametrize("name", NAMES)
 def test_most_exercises_accept_one_draw_in_ten(name):
     exercise = EXERCISES[name]
-    fits = [solved(exercise, draws(exercise, f"draw {i}", 0)) is not None for i in range(80)]
+    fits = [attempt(exercise, f"draw {i}", 0) is not None for i in range(80)]
     assert sum(fits) >= 4
 
 
@@ -277,6 +277,23 @@ def test_what_is_no_known_mistake_is_told_how_far_off_it_is():
         reply = task.check(1, ratio * right)
         assert reply.verdict is Verdict.OFF
         assert text in reply.text, (ratio, reply)
+
+
+def exchange(name):
+    """All that is said about one question of a lesson, a line each."""
+    task, cases = lesson(name, "Ada Lovelace"), draw(EXERCISES[name], "Ada Lovelace")[1]
+    number = 1 + task.exercise.number % 4
+    case = cases[number - 1]
+    own = [trace.number for trace in case.mistakes[: len(case.question.mistakes)]]
+    answers = [case.right, *own, 1.03 * case.right, 3.3 * case.right, None]
+    said = [task, task.question(number), *(task.check(number, answer) for answer in answers)]
+    said += [task.hint(number), task.hint(number), task.hint(number), task.reveal(number)]
+    return [" ".join(str(one).split()) for one in said]
+
+
+def test_what_is_said_stays_as_it_is_word_for_word():
+    stored = (SOLUTIONS / "replies.txt").read_text(encoding="utf-8").splitlines()
+    assert [line for name in NAMES for line in exchange(name)] == stored
 
 
 def test_no_reply_gives_the_answer_away():

@@ -15,7 +15,6 @@ from chutelab import theory
 from chutelab.checks.agreement import MOST_ALONE, verify
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind
-from chutelab.results.comparison import scene_of
 from chutelab.results.quantities import measure
 from chutelab.results.summary import summary
 from chutelab.scene.rules import SYMBOLS, unit_of
@@ -384,7 +383,7 @@ def test_a_wrong_expectation_of_a_shipped_scene_is_noticed():
 
 def test_expectations_travel_with_the_recording_and_change_nothing():
     scene, recording = shipped("perpendicular")
-    assert scene_of(recording).expect == scene.expect
+    assert recording.scene.expect == scene.expect
     tables = sc.to_dict(scene)
     del tables["expect"]
     bare = simulate(sc.from_dict(tables, scene.source))

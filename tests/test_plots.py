@@ -25,7 +25,6 @@ from chutelab.machine import build
 from chutelab.pictures import plots
 from chutelab.pictures.plots import Window, scenery, style
 from chutelab.results import Kind, Recording
-from chutelab.results.comparison import scene_of
 from chutelab.results.recorder import Recorder
 
 G, V, R, PARTICLE, EPS, DISTANCE, DROP, MASS, MU = 9.81, 2.0, 0.1, 0.004, 0.5, 0.5, 0.5, 0.008, 0.5
@@ -70,7 +69,7 @@ def by_hand(residual: float = 0.0, shift: float = 0.0) -> Recording:
     `residual` J too few are booked as slip heat; the flight is `shift` m too high.
     """
     machine = build(scene.parse(TEXT))
-    recorder = Recorder(1, machine.surfaces)
+    recorder = Recorder(machine)
     start = np.array([-1.0, R + PARTICLE])
     along = np.array([V, 0.0])
     lifted = np.array([0.0, shift])
@@ -109,10 +108,7 @@ def by_hand(residual: float = 0.0, shift: float = 0.0) -> Recording:
         normal_impulse=MASS * abs(down[1]), tangential_impulse=push,
     )  # fmt: skip
     recorder.ended[:] = 1
-    return recorder.finish(
-        scene=machine.scene, title="By hand", engine="exact", particle=machine.particle,
-        gravity=G, steps=3, seconds=0.0,
-    )  # fmt: skip
+    return recorder.finish(engine="exact", steps=3)
 
 
 def axes(width: float = 6.0, height: float = 4.0) -> Axes:
@@ -189,7 +185,7 @@ def test_arcs_stop_where_the_theory_does() -> None:
 
 def test_flight_is_nan_off_the_arcs_and_after_the_impact_at_it() -> None:
     recording = by_hand()
-    parts, start = plots.analytic_of(recording, theory.predict(scene_of(recording)))
+    parts, start = plots.analytic_of(recording, recording.prediction)
     assert start == BELT_TIME
     times = np.array([-1e-9, 0.0, 0.1, parts[0].end, parts[1].end + 1e-9])
     position, velocity = plots.flight(parts, times)
@@ -201,7 +197,7 @@ def test_flight_is_nan_off_the_arcs_and_after_the_impact_at_it() -> None:
 
 def test_dashed_line_is_the_formula() -> None:
     recording = by_hand()
-    parts, _ = plots.analytic_of(recording, theory.predict(scene_of(recording)))
+    parts, _ = plots.analytic_of(recording, recording.prediction)
     ax = plots.draw_analytic(axes(), parts)
     drawn = line(ax, "analytic")
     since = np.where(
@@ -276,7 +272,7 @@ def test_subset_is_the_same_motion(runs: dict[str, Recording]) -> None:
 
 def test_residual_is_the_distance_planted() -> None:
     recording = by_hand(shift=1e-6)
-    parts, start = plots.analytic_of(recording, theory.predict(scene_of(recording)))
+    parts, start = plots.analytic_of(recording, recording.prediction)
     ax = plots.draw_residual(axes(), recording, parts, start)
     residual = line(ax, "residual")
     assert residual[:, 1] == pytest.approx(1e-6, rel=1e-8)
@@ -292,7 +288,7 @@ def test_residual_is_the_distance_planted() -> None:
 def test_residual_of_an_exact_run_stays_on_a_sensible_axis(runs: dict[str, Recording]) -> None:
     for name in EXACT:
         recording = runs[name]
-        parts, start = plots.analytic_of(recording, theory.predict(scene_of(recording)))
+        parts, start = plots.analytic_of(recording, recording.prediction)
         ax = plots.draw_residual(axes(), recording, parts, start)
         residual = line(ax, "residual")[:, 1]
         low, high = ax.get_ylim()
@@ -315,7 +311,7 @@ def test_without_parabola_the_panel_says_why() -> None:
 
 def test_velocity_lines_are_the_components() -> None:
     recording = by_hand()
-    parts, start = plots.analytic_of(recording, theory.predict(scene_of(recording)))
+    parts, start = plots.analytic_of(recording, recording.prediction)
     ax = plots.draw_velocity(axes(), recording, parts, start)
     for axis, name in enumerate(("vx", "vy")):
         drawn = line(ax, name)
@@ -392,7 +388,7 @@ def test_round_times_are_multiples_within_the_bounds() -> None:
 
 def test_window_is_cropped_to_the_action_but_holds_it() -> None:
     recording = by_hand()
-    machine = plots.machine_of(recording)
+    machine = recording.machine
     window = plots.window_of(recording, machine)
     path = expected(np.linspace(0.0, t_landing(), 100))[0]
     for x, y in [*path, (-R, -R), (R, R), (R + DISTANCE, R + 0.3)]:
@@ -405,7 +401,7 @@ def test_window_is_cropped_to_the_action_but_holds_it() -> None:
 
 def test_a_long_slide_does_not_make_all_else_small(runs: dict[str, Recording]) -> None:
     recording = runs["belt-landing"]
-    window = plots.window_of(recording, plots.machine_of(recording))
+    window = plots.window_of(recording, recording.machine)
     assert window.width < 4.0
     assert window.right > 1.2
 
@@ -537,7 +533,7 @@ def test_overlay_holds_all_its_parts(tmp_path: Path) -> None:
 
 def test_given_prediction_is_the_one_drawn() -> None:
     recording = by_hand()
-    other = theory.predict(scene_of(recording))
+    other = recording.prediction
     slower = replace(other, t2=other.t2 * 2.0)
     figure = plots.overlay(recording, slower)
     residual = line(figure.axes[1], "residual")
@@ -557,12 +553,9 @@ def test_failure_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
 
 def test_a_run_that_is_over_at_once_can_be_drawn() -> None:
     machine = build(scene.parse(TEXT))
-    recorder = Recorder(1, machine.surfaces)
+    recorder = Recorder(machine)
     recorder.knots([0], [0.0], [-1.0, R + PARTICLE], [V, 0.0], 0.0)
-    recording = recorder.finish(
-        scene=machine.scene, title="", engine="exact", particle=machine.particle, gravity=G,
-        steps=0, seconds=0.0,
-    )  # fmt: skip
+    recording = recorder.finish(engine="exact", steps=0)
     figure = plots.overlay(recording)
     figure.canvas.draw()
     assert (line(figure.axes[0], "track") == [-1.0, R + PARTICLE]).all()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tracemalloc
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -33,16 +34,20 @@ def made(mapping):
     return exact.run(machine.build(scene.from_dict(mapping)))
 
 
-def finish(recorder, *, gravity=G, inertia=0.0):
-    return recorder.finish(
-        scene="{}",
-        title="made by hand",
-        engine="exact",
-        particle=Particle(0.0, M, inertia),
-        gravity=gravity,
-        steps=0,
-        seconds=0.0,
-    )
+def recorder_of(count, *, surfaces=(), gravity=G, inertia=0.0):
+    """What particles of the mass M would be recorded with, none of which has done anything yet."""
+    tables = {
+        "gravity": gravity,
+        "particle": {"radius": 0.0, "mass": M},
+        "stream": {"count": count, "at": [0.0, 1.0], "velocity": [1.0, 0.0]},
+        "surface": [{"name": name, "from": [0.0, 0.0], "to": [1.0, 0.0]} for name in surfaces],
+    }
+    built = machine.build(scene.from_dict(tables))
+    return Recorder(replace(built, particle=Particle(0.0, M, inertia)))
+
+
+def finish(recorder):
+    return recorder.finish(engine="exact", steps=0)
 
 
 def parabola(p0, v0, s):
@@ -52,7 +57,7 @@ def parabola(p0, v0, s):
 
 
 def thrown(p0, v0, begin, end):
-    recorder = Recorder(1, ())
+    recorder = recorder_of(1)
     position, velocity = parabola(p0, v0, [0.0, end - begin])
     recorder.knots([0, 0], [begin, end], position, velocity, 0.0)
     return finish(recorder)
@@ -121,7 +126,7 @@ def test_a_ride_round_the_pulley_stays_on_the_arc():
 
 def crowd():
     """Three particles: the second never released, the third later than the first."""
-    recorder = Recorder(3, ())
+    recorder = recorder_of(3)
     for particle, begin, end in ((2, 0.25, 1.0), (0, 0.0, 0.5)):
         position, velocity = parabola((particle, 1.0), (1.0, 0.0), [0.0, end - begin])
         recorder.knots([particle] * 2, [begin, end], position, velocity, 0.0)
@@ -259,8 +264,7 @@ def test_events_are_found_by_kind_and_surface():
 
 
 def test_the_recorder_keeps_the_order_it_is_given():
-    recorder = Recorder(3, ("floor",))
-    assert recorder.surfaces == ("floor", "particles")
+    recorder = recorder_of(3, surfaces=["floor"])
     recorder.knots([2, 0], [0.0, 1.0], [[2.0, 0.0], [0.0, 0.0]], [1.0, 0.0], 0.5)
     recorder.book([2, 0], 0, 3.0, [1.0, 2.0], 0.5)
     recorder.knots([2, 2, 0], [1.0, 1.0, 2.0], [[3.0, 0.0], [4.0, 0.0], [5.0, 0.0]], 0.0, 0.0)
@@ -269,6 +273,7 @@ def test_the_recorder_keeps_the_order_it_is_given():
         recorder.events(kind, [particle], t, [[0.0, 0.0]], [[0.0, 0.0]])
     recorder.ended[:] = REASONS.index("settled")
     recording = finish(recorder)
+    assert recording.surfaces == ("floor", "particles")
     assert recording.offsets.tolist() == [0, 2, 4, 7]
     assert recording.track(0)["position"][:, 0].tolist() == [0.0, 5.0]
     assert recording.track(2)["position"][:, 0].tolist() == [2.0, 3.0, 4.0]
@@ -282,9 +287,9 @@ def test_the_recorder_keeps_the_order_it_is_given():
 
 
 def test_a_turning_disk_carries_energy_of_rotation():
-    recorder = Recorder(1, ())
+    recorder = recorder_of(1, gravity=0.0, inertia=0.5)
     recorder.knots([0, 0], [0.0, 1.0], [[0.0, 0.0], [1.0, 0.0]], [1.0, 0.0], [2.0, 4.0])
-    now = finish(recorder, gravity=0.0, inertia=0.5).energy_at([0.0, 0.5, 1.0])
+    now = finish(recorder).energy_at([0.0, 0.5, 1.0])
     spin = 0.5 * 0.5 * np.array([2.0, 3.0, 4.0]) ** 2
     assert now["kinetic"] == pytest.approx(0.5 * M + spin, rel=1e-15)
     assert now["residual"] == pytest.approx(spin - spin[0], rel=1e-15)

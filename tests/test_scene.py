@@ -7,6 +7,7 @@ import sys
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -447,3 +448,47 @@ def _python(code, cwd=None, path=Path(sc.__file__).parents[2]):
         check=True,
     )
     return run.stdout.strip()
+
+
+@pytest.mark.parametrize(
+    ("values", "read"),
+    [
+        ({"plate.angle_deg": 20.0}, lambda s: s.plate.angle_deg == 20.0),
+        ({"plate": {"distance": 0.4}}, lambda s: (s.plate.distance, s.plate.above) == (0.4, 0.3)),
+        ({"incoming.speed": 3}, lambda s: s.outgoing.speed == 3.0),
+        ({"incoming.speed": np.float64(3.5)}, lambda s: s.incoming.speed == 3.5),
+        ({"stream.count": 5.0}, lambda s: s.stream.count == 5),
+        ({"stream.seed": np.int64(7)}, lambda s: s.stream.seed == 7),
+        ({"stream.velocity": np.array([2.0, 0.0])}, lambda s: s.stream.velocity == (2.0, 0.0)),
+        ({"plate.above": None}, lambda s: "above" not in s.plate.model_fields_set),
+        ({"outgoing": None}, lambda s: s.outgoing is None and s.run.until == "settled"),
+        ({}, lambda s: True),
+    ],
+)
+def test_a_scene_with_other_values_is_validated_and_filled_in_anew(values, read):
+    scene = sc.load("perpendicular")
+    other = scene.with_values(values)
+    assert read(other)
+    assert other.source == scene.source
+    assert other == sc.from_dict(sc.to_dict(other))
+    assert (other == scene) == (not values or "plate.above" in values)
+
+
+def test_surfaces_go_by_index_or_name_in_other_values():
+    scene = sc.load("free-fall")
+    name = scene.surface[0].name
+    by_name = scene.with_values({f"surface.{name}.friction": 0.125})
+    assert by_name == scene.with_values({"surface[0].friction": 0.125})
+    assert by_name.surface[0].friction == 0.125
+
+
+def test_refused_values_are_named_by_their_keys_all_at_once():
+    with pytest.raises(sc.SceneError) as error:
+        sc.load("perpendicular").with_values(
+            {"plate.angle_deg": 95.0, "stream.count": 1.5, "surface.hood.speed": 1.0, "title": 3}
+        )
+    faults = {fault.key: fault for fault in error.value.faults}
+    assert list(faults) == ["surface.hood.speed", "title", "plate.angle_deg", "stream.count"]
+    assert faults["plate.angle_deg"].value == 95.0
+    assert faults["plate.angle_deg"].allowed.endswith("in degrees")
+    assert "from" not in str(faults["plate.angle_deg"])

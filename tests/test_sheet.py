@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import io
 from dataclasses import replace
 from html.parser import HTMLParser
 
+import numpy as np
 import pytest
+from rich.console import Console
 
 import chutelab
 from chutelab import theory
 from chutelab.results.ledger import ledger
-from chutelab.util.tables import Sheet
+from chutelab.util.tables import Sheet, plain
 
 SHEET = Sheet(
     "What & where",
@@ -50,13 +53,13 @@ def test_text_is_aligned_words_left_and_numbers_right():
     assert str(SHEET).splitlines()[:7] == [
         "What & where",
         "name  unit  value",
-        "----  ----  -----",
+        "─────────────────",
         "x     m      1.25",
         "a<b           -10",
-        "----  ----  -----",
+        "",
         "sum         -8.75",
     ]
-    notes = str(SHEET).splitlines()[7:]
+    notes = str(SHEET).splitlines()[8:]
     assert len(notes) == 2
     assert max(map(len, notes)) <= 80
 
@@ -121,3 +124,21 @@ def test_the_papers_tables_mark_what_differs():
     assert sum(cell.endswith("*") for row in sheet.rows for cell in row) == 22
     assert sheet.notes[0] == "22 of 88 cells differ in a printed digit."
     assert len(Cells(theory.table(3)._repr_html_()).rows) == 3
+
+
+def test_words_at_the_end_are_set_to_the_left_and_the_first_of_several_lines_is_bold():
+    sheet = Sheet("", ("law", "figure", ""), (("energy", "1e-3", "J\nin all"),), tail=1)
+    assert str(sheet).splitlines()[2:] == ["energy    1e-3  J", "                in all"]
+    assert "J<br>in all" in sheet._repr_html_()
+    assert sheet._repr_html_().count("text-align:right") == 2
+    terminal = Console(file=io.StringIO(), force_terminal=True, color_system="standard")
+    terminal.print(sheet)
+    assert "\x1b[1mJ\x1b[0m" in terminal.file.getvalue()
+
+
+def test_json_has_lists_for_arrays_and_null_for_what_is_not_finite():
+    found = plain({"sheet": replace(SHEET, notes=()), "x": np.array([[1.0, np.inf]]), "n": None})
+    assert found["x"] == [[1.0, None]]
+    assert found["n"] is None
+    assert found["sheet"]["columns"] == ["name", "unit", "value"]
+    assert plain(np.float64(np.nan)) is None

@@ -85,7 +85,7 @@ class Size:
 
 
 def from_tsv(text: str, kind: type[R]) -> tuple[list[R], dict[str, str]]:
-    """Return the rows and what is said about them, as `chutelab.util.tables.tsv_text` wrote them.
+    """Return the rows and what is said about them, as `chutelab.util.files.tsv_text` wrote them.
 
     Raises
     ------

@@ -24,7 +24,7 @@ from chutelab.results.quantities import measure
 from chutelab.results.recorder import StalledError
 from chutelab.scene import Expect, Scene, SceneError
 from chutelab.scene.rules import SYMBOLS, unit_of
-from chutelab.studies.accuracy import apart, changed, each, sizes, stirred
+from chutelab.studies.accuracy import apart, each, sizes, stirred
 from chutelab.theory import Transfer, predict
 
 ANSWERS: Final = {
@@ -98,7 +98,8 @@ def agreement(scene: Scene) -> tuple[Agreement, ...]:
     SceneError
         If the geometry contradicts itself.
     """
-    alone = changed(scene, "stream.count=1", "stream.interact=false", "run.engine=auto")
+    lone = {"stream.count": 1, "stream.interact": False, "run.engine": "auto", "expect": None}
+    alone = scene.with_values(lone)
     build(alone)
     found: dict[str, Recording] = {}
     rows: list[Agreement] = []
@@ -168,7 +169,7 @@ def _with_base(
         return Agreement(pair, what, error if isfinite(error) else None, allowed)
     errors = [error]
     for n in (1, 2):
-        finer = changed(scene, f"run.dt={scene.run.dt / REFINED**n!r}")
+        finer = scene.with_values({"run.dt": scene.run.dt / REFINED**n, "expect": None})
         errors.append(_distance(_run(finer, name), base)[0])
     seen = ", ".join(f"{error:.0e}" for error in errors)
     least = ORDERS[name] - CHANCE[name]

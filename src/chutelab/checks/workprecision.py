@@ -20,7 +20,7 @@ from typing import TypeVar
 from chutelab.engines.simulation import simulate
 from chutelab.results.recorder import StalledError
 from chutelab.scene import Scene, SceneError
-from chutelab.studies.accuracy import SMALLEST, STIR, Search, Wanted, changed
+from chutelab.studies.accuracy import SMALLEST, STIR, Search, Wanted
 from chutelab.util.arrays import Progress
 
 T = TypeVar("T")
@@ -161,7 +161,8 @@ def measure(
     many = scene.stream.count > 1
     steps = sorted(set(steps or (MANY_STEPS if many else STEPS)), reverse=True)
     methods = methods or (METHODS[:-1] if many else METHODS)
-    search = Search(changed(scene, f"run.dt={steps[-1]!r}"), Wanted(SMALLEST, "relative"))
+    finest = scene.with_values({"run.dt": steps[-1], "expect": None})
+    search = Search(finest, Wanted(SMALLEST, "relative"))
     tasks = [
         (method, step)
         for method in METHODS
@@ -193,8 +194,8 @@ def _judged(
     blank = Timing(method, "" if step is None else "dt", step)
     engine = "pymunk" if method == "fixed" else method
     if step is not None:
-        aligned = "false" if method == "fixed" else "true"
-        scene = changed(scene, f"run.dt={step!r}", f"run.align={aligned}")
+        aligned = method != "fixed"
+        scene = scene.with_values({"run.dt": step, "run.align": aligned, "expect": None})
     import_module(f"chutelab.engines.{engine}")  # or its import would be timed
     run = partial(simulate, scene, engine)
     try:

@@ -86,7 +86,7 @@ def bench(
     from chutelab.cli.console import progress
     from chutelab.cli.output import destination
     from chutelab.scene import load
-    from chutelab.util.tables import tsv_text
+    from chutelab.util.files import tsv_text
     from chutelab.util.versions import environment
 
     loaded = retitled(load(scene, list(overrides)), overrides)
@@ -115,11 +115,10 @@ def tables(title: str, timings: Sequence[Timing]) -> list[RenderableType]:
     """Return the table of a scene, why runs failed, and how errors are known."""
     from rich.text import Text
 
-    from chutelab.cli.report import plain_table, titled
+    from chutelab.util.tables import Sheet
 
-    table = plain_table(["engine", "dt", "first", "median", "runs", "error", "of"])
-    for one, before in zip(timings, [None, *timings], strict=False):
-        table.add_row(
+    rows = [
+        (
             "" if before is not None and before.method == one.method else one.method,
             "" if one.value is None else f"{one.value:.0e}",
             duration(one.first),
@@ -128,6 +127,9 @@ def tables(title: str, timings: Sequence[Timing]) -> list[RenderableType]:
             "failed" if one.error is None else f"{one.error:.1e}",
             one.quantity,
         )
+        for one, before in zip(timings, [None, *timings], strict=False)
+    ]
+    heads = ("engine", "dt", "first", "median", "runs", "error", "of")
     lines = [
         f"{one.method} failed{'' if one.value is None else f' at dt {one.value:.0e}'}: {one.failed}"
         for one in timings
@@ -136,7 +138,7 @@ def tables(title: str, timings: Sequence[Timing]) -> list[RenderableType]:
     for how in dict.fromkeys(one.how for one in timings if one.how):
         who = dict.fromkeys(one.method for one in timings if one.how == how)
         lines.append(f"error of {', '.join(who)}: {how}")
-    return [titled(title, table), Text("\n".join(lines), style="italic")]
+    return [Sheet(title, heads, tuple(rows)), Text("\n".join(lines), style="italic")]
 
 
 def environment_line(about: Mapping[str, str]) -> RenderableType:

@@ -174,16 +174,13 @@ def _tell(found: Residuals, fit: Fit | None, out: Path | None, *, as_json: bool)
         return
     from rich.text import Text
 
-    from chutelab.cli.report import drawn
     from chutelab.studies.measured.result import advice
     from chutelab.util.tables import wrapped
 
     head = Text(found.recording.title, style="bold")
     head.append(f"\n{found.track.said()}", style="not bold")
     parts: list[RenderableType] = [head]
-    for sheet in [found.sheet()] if fit is None else [fit.sheet(), found.sheet()]:
-        lines = [line for note in sheet.notes for line in wrapped(note)]
-        parts += [drawn(sheet), Text("\n".join(lines))]
+    parts += [found] if fit is None else [fit, found]
     if fit is None and (advised := advice(found)):
         parts.append(Text("\n" + "\n".join(wrapped(f"note: {advised}"))))
     console.show(*parts)

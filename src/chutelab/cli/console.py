@@ -35,8 +35,10 @@ def show(*parts: RenderableType) -> None:
 
 
 def show_json(value: Any) -> None:
-    """Print one JSON object; NaN is no JSON and must not get here."""
-    click.echo(json.dumps(value, allow_nan=False))
+    """Print one JSON object, see `chutelab.util.tables.plain`."""
+    from chutelab.util.tables import plain
+
+    click.echo(json.dumps(plain(value), allow_nan=False))
 
 
 PATIENCE = 1.0

@@ -12,9 +12,6 @@ from chutelab.cli.parameters import folder
 from chutelab.cli.program import InOrder, RefusedError
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
-
-    from chutelab.classroom.grading import Grade
     from chutelab.classroom.lessons import Lesson
 
 
@@ -56,16 +53,14 @@ def list_lessons(as_json: bool) -> None:
     if as_json:
         console.show_json({"format": 1, "lessons": [_plain(one) for one in found]})
         return
-    from rich.text import Text
+    from chutelab.util.tables import Sheet
 
-    from chutelab.cli.report import plain_table
-
-    table = plain_table(["", "lesson", "level", "minutes", "what it is about"], texts=5)
-    for one in found:
-        about = Text(one.title, style="bold")
-        about.append(f"\n{one.question}", style="not bold")
-        table.add_row(str(one.number), one.name, one.level, str(one.minutes), about)
-    console.show(table)
+    rows = [
+        (str(one.number), one.name, one.level, str(one.minutes), f"{one.title}\n{one.question}")
+        for one in found
+    ]
+    heads = ("", "lesson", "level", "minutes", "what it is about")
+    console.show(Sheet("", heads, tuple(rows), texts=5))
 
 
 @lesson.command(short_help="Show one lesson, with its worksheet.")
@@ -79,14 +74,31 @@ def show(wanted: str, as_json: bool) -> None:
     chutelab lesson show the-bounce
     chutelab lesson show ./my-lesson
     """  # noqa: D301 - click wants the backspace
-    from chutelab.classroom.lessons import find
+    from rich.markdown import Markdown
+    from rich.text import Text
+
+    from chutelab.classroom.lessons import find, scene_of
+    from chutelab.classroom.lessons.building import plain_of
+    from chutelab.classroom.lessons.reading import unit_in
     from chutelab.cli import console
+    from chutelab.util.tables import Sheet
 
     found = find(wanted)
     if as_json:
         console.show_json({"format": 1, **_plain(found)})
-    else:
-        console.show(*_shown(found))
+        return
+    number = "" if found.number is None else f"{found.number}  "
+    about = f"\n{found.question}\n{found.level}, about {found.minutes} minutes"
+    head = Text(f"{number}{found.title}", style="bold").append(about, style="not bold")
+    scenes = tuple((name, scene_of(found, name).title) for name in found.scenes)
+    console.show(head, Sheet("Scenes", ("scene", "what it shows"), scenes, texts=2))
+    if found.quantities:
+        rows = tuple((name, unit_in(found, name), what) for name, what in found.quantities.items())
+        console.show(Sheet("Quantities", ("quantity", "unit", "what it is"), rows, texts=3))
+    console.show(Text(f"\nFiles in {found.folder}\n"))
+    if found.worksheet.is_file():
+        worksheet = plain_of(found.worksheet.read_text(encoding="utf-8"))
+        console.show(Markdown(worksheet, hyperlinks=False))
 
 
 @lesson.command(short_help="Make the picture of each lesson that changed.")
@@ -108,13 +120,11 @@ def build(wanted: tuple[str, ...], out: Path | None, force: bool, quiet: bool) -
     of chutelab, numpy, pymunk, matplotlib and pillow; the GIF says so in a comment. The same makes
     the same bytes.
     """
-    from chutelab.classroom.lessons import find
     from chutelab.classroom.lessons.building import build as build_lesson
-    from chutelab.classroom.lessons.reading import shipped_lessons
     from chutelab.cli.console import progress
     from chutelab.cli.output import writing
 
-    for one in [find(name) for name in wanted] or shipped_lessons():
+    for one in _lessons(wanted):
         with (
             writing(instead="another folder: --out DIR"),
             progress(one.name, quiet=quiet) as update,
@@ -176,23 +186,27 @@ def page(wanted: tuple[str, ...], out: Path, quiet: bool) -> None:
     links are relative: the folder works from a memory stick, from any static web server, and on a
     phone.
     """
-    from chutelab.classroom.lessons import find
     from chutelab.classroom.lessons.building import bundle
-    from chutelab.classroom.lessons.reading import shipped_lessons
     from chutelab.cli.console import progress
     from chutelab.cli.output import writing
     from chutelab.pictures.live.runs import PageError
     from chutelab.scene.variants import VaryError
 
-    lessons = [find(name) for name in wanted] or shipped_lessons()
     try:
         with writing(instead="another folder"), progress("making the pages", quiet=quiet) as update:
-            made = bundle(lessons, out, update)
+            made = bundle(_lessons(wanted), out, update)
     except (PageError, VaryError) as error:
         raise RefusedError(str(error)) from error
     if not quiet:
         size = sum(path.stat().st_size for path in made)
         click.echo(f"wrote {len(made)} files, {size / 1e6:.1f} MB; open {out / 'index.html'}")
+
+
+def _lessons(wanted: tuple[str, ...]) -> list[Lesson]:
+    """Return the lessons that are named, or all that are shipped."""
+    from chutelab.classroom.lessons import find, shipped_lessons
+
+    return [find(name) for name in wanted] or shipped_lessons()
 
 
 def _plain(lesson: Lesson) -> dict[str, object]:
@@ -207,41 +221,7 @@ def _plain(lesson: Lesson) -> dict[str, object]:
     }
 
 
-def _shown(lesson: Lesson) -> list[RenderableType]:
-    from rich.markdown import Markdown
-    from rich.text import Text
-
-    from chutelab.classroom.lessons import scene_of
-    from chutelab.classroom.lessons.building import plain_of
-    from chutelab.classroom.lessons.reading import unit_in
-    from chutelab.cli.report import plain_table, titled
-
-    number = "" if lesson.number is None else f"{lesson.number}  "
-    head = Text(f"{number}{lesson.title}", style="bold")
-    head.append(
-        f"\n{lesson.question}\n{lesson.level}, about {lesson.minutes} minutes", style="not bold"
-    )
-    scenes = plain_table(["scene", "what it shows"], texts=2)
-    for name in lesson.scenes:
-        scenes.add_row(name, scene_of(lesson, name).title)
-    looked_at = plain_table(["quantity", "unit", "what it is"], texts=3)
-    for name, words in lesson.quantities.items():
-        looked_at.add_row(name, unit_in(lesson, name), words)
-    parts: list[RenderableType] = [head, titled("Scenes", scenes)]
-    if lesson.quantities:
-        parts.append(titled("Quantities", looked_at))
-    parts.append(Text(f"\nFiles in {lesson.folder}\n"))
-    if lesson.worksheet.is_file():
-        worksheet = plain_of(lesson.worksheet.read_text(encoding="utf-8"))
-        parts.append(Markdown(worksheet, hyperlinks=False))
-    return parts
-
-
-LIMIT = 60.0
-"""s that a notebook may run."""
-
-
-@click.command(short_help="Run returned notebooks and mark them.")
+@lesson.command(short_help="Run returned notebooks and mark them.")
 @click.argument(
     "files",
     metavar="FILES...",
@@ -258,7 +238,7 @@ LIMIT = 60.0
 @click.option(
     "--time-limit",
     metavar="S",
-    default=LIMIT,
+    default=60.0,
     show_default=True,
     type=click.FloatRange(1.0, 3600.0),
     help="Seconds that a notebook may run.",
@@ -282,8 +262,14 @@ def grade(files: tuple[Path, ...], out: Path | None, time_limit: float, quiet: b
     from chutelab.cli import console
     from chutelab.cli.console import progress
     from chutelab.cli.output import check_file, writing
+    from chutelab.util.tables import Sheet
 
-    notebooks = [path for file in files for path in _notebooks(file)]
+    notebooks: list[Path] = []
+    for file in files:
+        found = sorted(file.glob("*.ipynb")) if file.is_dir() else [file]
+        if not found:
+            raise RefusedError(f"{file}: there is no notebook (*.ipynb) in this folder")
+        notebooks += found
     check_file("--out", out)
     try:
         with progress("running the notebooks", quiet=quiet) as update:
@@ -291,35 +277,17 @@ def grade(files: tuple[Path, ...], out: Path | None, time_limit: float, quiet: b
     except ImportError as error:
         raise RefusedError(str(error)) from error
     if not quiet:
-        console.show(_marks(grades))
+        rows = []
+        for one in grades:
+            marks = f"{one.total} of {one.out_of} ({' '.join(map(str, one.marks))})"
+            rows.append(
+                (one.file, one.student, one.lesson, marks if one.marks else "-", one.reason)
+            )
+        heads = ("file", "student", "lesson", "marks", "remarks")
+        console.show(Sheet("", heads, tuple(rows), texts=5))
     if not any(one.marks for one in grades):
         raise RefusedError("nothing to mark: none of these is a notebook of a lesson's exercise")
     if out is not None:
         with writing(f"--out {out}"):
             write_csv(grades, out)
         click.echo(f"wrote {out}")
-
-
-def _notebooks(path: Path) -> list[Path]:
-    if not path.is_dir():
-        return [path]
-    found = sorted(path.glob("*.ipynb"))
-    if not found:
-        raise RefusedError(f"{path}: there is no notebook (*.ipynb) in this folder")
-    return found
-
-
-def _marks(grades: list[Grade]) -> RenderableType:
-    from chutelab.cli.report import plain_table
-
-    table = plain_table(["file", "student", "lesson", "marks", "remarks"], texts=5)
-    table.columns[0].no_wrap = False
-    table.columns[0].overflow = "fold"  # a long path must leave room for the remarks
-    for one in grades:
-        marks = " ".join(str(mark) for mark in one.marks)
-        total = f"{one.total} of {one.out_of} ({marks})" if one.marks else "-"
-        table.add_row(one.file, one.student, one.lesson, total, one.reason)
-    return table
-
-
-lesson.add_command(grade)

@@ -96,13 +96,13 @@ def loaded_as_told(
 ) -> Scene:
     """Load a scene with what ``--set``, ``--engine`` and ``--dt`` change; its title says so."""
     from chutelab.scene import load
-    from chutelab.scene.overrides import Setting
+    from chutelab.scene.overrides import Override
 
-    settings = list(overrides)
+    settings: list[str | Override] = list(overrides)
     if engine is not None:
-        settings.append(Setting(f"run.engine={engine}", f"--engine {engine}"))
+        settings.append(Override("run.engine", engine, f"--engine {engine}"))
     if dt is not None:
-        settings.append(Setting(f"run.dt={dt}", f"--dt {dt:.12g}"))
+        settings.append(Override("run.dt", dt, f"--dt {dt:.12g}"))
     return retitled(load(name, settings), overrides)
 
 

@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
-from rich import box
-from rich.console import Group
-from rich.table import Table
+from rich.console import RenderableType
 from rich.text import Text
 
 from chutelab.machine.releases import Squeeze, squeeze
 from chutelab.results import REASONS, Kind, Recording
-from chutelab.results.comparison import compare, scene_of
+from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import Waits, waits
 from chutelab.results.summary import rolling
 from chutelab.studies.accuracy import Accuracy, Wanted
 from chutelab.util.tables import Sheet, number, wrapped
-
-if TYPE_CHECKING:
-    from rich.console import RenderableType
-
 
 STATIONS = 6
 """Contacts of particle 0 that are listed where no theory speaks of them."""
@@ -32,18 +24,14 @@ STATIONS = 6
 def report(recording: Recording, accuracy: Accuracy | None = None) -> list[RenderableType]:
     """Return what a run leaves to read: particle 0 beside the theory, the ledger, the accuracy."""
     compared = compare(recording).sheet()
-    parts: list[RenderableType] = [_head(recording)]
-    if compared.rows:
-        parts.append(drawn(compared))
-    parts += [Text(f"\n{note}") for note in compared.notes]
+    parts: list[RenderableType] = [_head(recording), compared]
     if compared.notes and (way := _way(recording)).rows:
-        parts.append(drawn(way))
-    books = ledger(recording).sheet()
-    parts += [drawn(books), Text("\n" + "\n".join(books.notes))]
-    if (late := waits(scene_of(recording), recording)) is not None:
+        parts.append(way)
+    parts.append(ledger(recording))
+    if (late := waits(recording.scene, recording)) is not None:
         parts.append(Text("\n" + "\n".join(wrapped(_waited(late)))))
     released = recording.select(Kind.RELEASE)
-    pressed = squeeze(scene_of(recording), released["t"], released["position"])
+    pressed = squeeze(recording.scene, released["t"], released["position"])
     if pressed is not None:
         parts.append(Text("\n" + "\n".join(wrapped(_squeezed(pressed)))))
     if (left := rolling(recording)) is not None:
@@ -63,33 +51,6 @@ def _way(recording: Recording) -> Sheet:
         rows.append((f"{what} {name}", *(number(float(value)) for value in numbers)))
     heads = ("", "t, s", "x, m", "y, m", "vx, m/s", "vy, m/s")
     return Sheet("Particle 0, its first contacts", heads, tuple(rows))
-
-
-def drawn(sheet: Sheet) -> Group:
-    """Return the table of a sheet under its title; its notes are left to the caller."""
-    table = plain_table(sheet.columns, texts=sheet.texts)
-    for row in sheet.rows:
-        table.add_row(*row)
-    table.add_section()
-    for row in sheet.foot:
-        table.add_row(*row)
-    return titled(sheet.title, table)
-
-
-def titled(title: str, table: Table) -> Group:
-    """Return a table under its title, which may be wider than the table."""
-    return Group(Text(f"\n{title}", style="bold"), table)
-
-
-def plain_table(columns: Sequence[str], *, texts: int = 1, width: int | None = None) -> Table:
-    """Return an empty table: `texts` columns of words, then numbers of at least `width`."""
-    table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, collapse_padding=True)
-    for index, column in enumerate(columns):
-        if index < texts:
-            table.add_column(column, no_wrap=index == 0)
-        else:
-            table.add_column(column, justify="right", min_width=width)
-    return table
 
 
 def _head(recording: Recording) -> Text:

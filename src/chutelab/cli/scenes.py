@@ -17,8 +17,6 @@ from chutelab.cli.parameters import folder
 from chutelab.cli.program import RefusedError
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
-
     from chutelab.theory import Table
     from chutelab.theory.figures import PaperFigure
 
@@ -41,16 +39,10 @@ def scenes(as_json: bool) -> None:
         ]
         console.show_json({"format": 1, "scenes": listed})
         return
-    from rich.text import Text
+    from chutelab.util.tables import Sheet
 
-    from chutelab.cli.report import plain_table
-
-    table = plain_table(["scene", "what it shows"], texts=2)
-    for scene in found:
-        what = Text(scene.title, style="bold")
-        what.append(f"\n{scene.look[0] if scene.look else ''}", style="not bold")
-        table.add_row(scene.name, what)
-    console.show(table)
+    rows = [(s.name, f"{s.title}\n{s.look[0] if s.look else ''}") for s in found]
+    console.show(Sheet("", ("scene", "what it shows"), tuple(rows), texts=2))
 
 
 @click.command(short_help="Print the JSON Schema of scene files, for editors.")
@@ -113,25 +105,11 @@ def tables(number: str | None, rebound: Literal["as-printed", "corrected"], as_j
     if as_json:
         console.show_json({"format": 1, "tables": [_plain(t) for t in found]})
     else:
-        console.show(*(part for t in found for part in _shown(t)))
+        console.show(*found)
 
 
 def _plain(table: Table) -> dict[str, object]:
     return {**asdict(table), "cells": table.cells, "differing": table.differing}
-
-
-def _shown(table: Table) -> list[RenderableType]:
-    from rich.text import Text
-
-    from chutelab.cli.report import plain_table, titled
-
-    sheet = table.sheet()
-    # Broken here, or the terminal breaks some of them elsewhere.
-    columns = [column.replace(" = ", " =\n") for column in sheet.columns]
-    drawn = plain_table(columns, width=max(len(text) for row in sheet.rows for text in row[1:]))
-    for row in sheet.rows:
-        drawn.add_row(*row)
-    return [titled(sheet.title, drawn), Text("\n" + "\n".join(sheet.notes))]
 
 
 @click.command(short_help="Draw the paper's figures anew, printed beside corrected.")
@@ -181,7 +159,7 @@ def figure(number: int, out: Path | None, as_json: bool) -> None:
             }
         )
         return
-    _tell(found)
+    console.show(found)
     if out is not None:
         click.echo(f"\nwrote into {out}: {', '.join(written)}")
         if found.sweep:
@@ -198,20 +176,10 @@ def _names(found: PaperFigure) -> list[str]:
 
 def _write(found: PaperFigure, place: Path) -> None:
     from chutelab.pictures.plots.figure import paper_figure
-    from chutelab.studies.design.quantities import to_toml
+    from chutelab.scene import to_toml
 
     picture, table, *scenes = _names(found)
     paper_figure(found, path=place / picture)
     (place / table).write_text(found.csv(), encoding="utf-8")
     for name, scene in zip(scenes, found.scenes.values(), strict=True):
         (place / name).write_text(to_toml(scene, found.title), encoding="utf-8")
-
-
-def _tell(found: PaperFigure) -> None:
-    from rich.text import Text
-
-    from chutelab.cli import console
-    from chutelab.cli.report import drawn
-
-    sheet = found.sheet()
-    console.show(drawn(sheet), Text(), *(Text(note) for note in sheet.notes))

@@ -156,8 +156,8 @@ def _write(found: Solution, place: Path) -> None:
     from chutelab.engines.simulation import simulate
     from chutelab.pictures.plots import overlay
     from chutelab.pictures.plots.design import scan
+    from chutelab.scene import to_toml
     from chutelab.studies.design.answers import as_dict
-    from chutelab.studies.design.quantities import to_toml
 
     text = json.dumps(as_dict(found), indent=1, allow_nan=False)
     (place / "solve.json").write_text(text + "\n", encoding="utf-8")
@@ -184,13 +184,10 @@ def _tell(found: Solution) -> None:
     from rich.text import Text
 
     from chutelab.cli import console
-    from chutelab.cli.report import drawn
 
-    sheet = found.sheet()
-    notes = [Text(f"\n{note}" if i == 0 else note) for i, note in enumerate(sheet.notes)]
-    console.show(Text(found.base.title, style="bold"), drawn(sheet), *notes)
+    console.show(Text(found.base.title, style="bold"), found.sheet())
     if found.solved:
-        console.show(drawn(found.slopes()))
+        console.show(found.slopes())
 
 
 def propagate(
@@ -232,7 +229,7 @@ def propagate(
     if as_json:
         console.show_json(as_dict(found))
     elif not quiet:
-        click.echo(str(found))
+        console.show(found)
         for path in (out, plot):
             if path is not None:
                 click.echo(f"wrote {path}")

@@ -135,7 +135,7 @@ def sweep(
     """
     from chutelab.cli import console
     from chutelab.scene import load
-    from chutelab.scene.overrides import Setting
+    from chutelab.scene.overrides import Override
     from chutelab.scene.variants import VaryError
     from chutelab.studies.sweep import (
         LostWorkersError,
@@ -157,7 +157,7 @@ def sweep(
 
         if resume or scheduler is not None or jobs != 1:
             raise click.UsageError("--resume, --jobs and --scheduler go with --vary only.")
-        engines = [Setting(f"run.engine={engine}", f"--engine {engine}")] if engine else []
+        engines = [Override("run.engine", engine, f"--engine {engine}")] if engine else []
         loaded = load(scene, [*overrides, *engines])
         propagate(
             loaded, uncertain, samples=sample, seed=seed, out=out, plot=plot,
@@ -180,7 +180,7 @@ def sweep(
     if as_json:
         console.show_json(_plain(found))
     elif not quiet:
-        click.echo(str(found))
+        console.show(found)
         for path in (out, plot):
             if path is not None:
                 click.echo(f"wrote {path}")

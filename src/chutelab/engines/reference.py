@@ -142,18 +142,17 @@ class _Run:
         self.t0, self.base = float(releases.t[0]), releases.position[0].copy()
         self.state = np.zeros(7)
         self.state[V] = releases.velocity[0]
-        self.log = Recorder(1, machine.surfaces)
+        self.log = Recorder(machine)
         self.things = _surfaces(machine)
         # Whether the left face of a segment was struck last.
         self.sides: dict[int, bool] = {}
         self.steps, self.landed, self.reason = 0, False, ""
 
     def result(self) -> Recording:
-        m = self.machine
         self.tell(Kind.RELEASE, -1)
         self.knot()
         lasting: _Lasting | None
-        if m.releases.carried[0]:
+        if self.machine.releases.carried[0]:
             lasting = _Lasting(0, np.array([0.0, 1.0]), 0, self.things[0].speed, carried=True)
         else:
             lasting = self.contact()
@@ -164,10 +163,7 @@ class _Run:
         else:
             raise UnableError(f"more than {MOST_PHASES} phases")
         self.log.ended[0] = ("time", "landed", "settled", "exit").index(self.reason)
-        return self.log.finish(
-            scene=m.text, title=m.title, engine="dop853", particle=m.particle, gravity=m.gravity,
-            steps=self.steps, seconds=0.0,
-        )  # fmt: skip
+        return self.log.finish(engine="dop853", steps=self.steps)
 
     # What touches.
 

@@ -3,62 +3,63 @@
 That is particle 0: no spread, lowest layer. Where it meets the unbounded line of the plate gives
 the height of the outgoing belt, and that the lower end of the plate. A release that overlaps a
 surface is refused, or moved out where it is by rounding only. A family of scenes becomes a family
-of machines, without those that cannot be built.
+of machines: NumPy's functions take a number and an array (N,) alike.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import pairwise
-from math import ceil, cos, hypot, inf, radians, sin
+from math import ceil, inf, prod
 from sys import float_info
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from chutelab.machine.nominal import Discharge, discharge, plate_hit
 from chutelab.machine.parts import Machine, Particle, Pulley, Segments
 from chutelab.machine.releases import ON_BELT, Releases, draw, release_point
 from chutelab.scene import Fault, Scene, SceneError
-from chutelab.util.arrays import Floats, Ints
-from chutelab.util.many import Value, at, each, larger, of, smaller, some
-
-Row = tuple[Value, ...]
+from chutelab.util.arrays import Floats, Ints, Numbers
 
 
-class RefusedError(ValueError):
-    """Some scenes of a family that contradict themselves.
+class RefusedError(SceneError):
+    """Scenes of a family that contradict themselves; its faults are those of the first one.
 
     Parameters
     ----------
-    reasons : mapping of int to str
-        What is wrong, by their numbers; "" if only building one by itself can tell.
+    source : str
+        What messages call the scenes.
+    members : mapping of int to Fault
+        What is wrong with each, by their numbers; a scene that is no family is number 0.
     """
 
-    def __init__(self, reasons: Mapping[int, str]) -> None:
-        super().__init__(f"{len(reasons)} scenes of the family cannot be built")
-        self.reasons = dict(reasons)
+    def __init__(self, source: str, members: Mapping[int, Fault]) -> None:
+        super().__init__(source, [members[min(members)]])
+        self.members = dict(members)
 
 
 def members(machine: Machine, places: Ints) -> Machine:
     """Return some members of a family of machines, as a family."""
-    segments, start, pulley = machine.segments, machine.releases, machine.pulley
-    own = ("start", "tangent", "length", "speed", "restitution", "friction")
-    particle, wheel = machine.particle, ("radius", "speed", "friction", "restitution")
+
+    def own(part: object, *names: str, axes: int = 0) -> dict[str, Any]:
+        values = {name: getattr(part, name) for name in names}
+        return {name: value[places] for name, value in values.items() if np.ndim(value) > axes}
+
+    segments, wheel = machine.segments, machine.pulley
+    lines = own(segments, "start", "tangent", axes=2)
+    lines |= own(segments, "length", "speed", "restitution", "friction", axes=1)
+    if wheel is not None:
+        wheel = replace(wheel, **own(wheel, "radius", "speed", "friction", "restitution"))
     return replace(
         machine,
-        gravity=of(machine.gravity, places),
-        particle=replace(
-            particle, **{name: of(value, places) for name, value in vars(particle).items()}
-        ),
-        segments=replace(
-            segments, **{name: np.take(getattr(segments, name), places, axis=0) for name in own}
-        ),
-        pulley=pulley
-        and replace(pulley, **{name: of(getattr(pulley, name), places) for name in wheel}),
-        releases=replace(start, **{name: value[places] for name, value in vars(start).items()}),
-        end_time=of(machine.end_time, places),
+        **own(machine, "gravity", "end_time"),
+        particle=replace(machine.particle, **own(machine.particle, "radius", "mass", "inertia")),
+        segments=replace(segments, **lines),
+        pulley=wheel,
+        releases=replace(machine.releases, **own(machine.releases, *vars(machine.releases))),
     )
 
 
@@ -67,11 +68,7 @@ ROUNDING = 64.0 * float_info.epsilon
 
 
 def cleared(
-    scene: Scene,
-    releases: Releases,
-    rows: Sequence[Row],
-    owner: Sequence[int],
-    names: Sequence[str],
+    scene: Scene, releases: Releases, ends: Floats, owner: Sequence[int], names: Sequence[str]
 ) -> Releases:
     """Return releases of which none lies in a surface.
 
@@ -83,84 +80,62 @@ def cleared(
         For the radius, the drive pulley and messages.
     releases : Releases
         As drawn.
-    rows : sequence of tuple of float
-        Each segment's ends x0, y0, x1, y1, and more; arrays (N,) in a family.
+    ends : ndarray, (4, S) or (4, S, N)
+        Each segment's x0, y0, x1, y1, m.
     owner, names : sequence of int and of str
         Which surface a segment belongs to, and what surfaces are called.
 
     Raises
     ------
-    SceneError
-        If a particle starts further inside a surface.
     RefusedError
-        If a particle of a family starts near one: each such scene has to be looked at by itself.
+        If a particle starts further inside a surface.
     """
-    r: Value = scene.particle.radius
-    if not some(r > 0.0):
-        return releases
+    r = scene.particle.radius
     # All start in one column, above the release point.
     x, low = release_point(scene)
-    carried, drawn = bool(releases.carried[0]), releases
-    for n, (x0, y0, x1, y1, *_) in enumerate(rows):
-        if carried and owner[n] == 0:
-            continue
-        near = (larger(x0, x1) > x - r) & (smaller(x0, x1) < x + r) & (larger(y0, y1) > low - r)
-        if some(near):
-            near = near & (smaller(y0, y1) < _highest(scene, drawn, low) + r)
-        if some(near):
-            _one_by_one(scene, near)
-            releases = _out(scene, releases, (x0, y0), (x1, y1), r, names[owner[n]])
+    high = low + scene.stream.bed_height
+    x0, y0, x1, y1 = ends
+    near = (np.maximum(x0, x1) > x - r) & (np.minimum(x0, x1) < x + r)
+    near &= (np.maximum(y0, y1) > low - r) & (np.minimum(y0, y1) < high + r)
+    carried = bool(releases.carried[0])
+    for n, surface in enumerate(owner):
+        if near[n].any() and not (carried and surface == 0):
+            releases = _out(scene, releases, ends[:, n], r, names[surface])
     if scene.incoming is not None and not carried:
-        reach = scene.incoming.pulley_radius + r
-        high = _highest(scene, drawn, low)
-        near = (abs(x) < reach) & (low < reach) & (high > -reach)
-        if some(near):
-            _one_by_one(scene, near)
-            releases = _out(scene, releases, (0.0, 0.0), (0.0, 0.0), reach, "incoming")
+        # A point may start anywhere.
+        reach = np.where(np.greater(r, 0.0), scene.incoming.pulley_radius + r, 0.0)
+        releases = _out(scene, releases, np.zeros(4), reach, "incoming")
     return releases
 
 
-def _highest(scene: Scene, releases: Releases, low: Value) -> Value:
-    """Return the height of the highest release, m."""
-    return low if scene.members is not None else float(releases.position[:, 1].max())
-
-
-def _one_by_one(scene: Scene, near: Value) -> None:
-    """Refuse to look closer at scenes of a family."""
-    if scene.members is not None:
-        places = np.flatnonzero(np.broadcast_to(near, scene.members))
-        raise RefusedError(dict.fromkeys(places.tolist(), ""))
-
-
-def _out(
-    scene: Scene,
-    releases: Releases,
-    start: tuple[float, float],
-    end: tuple[float, float],
-    reach: float,
-    name: str,
-) -> Releases:
-    """Return releases at least `reach` (m) away from a segment, or from a point."""
-    first, position = np.array(start), releases.position
-    along = np.array(end) - first
-    square = float(along @ along)
-    share = np.clip((position - first) @ along / square, 0.0, 1.0) if square > 0.0 else 0.0
-    away = position - first - np.multiply.outer(share, along)
-    distance = np.hypot(away[:, 0], away[:, 1])
+def _out(scene: Scene, releases: Releases, ends: Floats, reach: Numbers, name: str) -> Releases:
+    """Return releases at least `reach` (m) away from a segment, (4,) or (4, N), or from a point."""
+    x0, y0, x1, y1 = ends
+    (x, y), dx, dy = releases.position.T, x1 - x0, y1 - y0
+    square = dx * dx + dy * dy
+    along = (x - x0) * dx + (y - y0) * dy
+    share = np.clip(along / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
+    away = np.stack([x - x0 - share * dx, y - y0 - share * dy])
+    distance = np.hypot(*away)
     depth = reach - distance
-    worst = int(depth.argmax())
-    size = max(map(abs, (*start, *end, *position[worst].tolist())))
-    if depth[worst] <= ROUNDING * size:
+    rounding = ROUNDING * np.maximum(np.abs(ends).max(axis=0), np.maximum(np.abs(x), np.abs(y)))
+    inside = np.flatnonzero(depth > np.maximum(ON_BELT, rounding))
+    if len(inside):
+        every = len(depth) // prod(scene.shape)
+        deepest = {i // every: i for i in sorted(inside.tolist(), key=depth.__getitem__)}
+        reach = np.broadcast_to(reach, depth.shape)
+        faults = {}
+        for member, i in deepest.items():
+            allowed = (
+                f"at least {reach[i]:g} m from {name}: particle {i % every} would start"
+                f" {distance[i]:.6g} m from it, inside; move stream.at, or the surface"
+            )
+            faults[member] = Fault("stream.at", scene.stream.at, allowed)
+        raise RefusedError(scene.source, faults)
+    if not np.any(depth > rounding):
         return releases
-    if depth[worst] > max(ON_BELT, ROUNDING * size):
-        far = hypot(*away[worst].tolist())
-        allowed = (
-            f"at least {reach:g} m from {name}: particle {worst} would start {far:.6g} m from it,"
-            " inside; move stream.at, or the surface"
-        )
-        raise SceneError(scene.source, [Fault("stream.at", scene.stream.at, allowed)])
-    moved = position + (np.maximum(depth, 0.0) / distance)[:, None] * away
-    return Releases(releases.t, moved, releases.velocity, releases.carried)
+    moved = np.where(depth > rounding, away * (depth / distance), 0.0)
+    return replace(releases, position=releases.position + moved.T)
 
 
 REACH_WITHOUT_BELT = 2.0
@@ -179,21 +154,26 @@ def build(scene: Scene) -> Machine:
     Parameters
     ----------
     scene : Scene
-        Of a family (`chutelab.scene.variants`) each is resolved as it would be by itself, to the
-        bit; the machine has one particle for each, with surfaces of its own.
+        Of a family (`chutelab.scene.variants`) each is resolved as it would be by itself; the
+        machine has one particle for each, with surfaces of its own.
 
     Raises
     ------
-    SceneError
-        If the geometry contradicts itself: the nominal flight misses the plate whose impact should
-        place the outgoing belt, the impact lies off the finite plate, a particle starts inside a
-        surface, or interacting particles cannot be released without overlap.
     RefusedError
-        Likewise of a family: which of them, and why.
+        If the geometry contradicts itself: the nominal flight misses the plate whose impact should
+        place the outgoing belt, the impact lies off the finite plate, or a particle starts inside a
+        surface.
     """
+    # A flight that never meets the plate's line has NaN for its impact.
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        return _build(scene)
+
+
+def _build(scene: Scene) -> Machine:
     builder = _Builder(scene)
     belt_height = builder.incoming_and_plate(discharge(scene))
     if scene.outgoing is not None:
+        assert belt_height is not None
         out = scene.outgoing
         builder.add(
             "outgoing",
@@ -213,36 +193,36 @@ class _Builder:
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
         self.names: list[str] = []
-        self.rows: list[tuple[Value, ...]] = []
+        self.rows: list[tuple[Numbers, ...]] = []
         self.owner: list[int] = []
         self.warnings: list[str] = []
 
     def add(
         self,
         name: str,
-        points: Sequence[tuple[Value, Value]],
-        speed: Value,
-        restitution: Value,
-        friction: Value,
+        points: Sequence[tuple[Numbers, Numbers]],
+        speed: Numbers,
+        restitution: Numbers,
+        friction: Numbers,
     ) -> None:
         self.names.append(name)
         for (x0, y0), (x1, y1) in pairwise(points):
             self.rows.append((x0, y0, x1, y1, speed, restitution, friction))
             self.owner.append(len(self.names) - 1)
 
-    def incoming_and_plate(self, start: Discharge) -> Value | None:
+    def incoming_and_plate(self, start: Discharge) -> Numbers | None:
         """Add the belt and the plate; return the height of the outgoing belt's surface."""
         scene = self.scene
         if scene.incoming is None:
             return None
         belt = scene.incoming
-        top: Value = belt.pulley_radius
+        top = belt.pulley_radius
         self.add("incoming", [(-belt.length, top), (0.0, top)], belt.speed, belt.restitution,
                  _grip(belt.friction))  # fmt: skip
         plate, out, r = scene.plate, scene.outgoing, scene.particle.radius
         hit = plate_hit(scene, start)
-        missed = hit[1] != hit[1]  # NaN
-        height: Value | None = None
+        missed = np.isnan(hit[1])
+        height: Numbers | None = None
         if out is not None and out.drop_from == "top":
             height = top - out.drop
         elif out is not None:
@@ -258,18 +238,19 @@ class _Builder:
             height = hit[1] - out.drop - r
         if plate is None:
             return height
-        alpha = each(radians, plate.angle_deg)
-        sine, cosine = each(sin, alpha), each(cos, alpha)
+        alpha = np.radians(plate.angle_deg)
+        sine, cosine = np.sin(alpha), np.cos(alpha)
         x, y = top + plate.distance, plate.pivot_height
-        below: Value
+        below: Numbers
         if plate.below is not None:
             below = plate.below
         elif height is None:
             below = REACH_WITHOUT_BELT
         else:
-            below = larger((y - height - larger(CLEARANCE, CLEARANCE_RADII * r)) / cosine, 0.0)
+            lowest = height + np.maximum(CLEARANCE, CLEARANCE_RADII * r)
+            below = np.maximum((y - lowest) / cosine, 0.0)
         self._refuse(
-            below + plate.above <= 0.0,
+            np.less_equal(below + plate.above, 0.0),
             "plate.above",
             plate.above,
             lambda _: "above + below must be more than 0 m",
@@ -277,67 +258,58 @@ class _Builder:
         # Upwards, so that the struck face (-cos α, -sin α) lies to the left of the tangent.
         low, high = ((x - reach * sine, y + reach * cosine) for reach in (-below, plate.above))
         self.add("plate", [low, high], 0.0, plate.restitution, plate.friction)
-        if some(missed):
+        if np.any(missed):
             self.warnings.append("plate: the nominal particle never meets the plate's line")
         self._check_hit((y - hit[1]) * -cosine + (x - hit[0]) * sine, below)
         return height
 
-    def _check_hit(self, along: Value, below: Value) -> None:
+    def _check_hit(self, along: Numbers, below: Numbers) -> None:
         """Look whether a hit that far above the pivot, m, is on the plate; NaN is no hit."""
         scene = self.scene
         assert scene.plate is not None
-        above: Value = scene.plate.above
-        off = (along < -below) | (along > above)
-        if not some(off):
-            return
+        above = scene.plate.above
+        too_low, too_high = np.less(along, -below), np.greater(along, above)
+        off = np.flatnonzero(too_low | too_high)
 
         def told(place: int) -> str:
-            where = at(along, place)
+            where = self._at(along, place)
             return (
                 f"the nominal particle meets the plate's line {abs(where):.4g} m"
                 f" {'above' if where > 0 else 'below'} the pivot, off the finite plate"
             )
 
         def allowed(place: int) -> str:
-            enough = ceil(1e4 * abs(at(along, place))) / 1e4
+            enough = ceil(1e4 * abs(self._at(along, place))) / 1e4
             return (
                 f"{told(place)}: lengthen it to at least {enough:g} m,"
                 ' or set outgoing.drop_from = "top"'
             )
 
         if scene.outgoing is not None and scene.outgoing.drop_from == "impact":
-            self._refuse(off & (along > 0.0), "plate.above", above, allowed)
-            self._refuse(off & (along < 0.0), "plate.below", below, allowed)
-        elif scene.members is None:
-            self.warnings.append(f"plate: {told(0)}")
+            self._refuse(too_high, "plate.above", above, allowed)
+            self._refuse(too_low, "plate.below", below, allowed)
+        elif len(off):
+            self.warnings.append(f"plate: {told(int(off[0]))}")
 
-    def _refuse(self, bad: Value, key: str, value: Value, allowed: Callable[[int], str]) -> None:
-        """Raise if something is wrong; of a family, with those of which it is."""
-        if not some(bad):
-            return
-        if self.scene.members is None:
-            raise SceneError(self.scene.source, [Fault(key, value, allowed(0))])
-        raise RefusedError(
-            {
-                place: str(Fault(key, at(value, place), allowed(place)))
-                for place in np.flatnonzero(np.broadcast_to(bad, self.scene.members)).tolist()
-            }
-        )
+    def _refuse(
+        self, bad: ArrayLike, key: str, value: ArrayLike, allowed: Callable[[int], str]
+    ) -> None:
+        """Raise if something is wrong with a key of some scenes."""
+        if np.any(bad):
+            places = np.flatnonzero(np.broadcast_to(bad, self.scene.shape)).tolist()
+            faults = {n: Fault(key, self._at(value, n), allowed(n)) for n in places}
+            raise RefusedError(self.scene.source, faults)
 
-    def _columns(self) -> Floats:
-        """Return ends, speed, restitution and friction of the segments, (7, S) or (7, S, N)."""
-        count = self.scene.members
-        if count is None:
-            return np.array(self.rows, dtype=np.float64).reshape(-1, 7).T.copy()
-        columns = np.empty((7, len(self.rows), count))
-        for s, row in enumerate(self.rows):
-            for column, value in zip(columns, row, strict=True):
-                column[s] = value
-        return columns
+    def _at(self, value: ArrayLike, place: int) -> Any:
+        """Return what is a scene's own, as Python has it."""
+        return np.broadcast_to(value, self.scene.shape).flat[place].item()
 
     def machine(self) -> Machine:
         scene = self.scene
-        columns = self._columns()
+        columns = np.empty((7, len(self.rows), *scene.shape))
+        for s, row in enumerate(self.rows):
+            for column, value in zip(columns, row, strict=True):
+                column[s] = value
         speed, restitution, friction = columns[4:]
         along = columns[2:4] - columns[0:2]
         length = np.hypot(along[0], along[1])
@@ -354,12 +326,11 @@ class _Builder:
             pulley = Pulley(
                 belt.pulley_radius, belt.speed, _grip(belt.friction), belt.restitution, 0
             )
-        releases = cleared(scene, draw(scene), self.rows, self.owner, self.names)
-        bound = float(releases.t[-1]) + scene.run.max_time
+        releases = cleared(scene, draw(scene), columns[:4], self.owner, self.names)
+        bound = releases.t[-1].item() + scene.run.max_time
         until = scene.run.until
         return Machine(
-            title=scene.title,
-            text=partial(scene.model_dump_json, by_alias=True),
+            scene=scene,
             surfaces=tuple(self.names),
             gravity=scene.gravity,
             particle=particle,
@@ -376,7 +347,7 @@ class _Builder:
             releases=releases,
             landing=self.names.index("outgoing") if "outgoing" in self.names else -1,
             until=until if isinstance(until, str) else "time",
-            end_time=bound if isinstance(until, str) else smaller(bound, until),
+            end_time=bound if isinstance(until, str) else np.minimum(bound, until),
             dt=scene.run.dt,
             align=scene.run.align,
             interact=scene.stream.interact and scene.stream.count > 1,
@@ -387,5 +358,5 @@ class _Builder:
         )
 
 
-def _grip(friction: Value) -> Value:
+def _grip(friction: float | str) -> float:
     return inf if isinstance(friction, str) else friction

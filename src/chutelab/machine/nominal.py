@@ -1,21 +1,20 @@
 """The nominal particle up to the plate's line: what the machine's geometry is measured from.
 
-Of a family of scenes, the nominal particles of all: numbers are arrays (N,) then.
+Of a family of scenes, the nominal particles of all: what depends on a varied key is an array (N,).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import cos, inf, nan, radians, sin
+from math import inf, nan
 
 import numpy as np
 
 from chutelab.machine.releases import on_belt, release_point, release_velocity
-from chutelab.mechanics.ballistics import closing_time, crossing, descent
+from chutelab.mechanics.ballistics import closing_time, descent
 from chutelab.mechanics.ride import Circle, Outcome, advance, grip_slip, normal_force
 from chutelab.scene import Scene
-from chutelab.util.arrays import Bools, Floats, Ints
-from chutelab.util.many import Value, each, ratio, root, smaller, where
+from chutelab.util.arrays import Bools, Floats, Ints, Numbers
 
 STEPS = 100_000
 """Knots of a ride after which it counts as one without an end; a quarter turn takes 65, the slowest
@@ -29,8 +28,8 @@ class Discharge:
     NaN if the particle never leaves forwards (a belt at rest, or one that throws it off backwards).
     """
 
-    position: tuple[Value, Value]
-    velocity: tuple[Value, Value]
+    position: tuple[Numbers, Numbers]
+    velocity: tuple[Numbers, Numbers]
 
 
 def discharge(scene: Scene) -> Discharge:
@@ -44,23 +43,25 @@ def discharge(scene: Scene) -> Discharge:
     return _slip_round(scene, rho, velocity[0], -position[0])
 
 
-def _let_go(scene: Scene, rho: Value) -> Discharge:
+def _let_go(scene: Scene, rho: Numbers) -> Discharge:
     """Leave by adhesion where cos φ1 = v²/(g ρ), at the top if that is 1 or more (Eq. (2))."""
     assert scene.incoming is not None
-    speed: Value = scene.incoming.speed
-    grip = where(speed > 0.0, smaller(ratio(speed * speed, scene.gravity * rho), 1.0), nan)
-    sine = root((1.0 - grip) * (1.0 + grip))
+    speed = scene.incoming.speed
+    ratio = np.divide(speed * speed, scene.gravity * rho)
+    grip = np.where(np.greater(speed, 0.0), np.minimum(ratio, 1.0), nan)
+    sine = np.sqrt((1.0 - grip) * (1.0 + grip))
     return Discharge((rho * sine, rho * grip), (speed * grip, 0.0 - speed * sine))
 
 
-def _slip_round(scene: Scene, rho: Value, speed: Value, distance: Value) -> Discharge:
+def _slip_round(scene: Scene, rho: Numbers, speed: Numbers, distance: Numbers) -> Discharge:
     """Go along belt and pulley with Coulomb friction."""
     assert scene.incoming is not None
     given = (
         rho, speed, distance, scene.gravity, scene.incoming.friction, scene.incoming.speed,
     )  # fmt: skip
+    shape = np.broadcast_shapes(*map(np.shape, given))
     rho, speed, distance, gravity, friction, belt = (
-        array.copy() for array in np.broadcast_arrays(*map(np.atleast_1d, given))
+        np.broadcast_to(values, shape).ravel() for values in given
     )
     turns = np.full(len(rho), scene.particle.spin)
     w, z = _along_belt(speed, distance, friction * gravity, belt, turns)
@@ -71,12 +72,9 @@ def _slip_round(scene: Scene, rho: Value, speed: Value, distance: Value) -> Disc
     )  # fmt: skip
     slip = w + z - belt
     circle = replace(circle, slip=np.where(slip == 0.0, grip_slip(circle), np.sign(slip)))
-    phi, w = _round_pulley(circle)
-    sine, cosine = each(sin, phi), each(cos, phi)
-    found = (rho * sine, rho * cosine), (w * cosine, -w * sine)
-    if scene.members is None:
-        found = tuple((float(x[0]), float(y[0])) for x, y in found)  # type: ignore[assignment]
-    return Discharge(*found)
+    phi, w = (values.reshape(shape) for values in _round_pulley(circle))
+    rho, sine, cosine = rho.reshape(shape), np.sin(phi), np.cos(phi)
+    return Discharge((rho * sine, rho * cosine), (w * cosine, -w * sine))
 
 
 def _along_belt(
@@ -125,26 +123,21 @@ def _some(circle: Circle, which: Ints | Bools) -> Circle:
     return Circle(**{name: array[which] for name, array in vars(circle).items()})
 
 
-def plate_hit(scene: Scene, start: Discharge) -> tuple[Value, Value]:
+def plate_hit(scene: Scene, start: Discharge) -> tuple[Numbers, Numbers]:
     """Return the centre (m) as it meets the struck face of the unbounded plate; NaN if never.
 
     The face's normal is (-cos α, -sin α); contact is when the centre is r in front of it.
     """
     if scene.plate is None or scene.incoming is None:
         return nan, nan
-    alpha = each(radians, scene.plate.angle_deg)
-    nx, ny = -each(cos, alpha), -each(sin, alpha)
+    alpha = np.radians(scene.plate.angle_deg)
+    nx, ny = -np.cos(alpha), -np.sin(alpha)
     pivot_x = scene.incoming.pulley_radius + scene.plate.distance
-    pivot_y: Value = scene.plate.pivot_height
+    pivot_y = scene.plate.pivot_height
     (x, y), (vx, vy) = start.position, start.velocity
     gap = (x - pivot_x) * nx + (y - pivot_y) * ny - scene.particle.radius
     pace, pull = vx * nx + vy * ny, -scene.gravity * ny
-    t: Value
-    if scene.members is None:
-        t = crossing(gap, pace, pull)
-    else:
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            t = descent(np.asarray(gap), np.asarray(pace), pull)
+    t = descent(gap, pace, pull)
     moves = (vx != 0.0) | (vy != 0.0) | (scene.gravity != 0.0)
-    t = where((gap >= 0.0) & (t >= 0.0) & (t < inf) & moves, t, nan)
+    t = np.where((gap >= 0.0) & (t >= 0.0) & (t < inf) & moves, t, nan)
     return x + vx * t, y + vy * t - 0.5 * scene.gravity * t * t

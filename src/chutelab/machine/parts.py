@@ -7,7 +7,7 @@ few digits left.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chutelab.machine.releases import Releases
+from chutelab.scene import Scene
 from chutelab.util.arrays import Floats, Ints
-from chutelab.util.many import Value, larger, smaller
 
 FIRST_WINS = "; surfaces may cross, the first contact wins"
 
@@ -171,10 +171,8 @@ class Machine:
 
     Attributes
     ----------
-    title : str
-        Of the scene, passed on to the recording.
-    text : callable
-        Writes the scene as canonical JSON, for `scene`.
+    scene : Scene
+        What it was built from; a family of scenes for a family of machines.
     surfaces : tuple of str
         Names; several segments, or a segment and the pulley, may share one.
     gravity : float
@@ -207,8 +205,7 @@ class Machine:
         What is to be said of a nominal particle that misses the plate.
     """
 
-    title: str
-    text: Callable[[], str]
+    scene: Scene
     surfaces: tuple[str, ...]
     gravity: float
     particle: Particle
@@ -232,11 +229,6 @@ class Machine:
         return len(self.releases.t)
 
     @cached_property
-    def scene(self) -> str:
-        """The scene in canonical JSON."""
-        return self.text()
-
-    @cached_property
     def warnings(self) -> tuple[str, ...]:
         """What `chutelab check` tells about a machine that works but may surprise."""
         ends = np.concatenate([self.segments.start, self.segments.end], axis=-1)
@@ -245,11 +237,11 @@ class Machine:
         return (*self.plate_warnings, *crossings(self.surfaces, ends, owner, radius))
 
     @property
-    def exit_box(self) -> tuple[Value, Value, Value, Value]:
+    def exit_box(self) -> tuple[float, float, float, float]:
         """Left, right, bottom and top (m) beyond which a particle has left the scene.
 
-        With gravity only the bottom is finite: what flies up comes back. In a family, all have
-        gravity or none.
+        With gravity only the bottom is finite: what flies up comes back. In a family these are
+        arrays (N,), and all have gravity or none.
         """
         start, end = self.segments.start, self.segments.end
         if not start.size:
@@ -257,8 +249,8 @@ class Machine:
         wheel = self.pulley.radius if self.pulley is not None else -inf
         ends = np.concatenate([start, end], axis=-2)
         low, high = ends.min(axis=-2), ends.max(axis=-2)
-        left, bottom = (smaller(low[..., axis], -wheel) for axis in (0, 1))
-        right, top = (larger(high[..., axis], wheel) for axis in (0, 1))
+        left, bottom = (np.minimum(low[..., axis], -wheel) for axis in (0, 1))
+        right, top = (np.maximum(high[..., axis], wheel) for axis in (0, 1))
         if np.all(np.greater(self.gravity, 0.0)):
             return -inf, inf, bottom - EXIT_MARGIN, inf
         return left - EXIT_MARGIN, right + EXIT_MARGIN, bottom - EXIT_MARGIN, top + EXIT_MARGIN

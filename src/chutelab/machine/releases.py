@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf
+from math import inf, prod
 
 import numpy as np
 
 from chutelab.scene import Scene
 from chutelab.util.arrays import Bools, Floats
-from chutelab.util.many import Value
 
 ON_BELT = 1e-9
 """m; a release point this close to the riding height counts as on the belt."""
@@ -79,10 +78,8 @@ def on_belt(scene: Scene) -> bool:
 
 
 def schedule(scene: Scene) -> Floats:
-    """Return when each particle is due, s (N,); of a family each scene has one, at 0 s."""
-    if scene.members is not None:
-        return np.zeros(scene.members)
-    return np.arange(scene.stream.count) / scene.stream.rate
+    """Return when each particle is due, s (N,); those of each scene of a family follow another."""
+    return np.tile(np.arange(scene.stream.count), prod(scene.shape)) / scene.stream.rate
 
 
 @dataclass(frozen=True)
@@ -161,7 +158,7 @@ def draw(scene: Scene) -> Releases:
     crowded, count = stream.interact and stream.count > 1, len(t)
     position, velocity = np.empty((2, count, 2))
     velocity[:, 0], velocity[:, 1] = release_velocity(scene)
-    height: Value = 0.0
+    height = np.zeros(count)
     # The first one has no spread. Making a generator takes as long as all other preparations.
     if stream.count > 1 and (stream.bed_height > 0.0 or stream.speed_spread > 0.0 or crowded):
         rng = np.random.default_rng(stream.seed)

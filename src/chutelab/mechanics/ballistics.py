@@ -7,14 +7,12 @@ to negative is a contact; the other one is a departure.
 from __future__ import annotations
 
 import itertools
-from math import comb, inf, sqrt
+from math import comb
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chutelab.util.arrays import Floats
-
-Values = Floats | np.float64 | float
+from chutelab.util.arrays import Floats, Numbers
 
 ITERATIONS = 120
 """Bound on the refinements of a root: Newton's method takes about 8, a double root by halving up to
@@ -51,25 +49,7 @@ def closing_time(gap: ArrayLike, rate: ArrayLike, acceleration: ArrayLike) -> Fl
     return np.where(np.isfinite(t), t, np.inf)
 
 
-def crossing(gap: float, rate: float, acceleration: float) -> float:
-    """Return when one gap closes, as `closing_time`, but inf where that was in the past.
-
-    In plain numbers, for who asks for one after another.
-    """
-    square = rate * rate - 2.0 * acceleration * gap
-    if square < 0.0:
-        return inf
-    span = abs(rate) + sqrt(square)
-    if rate > 0.0:
-        t = -span / acceleration if acceleration != 0.0 else inf
-    elif span == 0.0:
-        t = 0.0 if gap == 0.0 and acceleration < 0.0 else inf
-    else:
-        t = 2.0 * gap / span
-    return t if t >= 0.0 else inf
-
-
-def descent(gap: Values, rate: Values, acceleration: Values) -> Floats:
+def descent(gap: Numbers, rate: Numbers, acceleration: Numbers) -> Floats:
     """Return when gaps close, as `closing_time`, but NaN or ∓inf where they never do.
 
     A parabola crosses any level downwards at most once, with derivative -S, where

@@ -7,7 +7,6 @@ for angles, ½ m v2² for energies.
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from math import degrees, isfinite, nan
 from typing import Any
@@ -15,11 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab import scene as scenes
 from chutelab.results.ledger import ledger
 from chutelab.results.recording import EVENT, REASONS, Kind, Recording
 from chutelab.scene import Scene
-from chutelab.theory import Transfer, predict
+from chutelab.theory import Transfer
 from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet, Shown, number
 
@@ -114,15 +112,9 @@ class Comparison(Shown):
         )
 
 
-def scene_of(recording: Recording) -> Scene:
-    """Return the scene a recording was made from."""
-    return scenes.from_dict(json.loads(recording.scene), recording.title)
-
-
 def compare(recording: Recording) -> Comparison:
     """Compare particle 0 with the theory's prediction for its scene."""
-    scene = scene_of(recording)
-    prediction = predict(scene)
+    scene, prediction = recording.scene, recording.prediction
     theory = {name: float(getattr(prediction, name)) for name in QUANTITIES}
     found = observed(recording, scene)
     sizes = scales(scene, prediction)

@@ -32,7 +32,7 @@ def measure(recording: Recording, name: str, scene: Scene) -> float:
         Such as ``x2``, ``landing.x.mean`` or ``ledger.by_surface.plate.restitution_loss``. A
         name without statistic is particle 0's; ``spread`` is the standard deviation.
     scene : Scene
-        The recording's, see `chutelab.results.comparison.scene_of`.
+        The recording's, `recording.scene`.
 
     Raises
     ------

@@ -6,14 +6,13 @@ end.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.machine.parts import Particle
-from chutelab.results.recording import EVENT, KNOT, PARTICLES, Kind, Recording
+from chutelab.machine import Machine
+from chutelab.results.recording import EVENT, KNOT, Kind, Recording
 from chutelab.util.arrays import Ints
 
 
@@ -61,19 +60,17 @@ class Recorder:
 
     Parameters
     ----------
-    count : int
-        Number of particles N.
-    surfaces : tuple of str
-        Names of the surfaces, without ``"particles"``, which is added last.
+    machine : Machine
+        What is run; its N particles and its surfaces are what is recorded.
     apart : bool
         Whether the books of each particle are kept apart: `by_surface` is (N, S, 3) then.
     """
 
-    def __init__(self, count: int, surfaces: tuple[str, ...], *, apart: bool = False) -> None:
-        self.surfaces = (*surfaces, PARTICLES)
+    def __init__(self, machine: Machine, *, apart: bool = False) -> None:
+        self.machine, self.apart = machine, apart
+        count, owners = machine.count, len(machine.surfaces) + 1  # and the particles
         self.entries = np.zeros((count, 3))
-        self.apart = apart
-        self.by_surface = np.zeros((*((count,) if apart else ()), len(self.surfaces), 3))
+        self.by_surface = np.zeros((*((count,) if apart else ()), owners, 3))
         self.ended = np.zeros(count, dtype=np.int8)
         self.contacts = 0
         self.sizes = np.zeros(count, dtype=np.int64)
@@ -162,13 +159,9 @@ class Recorder:
     def finish(
         self,
         *,
-        scene: str | Callable[[], str],
-        title: str,
         engine: str,
-        particle: Particle,
-        gravity: float,
         steps: int,
-        seconds: float,
+        seconds: float = 0.0,
         origin: tuple[float, float] = (0.0, 0.0),
     ) -> Recording:
         """Sort what was collected, counted from `origin` (m), and freeze it."""
@@ -195,12 +188,8 @@ class Recorder:
             for rows in (knots, events):
                 rows["position"] += origin
         return Recording(
-            scene=cast("str", scene),  # or what writes it, see `Recording`
-            title=title,
+            machine=self.machine,
             engine=engine,
-            particle=particle,
-            gravity=gravity,
-            surfaces=self.surfaces,
             knots=knots,
             offsets=offsets,
             ended=self.ended.copy(),

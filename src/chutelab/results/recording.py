@@ -8,16 +8,19 @@ knots however long it lasts. An impact is two knots at one time.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
 from enum import IntEnum
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.machine.parts import Particle
+from chutelab.machine import Machine, Particle
+from chutelab.scene import Scene
+from chutelab.theory import Transfer, predict
 from chutelab.util.arrays import Floats, Ints
 from chutelab.util.tables import Sheet, Shown
 
@@ -262,42 +265,16 @@ class _Books:
         return cls(belt, restitution, friction, residual, omega)
 
 
-class _Text:
-    """A text field that may be given as a function, which is called when the text is asked for."""
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self.key = f"_{name}"
-
-    def __get__(self, instance: object | None, owner: type) -> str:
-        if instance is None:
-            # So that the field has no default.
-            raise AttributeError(self.key)
-        text: str | Callable[[], str] = vars(instance)[self.key]
-        if not isinstance(text, str):
-            vars(instance)[self.key] = text = text()
-        return text
-
-    def __set__(self, instance: object, value: str | Callable[[], str]) -> None:
-        vars(instance)[self.key] = value
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Recording(Shown):
     """A finished run: read-only arrays, the same type from every engine.
 
     Attributes
     ----------
-    scene : str
-        The scene in canonical JSON, as `Scene.model_dump_json` writes it; an engine may give a
-        function instead, so that it is written only when somebody asks.
-    title, engine : str
-        The scene's title; ``"exact"``, ``"contact"`` or ``"pymunk"``.
-    particle : Particle
-        Radius, mass and inertia.
-    gravity : float
-        m/s².
-    surfaces : tuple of str
-        Names that `events["surface"]` indexes; the last is always ``"particles"``.
+    machine : Machine
+        What was run; it knows the scene.
+    engine : str
+        ``"exact"``, ``"contact"`` or ``"pymunk"``.
     knots : ndarray, shape (K,), dtype `KNOT`
         All tracks, one after the other.
     offsets : ndarray, shape (N + 1,)
@@ -318,15 +295,8 @@ class Recording(Shown):
         Wall time from the validated scene to the recording.
     """
 
-    if TYPE_CHECKING:
-        scene: str
-    else:
-        scene: _Text = _Text()
-    title: str
+    machine: Machine
     engine: str
-    particle: Particle
-    gravity: float
-    surfaces: tuple[str, ...]
     knots: NDArray[Any]
     offsets: Ints
     ended: NDArray[np.int8]
@@ -334,11 +304,41 @@ class Recording(Shown):
     by_surface: Floats
     steps: int
     contacts: int
-    seconds: float = field(default=0.0)
+    seconds: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("knots", "offsets", "ended", "events", "by_surface"):
             getattr(self, name).flags.writeable = False
+
+    @property
+    def scene(self) -> Scene:
+        """The scene that was run."""
+        return self.machine.scene
+
+    @property
+    def title(self) -> str:
+        """The scene's title."""
+        return self.scene.title
+
+    @property
+    def particle(self) -> Particle:
+        """Radius, mass and inertia."""
+        return self.machine.particle
+
+    @property
+    def gravity(self) -> float:
+        """m/s²."""
+        return self.machine.gravity
+
+    @cached_property
+    def surfaces(self) -> tuple[str, ...]:
+        """Names that `events["surface"]` indexes; the last is always ``"particles"``."""
+        return (*self.machine.surfaces, PARTICLES)
+
+    @cached_property
+    def prediction(self) -> Transfer:
+        """What the theory predicts for the scene, see `chutelab.theory.predict`."""
+        return predict(self.scene)
 
     @property
     def count(self) -> int:

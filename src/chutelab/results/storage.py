@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterable
-from dataclasses import asdict, fields
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import asdict
 from math import inf
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from chutelab.machine.parts import Particle
+from chutelab.machine import build
 from chutelab.results.recording import ENTRIES, EVENT, KNOT, REASONS, Kind, Recording
-from chutelab.util.files import whole
+from chutelab.scene import from_dict
+from chutelab.util.files import csv_lines, whole, write_lines
 
 FORMAT = 1
 """Version of the file; a reader refuses what it does not know."""
@@ -44,13 +45,7 @@ class RecordingError(ValueError):
 def save(recording: Recording, path: str | Path) -> Path:
     """Write a recording to an npz file, whole or not at all."""
     path = Path(path)
-    about = {
-        field.name: getattr(recording, field.name)
-        for field in fields(recording)
-        if field.name not in ARRAYS
-    }
-    about["particle"] = asdict(recording.particle)
-    header = json.dumps({"format": FORMAT, **about})
+    header = json.dumps(_about(recording))
     arrays = {name: getattr(recording, name) for name in ARRAYS}
     with whole(path) as unfinished, unfinished.open("wb") as file:
         np.savez_compressed(file, about=np.array(header), **arrays)
@@ -69,14 +64,14 @@ def load(path: str | Path) -> Recording:
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
             about: dict[str, Any] = json.loads(str(data["about"]))
-            version = about.pop("format", None)
+            version = about.get("format")
             arrays = {name: data[name] for name in ARRAYS} if version == FORMAT else {}
         recording = None
         if arrays:
-            about["particle"] = Particle(**about["particle"])
-            about["surfaces"] = tuple(about["surfaces"])
-            recording = Recording(**about, **arrays)
-            _check(recording)
+            scene = from_dict(json.loads(about["scene"]), about["title"])
+            told = {name: about[name] for name in ("engine", "steps", "contacts", "seconds")}
+            recording = Recording(machine=build(scene), **told, **arrays)
+            _check(recording, about)
     except FileNotFoundError:
         raise RecordingError(f"{path}: no such file") from None
     except OSError as error:
@@ -95,8 +90,29 @@ def load(path: str | Path) -> Recording:
     return recording
 
 
-def _check(recording: Recording) -> None:
-    """Raise a ValueError if the arrays contradict each other: every index has to lead somewhere."""
+def _about(recording: Recording) -> dict[str, Any]:
+    """Return the header of the file."""
+    return {
+        "format": FORMAT,
+        "scene": recording.scene.model_dump_json(by_alias=True),
+        "title": recording.title,
+        "engine": recording.engine,
+        "particle": asdict(recording.particle),
+        "gravity": recording.gravity,
+        "surfaces": list(recording.surfaces),
+        "steps": recording.steps,
+        "contacts": recording.contacts,
+        "seconds": recording.seconds,
+    }
+
+
+def _check(recording: Recording, about: dict[str, Any]) -> None:
+    """Raise a ValueError if header and arrays contradict each other, or the scene.
+
+    Every index has to lead somewhere. The scene's text may be an older one, without later keys.
+    """
+    if _about(recording) | {"scene": about["scene"]} != about:
+        raise ValueError("the header is of another scene")
     offsets, events = recording.offsets, recording.events
     sizes, surfaces = np.diff(offsets), len(recording.surfaces)
     sound = (
@@ -144,36 +160,29 @@ def to_csv(
     if step is not None and not 0.0 < step < inf:
         raise ValueError(f"step = {step!r}: a finite number above 0 s")
     written = []
-    for name, lines in (("events", _events), ("trajectory", _trajectory)):
+    for name, rows in (("events", _events), ("trajectory", _trajectory)):
         if name in only:
             path = Path(folder) / f"{name}.csv"
-            with whole(path) as unfinished, unfinished.open("w", encoding="utf-8") as file:
-                file.writelines(f"{line}\n" for line in lines(recording, step))
-            written.append(path)
+            written.append(write_lines(path, csv_lines(rows(recording, step))))
     return written
 
 
-def _events(recording: Recording, _step: float | None) -> Iterable[str]:
-    yield (
-        "t,particle,other,kind,surface,x,y,vx_before,vy_before,vx_after,vy_after,"
-        "omega_before,omega_after,normal_impulse,tangential_impulse"
-    )
-    events, kinds = recording.events, [kind.name.lower() for kind in Kind]
-    names = (*recording.surfaces, "")
+def _events(recording: Recording, _step: float | None) -> Iterator[Sequence[object]]:
+    places = ("x", "y", "vx_before", "vy_before", "vx_after", "vy_after")
     vectors = ("position", "velocity_before", "velocity_after")
     scalars = ("omega_before", "omega_after", "normal_impulse", "tangential_impulse")
+    yield *COLUMNS, *places, *scalars
+    events, kinds = recording.events, [kind.name.lower() for kind in Kind]
+    names = (*recording.surfaces, "")
     numbers = [column for name in vectors for column in events[name].T.tolist()]
     numbers += [events[name].tolist() for name in scalars]
     heads = zip(*(events[name].tolist() for name in COLUMNS), strict=True)
     for (t, particle, other, kind, surface), *row in zip(heads, *numbers, strict=True):
-        partner = "" if other < 0 else str(other)
-        yield ",".join(
-            [repr(t), str(particle), partner, kinds[kind], names[surface], *map(repr, row)]
-        )
+        yield t, particle, None if other < 0 else other, kinds[kind], names[surface], *row
 
 
-def _trajectory(recording: Recording, step: float | None) -> Iterable[str]:
-    yield "t,particle,x,y,vx,vy"
+def _trajectory(recording: Recording, step: float | None) -> Iterator[Sequence[object]]:
+    yield "t", "particle", "x", "y", "vx", "vy"
     if not len(recording.knots):
         return
     begin, end = float(recording.knots["t"].min()), float(recording.knots["t"].max())
@@ -187,5 +196,4 @@ def _trajectory(recording: Recording, step: float | None) -> Iterable[str]:
     for t in times:
         (position,), (velocity,) = recording.at([t])
         for i in np.flatnonzero(np.isfinite(position[:, 0])).tolist():
-            (x, y), (vx, vy) = position[i].tolist(), velocity[i].tolist()
-            yield f"{t!r},{i},{x!r},{y!r},{vx!r},{vy!r}"
+            yield t, i, *position[i].tolist(), *velocity[i].tolist()

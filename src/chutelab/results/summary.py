@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.machine.releases import squeeze
-from chutelab.results.comparison import compare, scene_of
+from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import waits
 from chutelab.results.recording import REASONS, Kind, Recording
@@ -40,7 +40,7 @@ def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> 
     ``waited`` unless particles found their place taken (see `results.quantities.Waits`), and
     ``squeezed`` unless riders by adhesion got into each other (see `machine.releases.Squeeze`).
     """
-    scene = scene_of(recording)
+    scene = recording.scene
     compared = compare(recording)
     impacts = recording.select(Kind.IMPACT, surface="plate")
     landings = recording.select(Kind.LANDING)
@@ -63,7 +63,7 @@ def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> 
         "waited": None if waited is None else asdict(waited),
         "squeezed": None if squeezed is None else asdict(squeezed),
         "ledger": asdict(ledger(recording)),
-        "theory": _theory(predict(scene)),
+        "theory": _theory(recording.prediction),
         "theory_as_printed": _as_printed(scene),
         "error": {**compared.errors, "max": compared.max},
         "accuracy": None if accuracy is None else dict(accuracy),
@@ -114,7 +114,7 @@ def rolling(recording: Recording) -> dict[str, Any] | None:
         ``particles``, how many; ``belt_work``, what the outgoing belt has paid for all particles,
         and ``belt_work_carried``, what it would have paid if these were carried, J.
     """
-    belt = scene_of(recording).outgoing
+    belt = recording.scene.outgoing
     if belt is None or belt.speed is None or recording.particle.inertia == 0.0:
         return None
     settled = recording.select(Kind.SETTLE, surface="outgoing")

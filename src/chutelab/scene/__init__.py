@@ -5,7 +5,7 @@
 - `rules`: conflicts between keys and between tables; ``[[expect]]``.
 - `schema`: the tables of a scene as frozen Pydantic models, with the defaults.
 - `overrides`: keys by their full path: JSON Schema, limits, ``KEY=VALUE`` texts.
-- `loading`: read, parse, override, validate; the shipped scenes.
+- `loading`: read, parse, override, validate, write; the shipped scenes.
 - `variants`: one scene with other values: ``--vary``, combinations, families.
 """
 
@@ -16,11 +16,11 @@ from chutelab.scene.loading import (
     find,
     from_dict,
     load,
-    overridden,
     parse,
     shipped,
     template,
     to_dict,
+    to_toml,
 )
 from chutelab.scene.overrides import schema
 from chutelab.scene.rules import Expect
@@ -46,11 +46,11 @@ __all__ = [
     "find",
     "from_dict",
     "load",
-    "overridden",
     "parse",
     "schema",
     "shipped",
     "shown",
     "template",
     "to_dict",
+    "to_toml",
 ]

@@ -14,12 +14,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
 
+import tomli_w
 from annotated_types import Ge, Gt, Le, Lt, MaxLen
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
-from chutelab.scene import overrides as _overrides
 from chutelab.scene.errors import MISSING, Fault, SceneError, at_path, did_you_mean, joined
+from chutelab.scene.overrides import Override, apply
 from chutelab.scene.rules import ConflictError, Look, conflicts
 from chutelab.scene.schema import Scene
 from chutelab.scene.units import MOST_POINTS, Point, Table
@@ -282,7 +283,7 @@ _LARGEST_FILE: Final = 1 << 20
 _STARTER: Final = "`chutelab new` writes a complete scene to start from."
 
 
-def load(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
+def load(path: str | Path, overrides: Sequence[str | Override] = ()) -> Scene:
     """Load a scene from a file or, by name, from the shipped ones.
 
     Parameters
@@ -290,7 +291,7 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
     path
         A file, or the name of a shipped scene, with or without ``.toml``.
     overrides
-        ``KEY=VALUE`` each, laid over the file; see `chutelab.scene.overrides.apply`.
+        Texts ``KEY=VALUE``, laid over the file; see `chutelab.scene.overrides.Override`.
 
     Raises
     ------
@@ -301,7 +302,7 @@ def load(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
     return parse(_read(found), str(found), overrides)
 
 
-def parse(text: str, source: str = "<scene>", overrides: Sequence[str] = ()) -> Scene:
+def parse(text: str, source: str = "<scene>", overrides: Sequence[str | Override] = ()) -> Scene:
     """Validate a scene given as TOML text; `source` is what messages call it.
 
     Raises
@@ -322,7 +323,7 @@ def parse(text: str, source: str = "<scene>", overrides: Sequence[str] = ()) -> 
 
 
 def from_dict(
-    mapping: Mapping[str, Any], source: str = "<scene>", overrides: Sequence[str] = ()
+    mapping: Mapping[str, Any], source: str = "<scene>", overrides: Sequence[str | Override] = ()
 ) -> Scene:
     """Validate a scene given as nested mappings, with the keys of the file.
 
@@ -332,7 +333,7 @@ def from_dict(
         With all faults.
     """
     document: dict[str, Any] = plain(mapping)
-    faults, given = _overrides.apply(document, overrides)
+    faults, given = apply(document, overrides)
     empty = not document
     if source != "<scene>":
         document.setdefault("title", Path(source).stem)
@@ -350,35 +351,55 @@ def from_dict(
     return scene
 
 
-def overridden(scene: Scene, overrides: Sequence[str]) -> Scene:
-    """Return a scene with overrides laid over it, validated anew.
-
-    Raises
-    ------
-    SceneError
-        If it refuses a value, or two that do not go together.
-    """
-    return from_dict(to_dict(scene), scene.source, overrides)
-
-
 def to_dict(scene: Scene) -> dict[str, Any]:
     """Return the keys that were set, nested as in the file: `from_dict` makes the scene again."""
     return scene.model_dump(by_alias=True, exclude_unset=True)
 
 
+_POINT: Final = re.compile(r"\[\n\s+([-+\w.]+),\n\s+([-+\w.]+),\n\s*\]")
+
+
+def to_toml(scene: Scene, comment: str = "") -> str:
+    """Return the keys of a scene that were set, as the text of a scene file.
+
+    Its ``[[expect]]`` are left out: they were promised for another scene.
+
+    Parameters
+    ----------
+    comment : str
+        Lines to begin with.
+
+    Examples
+    --------
+    >>> scene = load("perpendicular")
+    >>> parse(to_toml(scene)).plate == scene.plate
+    True
+    """
+    tables = scene.model_dump(
+        by_alias=True, exclude_unset=True, exclude_none=True, exclude={"expect"}
+    )
+    # tomli-w writes a line for each number of a list; no text holds a line break as it stands.
+    text = _POINT.sub(r"[\1, \2]", tomli_w.dumps(tables))
+    remark = "".join(f"# {line}".rstrip() + "\n" for line in comment.splitlines())
+    return f"{remark}\n{text}" if remark else text
+
+
 def plain(value: object) -> Any:
-    """Copy a mapping as `tomllib` would have made it: of dicts and lists, with texts as keys."""
+    """Copy a value as `tomllib` would have made it: of dicts, lists and Python's own numbers."""
     match value:
         case Mapping():
             return {str(key): plain(content) for key, content in value.items()}
         case list() | tuple():
             return [plain(item) for item in value]
-    return value
+    # NumPy's numbers and arrays, without its import.
+    return value.tolist() if hasattr(value, "tolist") else value
 
 
 def _traced(fault: Fault, given: Mapping[str, str]) -> Fault:
     """Add to a fault which override it came from, if one."""
     for path, typed in given.items():
+        if not typed:
+            continue
         inside = fault.key == path or fault.key.startswith((path + ".", path + "["))
         if inside or path.startswith(fault.key + "."):
             return Fault(fault.key, fault.value, f"{fault.allowed} (from {typed})")

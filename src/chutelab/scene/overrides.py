@@ -9,6 +9,7 @@ import difflib
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from math import inf, nextafter
 from typing import Any, Final
@@ -121,24 +122,39 @@ _SEGMENT: Final = re.compile(r"([^\s.=\[\]\"']+)((?:\[\d{1,9}\])*)")
 _FORM: Final = "must be KEY=VALUE, such as plate.angle_deg=20 or surface[0].speed=1"
 
 
-class Setting(str):
-    """A ``KEY=VALUE`` that an option of its own stands for; `typed` is what messages call it."""
+@dataclass(frozen=True)
+class Override:
+    """A value to be laid over a scene.
 
-    __slots__ = ("typed",)
-    typed: str
+    Attributes
+    ----------
+    key : str
+        Full path; a free surface goes by index or by name, ``surface[0].speed`` or
+        ``surface.hood.speed``.
+    value : object
+        As `tomllib` would have read it; None takes the key away, so that it has its default.
+    typed : str
+        The option that it came from, for messages; "" for none.
+    """
 
-    def __new__(cls, override: str, typed: str) -> Setting:
-        """Keep what was typed beside the text."""
-        setting = super().__new__(cls, override)
-        setting.typed = typed
-        return setting
+    key: str
+    value: object
+    typed: str = ""
+
+
+def read(text: str) -> Override:
+    """Read what ``--set`` takes, ``KEY=VALUE``; VALUE is a TOML value or else a string."""
+    key, equals, value = text.partition("=")
+    return Override(key.strip() if equals else "", value_of(value), f"--set {text}")
 
 
 class _RefusedError(Exception):
     """Why an override cannot be laid over the scene."""
 
 
-def apply(document: dict[str, Any], overrides: Sequence[str]) -> tuple[list[Fault], dict[str, str]]:
+def apply(
+    document: dict[str, Any], overrides: Sequence[str | Override]
+) -> tuple[list[Fault], dict[str, str]]:
     """Lay overrides over a scene's tables, in place and in order; the last one wins.
 
     Parameters
@@ -146,9 +162,7 @@ def apply(document: dict[str, Any], overrides: Sequence[str]) -> tuple[list[Faul
     document
         The tables of a scene, as `tomllib` reads them.
     overrides
-        ``KEY=VALUE`` each. KEY is a full path; a free surface goes by index or by name,
-        ``surface[0].speed`` or ``surface.hood.speed``. VALUE is a TOML value, or else taken as a
-        string as it stands. A missing table is made.
+        Texts are as `read` takes them. A missing table is made.
 
     Returns
     -------
@@ -158,16 +172,15 @@ def apply(document: dict[str, Any], overrides: Sequence[str]) -> tuple[list[Faul
     """
     faults: list[Fault] = []
     given: dict[str, str] = {}
-    for override in overrides:
-        typed = override.typed if isinstance(override, Setting) else f"--set {override}"
-        key, equals, text = override.partition("=")
+    for given_one in overrides:
+        one = read(given_one) if isinstance(given_one, str) else given_one
         try:
-            path = _resolve(document, _split(key.strip() if equals else ""))
-            _put(document, path, value_of(text))
+            path = _resolve(document, _split(one.key))
+            _put(document, path, one.value)
         except _RefusedError as refusal:
-            faults.append(Fault(typed, None, str(refusal)))
+            faults.append(Fault(one.typed or one.key, None, str(refusal)))
         else:
-            given[joined(path)] = typed
+            given[joined(path)] = one.typed
     return faults, given
 
 
@@ -227,7 +240,9 @@ def _put(document: dict[str, Any], path: list[str | int], value: object) -> None
             if isinstance(path[depth + 1], int):
                 raise _RefusedError(f"{joined(path[: depth + 1])} is not there; give it whole")
             place[part] = {}
-        if last:
+        if last and value is None and isinstance(place, dict):
+            place.pop(part, None)
+        elif last:
             place[part] = value
         else:
             place = place[part]

@@ -5,6 +5,7 @@ Attributes mirror the TOML keys. Angles are degrees here (``_deg``) and nowhere 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Literal, Self
 
 from pydantic import ConfigDict, Field, PrivateAttr, model_validator
@@ -227,7 +228,7 @@ class Scene(Table):
     expect: tuple[Expect, ...] = Field((), max_length=MOST_EXPECTATIONS)
 
     _source: str = PrivateAttr("<scene>")
-    _members: int | None = PrivateAttr(None)
+    _shape: tuple[int, ...] = PrivateAttr(())
 
     @classmethod
     def tables(cls) -> dict[str, type[Table]]:
@@ -255,10 +256,39 @@ class Scene(Table):
         return (*tables, *(free.name for free in self.surface))
 
     @property
-    def members(self) -> int | None:
-        """How many scenes a family holds, see `chutelab.scene.variants`; None for one scene."""
-        # As `self._members`, for which pydantic takes ten times as long.
-        return (self.__pydantic_private__ or {}).get("_members")
+    def shape(self) -> tuple[int, ...]:
+        """(N,) of a family of scenes, see `chutelab.scene.variants.family`; () of one scene."""
+        # As `self._shape`, for which pydantic takes ten times as long.
+        private: dict[str, tuple[int, ...]] = self.__pydantic_private__ or {}
+        return private.get("_shape", ())
+
+    def with_values(self, values: Mapping[str, object]) -> Scene:
+        """Return the scene with other values, validated, and with defaults filled in anew.
+
+        Parameters
+        ----------
+        values
+            By full path, such as ``plate.angle_deg``, ``surface.hood.speed`` or
+            ``surface[0].speed``; also whole tables. None takes a key away, so that it has its
+            default. A whole float such as 3.0 will do for a whole number.
+
+        Raises
+        ------
+        SceneError
+            With all values that the scene refuses, and those that do not go together.
+
+        Examples
+        --------
+        >>> from chutelab.scene import load
+        >>> load("perpendicular").with_values({"plate.angle_deg": 20.0}).plate.angle_deg
+        20.0
+        """
+        # Here, because `loading` builds on the tables above.
+        from chutelab.scene.loading import from_dict, plain, to_dict
+        from chutelab.scene.overrides import Override
+
+        overrides = [Override(key, plain_number(plain(value))) for key, value in values.items()]
+        return from_dict(to_dict(self), self.source, overrides)
 
     def __eq__(self, other: object) -> bool:
         # The same machine from another file is the same scene.
@@ -284,3 +314,12 @@ class Scene(Table):
             filled = given.model_copy()
             filled._fill(key, value)
             self._fill(table, filled)
+
+
+def plain_number(value: object) -> object:
+    """Return a whole float as an integer, which will do for a float, but not the other way round.
+
+    Beyond 2**53 not every integer is a float.
+    """
+    whole = isinstance(value, float) and value.is_integer() and abs(value) < 2.0**53
+    return int(value) if whole else value  # type: ignore[call-overload]

@@ -19,9 +19,9 @@ from pydantic import TypeAdapter, ValidationError
 
 from chutelab.scene.errors import MISSING, SceneError
 from chutelab.scene.loading import from_dict, plain, to_dict
-from chutelab.scene.overrides import Setting, apply
+from chutelab.scene.overrides import Override, apply
 from chutelab.scene.rules import Look, conflicts
-from chutelab.scene.schema import Scene
+from chutelab.scene.schema import Scene, plain_number
 from chutelab.scene.units import read_size
 from chutelab.util.arrays import Bools, Floats
 
@@ -280,12 +280,9 @@ def quantities(scene: Scene, varies: Sequence[Vary]) -> tuple[Quantity, ...]:
     return tuple(found)
 
 
-def setting(key: str, value: float) -> Setting:
-    """Return an override of one key, in digits that give the value back."""
-    # A whole number will do for a float, but not the other way round.
-    whole = value.is_integer() and abs(value) < 2.0**53
-    written = str(int(value)) if whole else repr(value)
-    return Setting(f"{key}={written}", f"--vary {key}={written}")
+def setting(key: str, value: float) -> Override:
+    """Return an override of one key."""
+    return Override(key, plain_number(value))
 
 
 MOST_VARIED: Final = 2
@@ -450,7 +447,7 @@ class _Noting(Look):
         return super().__call__(table, key)
 
 
-def judged_by(mapping: Mapping[str, Any], overrides: Sequence[str] = ()) -> set[str]:
+def judged_by(mapping: Mapping[str, Any], overrides: Sequence[str | Override] = ()) -> set[str]:
     """Return the keys of tables whose numbers decide whether a scene contradicts itself.
 
     Another number under any other key makes no contradiction, nor takes one away.
@@ -481,7 +478,8 @@ def family(scene: Scene, columns: Mapping[str, Floats]) -> Scene:
     Returns
     -------
     Scene
-        With arrays under these keys, and under those whose defaults they are; `Scene.members` is N.
+        With arrays under these keys, and under those whose defaults they are; its `shape` is
+        (N,).
     """
     changes: dict[str, Any] = {}
     for path, values in columns.items():
@@ -502,6 +500,6 @@ def family(scene: Scene, columns: Mapping[str, Floats]) -> Scene:
         if given is not None and key not in given.model_fields_set:
             changes[table] = given.model_copy(update={key: None})
     many = scene.model_copy(update=changes)
-    many._source, many._members = scene.source, len(next(iter(columns.values())))
+    many._source, many._shape = scene.source, next(iter(columns.values())).shape
     many._fill_defaults()
     return many

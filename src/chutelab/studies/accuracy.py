@@ -17,17 +17,15 @@ from typing import Literal
 
 import numpy as np
 
-from chutelab import scene as scenes
 from chutelab.engines import reference
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
 from chutelab.results import ENTRIES, REASONS, Kind, Recording
-from chutelab.results.comparison import QUANTITIES, compare, scales, scene_of
+from chutelab.results.comparison import QUANTITIES, compare, scales
 from chutelab.results.ledger import ledger
 from chutelab.results.recorder import StalledError
 from chutelab.scene import Scene, SceneError
 from chutelab.scene.units import read_size, write_size
-from chutelab.theory import predict
 from chutelab.util.arrays import Floats, Progress
 
 SMALLEST, LARGEST_SHARE, LARGEST_LENGTH = 1e-15, 0.5, 1e3
@@ -148,7 +146,7 @@ def _ends(recording: Recording) -> Floats:
 
     Others end where they do because a run has to stop somewhere.
     """
-    scene = scene_of(recording)
+    scene = recording.scene
     driven = {free.name for free in scene.surface if free.speed != 0.0}
     driven |= {name for name in ("incoming", "outgoing") if getattr(scene, name) is not None
                and getattr(scene, name).speed != 0.0}  # fmt: skip
@@ -185,8 +183,7 @@ def sizes(recording: Recording) -> dict[str, float]:
     Otherwise by the extent of the way, its duration and the highest speed; energies always by the
     energy that was turned over.
     """
-    scene = scene_of(recording)
-    known = scales(scene, predict(scene))
+    known = scales(recording.scene, recording.prediction)
     knots = recording.knots
     place = knots["position"]
     extent = float(np.hypot(*np.ptp(place, axis=0))) if len(place) else 0.0
@@ -418,7 +415,7 @@ class Search:
             met=reached <= self.wanted.size,
             worst=which,
             chaotic=chaotic,
-            dt=scene_of(found).run.dt if found.engine in STEPPED else None,
+            dt=found.scene.run.dt if found.engine in STEPPED else None,
             runs=self.runs,
             against=against,
         )
@@ -481,7 +478,7 @@ class Search:
                 last = replace(best[1], runs=self.runs, method=f"{best[1].method}; {reason}")
                 return best[0], last
             dt *= 0.5
-            finer = changed(self.scene, f"run.dt={dt!r}")
+            finer = self.scene.with_values({"run.dt": dt, "expect": None})
             if found.engine in STEPPED:
                 found = self.run(finer, found.engine)
             if other is not None and other.engine in STEPPED:
@@ -490,7 +487,7 @@ class Search:
     def held(self, found: Recording, other: Recording) -> Accuracy:
         """Hold a run against its witness."""
         error, which = apart(list(each(found)), list(each(other)), sizes(other), self.wanted.unit)
-        at = f" at dt = {scene_of(other).run.dt:.3g} s" if other.engine in STEPPED else ""
+        at = f" at dt = {other.scene.run.dt:.3g} s" if other.engine in STEPPED else ""
         name = "SciPy's DOP853" if other.engine == "dop853" else f"the {other.engine} engine"
         how = f"difference from {name}{at}"
         if not isfinite(error):
@@ -504,7 +501,7 @@ class Search:
         collisions, and so, less, the mean: differences smaller than that would be luck.
         """
         engine = "pymunk" if found.engine == "contact" else "contact"
-        scene = scene_of(found)
+        scene = found.scene
         moved = stirred(scene, STIR)
         runs = [
             found,
@@ -541,13 +538,6 @@ def _size(found: Accuracy) -> float:
     return inf if found.reached is None else found.reached
 
 
-def changed(scene: Scene, *settings: str) -> Scene:
-    """Return a scene with some keys set, ``KEY=VALUE`` each, and without its expectations."""
-    tables = scenes.to_dict(scene)
-    tables.pop("expect", None)
-    return scenes.from_dict(tables, scene.source, settings)
-
-
 def stirred(scene: Scene, share: float) -> Scene:
     """Return a scene with gravity and speeds lower by a share, a tiny one.
 
@@ -555,9 +545,9 @@ def stirred(scene: Scene, share: float) -> Scene:
     what is released on it keep the same speed.
     """
     less = 1.0 - share
-    settings = [f"gravity={scene.gravity * less!r}"]
+    values: dict[str, object] = {"gravity": scene.gravity * less, "expect": None}
     if scene.incoming is not None:
-        settings.append(f"incoming.speed={scene.incoming.speed * less!r}")
+        values["incoming.speed"] = scene.incoming.speed * less
     if scene.stream.velocity is not None:
-        settings.append(f"stream.velocity={[part * less for part in scene.stream.velocity]}")
-    return changed(scene, *settings)
+        values["stream.velocity"] = [part * less for part in scene.stream.velocity]
+    return scene.with_values(values)

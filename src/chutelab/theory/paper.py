@@ -173,7 +173,8 @@ class Table(Shown):
         form = self.rebound.replace("-", " ")
         return Sheet(
             f"{self.title}\n(printed, computed with Eq. (9) {form})",
-            self.columns,
+            # Broken here, or the terminal breaks some of them elsewhere.
+            tuple(column.replace(" = ", " =\n") for column in self.columns),
             tuple((row.label, *map(str, row.cells)) for row in self.rows),
             notes=(
                 f"{self.differing} of {self.cells} cells differ in a printed digit.",

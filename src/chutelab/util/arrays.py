@@ -11,5 +11,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
+Numbers = Floats | float
+"""A number, or an array (N,) where a family of scenes differs in it."""
+
 Progress = Callable[[float], None]
 """Called now and then with the share of the work that is done, 0 to 1."""

@@ -1,12 +1,19 @@
-"""Files that are written whole or not at all."""
+"""Files that are written whole or not at all, and tables in them: CSV and TSV.
+
+It imports no NumPy: commands that need none answer at once.
+"""
 
 from __future__ import annotations
 
+import csv
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import fields
 from errno import ENOENT
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 
 @contextmanager
@@ -23,3 +30,47 @@ def whole(path: str | Path) -> Iterator[Path]:
         unfinished = Path(folder) / path.name
         yield unfinished
         unfinished.replace(path)
+
+
+def csv_lines(
+    rows: Iterable[Iterable[object]], *, separator: str = ",", end: str = "\n"
+) -> Iterator[str]:
+    r"""Yield rows as lines of CSV, cells quoted where they must be.
+
+    None is an empty cell, numbers come back to the last bit.
+
+    >>> list(csv_lines([("t", "what"), (0.1, "a, b"), (1, None)]))
+    ['t,what\n', '0.1,"a, b"\n', '1,\n']
+    """
+    # `writerow` returns what `write` does: the line.
+    out = csv.writer(SimpleNamespace(write=str), delimiter=separator, lineterminator=end)
+    return map(out.writerow, rows)
+
+
+def write_lines(path: str | Path, texts: Iterable[str], *, errors: str = "strict") -> Path:
+    """Write lines, each with its end, to a UTF-8 file, whole or not at all."""
+    with (
+        whole(path) as unfinished,
+        unfinished.open("w", encoding="utf-8", errors=errors, newline="") as file,
+    ):
+        file.writelines(texts)
+    return Path(path)
+
+
+def csv_text(columns: Mapping[str, Any]) -> str:
+    """Return named columns, arrays of one length, as CSV; NaN is an empty cell."""
+    # Only NaN differs from itself.
+    cells = ([None if x != x else x for x in column.tolist()] for column in columns.values())
+    return "".join(csv_lines([columns, *zip(*cells, strict=True)]))
+
+
+def tsv_text(rows: Sequence[object], kind: type, about: Mapping[str, str]) -> str:
+    """Return rows of a dataclass as tab-separated values.
+
+    Lines of ``# key: value`` come first and say where the figures are from; then the names of the
+    columns.
+    """
+    names = [field.name for field in fields(kind)]
+    cells = [[getattr(row, name) for name in names] for row in rows]
+    head = "".join(f"# {key}: {value}\n" for key, value in about.items())
+    return head + "".join(csv_lines([names, *cells], separator="\t"))

@@ -1,26 +1,30 @@
-"""A small table for terminal and notebook; columns as a pandas DataFrame and as CSV, rows as TSV.
+"""A small table for terminal and notebook, plain data for JSON, and columns as a DataFrame.
 
-pandas is imported only where a DataFrame is asked for.
+NumPy, pandas and rich are not imported before they are needed.
 """
 
 from __future__ import annotations
 
-import csv
 import io
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, is_dataclass
 from html import escape
 from importlib import import_module
-from math import isfinite, isnan
+from math import isfinite
 from textwrap import wrap
 from typing import Any
-
-from numpy.typing import NDArray
 
 WIDTH = 80
 """Columns of a line of prose in a terminal, at most."""
 
-GAP = "  "
+LONG = 55
+"""Characters from which the first cell of a row may be broken, as a path may have to be."""
+
+UNBOUNDED = 10_000
+"""Columns of a table that is no wider than its cells."""
+
+STYLES = {"ok": "green", "FAILED": "bold red"}
+"""Colours of a row, in a terminal that has some, by its words for a verdict."""
 
 
 @dataclass(frozen=True)
@@ -34,9 +38,11 @@ class Sheet:
     columns : tuple of str
         Heads, "" where a column needs none.
     rows, foot : tuple of tuple of str
-        Cells; those of the foot stand below a line.
+        Cells; those of the foot stand below a line. The first line of a cell of several is bold.
     texts : int
         How many columns hold words; the others hold numbers and are set to the right.
+    tail : int
+        How many columns at the end hold words again.
     notes : tuple of str
         Sentences below the table.
     """
@@ -46,23 +52,45 @@ class Sheet:
     rows: tuple[tuple[str, ...], ...]
     foot: tuple[tuple[str, ...], ...] = ()
     texts: int = 1
+    tail: int = 0
     notes: tuple[str, ...] = ()
 
-    def __str__(self) -> str:
-        every = [self.columns, *self.rows, *self.foot]
-        widths = [max(map(len, column)) for column in zip(*every, strict=True)]
-        line = GAP.join("-" * width for width in widths)
-        head = [self._line(self.columns, widths), line] if any(self.columns) else []
-        body = [self._line(row, widths) for row in self.rows]
-        foot = [line, *(self._line(row, widths) for row in self.foot)] if self.foot else []
-        said = ["\n".join(wrapped(note)) for note in self.notes]
-        return "\n".join([*([self.title] if self.title else []), *head, *body, *foot, *said])
+    def __rich__(self) -> Any:
+        """Return what rich prints: title, table and notes, a blank line between the parts."""
+        from rich import box
+        from rich.console import Group
+        from rich.table import Table
+        from rich.text import Text
 
-    def _line(self, cells: tuple[str, ...], widths: list[int]) -> str:
-        return GAP.join(
-            cell.ljust(width) if index < self.texts else cell.rjust(width)
-            for index, (cell, width) in enumerate(zip(cells, widths, strict=True))
-        ).rstrip()
+        table = Table(
+            box=box.SIMPLE_HEAD,
+            show_edge=False,
+            pad_edge=False,
+            collapse_padding=True,
+            show_header=any(self.columns),
+        )
+        rows = [*self.rows, *self.foot]
+        for index, name in enumerate(self.columns):
+            widest = max((len(row[index]) for row in rows), default=0)
+            if self._has_words(index):
+                # What a row is about stays on one line, unless it is a long path.
+                table.add_column(name, no_wrap=index == 0 and widest < LONG, overflow="fold")
+            else:
+                table.add_column(name, justify="right", min_width=widest)
+        for number, row in enumerate(rows):
+            if number == len(self.rows):
+                table.add_section()
+            style = next((STYLES[cell] for cell in row if cell in STYLES), "")
+            table.add_row(*map(_cell, row), style=style)
+        parts: list[Any] = [Text(f"\n{self.title}", style="bold")] if self.title else []
+        parts += [table] if rows else []
+        if self.notes:
+            notes = [line for note in self.notes for line in wrapped(note)]
+            parts.append(Text("\n".join(["", *notes])))
+        return Group(*parts)
+
+    def __str__(self) -> str:
+        return _printed(self)
 
     def html(self) -> str:
         """Return the table as HTML that takes its colours from the page around it."""
@@ -79,17 +107,18 @@ class Sheet:
         notes = "".join(f'<p style="max-width:45em">{escape(note)}</p>' for note in self.notes)
         return f"<div><table>{caption}{head}<tbody>{body}</tbody>{foot}</table>{notes}</div>"
 
-    def _repr_html_(self) -> str:
-        return self.html()
+    _repr_html_ = html
 
     def _row(self, cells: tuple[str, ...], tag: str = "td") -> str:
-        sides = ("left" if index < self.texts else "right" for index in range(len(cells)))
-        return "<tr>{}</tr>".format(
-            "".join(
-                f'<{tag} style="text-align:{side};padding:.1em .8em .1em 0">{escape(cell)}</{tag}>'
-                for side, cell in zip(sides, cells, strict=True)
-            )
-        )
+        row = ""
+        for index, cell in enumerate(cells):
+            side = "left" if self._has_words(index) else "right"
+            style = f"text-align:{side};padding:.1em .8em .1em 0"
+            row += f'<{tag} style="{style}">{escape(cell).replace(chr(10), "<br>")}</{tag}>'
+        return f"<tr>{row}</tr>"
+
+    def _has_words(self, column: int) -> bool:
+        return not self.texts <= column < len(self.columns) - self.tail
 
 
 class Shown:
@@ -102,8 +131,27 @@ class Shown:
     def __repr__(self) -> str:
         return str(self.sheet())
 
+    def __rich__(self) -> Sheet:
+        return self.sheet()
+
     def _repr_html_(self) -> str:
         return self.sheet().html()
+
+
+def _cell(text: str) -> Any:
+    from rich.text import Text
+
+    first, end, rest = text.partition("\n")
+    return Text.assemble((first, "bold"), end, rest) if end else Text(text)
+
+
+def _printed(shown: Any) -> str:
+    """Return what rich prints, without colours, in lines as long as it takes."""
+    from rich.console import Console
+
+    out = io.StringIO()
+    Console(file=out, width=UNBOUNDED, color_system=None).print(shown)
+    return "\n".join(line.rstrip() for line in out.getvalue().strip("\n").splitlines())
 
 
 def wrapped(text: str, width: int = WIDTH) -> list[str]:
@@ -120,8 +168,29 @@ def number(value: float) -> str:
     return f"{value:.6g}" if isfinite(value) else "-"
 
 
-def frame(columns: Mapping[str, NDArray[Any]]) -> Any:
-    """Return named columns of one length as a DataFrame.
+def plain(value: Any) -> Any:
+    """Return a value as JSON has it.
+
+    Dataclasses become objects, arrays lists, and what is not finite None.
+
+    >>> plain({"x": (1.0, float("nan")), "n": (1, 2)})
+    {'x': [1.0, None], 'n': [1, 2]}
+    """
+    if hasattr(value, "tolist"):  # what NumPy has
+        value = value.tolist()
+    if isinstance(value, float):
+        return value if isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {key: plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(one) for one in value]
+    if is_dataclass(value):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    return value
+
+
+def frame(columns: Mapping[str, Any]) -> Any:
+    """Return named columns, arrays of one length, as a DataFrame.
 
     Raises
     ------
@@ -135,31 +204,3 @@ def frame(columns: Mapping[str, NDArray[Any]]) -> Any:
             "A DataFrame needs pandas: pip install pandas. The arrays are there without it."
         ) from error
     return pandas.DataFrame(dict(columns))
-
-
-def csv_text(columns: Mapping[str, NDArray[Any]]) -> str:
-    """Return named columns of one length as CSV; NaN is an empty cell."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(columns)
-    for row in zip(*(column.tolist() for column in columns.values()), strict=True):
-        writer.writerow("" if isinstance(one, float) and isnan(one) else one for one in row)
-    return out.getvalue()
-
-
-def tsv_text(rows: Sequence[object], kind: type, about: Mapping[str, str]) -> str:
-    """Return rows of a dataclass as tab-separated values.
-
-    Lines of ``# key: value`` come first and say where the figures are from; then the names of the
-    columns. What is None is empty. Numbers come back to the last bit.
-    """
-    text = io.StringIO()
-    for key, value in about.items():
-        text.write(f"# {key}: {value}\n")
-    writer = csv.writer(text, dialect="excel-tab", lineterminator="\n")
-    names = [field.name for field in fields(kind)]
-    writer.writerow(names)
-    for row in rows:
-        values = (getattr(row, name) for name in names)
-        writer.writerow(["" if value is None else value for value in values])
-    return text.getvalue()

@@ -159,10 +159,8 @@ def _written(key: str, value: Any) -> str:
 def _mends(scene: Scene, machine: Machine, setting: tuple[str, Any]) -> bool:
     """Tell whether a machine with a setting has fewer warnings."""
     key, value = setting
-    tables = scenes.to_dict(scene)
-    tables.pop("expect", None)
     try:
-        changed = build(scenes.from_dict(tables, scene.source, [f"{key}={scenes.shown(value)}"]))
+        changed = build(scene.with_values({key: value, "expect": None}))
     except SceneError:
         return False
     return len(changed.warnings) < len(machine.warnings)
@@ -340,7 +338,7 @@ def preflight(scene: Scene) -> Preflight:
     steps = None if engine == "exact" else stepping(machine, engine, tried.lone, recording)
     cost = effort(scene, engine, tried)
     return Preflight(
-        title=machine.title,
+        title=machine.scene.title,
         built=tuple(built(machine)),
         skipped=tuple(skipped(scene, machine, engine)),
         engine=engine,

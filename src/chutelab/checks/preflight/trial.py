@@ -5,14 +5,12 @@ From it contacts and run time of the whole stream are estimated.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import sqrt
 from time import perf_counter
 
 import numpy as np
 
-from chutelab import scene as scenes
 from chutelab.checks.preflight.results import Effort
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind, Recording
@@ -86,21 +84,12 @@ def trial(scene: Scene, engine: str) -> Trial:
     most = CROWD if crowd else ALONE if engine == "pymunk" else INDEPENDENT
     count = min(scene.stream.count, most)
     landed = crowd and scene.run.until == "settled" and scene.outgoing is not None
-    run = {"until": "landed"} if landed else {}
-    found = _warm(_with(scene, {"count": count}, run))
+    run = {"run.until": "landed"} if landed else {}
+    found = _warm(scene.with_values({"stream.count": count, "expect": None, **run}))
     if engine == "exact":
         return found
-    alone = _with(scene, {"count": 1, "interact": False}, {"engine": "auto"})
-    return replace(found, landed=landed, lone=_lone(alone))
-
-
-def _with(scene: Scene, stream: Mapping[str, object], run: Mapping[str, object]) -> Scene:
-    """Return a scene with other keys of stream and run, without its expectations."""
-    tables = scenes.to_dict(scene)
-    tables.pop("expect", None)
-    tables["stream"] = {**tables.get("stream", {}), **stream}
-    tables["run"] = {**tables.get("run", {}), **run}
-    return scenes.from_dict(tables, scene.source)
+    alone = {"stream.count": 1, "stream.interact": False, "run.engine": "auto", "expect": None}
+    return replace(found, landed=landed, lone=_lone(scene.with_values(alone)))
 
 
 def _warm(scene: Scene) -> Trial:

@@ -9,8 +9,8 @@
   `progress`; all exercises by name.
 - `exercise`: what an exercise is made of: parameters, drawn from a name, questions, known mistakes.
 - `judging`: a number read and judged: right, a known mistake, or how far off; replies.
-- `the_parabola`, `letting_go`, `the_bounce`, `turning_the_plate`, `landing`, `grip_or_slip`,
-  `a_stream`, `trust`: the eight lessons, a module each.
+- ``the-parabola.toml`` and so on: the exercises themselves, a file a lesson: what is drawn,
+  questions, and each answer and mistake as a formula.
 
 Answers are computed from `chutelab.theory` for the parameters drawn; none is stored.
 """

@@ -4,20 +4,12 @@ from __future__ import annotations
 
 import difflib
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import replace
+from importlib.resources import files
+from typing import Final
 
-from chutelab.classroom.exercises import (
-    a_stream,
-    grip_or_slip,
-    judging,
-    landing,
-    letting_go,
-    the_bounce,
-    the_parabola,
-    trust,
-    turning_the_plate,
-)
-from chutelab.classroom.exercises.exercise import Case, Exercise, Values, draw, shown
+from chutelab.classroom.exercises import judging
+from chutelab.classroom.exercises.exercise import TOLERANCE, Exercise, draw, read, shown
 from chutelab.classroom.exercises.judging import (
     Passage,
     Progress,
@@ -25,29 +17,14 @@ from chutelab.classroom.exercises.judging import (
     Standing,
     Unreadable,
     Verdict,
-    blank,
-    filled,
-    judge,
     number_of,
-    unread,
 )
 
-OPENED: deque[Task] = deque(maxlen=64)
+OPENED: Final[deque[Task]] = deque(maxlen=64)
 """The tasks of this process, the last one last: where grading looks for what was answered."""
 
-UNNAMED = "your name"
+UNNAMED: Final = "your name"
 """What stands in a notebook in place of the student's name."""
-
-
-@dataclass
-class _State:
-    """What happened to one question so far."""
-
-    reply: Reply
-    answer: float | None = None
-    tries: int = 0
-    hints: int = 0
-    revealed: bool = False
 
 
 class Task:
@@ -74,10 +51,11 @@ class Task:
     def __init__(self, exercise: Exercise, student: str) -> None:
         self.exercise = exercise
         self.student = student
-        self.given: Values
-        self._cases: tuple[Case, ...]
         self.given, self._cases = draw(exercise, student)
-        self._states = [_State(blank(i + 1)) for i in range(len(self._cases))]
+        self._standings = [
+            Standing(number, case.question.title)
+            for number, case in enumerate(self._cases, start=1)
+        ]
         OPENED.append(self)
 
     @property
@@ -88,21 +66,17 @@ class Task:
     @property
     def answers(self) -> dict[int, float]:
         """The last number that was checked, by question."""
-        return {
-            index + 1: state.answer
-            for index, state in enumerate(self._states)
-            if state.answer is not None
-        }
+        return {one.number: one.answer for one in self._standings if one.answer is not None}
 
     @property
     def revealed(self) -> tuple[int, ...]:
         """Questions whose working was shown."""
-        return tuple(index + 1 for index, state in enumerate(self._states) if state.revealed)
+        return tuple(one.number for one in self._standings if one.revealed)
 
     def question(self, number: object = None) -> Passage | Reply:
         """Show a question with this student's numbers."""
         index = self._index(number)
-        return self._unknown(number) if index is None else self._asked(index)
+        return self._unknown if index is None else self._asked(index)
 
     def check(self, number: object = None, answer: object = None) -> Reply:
         """Say what becomes of an answer.
@@ -116,32 +90,33 @@ class Task:
         """
         index = self._index(number)
         if index is None:
-            return self._unknown(number)
-        state = self._states[index]
+            return self._unknown
+        standing = self._standings[index]
         try:
             value = number_of(answer)
         except Unreadable as problem:
-            state.reply = unread(index + 1, str(problem))
-            state.tries += 1
-            return state.reply
-        if value is None:
-            return blank(index + 1)
-        state.answer = value
-        state.tries += 1
-        state.reply = judge(index + 1, self._cases[index], value)
-        return state.reply
+            reply = Reply(index + 1, Verdict.UNREAD, str(problem))
+        else:
+            if value is None:
+                text = "Put your number in place of None, and run the cell. Stuck?"
+                return Reply(index + 1, Verdict.BLANK, f"{text} task.hint({index + 1})")
+            standing.answer = value
+            reply = judging.judge(index + 1, self._cases[index], value)
+        standing.tries += 1
+        standing.verdict = reply.verdict
+        return reply
 
     def hint(self, number: object = None) -> Passage | Reply:
         """Give the next hint to a question; the last one again when there are no more."""
         index = self._index(number)
         if index is None:
-            return self._unknown(number)
-        case, state = self._cases[index], self._states[index]
+            return self._unknown
+        case, standing = self._cases[index], self._standings[index]
         hints = case.question.hints
-        state.hints = min(state.hints + 1, len(hints))
-        title = f"Hint {state.hints} of {len(hints)} to question {index + 1}"
-        text = case.values.text(hints[state.hints - 1])
-        if state.hints == len(hints):
+        standing.hints = min(standing.hints + 1, len(hints))
+        title = f"Hint {standing.hints} of {len(hints)} to question {index + 1}"
+        text = case.numbers.text(hints[standing.hints - 1])
+        if standing.hints == len(hints):
             text += f"\nThat was the last one. task.reveal({index + 1}) shows the working."
         return Passage(index + 1, title, text)
 
@@ -149,27 +124,17 @@ class Task:
         """Show the working of a question, with the answer. It is noted that you asked."""
         index = self._index(number)
         if index is None:
-            return self._unknown(number)
+            return self._unknown
         case = self._cases[index]
-        self._states[index].revealed = True
+        self._standings[index].revealed = True
         right = f"{shown(case.right)} {case.question.unit}".strip()
-        text = f"{case.values.text(case.question.working)}\nAnswer: {right}"
+        text = f"{case.numbers.text(case.question.working)}\nAnswer: {right}"
         text += f"\nSource: {case.question.source}"
         return Passage(index + 1, f"Working of question {index + 1}", text, case.question.unit)
 
     def progress(self) -> Progress:
         """Draw what is done."""
-        rows = tuple(
-            Standing(
-                number=index + 1,
-                title=case.question.title,
-                verdict=state.reply.verdict,
-                tries=state.tries,
-                hints=state.hints,
-                revealed=state.revealed,
-            )
-            for index, (case, state) in enumerate(zip(self._cases, self._states, strict=True))
-        )
+        rows = tuple(replace(standing) for standing in self._standings)
         return Progress(f"{self.exercise.title}, {self.student}", rows)
 
     def _index(self, number: object) -> int | None:
@@ -182,10 +147,11 @@ class Task:
             return None
         return int(wanted) - 1
 
-    def _unknown(self, number: object) -> Reply:
-        count = len(self._cases)
+    @property
+    def _unknown(self) -> Reply:
         text = (
-            f"This lesson has questions 1 to {count}; ask for one of them, as in task.check(1, …)."
+            f"This lesson has questions 1 to {len(self._cases)}; ask for one of them, as in"
+            " task.check(1, …)."
         )
         return Reply(0, Verdict.UNKNOWN, text)
 
@@ -193,9 +159,13 @@ class Task:
         case = self._cases[index]
         question = case.question
         unit = question.unit or "a pure number"
-        within = f"{100 * question.tolerance:g} %"
-        text = f"{self.given.text(question.text)}\nAnswer in: {unit}, to within {within}."
+        text = case.numbers.text(question.text)
+        text += f"\nAnswer in: {unit}, to within {100 * TOLERANCE:g} %."
         return Passage(index + 1, f"Question {index + 1}: {question.title}", text, question.unit)
+
+    @property
+    def _story(self) -> str:
+        return self._cases[0].numbers.text(self.exercise.story)
 
     def _rows(self) -> list[tuple[str, str, str]]:
         return [
@@ -209,15 +179,13 @@ class Task:
         left, middle = (max(len(row[i]) for row in rows) for i in (0, 1))
         lines = [f"  {s:<{left}} = {value:<{middle}}  {meaning}" for s, value, meaning in rows]
         head = f"Lesson {self.exercise.number}: {self.exercise.title}\nNumbers of {self.student}:"
-        questions = [f"  {i + 1} {case.question.title}" for i, case in enumerate(self._cases)]
-        story = filled(self.given.text(self.exercise.story))
-        return "\n".join([head, *lines, story, "Questions:", *questions])
+        questions = [f"  {one.number} {one.title}" for one in self._standings]
+        return "\n".join([head, *lines, judging.filled(self._story), "Questions:", *questions])
 
     def _repr_html_(self) -> str:
         head = f"Lesson {self.exercise.number}: {self.exercise.title}, numbers of {self.student}"
         rows = [(f"{s} = {value}", meaning) for s, value, meaning in self._rows()]
-        story = judging.box(judging.INFO, head, self.given.text(self.exercise.story))
-        return f"{story}{judging.table(rows)}"
+        return f"{judging.box(head, self._story)}{judging.table(rows)}"
 
 
 def report() -> list[dict[str, object]]:
@@ -233,17 +201,11 @@ def report() -> list[dict[str, object]]:
     ]
 
 
-EXERCISES: dict[str, Exercise] = {
-    module.EXERCISE.name: module.EXERCISE
-    for module in (
-        the_parabola,
-        letting_go,
-        the_bounce,
-        turning_the_plate,
-        landing,
-        grip_or_slip,
-        a_stream,
-        trust,
+EXERCISES: Final[dict[str, Exercise]] = {
+    exercise.name: exercise
+    for exercise in sorted(
+        (read(file) for file in files(__package__).iterdir() if file.name.endswith(".toml")),
+        key=lambda exercise: exercise.number,
     )
 }
 """All exercises by name, in the order of the lessons."""

@@ -1,5 +1,10 @@
 """What an exercise is made of: parameters, questions, and the mistakes that are known.
 
+An exercise is a file ``NAME.toml`` beside this module, without any code: what is drawn, formulas,
+and four questions, each with its right answer and a row for each known mistake: name, formula,
+reply. A formula is a Python expression of the parameters, of other formulas and of `FUNCTIONS`.
+Texts are templates: ``{name}`` stands for a number, and a line break for a space.
+
 Some mistakes any question knows: a sign, a power of ten, radians, ½. A student's own parameters are
 drawn from the name, the same on every machine, and redrawn until every mistake can be told from the
 others.
@@ -7,20 +12,31 @@ others.
 
 from __future__ import annotations
 
+import math
+import re
+import tomllib
 import unicodedata
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from functools import cache, cached_property
 from hashlib import sha256
+from importlib.resources.abc import Traversable
 from itertools import combinations
 from math import degrees, isfinite, radians
+from types import CodeType, SimpleNamespace
+from typing import Any, Final
 
-DIGITS = 4
+from chutelab.theory import transfer
+
+DIGITS: Final = 4
 """Significant digits of numbers in texts: more than any tolerance here can tell apart."""
+
+TOLERANCE: Final = 0.01
+"""Relative difference within which an answer counts as right."""
 
 
 class Values:
-    """Numbers by name, read as attributes; SI units unless an exercise says otherwise.
+    """A student's numbers by name, read as attributes; SI units unless an exercise says otherwise.
 
     Parameters
     ----------
@@ -30,8 +46,8 @@ class Values:
     Examples
     --------
     >>> given = Values({"v0": 2.0, "h": 0.5})
-    >>> given.v0, given.text("from {h} m at {v0} m/s")
-    (2.0, 'from 0.5 m at 2 m/s')
+    >>> given.v0, given
+    (2.0, v0 = 2, h = 0.5)
     """
 
     __slots__ = ("_numbers",)
@@ -58,22 +74,11 @@ class Values:
     def __iter__(self) -> Iterator[str]:
         return iter(self._numbers)
 
-    def __len__(self) -> int:
-        return len(self._numbers)
-
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *self._numbers]
 
     def __repr__(self) -> str:
         return ", ".join(f"{name} = {shown(number)}" for name, number in self._numbers.items())
-
-    def joined(self, more: Mapping[str, float]) -> Values:
-        """Return these numbers and more."""
-        return Values({**self._numbers, **more})
-
-    def text(self, template: str) -> str:
-        """Return a template with every ``{name}`` replaced by its number."""
-        return template.format_map({name: shown(n) for name, n in self._numbers.items()})
 
 
 def shown(number: float) -> str:
@@ -86,16 +91,58 @@ def shown(number: float) -> str:
     return f"{mantissa}e{int(power)}" if power else mantissa
 
 
-G = 9.81
-"""m/s², the gravity of all exercises."""
+def _carried(**arguments: Any) -> SimpleNamespace:
+    """Return what `chutelab.theory.transfer` finds, as numbers and lists of numbers."""
+    found = transfer(**arguments)
+    return SimpleNamespace(**{f.name: getattr(found, f.name).tolist() for f in fields(found)})
 
-AS_PRINTED = "the equation as printed"
-RADIUS = "radius forgotten"
-BACKWARDS = "direction lost"
-"""Names of mistakes that several lessons know."""
 
-Formula = Callable[["Values"], float]
-"""A number from the parameters and what was solved for them."""
+_OF_MATH: Final = (
+    "acos", "asin", "atan", "atan2", "cos", "degrees", "hypot", "inf", "log", "log10", "radians",
+    "sin", "sqrt",
+)  # fmt: skip
+FUNCTIONS: Final[dict[str, Any]] = {
+    "__builtins__": {},
+    "g": 9.81,
+    "transfer": _carried,
+    **{one.__name__: one for one in (abs, dict, round)},
+    **{name: getattr(math, name) for name in _OF_MATH},
+}
+"""What formulas know besides the exercise's own names; g in m/s²."""
+
+
+@cache
+def _compiled(formula: str) -> CodeType:
+    return compile(formula, f"<{formula}>", "eval")
+
+
+class Numbers(dict[str, Any]):
+    """All numbers of one draw by name; a formula is computed when it is first asked for.
+
+    Parameters
+    ----------
+    drawn : mapping of float
+        The parameters.
+    formulas : mapping of str
+        How the other numbers follow from them.
+    """
+
+    def __init__(self, drawn: Mapping[str, float], formulas: Mapping[str, str]) -> None:
+        super().__init__(drawn)
+        self.formulas = formulas
+
+    def __missing__(self, name: str) -> Any:
+        # A KeyError sends `eval` on to FUNCTIONS.
+        self[name] = value = self.of(self.formulas[name])
+        return value
+
+    def of(self, formula: str) -> Any:
+        """Return the value of a formula."""
+        return eval(_compiled(formula), FUNCTIONS, self)
+
+    def text(self, template: str) -> str:
+        """Return a template with every ``{name}`` replaced by its number."""
+        return re.sub(r"\{(\w+)\}", lambda match: shown(self[match[1]]), template)
 
 
 @dataclass(frozen=True)
@@ -106,7 +153,7 @@ class Parameter:
     ----------
     name : str
         By which templates and formulas call it; unique in its exercise.
-    symbol, meaning, unit : str
+    symbol, unit, meaning : str
         For the table of the student's numbers.
     values : tuple of float
         What is drawn from: round numbers.
@@ -114,8 +161,8 @@ class Parameter:
 
     name: str
     symbol: str
-    meaning: str
     unit: str
+    meaning: str
     values: tuple[float, ...]
 
 
@@ -126,17 +173,17 @@ class Mistake:
     Attributes
     ----------
     name : str
-        A few words; one of `chutelab.classroom.exercises.exercise` replaces that general mistake.
+        A few words; that of a general mistake replaces it.
+    formula : str
+        The wrong answer.
     says : str
         What the student is told: what seems to have happened, and never the right number. A
         template.
-    number : callable
-        The wrong answer.
     """
 
     name: str
+    formula: str
     says: str
-    number: Formula
 
 
 @dataclass(frozen=True)
@@ -148,40 +195,27 @@ class Question:
     title, text : str
         A few words, and the question itself.
     unit : str
-        Of the answer; empty for a pure number.
-    answer : callable
-        The right number.
+        Of the answer; empty for a pure number. Angles are asked for in ``degrees``.
+    answer : str
+        Formula of the right number.
     mistakes : tuple of Mistake
         Those of this question; the general ones come on top.
     hints : tuple of str
         Each says more than the one before.
     working : str
-        The way to the answer, with the answer.
+        The way to the answer, with the answer, line by line.
     source : str
         Equation or law behind it.
-    tolerance : float
-        Relative difference within which an answer counts as right.
     """
 
     title: str
     text: str
     unit: str
-    answer: Formula
+    answer: str
     mistakes: tuple[Mistake, ...]
     hints: tuple[str, ...]
     working: str
     source: str
-    tolerance: float = 0.01
-
-
-def nothing(given: Values) -> Mapping[str, float]:
-    """Return no further numbers."""
-    return {}
-
-
-def always(given: Values) -> bool:
-    """Return that any draw will do."""
-    return True
 
 
 @dataclass(frozen=True)
@@ -200,12 +234,12 @@ class Exercise:
         What is drawn.
     questions : tuple of Question
         What is asked.
-    solve : callable
-        What texts and formulas need besides: the theory's answer for the parameters.
-    tell : callable
-        Numbers that follow from the parameters and are told to the student too.
-    fits : callable
-        Whether a draw is one the lesson is about, judged before it is solved.
+    formulas : mapping of str
+        What texts and other formulas need besides.
+    tell : tuple of str
+        Formulas whose numbers are told to the student too.
+    fits : tuple of str
+        Conditions of a draw that the lesson is about.
     """
 
     number: int
@@ -214,49 +248,60 @@ class Exercise:
     story: str
     parameters: tuple[Parameter, ...]
     questions: tuple[Question, ...]
-    solve: Callable[[Values], Mapping[str, float]]
-    tell: Callable[[Values], Mapping[str, float]] = nothing
-    fits: Callable[[Values], bool] = always
+    formulas: Mapping[str, str]
+    tell: tuple[str, ...]
+    fits: tuple[str, ...]
 
 
-def falls_past_pulley(given: Values, radius: float, bed: float = 0.0) -> bool:
-    """Tell whether what an upright plate throws back is below the pulley when it gets there.
-
-    Else it would strike pulley or belt on its way to the landing. From the plate it has d - 2 r to
-    the place where it could touch the pulley, at ε v0, and falls all the time.
-
-    Parameters
-    ----------
-    given : Values
-        With v0, R, d and e, of a ball that leaves the pulley at its top.
-    radius, bed : float
-        Of the ball, and how much higher than on the pulley its flight begins, m.
-    """
-    ride = given.R + radius
-    flown = (given.R + given.d - radius) / given.v0 + (given.d - 2.0 * radius) / (
-        given.e * given.v0
+def read(file: Traversable) -> Exercise:
+    """Read the exercise in a TOML file."""
+    found = tomllib.loads(file.read_text(encoding="utf-8"))
+    questions = tuple(
+        Question(
+            title=asked["title"],
+            text=_folded(asked["text"]),
+            unit=asked["unit"],
+            answer=asked["answer"],
+            mistakes=tuple(
+                Mistake(name, formula, _folded(says)) for name, formula, says in asked["mistakes"]
+            ),
+            hints=tuple(map(_folded, asked["hints"])),
+            working="\n".join(map(str.strip, asked["working"].splitlines())),
+            source=asked["source"],
+        )
+        for asked in found["questions"]
     )
-    return 0.5 * G * flown**2 > 2.0 * ride + bed
+    return Exercise(
+        number=found["number"],
+        name=file.name.removesuffix(".toml"),
+        title=found["title"],
+        story=_folded(found["story"]),
+        parameters=tuple(
+            Parameter(
+                name,
+                symbol,
+                unit,
+                meaning,
+                _steps(**values) if isinstance(values, dict) else tuple(map(float, values)),
+            )
+            for name, symbol, unit, meaning, values in found["parameters"]
+        ),
+        questions=questions,
+        formulas=found["formulas"],
+        tell=tuple(found.get("tell", ())),
+        fits=tuple(found.get("fits", ())),
+    )
 
 
-def steps(first: float, last: float, step: float) -> tuple[float, ...]:
-    """Return round numbers from first to last, both included.
+def _folded(text: str) -> str:
+    return " ".join(text.split())
 
-    >>> steps(0.3, 0.5, 0.1)
-    (0.3, 0.4, 0.5)
-    """
+
+def _steps(**ends: float) -> tuple[float, ...]:
+    """Return round numbers from first to last, both included."""
+    first, last, step = ends["from"], ends["to"], ends["step"]
     count = round((last - first) / step) + 1
-    return tuple(round(first + i * step, 9) for i in range(count))
-
-
-SIGN = "sign or direction"
-TENS = "power of ten"
-ANGLE = "radians for degrees"
-DOUBLE = "a missing ½"
-HALF = "a ½ too many"
-
-MOST_TENS = 6
-"""Powers of ten, either way: from micro to mega."""
+    return tuple(round(float(first + i * step), 9) for i in range(count))
 
 
 @dataclass(frozen=True)
@@ -268,103 +313,77 @@ class Trace:
     number: float
 
 
-def traces(right: float, unit: str) -> list[Trace]:
-    """Return what the general mistakes make of the right answer.
+MOST_TENS: Final = 6
+"""Powers of ten, either way: from micro to mega."""
 
-    Parameters
-    ----------
-    right : float
-        The right answer, not 0.
-    unit : str
-        Its unit; angles are asked for in ``degrees``.
-    """
-    found = [
-        Trace(
-            SIGN,
-            "The size is right, but the sign is not. Which way does it point, and which way counts"
-            " as positive here?",
-            -right,
-        ),
-        Trace(DOUBLE, "Twice what it should be. Is a ½ missing?", 2.0 * right),
-        Trace(HALF, "Half of what it should be. Is there a ½ too many, or a 2 missing?", right / 2),
-    ]
+_RAISED: Final = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def traces(right: float, unit: str) -> Iterator[Trace]:
+    """Yield what the general mistakes make of a right answer in a unit."""
+    yield Trace(
+        "sign or direction",
+        "The size is right, but the sign is not. Which way does it point, and which way counts"
+        " as positive here?",
+        -right,
+    )
+    yield Trace("a missing ½", "Twice what it should be. Is a ½ missing?", 2.0 * right)
+    half = "Half of what it should be. Is there a ½ too many, or a 2 missing?"
+    yield Trace("a ½ too many", half, right / 2)
     if unit == "degrees":
-        found += [
-            Trace(ANGLE, "That is the angle in radians; degrees are asked for.", radians(right)),
-            Trace(
-                ANGLE,
-                "An angle that was in degrees seems to have been turned into degrees once more.",
-                degrees(right),
-            ),
-        ]
+        angle = "radians for degrees"
+        says = "That is the angle in radians; degrees are asked for."
+        yield Trace(angle, says, radians(right))
+        says = "An angle that was in degrees seems to have been turned into degrees once more."
+        yield Trace(angle, says, degrees(right))
     for power in range(-MOST_TENS, MOST_TENS + 1):
         if power != 0:
-            size = f"10{_raised(abs(power))} = {10 ** abs(power):,} times too".replace(",", " ")
-            size += " large" if power > 0 else " small"
-            unit_too = " Is it all in SI units: kg for g, m for mm, J for mJ?"
-            says = f"The digits are right, but it is {size}.{unit_too}"
-            found.append(Trace(TENS, says, right * 10.0**power))
+            times = f"{10 ** abs(power):,}".replace(",", " ")
+            says = (
+                f"The digits are right, but it is 10{str(abs(power)).translate(_RAISED)} = {times}"
+                f" times too {'large' if power > 0 else 'small'}."
+                " Is it all in SI units: kg for g, m for mm, J for mJ?"
+            )
+            yield Trace("power of ten", says, right * 10.0**power)
             also = f"{says} And the sign is the other way round."
-            found.append(Trace(TENS, also, -right * 10.0**power))
-    return found
+            yield Trace("power of ten", also, -right * 10.0**power)
 
 
-def _raised(power: int) -> str:
-    return str(power).translate(str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹"))
-
-
-MOST_DRAWS = 1000
-"""A lesson whose draws fit less often than that is badly made."""
-
-LEAST = 1e-9
+LEAST: Final = 1e-9
 """An answer smaller than that in its unit has no digits to judge."""
 
 
 @dataclass(frozen=True)
 class Case:
-    """One question for one student: the numbers behind it.
-
-    Attributes
-    ----------
-    question : Question
-        What is asked.
-    values : Values
-        The student's parameters, and what the theory makes of them.
-    """
+    """One question for one student: the numbers behind it."""
 
     question: Question
-    values: Values
+    numbers: Numbers
 
     @cached_property
     def right(self) -> float:
         """The right answer."""
-        return float(self.question.answer(self.values))
+        return float(self.numbers.of(self.question.answer))
 
     @cached_property
     def mistakes(self) -> tuple[Trace, ...]:
         """The question's own mistakes first, then the general ones that it does not replace."""
+        numbers = self.numbers
         own = [
-            Trace(known.name, self.values.text(known.says), float(known.number(self.values)))
+            Trace(known.name, numbers.text(known.says), float(numbers.of(known.formula)))
             for known in self.question.mistakes
         ]
         names = {trace.name for trace in own}
-        general = [t for t in traces(self.right, self.question.unit) if t.name not in names]
-        return (*own, *general)
-
-    def matches(self, answer: float, number: float) -> bool:
-        """Tell whether an answer is that number, within the tolerance."""
-        return abs(answer - number) <= self.question.tolerance * abs(number)
+        return (*own, *(t for t in traces(self.right, self.question.unit) if t.name not in names))
 
     @property
     def clear(self) -> bool:
         """Whether the right answer and every mistake can be told from each other."""
-        numbers = [self.right, *(trace.number for trace in self.mistakes)]
-        if not all(isfinite(n) for n in numbers) or abs(self.right) < LEAST:
+        wrong = [trace.number for trace in self.mistakes]
+        numbers = [self.right, *wrong]
+        if not all(map(isfinite, numbers)) or abs(self.right) < LEAST or 0.0 in wrong:
             return False
-        if any(trace.number == 0.0 for trace in self.mistakes):
-            return False
-        twice = self.question.tolerance
-        return all(abs(a - b) > twice * (abs(a) + abs(b)) for a, b in combinations(numbers, 2))
+        return all(abs(a - b) > TOLERANCE * (abs(a) + abs(b)) for a, b in combinations(numbers, 2))
 
 
 def plain(student: str) -> str:
@@ -376,28 +395,25 @@ def plain(student: str) -> str:
     return " ".join(unicodedata.normalize("NFKC", student).casefold().split())
 
 
-def draws(exercise: Exercise, student: str, attempt: int) -> Values:
-    """Return what a student's attempt draws, whether it fits or not, and what is told besides."""
+def attempt(exercise: Exercise, student: str, number: int) -> tuple[Case, ...] | None:
+    """Return the cases of one draw, or None if it does not fit, or some mistake is not clear."""
     drawn = {}
     for parameter in exercise.parameters:
-        key = "\n".join((exercise.name, plain(student), parameter.name, str(attempt)))
-        number = int.from_bytes(sha256(key.encode("utf-8", "replace")).digest()[:8])
-        drawn[parameter.name] = parameter.values[number % len(parameter.values)]
-    given = Values(drawn)
-    return given.joined(exercise.tell(given))
-
-
-def solved(exercise: Exercise, given: Values) -> tuple[Case, ...] | None:
-    """Return the cases of all questions, or None if the draw does not fit or is not clear."""
-    if not exercise.fits(given):
-        return None
+        key = "\n".join((exercise.name, plain(student), parameter.name, str(number)))
+        random = int.from_bytes(sha256(key.encode("utf-8", "replace")).digest()[:8])
+        drawn[parameter.name] = parameter.values[random % len(parameter.values)]
+    numbers = Numbers(drawn, exercise.formulas)
+    cases = tuple(Case(question, numbers) for question in exercise.questions)
     try:
-        values = given.joined(exercise.solve(given))
-        cases = tuple(Case(question, values) for question in exercise.questions)
-        return cases if all(case.clear for case in cases) else None
+        fits = all(map(numbers.of, exercise.fits)) and all(case.clear for case in cases)
     except ValueError:
         # A mistake may lead out of a function's domain, such as arccos of more than 1.
         return None
+    return cases if fits else None
+
+
+MOST_DRAWS: Final = 1000
+"""A lesson whose draws fit less often than that is badly made."""
 
 
 def draw(exercise: Exercise, student: str) -> tuple[Values, tuple[Case, ...]]:
@@ -408,9 +424,9 @@ def draw(exercise: Exercise, student: str) -> tuple[Values, tuple[Case, ...]]:
     RuntimeError
         If none of many draws fits: the exercise is wrongly made.
     """
-    for attempt in range(MOST_DRAWS):
-        given = draws(exercise, student, attempt)
-        cases = solved(exercise, given)
+    for number in range(MOST_DRAWS):
+        cases = attempt(exercise, student, number)
         if cases is not None:
-            return given, cases
+            told = [*(parameter.name for parameter in exercise.parameters), *exercise.tell]
+            return Values({name: cases[0].numbers[name] for name in told}), cases
     raise RuntimeError(f"{exercise.name}: none of {MOST_DRAWS} draws fits")

@@ -13,67 +13,15 @@ from dataclasses import dataclass
 from enum import StrEnum
 from html import escape
 from math import isinf, isnan
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
-from chutelab.classroom.exercises.exercise import Case, shown
+from chutelab.classroom.exercises.exercise import TOLERANCE, Case, shown
 from chutelab.pictures import colours
 from chutelab.util.tables import Sheet
 
-GOOD, WRONG, WARN = colours.GREEN, colours.VERMILION, colours.ORANGE
-INFO, QUIET = colours.SKY, colours.GREY
-
-BAR, HEIGHT, GAP = 150, 12, 4
-"""Pixels: length and height of a part of the progress bar, and what is between two."""
-
-FAINT = 0.35
-"""Opacity of the parts that nothing was done about."""
-
-
-def box(colour: str, heading: str, text: str) -> str:
-    """Return a heading and a text beside a coloured bar."""
-    body = escape(text).replace("\n", "<br>")
-    return (
-        f'<div style="border-left:5px solid {colour};padding:.2em .9em;margin:.4em 0;'
-        f'max-width:46em;line-height:1.5"><b>{escape(heading)}</b><br>{body}</div>'
-    )
-
-
-def progress(summary: str, rows: Sequence[tuple[str, str, str, str, str]]) -> str:
-    """Return a bar with a part per question, and a line for each.
-
-    Parameters
-    ----------
-    summary : str
-        What a screen reader says of the bar.
-    rows : sequence of (sign, colour, title, verdict, remarks)
-        One per question.
-    """
-    width = len(rows) * (BAR + GAP) - GAP
-    parts = "".join(
-        f'<rect x="{i * (BAR + GAP)}" width="{BAR}" height="{HEIGHT}" rx="3" fill="{row[1]}"'
-        f' fill-opacity="{FAINT if row[1] == QUIET else 1}"/>'
-        for i, row in enumerate(rows)
-    )
-    bar = (
-        f'<svg role="img" aria-label="{escape(summary)}" width="{width}" height="{HEIGHT}"'
-        f' viewBox="0 0 {width} {HEIGHT}" style="max-width:100%">{parts}</svg>'
-    )
-    lines = [
-        (sign, title, f"{verdict} ({remarks})" if remarks else verdict)
-        for sign, _, title, verdict, remarks in rows
-    ]
-    return f'<div style="line-height:1.5"><b>{escape(summary)}</b><br>{bar}{table(lines)}</div>'
-
-
-def table(rows: Sequence[tuple[str, ...]]) -> str:
-    """Return a table of words without a head, at least one row."""
-    width = len(rows[0])
-    return Sheet("", ("",) * width, tuple(rows), texts=width).html()
-
-
-WIDTH = 88
+WIDTH: Final = 88
 """Columns of a reply in a terminal."""
 
 
@@ -88,15 +36,35 @@ class Verdict(StrEnum):
     UNKNOWN = "no such question"
 
 
-MARKS = {
-    Verdict.RIGHT: ("✓", GOOD),
-    Verdict.MISTAKE: ("✗", WRONG),
-    Verdict.OFF: ("✗", WRONG),
-    Verdict.UNREAD: ("?", WARN),
-    Verdict.BLANK: ("○", QUIET),
-    Verdict.UNKNOWN: ("?", WARN),
+MARKS: Final = {
+    Verdict.RIGHT: ("✓", colours.GREEN),
+    Verdict.MISTAKE: ("✗", colours.VERMILION),
+    Verdict.OFF: ("✗", colours.VERMILION),
+    Verdict.UNREAD: ("?", colours.ORANGE),
+    Verdict.BLANK: ("○", colours.GREY),
+    Verdict.UNKNOWN: ("?", colours.ORANGE),
 }
 """Sign and colour of each verdict; the words always say it too."""
+
+
+def filled(text: str) -> str:
+    """Return a text in lines that fit a terminal; its own line breaks are kept."""
+    return "\n".join(textwrap.fill(line, WIDTH) for line in text.split("\n"))
+
+
+def box(heading: str, text: str, colour: str = colours.SKY) -> str:
+    """Return a heading and a text beside a coloured bar, as HTML."""
+    body = escape(text).replace("\n", "<br>")
+    return (
+        f'<div style="border-left:5px solid {colour};padding:.2em .9em;margin:.4em 0;'
+        f'max-width:46em;line-height:1.5"><b>{escape(heading)}</b><br>{body}</div>'
+    )
+
+
+def table(rows: Sequence[tuple[str, ...]]) -> str:
+    """Return a table of words without a head, at least one row, as HTML."""
+    width = len(rows[0])
+    return Sheet("", ("",) * width, tuple(rows), texts=width).html()
 
 
 @dataclass(frozen=True, repr=False)
@@ -109,10 +77,10 @@ class Reply:
         Number of the question; 0 if there is no such one.
     verdict : Verdict
         What became of it.
-    mistake : str
-        Name of the known mistake that it looks like, or empty.
     text : str
         What to tell the student.
+    mistake : str
+        Name of the known mistake that it looks like, or empty.
     """
 
     question: int
@@ -136,7 +104,7 @@ class Reply:
 
     def _repr_html_(self) -> str:
         mark, colour = MARKS[self.verdict]
-        return box(colour, f"{mark} {self.heading}", self.text)
+        return box(f"{mark} {self.heading}", self.text, colour)
 
 
 @dataclass(frozen=True, repr=False)
@@ -160,10 +128,10 @@ class Passage:
         return f"{self.title}\n{filled(self.text)}"
 
     def _repr_html_(self) -> str:
-        return box(INFO, self.title, self.text)
+        return box(self.title, self.text)
 
 
-@dataclass(frozen=True)
+@dataclass
 class Standing:
     """How far a student got with one question.
 
@@ -173,6 +141,8 @@ class Standing:
         Of the question.
     verdict : Verdict
         Of the last answer.
+    answer : float or None
+        The last number that was checked.
     tries : int
         Answers given, blank ones not counted.
     hints : int
@@ -183,23 +153,33 @@ class Standing:
 
     number: int
     title: str
-    verdict: Verdict
-    tries: int
-    hints: int
-    revealed: bool
+    verdict: Verdict = Verdict.BLANK
+    answer: float | None = None
+    tries: int = 0
+    hints: int = 0
+    revealed: bool = False
 
     @property
     def remarks(self) -> str:
         """Tries, hints and whether the working was shown, in words."""
-        words = [
-            f"{count} {noun if count == 1 else plural}"
-            for count, noun, plural in (
-                (self.tries, "try", "tries"),
-                (self.hints, "hint", "hints"),
-            )
-            if count
-        ]
-        return ", ".join([*words, *(["working shown"] if self.revealed else [])])
+        words = []
+        if self.tries:
+            words.append("1 try" if self.tries == 1 else f"{self.tries} tries")
+        if self.hints:
+            words.append("1 hint" if self.hints == 1 else f"{self.hints} hints")
+        return ", ".join([*words, "working shown"] if self.revealed else words)
+
+    @property
+    def state(self) -> str:
+        """Verdict and remarks."""
+        return f"{self.verdict} ({self.remarks})" if self.remarks else str(self.verdict)
+
+
+BAR, HEIGHT, GAP = 150, 12, 4
+"""Pixels: length and height of a part of the progress bar, and what is between two."""
+
+FAINT: Final = 0.35
+"""Opacity of the parts that nothing was done about."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -230,27 +210,32 @@ class Progress:
     def __repr__(self) -> str:
         width = max(len(row.title) for row in self.rows)
         lines = [
-            f"  {MARKS[row.verdict][0]} {row.number} {row.title:<{width}}  {row.verdict}"
-            + (f" ({row.remarks})" if row.remarks else "")
+            f"  {MARKS[row.verdict][0]} {row.number} {row.title:<{width}}  {row.state}"
             for row in self.rows
         ]
         return "\n".join([self.summary, *lines])
 
     def _repr_html_(self) -> str:
-        cells = [
-            (*MARKS[row.verdict], f"{row.number} {row.title}", str(row.verdict), row.remarks)
-            for row in self.rows
+        summary = escape(self.summary)
+        width = len(self.rows) * (BAR + GAP) - GAP
+        parts = "".join(
+            f'<rect x="{i * (BAR + GAP)}" width="{BAR}" height="{HEIGHT}" rx="3"'
+            f' fill="{MARKS[row.verdict][1]}"'
+            f' fill-opacity="{FAINT if row.verdict is Verdict.BLANK else 1}"/>'
+            for i, row in enumerate(self.rows)
+        )
+        bar = (
+            f'<svg role="img" aria-label="{summary}" width="{width}" height="{HEIGHT}"'
+            f' viewBox="0 0 {width} {HEIGHT}" style="max-width:100%">{parts}</svg>'
+        )
+        lines = [
+            (MARKS[row.verdict][0], f"{row.number} {row.title}", row.state) for row in self.rows
         ]
-        return progress(self.summary, cells)
+        return f'<div style="line-height:1.5"><b>{summary}</b><br>{bar}{table(lines)}</div>'
 
 
-def filled(text: str) -> str:
-    """Return a text in lines that fit a terminal; its own line breaks are kept."""
-    return "\n".join(textwrap.fill(line, WIDTH) for line in text.split("\n"))
-
-
-_NUMBER = re.compile(r"\s*([-+−]?\d*[.,]?\d+(?:[eE][-+−]?\d+)?)\s*(.*)", re.DOTALL)
-_LONGEST = 40
+_NUMBER: Final = re.compile(r"\s*([-+−]?\d*[.,]?\d+(?:[eE][-+−]?\d+)?)\s*(.*)", re.DOTALL)
+_LONGEST: Final = 40
 """Characters of a student's text that are shown back."""
 
 
@@ -285,21 +270,27 @@ def _read(answer: Any) -> float | None:
             f"That is {bool(answer)}, the result of a comparison. A number is asked for."
         )
     if isinstance(answer, (str, bytes)):
-        return _text(answer if isinstance(answer, str) else answer.decode("utf-8", "replace"))
+        text = answer if isinstance(answer, str) else answer.decode("utf-8", "replace")
+        if text.strip(" \t\n.?…_-"):
+            raise _no_text(text)
+        return None
     if isinstance(answer, (complex, np.complexfloating)) and not isinstance(answer, float):
         raise Unreadable(
             "That is a complex number. Was there the square root of something negative?"
         )
     if isinstance(answer, (list, tuple, np.ndarray)):
-        return _several(answer)
+        items = answer.ravel().tolist() if isinstance(answer, np.ndarray) else list(answer)
+        if len(items) > 1:
+            raise Unreadable(
+                f"Those are {len(items)} values, and one number is asked for. Pick it, with [0]"
+                " say."
+            )
+        return _read(items[0]) if items else None
     if callable(answer):
         raise Unreadable(
             "That is a function, not its result. Call it, with its numbers in parentheses."
         )
-    return _finite(float(answer))
-
-
-def _finite(value: float) -> float:
+    value = float(answer)
     if isnan(value):
         raise Unreadable(
             "That is NaN, not a number: somewhere on the way something had no answer, such as the"
@@ -310,36 +301,20 @@ def _finite(value: float) -> float:
     return value
 
 
-def _several(answer: Any) -> float | None:
-    items = answer.ravel().tolist() if isinstance(answer, np.ndarray) else list(answer)
-    if len(items) > 1:
-        raise Unreadable(
-            f"Those are {len(items)} values, and one number is asked for. Pick it, with [0] say."
-        )
-    return _read(items[0]) if items else None
-
-
-def _text(text: str) -> float | None:
-    if not text.strip(" \t\n.?…_-"):
-        return None
+def _no_text(text: str) -> Unreadable:
+    """Say what to do about a text: a number in quotes, one with a unit, or words."""
     found = _NUMBER.match(text)
     if found is None:
-        short = text.strip()[:_LONGEST]
-        raise Unreadable(f"That is text (“{short}”). Give a number, without quotes.")
-    bare = found[1].replace(",", ".").replace("−", "-")[:_LONGEST]
+        return Unreadable(
+            f"That is text (“{text.strip()[:_LONGEST]}”). Give a number, without quotes."
+        )
     if found[2].strip():
-        raise Unreadable(
+        return Unreadable(
             "That is text with a unit in it. Give the number alone, without quotes and unit, in the"
             " unit that is asked for."
         )
-    raise Unreadable(f"That is text. Give the number without quotes: {bare}.")
-
-
-CLOSE = 0.05
-"""Relative difference up to which rounding, or another g, is the likely reason."""
-
-FAR = 10.0
-"""Ratio from which on a percentage says less than a factor."""
+    bare = found[1].replace(",", ".").replace("−", "-")[:_LONGEST]
+    return Unreadable(f"That is text. Give the number without quotes: {bare}.")
 
 
 def judge(number: int, case: Case, answer: float) -> Reply:
@@ -354,26 +329,21 @@ def judge(number: int, case: Case, answer: float) -> Reply:
     answer : float
         A finite number, in the unit that was asked for.
     """
-    question = case.question
-    if case.matches(answer, case.right):
-        found = f"{shown(answer)} {question.unit}".strip()
-        text = f"{found} is within {100 * question.tolerance:g} % of what the theory gives."
+    if abs(answer - case.right) <= TOLERANCE * abs(case.right):
+        found = f"{shown(answer)} {case.question.unit}".strip()
+        text = f"{found} is within {100 * TOLERANCE:g} % of what the theory gives."
         return Reply(number, Verdict.RIGHT, text)
     for trace in case.mistakes:
-        if case.matches(answer, trace.number):
+        if abs(answer - trace.number) <= TOLERANCE * abs(trace.number):
             return Reply(number, Verdict.MISTAKE, trace.says, trace.name)
     return Reply(number, Verdict.OFF, _distance(number, answer, case.right))
 
 
-def blank(number: int) -> Reply:
-    """Return the reply to nothing."""
-    text = f"Put your number in place of None, and run the cell. Stuck? task.hint({number})"
-    return Reply(number, Verdict.BLANK, text)
+CLOSE: Final = 0.05
+"""Relative difference up to which rounding, or another g, is the likely reason."""
 
-
-def unread(number: int, problem: str) -> Reply:
-    """Return the reply to what is no number."""
-    return Reply(number, Verdict.UNREAD, problem)
+FAR: Final = 10.0
+"""Ratio from which on a percentage says less than a factor."""
 
 
 def _distance(number: int, answer: float, right: float) -> str:

@@ -171,9 +171,7 @@ def stamp_of(lesson: Lesson, scene: Scene) -> Stamp:
     return Stamp(digest, ", ".join(f"{name} {version_of(name) or 'unknown'}" for name in LIBRARIES))
 
 
-PAGE: Final = "index.html"
-"""What a link to another lesson's worksheet becomes."""
-
+INDEX: Final = "index.html"
 _WORKSHEET: Final = re.compile(r"(^|/)README\.md(?=$|#)")
 
 
@@ -183,13 +181,21 @@ def html_of(markdown: str) -> str:
     Raw HTML is shown, not obeyed. Links to worksheets become links to pages.
     """
     parser = MarkdownIt("commonmark", {"html": False}).enable("table")
-    tokens = _body(parser.parse(markdown))
-    for token in tokens:
+    tokens = parser.parse(markdown)
+    kept: list[Token] = []
+    while tokens:
+        token = tokens.pop(0)
+        alone = [one.type for one in tokens[0].children or ()] if tokens else []
+        picture = token.type == "paragraph_open" and alone == ["image"]
+        if token.level == 0 and (token.tag == "h1" or picture):
+            del tokens[:2]  # what is in it, and its end
+            continue
+        kept.append(token)
         for inner in token.children or ():
             target = inner.attrGet("href")
             if isinstance(target, str):
-                inner.attrSet("href", _WORKSHEET.sub(rf"\g<1>{PAGE}", target))
-    made = str(parser.renderer.render(tokens, parser.options, {}))
+                inner.attrSet("href", _WORKSHEET.sub(rf"\g<1>{INDEX}", target))
+    made = str(parser.renderer.render(kept, parser.options, {}))
     # What is too wide for a phone scrolls by itself, and with the keyboard.
     return re.sub("<(pre|table)>", r'<\1 tabindex="0">', made)
 
@@ -204,30 +210,13 @@ def plain_of(markdown: str) -> str:
     return re.sub(r"(?<!!)\[([^\]]+)\]\((?!https?:)[^)]*\)", r"\1", text)
 
 
-def pictures_of(markdown: str) -> dict[str, str]:
-    """Return the words that stand for each picture of a worksheet, by the picture's address."""
-    found = MarkdownIt("commonmark").parse(markdown)
-    images = [i for token in found for i in token.children or () if i.type == "image"]
-    return {str(image.attrGet("src")): image.content for image in images}
-
-
-def _body(tokens: list[Token]) -> list[Token]:
-    """Leave out the first heading of level 1, and paragraphs that hold nothing but a picture."""
-    kept: list[Token] = []
-    skipping = ""
-    for i, token in enumerate(tokens):
-        if not skipping and token.level == 0:
-            inner = tokens[i + 1].children or [] if i + 1 < len(tokens) else []
-            alone = [one.type for one in inner] == ["image"]
-            if token.type == "paragraph_open" and alone:
-                skipping = "paragraph_close"
-            elif token.type == "heading_open" and token.tag == "h1":
-                skipping = "heading_close"
-        if not skipping:
-            kept.append(token)
-        elif token.type == skipping:
-            skipping = ""
-    return kept
+def words_for(picture: str, markdown: str) -> str | None:
+    """Return the words that stand for a picture in a worksheet, None if it is not in there."""
+    for token in MarkdownIt("commonmark").parse(markdown):
+        for image in token.children or ():
+            if image.type == "image" and image.attrGet("src") == picture:
+                return image.content
+    return None
 
 
 _TEMPLATE: Final = ("lesson.toml", "README.md", "scene.toml")
@@ -266,7 +255,11 @@ def start(path: str | Path, model: Lesson | None = None) -> Path:
         unfinished = Path(made) / path.name
         unfinished.mkdir()
         if model is None:
-            _fill_in(unfinished)
+            title = re.sub(r"^\d+-", "", path.name).replace("-", " ").capitalize()
+            for name in _TEMPLATE:
+                text = _text("template", name)
+                said = json.dumps(title) if name.endswith(".toml") else title
+                (unfinished / name).write_text(text.replace("TITLE", said), encoding="utf-8")
         else:
             for file in files_of(model):
                 shutil.copyfile(file, unfinished / file.name)
@@ -281,17 +274,8 @@ def files_of(lesson: Lesson) -> list[Path]:
     return sorted(path for path in found if path.is_file() and not path.name.startswith("."))
 
 
-def _fill_in(folder: Path) -> None:
-    title = re.sub(r"^\d+-", "", folder.name).replace("-", " ").capitalize()
-    for name in _TEMPLATE:
-        text = (Path(__file__).parent / "template" / name).read_text(encoding="utf-8")
-        quoted = json.dumps(title) if name.endswith(".toml") else title
-        (folder / name).write_text(text.replace("TITLE", quoted), encoding="utf-8")
-
-
 LIVE: Final = "page.html"
 STILL: Final = "still.png"
-INDEX: Final = "index.html"
 _SHARED: Final = ("style.css", "picture.js")
 
 
@@ -333,39 +317,70 @@ def bundle(
         made = Path(unfinished)
         cards = []
         for i, lesson in enumerate(lessons):
+
+            def part(share: float, done: int = i) -> None:
+                if progress is not None:
+                    progress((done + share) / len(lessons))
+
             around = (lessons[i - 1] if i else None, (*lessons, None)[i + 1])
-            size = _lesson(lesson, made / lesson.folder.name, around, _part(progress, i, lessons))
+            size = _lesson(lesson, made / lesson.folder.name, around, part)
             cards.append(_filled("card.html", lesson, size))
         many = "One lesson" if len(lessons) == 1 else f"{len(lessons)} lessons"
         index = _page("index.html", cards="".join(cards), count=many)
         (made / INDEX).write_text(index, encoding="utf-8")
         for name in _SHARED:
-            (made / name).write_text(_asset(name), encoding="utf-8")
-        return _moved(made, folder)
+            (made / name).write_text(_text("assets", name), encoding="utf-8")
+        written = []
+        for file in sorted(path for path in made.rglob("*") if path.is_file()):
+            target = folder / file.relative_to(made)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            file.replace(target)
+            written.append(target)
+        return written
 
 
 def _lesson(
     lesson: Lesson,
     folder: Path,
     around: tuple[Lesson | None, Lesson | None],
-    progress: Callable[[float], None] | None,
+    progress: Callable[[float], None],
 ) -> tuple[int, int]:
     """Make the folder of one lesson; return the size of its picture, pixels."""
+    from PIL.GifImagePlugin import GifImageFile
+
     folder.mkdir()
     for file in files_of(lesson):
         shutil.copyfile(file, folder / file.name)
     if not is_current(lesson):
         build(lesson, folder, force=True)
-    size = _still(folder / PICTURE, folder / STILL)
-    _live(lesson, folder, progress)
+    with GifImageFile(folder / PICTURE) as film:
+        # On the last frame everything has happened.
+        film.seek(film.n_frames - 1)
+        film.convert("RGB").quantize(255).save(folder / STILL, optimize=True)
+        size = film.size
+    # What there is to play with, and to take along.
+    doors = []
+    if lesson.page is not None:
+        from chutelab.pictures.live.page import write
+
+        scene = scene_of(lesson, lesson.page.scene, lesson.page.set)
+        home = (f"Back to the lesson: {lesson.title}", INDEX)
+        write(scene, lesson.page.vary, folder / LIVE, home=home, progress=progress)
+        doors.append(f'<li><a class="main" href="{LIVE}">Try it: change the machine</a></li>')
+    if (folder / "exercise.ipynb").is_file():
+        doors.append('<li><a href="exercise.ipynb" download>Exercise (Jupyter notebook)</a></li>')
+    for name in lesson.scenes:
+        if (folder / name).is_file():
+            said = escape(name)
+            doors.append(f'<li><a href="{said}" download>Scene {said}</a></li>')
     markdown = lesson.worksheet.read_text(encoding="utf-8") if lesson.worksheet.is_file() else ""
     page = _filled(
         "lesson.html",
         lesson,
         size,
-        alt=escape(pictures_of(markdown).get(PICTURE, lesson.title)),
+        alt=escape(words_for(PICTURE, markdown) or lesson.title),
         worksheet=html_of(markdown),
-        doors="\n".join(_doors(lesson, folder)),
+        doors="\n".join(doors),
         before=_link(around[0], "prev", "← {}"),
         after=_link(around[1], "next", "{} →"),
     )
@@ -373,43 +388,15 @@ def _lesson(
     return size
 
 
-def _live(lesson: Lesson, folder: Path, progress: Callable[[float], None] | None) -> None:
-    from chutelab.pictures.live.page import write
-
-    if lesson.page is not None:
-        scene = scene_of(lesson, lesson.page.scene, lesson.page.set)
-        home = (f"Back to the lesson: {lesson.title}", INDEX)
-        write(scene, lesson.page.vary, folder / LIVE, home=home, progress=progress)
-
-
-def _still(gif: Path, png: Path) -> tuple[int, int]:
-    """Write the last frame of a picture, on which everything has happened."""
-    from PIL.GifImagePlugin import GifImageFile
-
-    with GifImageFile(gif) as film:
-        film.seek(film.n_frames - 1)
-        film.convert("RGB").quantize(255).save(png, optimize=True)
-        return film.size
-
-
-def _doors(lesson: Lesson, folder: Path) -> list[str]:
-    """Return the ways on from a lesson's page: what there is to play with, and to take along."""
-    doors = []
-    if (folder / LIVE).is_file():
-        doors.append(f'<li><a class="main" href="{LIVE}">Try it: change the machine</a></li>')
-    if (folder / "exercise.ipynb").is_file():
-        doors.append('<li><a href="exercise.ipynb" download>Exercise (Jupyter notebook)</a></li>')
-    own = [name for name in lesson.scenes if (folder / name).is_file()]
-    said = [escape(name) for name in own]
-    return [*doors, *(f'<li><a href="{name}" download>Scene {name}</a></li>' for name in said)]
-
-
 def _link(lesson: Lesson | None, relation: str, form: str) -> str:
     if lesson is None:
         return ""
-    number = "" if lesson.number is None else f"{lesson.number}. "
-    text = form.format(number + escape(lesson.title))
+    text = form.format(_numbered(lesson) + escape(lesson.title))
     return f'<a rel="{relation}" href="../{lesson.folder.name}/{INDEX}">{text}</a>'
+
+
+def _numbered(lesson: Lesson) -> str:
+    return "" if lesson.number is None else f"{lesson.number}. "
 
 
 def _filled(name: str, lesson: Lesson, size: tuple[int, int], **more: str) -> str:
@@ -417,7 +404,7 @@ def _filled(name: str, lesson: Lesson, size: tuple[int, int], **more: str) -> st
     return _page(
         name,
         folder=lesson.folder.name,
-        number="" if lesson.number is None else f"{lesson.number}. ",
+        number=_numbered(lesson),
         title=escape(lesson.title),
         question=escape(lesson.question),
         level=lesson.level,
@@ -429,28 +416,8 @@ def _filled(name: str, lesson: Lesson, size: tuple[int, int], **more: str) -> st
 
 
 def _page(name: str, **values: str) -> str:
-    return Template(_asset(name)).substitute(version=escape(own_version()), **values)
+    return Template(_text("assets", name)).substitute(version=escape(own_version()), **values)
 
 
-def _asset(name: str) -> str:
-    return (files("chutelab.classroom.lessons") / "assets" / name).read_text(encoding="utf-8")
-
-
-def _part(
-    progress: Callable[[float], None] | None, done: int, lessons: Sequence[Lesson]
-) -> Callable[[float], None] | None:
-    """Return a progress of one lesson's share of all."""
-    if progress is None:
-        return None
-    return lambda share: progress((done + share) / len(lessons))
-
-
-def _moved(made: Path, folder: Path) -> list[Path]:
-    """Move all files of a tree into a folder, replacing those of the same name."""
-    written = []
-    for file in sorted(path for path in made.rglob("*") if path.is_file()):
-        target = folder / file.relative_to(made)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        file.replace(target)
-        written.append(target)
-    return written
+def _text(folder: str, name: str) -> str:
+    return (files(__package__) / folder / name).read_text(encoding="utf-8")

@@ -1,7 +1,6 @@
 """Lessons: ``lesson.toml`` as a frozen model, a lesson's folder, and the shipped lessons.
 
-A folder is read and validated with its scenes, and all that is wrong is said at once. Shipped
-lessons are found by number, by name or by folder.
+A folder is validated with its scenes, and all that is wrong is said at once.
 """
 
 from __future__ import annotations
@@ -13,10 +12,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import BaseModel, Field, PrivateAttr, ValidationError
+from pydantic import Field, PrivateAttr, ValidationError
 
 from chutelab.scene import MISSING, Fault, Scene, SceneError, load, shipped
-from chutelab.scene import shipped as shipped_scenes
 from chutelab.scene.errors import at_path, did_you_mean, joined
 from chutelab.scene.rules import suggestion, unit_of
 from chutelab.scene.units import Number, Table, Text, Whole
@@ -41,15 +39,20 @@ def key(default: Any, what: str, allowed: str, **limits: Any) -> Any:
     return Field(default, description=f"{what}.", json_schema_extra={"allowed": allowed}, **limits)
 
 
-class Picture(Table):
-    """How ``lesson.gif`` is made."""
+class Chosen(Table):
+    """One of a lesson's scenes, with settings laid over it."""
 
     scene: Said | None = key(
-        None, "The scene that is filmed; default: the first", "one of the names in scenes"
+        None, "The scene; default: the first of the lesson", "one of the names in scenes"
     )
     set: Names = key(
         (), "Keys of that scene to change", f'a list of at most {MOST} texts such as "run.dt=0.01"'
     )
+
+
+class Picture(Chosen):
+    """How ``lesson.gif`` is made."""
+
     slow: Number | None = key(
         None,
         "Seconds on the screen for one of the recording; default: a round one that suits",
@@ -62,15 +65,9 @@ class Picture(Table):
     height: Whole = key(450, "Height, pixels", "a whole number from 180 to 2160", ge=180, le=2160)
 
 
-class Page(Table):
+class Page(Chosen):
     """What the page of the lesson lets one vary; without this table it has none."""
 
-    scene: Said | None = key(
-        None, "The scene of the page; default: the first", "one of the names in scenes"
-    )
-    set: Names = key(
-        (), "Keys of that scene to change", f'a list of at most {MOST} texts such as "run.dt=0.01"'
-    )
     vary: Annotated[tuple[Said, ...], Field(min_length=1, max_length=VARIED)] = key(
         ...,
         "A slider each",
@@ -127,7 +124,7 @@ class Lesson(Table):
         return self._folder / "README.md"
 
 
-TABLES: Final[dict[str, type[Table]]] = {"picture": Picture, "page": Page}
+TABLES: Final[dict[str, type[Chosen]]] = {"picture": Picture, "page": Page}
 """Model of each table by its key."""
 
 
@@ -175,19 +172,19 @@ def read(folder: str | Path) -> Lesson:
         lesson = Lesson.model_validate(document)
     except ValidationError as error:
         faults += _faults(error, document)
-        lesson = _sound_part(document, {str(detail["loc"][0]) for detail in error.errors()})
+        # What is sound is judged all the same, so that all faults are said at once.
+        faulty = {detail["loc"][0] for detail in error.errors()}
+        sound = {name: value for name, value in document.items() if name not in faulty}
+        needed = {"title": "-", "level": LEVELS[0], "question": "-", "scenes": ["-"]}
+        lesson = Lesson.model_validate(needed | sound)
+        if "scenes" not in sound:
+            lesson = lesson.model_copy(update={"scenes": ()})
     lesson._folder = folder.resolve()
-    if faults := [*faults, *_judged(lesson)]:
+    if lesson.scenes:
+        faults += _misfits(lesson)
+    if faults:
         raise LessonError(str(source), faults)
     return lesson
-
-
-def _sound_part(document: Mapping[str, Any], faulty: set[str]) -> Lesson:
-    """Return a lesson of the keys that are sound, so that their values can be judged, too."""
-    sound = {name: value for name, value in document.items() if name not in faulty}
-    needed = {"title": "-", "level": LEVELS[0], "question": "-", "scenes": ["-"]}
-    lesson = Lesson.model_validate(needed | sound)
-    return lesson.model_copy(update={"scenes": ()}) if "scenes" not in sound else lesson
 
 
 def scene_of(lesson: Lesson, name: str | None = None, settings: Sequence[str] = ()) -> Scene:
@@ -208,10 +205,8 @@ def beside(lesson: Lesson, name: str) -> Path | None:
     return lesson.folder / name if plain and (lesson.folder / name).is_file() else None
 
 
-def _judged(lesson: Lesson) -> Iterator[Fault]:
+def _misfits(lesson: Lesson) -> Iterator[Fault]:
     """Yield what no key can be judged for alone: scenes that load, names that are in them."""
-    if not lesson.scenes:
-        return
     scenes: dict[str, Scene] = {}
     for i, name in enumerate(lesson.scenes):
         here = f"scenes[{i}]"
@@ -224,33 +219,34 @@ def _judged(lesson: Lesson) -> Iterator[Fault]:
         except SceneError as error:
             for fault in error.faults:
                 yield Fault(here, name, f"{error.source}: {fault}")
-    yield from _measured(lesson, scenes)
+    if len(scenes) == len(lesson.scenes):  # one that is broken may be the one that has a quantity
+        surfaces = [scene.surfaces for scene in scenes.values()]
+        for name, words in lesson.quantities.items():
+            if all(unit_of(name, names) is None for names in surfaces):
+                text = f"no such quantity in its scenes; {suggestion(name, surfaces[0])}"
+                yield Fault(f"quantities.{name}", words, text)
     for table in TABLES:
-        part = getattr(lesson, table)
+        part: Chosen | None = getattr(lesson, table)
         if part is None:
             continue
         name = part.scene or lesson.scenes[0]
         if name not in lesson.scenes:
             allowed = f"must be one of scenes: {', '.join(lesson.scenes)}"
             yield Fault(f"{table}.scene", name, allowed)
-        elif name in scenes:
-            yield from _varied(lesson, table, name, part)
-
-
-def _varied(lesson: Lesson, table: str, name: str, part: Picture | Page) -> Iterator[Fault]:
-    """Yield what is wrong with the settings of a table's scene, or else with what it varies."""
-    try:
-        scene = scene_of(lesson, name, part.set)
-    except SceneError as error:
-        for fault in error.faults:
-            yield Fault(f"{table}.set", list(part.set), str(fault))
-        return
-    for i, text in enumerate(part.vary if isinstance(part, Page) else ()):
+        if name not in scenes:
+            continue
         try:
-            quantity(scene, parse(text))
-        except VaryError as error:
-            said = str(error).removeprefix(f"--vary {text}: ")
-            yield Fault(f"{table}.vary[{i}]", text, said)
+            scene = scene_of(lesson, name, part.set)
+        except SceneError as error:
+            for fault in error.faults:
+                yield Fault(f"{table}.set", list(part.set), str(fault))
+            continue
+        for i, text in enumerate(part.vary if isinstance(part, Page) else ()):
+            try:
+                quantity(scene, parse(text))
+            except VaryError as error:
+                said = str(error).removeprefix(f"--vary {text}: ")
+                yield Fault(f"{table}.vary[{i}]", text, said)
 
 
 def unit_in(lesson: Lesson, quantity: str) -> str:
@@ -259,22 +255,14 @@ def unit_in(lesson: Lesson, quantity: str) -> str:
     return next((unit for unit in found if unit is not None), "")
 
 
-def _measured(lesson: Lesson, scenes: Mapping[str, Scene]) -> Iterator[Fault]:
-    surfaces = [scene.surfaces for scene in scenes.values()]
-    if len(scenes) < len(lesson.scenes):
-        return  # one that is broken may be the one that has it
-    for name, words in lesson.quantities.items():
-        if all(unit_of(name, names) is None for names in surfaces):
-            text = f"no such quantity in its scenes; {suggestion(name, surfaces[0])}"
-            yield Fault(f"quantities.{name}", words, text)
-
-
 def _faults(error: ValidationError, document: Mapping[str, Any]) -> Iterator[Fault]:
     """Yield each error of a validation in words, one fault a key."""
     told = set()
     for detail in error.errors(include_url=False):
         parts, missing = detail["loc"], detail["type"] == "missing"
-        table, path = _table(parts)
+        inside = str(parts[0]) in TABLES and len(parts) > 1
+        table: type[Table] = TABLES[str(parts[0])] if inside else Lesson
+        path = parts[:2] if inside else parts[:1]  # without indices
         if detail["type"] == "extra_forbidden":
             near = difflib.get_close_matches(str(parts[-1]), table.model_fields, n=1, cutoff=0.55)
             known = ", ".join(table.model_fields)
@@ -288,12 +276,6 @@ def _faults(error: ValidationError, document: Mapping[str, Any]) -> Iterator[Fau
         if path not in told:
             told.add(path)
             yield Fault(joined(path), MISSING if missing else at_path(document, path), text)
-
-
-def _table(parts: tuple[str | int, ...]) -> tuple[type[BaseModel], tuple[str | int, ...]]:
-    """Return the model that a location is in, and its path without indices."""
-    inner = TABLES.get(str(parts[0])) if len(parts) > 1 else None
-    return (Lesson, parts[:1]) if inner is None else (inner, parts[:2])
 
 
 def find(wanted: str | int | Path) -> Lesson:
@@ -329,16 +311,9 @@ def find(wanted: str | int | Path) -> Lesson:
     raise LessonError(said or '""', [Fault("", None, text)])
 
 
-def home() -> Path | None:
-    """Return the folder of the shipped lessons: beside that of the scenes, wherever that is."""
-    for scene in shipped_scenes().values():
-        folder = scene.parent.parent / "lessons"
-        return folder if folder.is_dir() else None
-    return None
-
-
 def _folders() -> list[Path]:
-    folder = home()
-    found = folder.glob("*/" + PLAN) if folder else ()
+    """Return the folders of the shipped lessons, which lie beside those of the scenes."""
+    scene = next(iter(shipped().values()), None)
+    found = scene.parent.parent.glob(f"lessons/*/{PLAN}") if scene else ()
     numbered = [path.parent for path in found if re.match(r"\d+-.", path.parent.name)]
     return sorted(numbered, key=lambda path: (int(path.name.split("-")[0]), path.name))

@@ -230,7 +230,7 @@ class Job:
 
     def recording(self, machine: Machine, place: tuple[float, float], seconds: float) -> Recording:
         """Return what was recorded."""
-        recorder = Recorder(machine.count, machine.surfaces)
+        recorder = Recorder(machine)
         world, module = self.module.world, self.module
         for rows in self.knots:
             owner = rows["disk"].astype(np.int64)
@@ -253,7 +253,5 @@ class Job:
         recorder.by_surface[:] = books.reshape(-1, 3)
         recorder.contacts = world.impact_count
         return recorder.finish(
-            scene=machine.text, title=machine.title, engine="contact", particle=machine.particle,
-            gravity=machine.gravity, steps=world.step_count, seconds=seconds,
-            origin=place,
-        )  # fmt: skip
+            engine="contact", steps=world.step_count, seconds=seconds, origin=place
+        )

@@ -12,7 +12,6 @@ from chutelab.engines.exact.particle_state import COLLAPSE, Contact, Mode, Swarm
 from chutelab.mechanics.impact import impulses, limited
 from chutelab.results import Kind
 from chutelab.util.arrays import Bools, Floats, Ints
-from chutelab.util.many import Value, of
 
 WEIGHTLESS = 1e-9
 """Share of the weight that a surface may seem to pull with, by rounding, where it holds nothing."""
@@ -45,13 +44,13 @@ def hold(s: Swarm, who: Ints, on: tuple[Ints, Floats], other: tuple[Ints, Floats
             "a spinning disk is held between two surfaces of which one moves; the exact engine"
             ' cannot follow that: run it with engine = "contact"'
         )
-    v, mass = s.v.take(who, axis=1), of(s.mass, who)
+    v, mass = s.v.take(who, axis=1), s.mass[who]
     kinetic = 0.5 * mass * (dot(v, v) + 0.5 * s.z[who] ** 2)
     s.v[:, who], s.z[who] = 0.0, 0.0
     s.book(who, b.surface, 0.0, kinetic, 0.0)
     s.knots(who)
-    loads, locked = _corner_loads(of(s.gravity, who), a, b)
-    stays = locked | np.all(loads >= -WEIGHTLESS * of(s.gravity, who), axis=0)
+    loads, locked = _corner_loads(s.gravity[who], a, b)
+    stays = locked | np.all(loads >= -WEIGHTLESS * s.gravity[who], axis=0)
     onto = ~stays & (loads[0] < 0.0) & (s.weight_on(who, b.normal) > 0.0)
     falls = ~stays & ~onto
     s.fly(who[falls], other[0][falls], other[1][falls], 2)
@@ -76,7 +75,7 @@ def _grip(c: Contact) -> Floats:
     return np.where((c.belt == 0.0) | np.isinf(c.friction), 0.0, c.friction)
 
 
-def _corner_loads(gravity: Value, a: Contact, b: Contact) -> tuple[Floats, Bools]:
+def _corner_loads(gravity: Floats, a: Contact, b: Contact) -> tuple[Floats, Bools]:
     """Return the two normal forces per mass that hold a particle, (2, k), and where it locks."""
     first, second = (c.normal + (np.sign(c.belt) * _grip(c)) * c.tangent for c in (a, b))
     determinant = first[0] * second[1] - first[1] * second[0]
@@ -175,7 +174,7 @@ def strike(s: Swarm, who: Ints, obstacle: Ints, side: Floats) -> None:
     carried = s.mode[who] == Mode.CARRIED
     if np.count_nonzero(carried):
         s.part(who[carried], 0)
-    place, normal = s.obstacles.snapped(who, obstacle, side, s.p, of(s.radius, who))
+    place, normal = s.obstacles.snapped(who, obstacle, side, s.p, s.radius[who])
     s.p[:, s.at(who)] = place
     c = s.contact(who, obstacle, side, normal)
     before = s.v.take(who, axis=1)
@@ -283,7 +282,7 @@ def _blow(
     s.v[:, s.at(who)] = bare(rebound) * c.normal + bare(along + tangential) * c.tangent
     if s.spins:
         s.z[who] += 2.0 * tangential
-    after, mass = slip + tangential / s.share, of(s.mass, who)
+    after, mass = slip + tangential / s.share, s.mass[who]
     s.book(
         who,
         c.surface,
@@ -380,7 +379,7 @@ def _last_bounces(s: Swarm, who: Ints, obstacle: Ints, side: Floats, rebound: Fl
     s.v[:, who] = (w + tangential) * c.tangent
     if s.spins:
         s.z[who] += 2.0 * tangential
-    mass = of(s.mass, who)
+    mass = s.mass[who]
     s.book(
         who,
         c.surface,
@@ -401,6 +400,6 @@ def _ride(s: Swarm, who: Ints) -> None:
     s.side[who] = side
     phi = np.arctan2(normal[0], normal[1])
     rho = pick(o.rho, who, on - o.segments)
-    found = bounds(o, who, on - o.segments, side, rho, phi, of(s.radius, who))
+    found = bounds(o, who, on - o.segments, side, rho, phi, s.radius[who])
     for field in fields(found):
         getattr(s.bounds, field.name)[who] = getattr(found, field.name)

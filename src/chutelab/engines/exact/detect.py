@@ -14,8 +14,6 @@ import numpy as np
 from chutelab.engines.exact.obstacles import NONE, Obstacles, bare, dot, length_of, pick, rows_of
 from chutelab.mechanics.ballistics import descent, first_descent
 from chutelab.util.arrays import Bools, Floats, Ints
-from chutelab.util.many import Value, of
-from chutelab.util.many import of as some_of
 
 PARALLEL = 1e-14
 """Share of a speed or an acceleration along a surface below which it has no part towards it."""
@@ -132,7 +130,7 @@ def first_circle(
     gap[3] = dot(v, a)
     gap[4] = 0.25 * dot(a, a)
     leaving = motion.left[who] == circle + obstacles.segments
-    touch = of(obstacles.touch, rows)
+    touch = rows_of(obstacles.touch, rows)
     touching = np.abs(distance - rho) <= touch
     # The direction from the centre is as uncertain as the places are, over ρ.
     uncertain = 2.0 * (PARALLEL * rho + touch) * length_of(v)
@@ -202,7 +200,7 @@ FEW = 4
 
 
 def first_contact(
-    motion: Motion, obstacles: Obstacles, radius: Value, until: Floats
+    motion: Motion, obstacles: Obstacles, radius: Floats, until: Floats
 ) -> tuple[Floats, Bools, Ints, Floats]:
     """Return until when particles go on, who meets something then, and its number and side, (k,).
 
@@ -215,7 +213,7 @@ def first_contact(
         k particles.
     obstacles : Obstacles
         What they can meet.
-    radius : float, or ndarray, (k,)
+    radius : ndarray, (k,)
         r, m.
     until : ndarray, (k,)
         Finite time after which nothing matters, s.
@@ -295,7 +293,7 @@ def _reached(
 
 
 def _faces(
-    motion: Motion, obstacles: Obstacles, radius: Value, until: Floats, segments: Ints
+    motion: Motion, obstacles: Obstacles, radius: Floats, until: Floats, segments: Ints
 ) -> tuple[Floats, Ints, Floats]:
     """Return time, segment and side of the first face met up to `until`, (k,); time inf if none.
 
@@ -317,7 +315,7 @@ def _faces(
 
     leaving = motion.left == segments[:, None, None]
     same = leaving & (motion.left_side == sides)
-    touching = np.abs(gap) <= some_of(obstacles.touch, motion.rows)
+    touching = np.abs(gap) <= rows_of(obstacles.touch, motion.rows)
     touching |= same
     grazing: Bools | None = None
     if np.count_nonzero(touching):
@@ -425,7 +423,7 @@ class Bounds:
 
 def bounds(
     obstacles: Obstacles, rows: Ints, circle: Ints, side: Floats, rho: Floats, phi: Floats,
-    radius: Value,
+    radius: Floats,
 ) -> Bounds:  # fmt: skip
     """Find what stops rides round circles in both directions.
 
@@ -439,7 +437,7 @@ def bounds(
         On which half of it, see `Obstacles.rim_side`.
     rho, phi : ndarray, (k,)
         Radius of the centre's path (m) and angle now, from the top, clockwise (rad).
-    radius : float, or ndarray, (k,)
+    radius : ndarray, (k,)
         r, m.
     """
     found = Bounds.free(len(rows))
@@ -477,7 +475,7 @@ def bounds(
         # The gap to a circle grows with -cos(φ - tilt).
         apart = rows_of(obstacles.center[:, other], rows) - center
         distance = np.hypot(apart[0], apart[1])
-        distinct = (circle != other) & (distance > of(obstacles.touch, rows))
+        distinct = (circle != other) & (distance > rows_of(obstacles.touch, rows))
         reach = rows_of(obstacles.rho[other], rows)
         level = (rho**2 + distance**2 - reach**2) / np.where(distinct, 2.0 * rho * distance, 1.0)
         met = distinct & (np.abs(level) < 1.0)

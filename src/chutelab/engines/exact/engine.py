@@ -17,7 +17,6 @@ from chutelab.engines.exact.obstacles import (
     NONE,
     corners_of,
     size_of,
-    spots_of,
     touch_of,
 )
 from chutelab.engines.exact.particle_state import Mode, Swarm, World
@@ -25,10 +24,6 @@ from chutelab.machine import Machine
 from chutelab.results import Kind, Recording
 from chutelab.results.recorder import Recorder, StalledError
 from chutelab.util.arrays import Bools, Floats, Ints, Progress
-from chutelab.util.many import at
-
-MOST_KINDS = 16
-"""Kinds that are looked for; what is left over runs by itself."""
 
 
 def kinds(machine: Machine) -> list[Ints]:
@@ -47,71 +42,34 @@ def kinds(machine: Machine) -> list[Ints]:
     list of ndarray
         Numbers of members that are alike; each member is in one of them.
     """
-    left = np.arange(machine.count)
-    found: list[Ints] = []
-    while len(left) and len(found) < MOST_KINDS:
-        same = _like(machine, left)
-        if not same[0]:
-            # Ends so near each other that a joins b and b joins c, but a does not join c.
-            same = np.arange(len(left)) == 0
-        found.append(left[same])
-        left = left[~same]
-    return found + [np.array([member]) for member in left.tolist()]
-
-
-def _like(machine: Machine, members: Ints) -> Bools:
-    """Tell which of the members are like the first of them."""
-    every = np.zeros(machine.count)
-    radius, gravity = machine.particle.radius + every, machine.gravity + every
-    corners = corners_of(machine)
-    size = size_of(corners, machine.releases.position) + every
-    signs = [radius > 0.0, radius <= touch_of(size), gravity > 0.0]
+    ends, segments = corners_of(machine), len(machine.segments.surface)
+    size, radius = size_of(ends, machine.releases.position), machine.particle.radius
+    reach = JOINT * size
+    traits = [np.greater(radius, 0.0), radius <= touch_of(size), np.greater(machine.gravity, 0.0)]
     if machine.pulley is not None:
-        signs.append(machine.pulley.speed + every == 0.0)
-    table = np.stack(signs)[:, members]
-    same = np.asarray((table == table[:, :1]).all(axis=0))
-    corners, reach = corners[..., members], JOINT * size[members]
-    spots = [spot for pair in spots_of(corners[..., 0], float(reach[0])) for spot in pair]
-    # Ends that stay where they are: a wider tolerance must not join more of them.
-    wide = [spot for pair in spots_of(corners[..., 0], float(reach.max())) for spot in pair]
-    if _partition(wide) != _partition(spots):
-        same &= reach == reach[0]
-    count = corners.shape[1] // 2
-    # Ends are numbered as `corners` are: all first ones, then all second ones.
-    number = np.array(spots[0::2] + spots[1::2])
-    moving = np.flatnonzero((corners != corners[..., :1]).any(axis=(0, 2)))
-    for end in moving.tolist():
-        apart = np.abs(corners - corners[:, end : end + 1])
-        close = (apart <= reach).all(axis=0)
-        same &= (close == (number == number[end])[:, None]).all(axis=0)
-    for end, other in _joined(number):
-        same &= (np.abs(corners[:, end] - corners[:, other]) <= reach).all(axis=0)
-        if end % count != other % count:
-            folds = _folds(machine, members, (end, other))
-            same &= folds == folds[0]
-    return np.asarray(same)
-
-
-def _partition(spots: list[int]) -> list[int]:
-    """Name the places by the first end that is there."""
-    return [spots.index(spot) for spot in spots]
-
-
-def _joined(number: Ints) -> list[tuple[int, int]]:
-    """Return the pairs of ends that are at one place."""
-    order = np.argsort(number, kind="stable")
-    groups = np.split(order, np.flatnonzero(np.diff(number[order])) + 1)
-    return [pair for group in groups for pair in combinations(group.tolist(), 2)]
-
-
-def _folds(machine: Machine, members: Ints, ends: tuple[int, int]) -> Bools:
-    """Tell whether two segments that meet at these ends lie on each other, (k,)."""
-    tangent = machine.segments.tangent
-    count = tangent.shape[-2]
-    out: list[Floats] = [
-        tangent[members, end % count] * (1.0 if end >= count else -1.0) for end in ends
-    ]
-    return np.asarray(np.abs(out[0] - out[1]).max(axis=1) <= FOLDED)
+        traits.append(np.equal(machine.pulley.speed, 0.0))
+    # Most ends are never near each other.
+    beyond = ends.min(axis=-1)[:, :, None] > ends.max(axis=-1)[:, None] + reach.max()
+    beyond |= beyond.transpose(0, 2, 1)
+    joins: dict[frozenset[int], Bools] = {}
+    for a, b in np.argwhere(np.triu(~beyond.any(axis=0), 1)).tolist():
+        near: Bools = np.all(np.abs(ends[:, a] - ends[:, b]) <= reach, axis=0)
+        joins[frozenset((a, b))] = near
+        outward, onward = (
+            machine.segments.tangent[..., end % segments, :] * (1.0 if end < segments else -1.0)
+            for end in (a, b)
+        )
+        traits += [near, near & (np.abs(outward - onward).max(axis=-1) <= FOLDED)]
+    # Where a joins b and b joins c, but a does not join c, the order of the ends matters too.
+    nobody = np.zeros(machine.count, dtype=bool)
+    chained = nobody.copy()
+    for one, other in combinations(joins, 2):
+        if len(one ^ other) == 2:
+            chained |= joins[one] & joins[other] & ~joins.get(one ^ other, nobody)
+    apart = np.where(chained, 1 + np.arange(machine.count), 0)
+    table = np.stack([np.broadcast_to(trait, machine.count) for trait in (*traits, apart)])
+    order = np.lexsort(table)
+    return np.split(order, 1 + np.flatnonzero(np.diff(table[:, order]).any(axis=0)))
 
 
 MOVE = {Mode.FLIGHT: fly, Mode.CARRIED: carry, Mode.FACE: slide, Mode.ARC: ride}
@@ -173,19 +131,11 @@ def run(
     if machine.interact:
         raise ValueError("the exact engine has no contacts between particles")
     begin = perf_counter() if began is None else began
-    recorder = Recorder(machine.count, machine.surfaces, apart=apart)
+    recorder = Recorder(machine, apart=apart)
     rounds = 0
 
     def recording() -> Recording:
-        return recorder.finish(
-            scene=machine.text,
-            title=machine.title,
-            engine="exact",
-            particle=machine.particle,
-            gravity=machine.gravity,
-            steps=rounds,
-            seconds=perf_counter() - begin,
-        )
+        return recorder.finish(engine="exact", steps=rounds, seconds=perf_counter() - begin)
 
     world = World.of(machine)
     size = _block(len(world.obstacles.surface))
@@ -248,7 +198,11 @@ def _release(s: Swarm) -> None:
     state = s.now(who)
     s.journal.knots(who, state)
     s.journal.events(int(Kind.RELEASE), who, NONE, state)
-    if s.machine.until == "settled" and s.machine.pulley and at(s.machine.pulley.speed, 0) == 0.0:
+    if (
+        s.machine.until == "settled"
+        and s.machine.pulley
+        and np.ravel(s.machine.pulley.speed)[0] == 0.0
+    ):
         rests = who[s.mode[who] == Mode.CARRIED]
         s.event(int(Kind.SETTLE), rests, s.machine.pulley.surface)
         s.finish(rests, "settled")

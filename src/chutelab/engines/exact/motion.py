@@ -16,7 +16,6 @@ from chutelab.mechanics.ballistics import descent
 from chutelab.mechanics.ride import STEP_ANGLE, Circle, Outcome, advance, normal_force
 from chutelab.results import Kind
 from chutelab.util.arrays import Bools, Floats, Ints
-from chutelab.util.many import of
 
 
 def ride_on(s: Swarm, who: Ints, circle: Ints) -> None:
@@ -49,13 +48,13 @@ def carry_round(s: Swarm, who: Ints) -> None:
     s.p[0, who] = 0.0
     rho, v = s.p[1, who], s.v[0, who]
     left = s.stop[who] - s.age[who]
-    cosine = np.minimum(v**2 / (of(s.gravity, who) * rho), 1.0)
+    cosine = np.minimum(v**2 / (s.gravity[who] * rho), 1.0)
     end, struck, found = np.zeros(len(who)), np.zeros(len(who), dtype=bool), None
     if np.count_nonzero(cosine < 1.0):
         end = np.arctan2(np.sqrt((1.0 - cosine) * (1.0 + cosine)), cosine)
         pulley = np.full(len(who), o.pulley - o.segments)
         top, clockwise = np.zeros(len(who)), np.ones(len(who))
-        found = bounds(o, who, pulley, clockwise, rho, top, of(s.radius, who))
+        found = bounds(o, who, pulley, clockwise, rho, top, s.radius[who])
         struck = ~found.high_handover & (found.high < end)
         end = np.where(struck, found.high, end)
         end = np.where(end * rho / v > left, left * v / rho, end)
@@ -81,7 +80,7 @@ def _ease_round(s: Swarm, who: Ints, rho: Floats, v: Floats, end: Floats) -> Non
         s.age[riders] = start[on] + rho[on] * part / v[on]
         # The belt lets the particle down: F v = -m g v sin φ, summed from the last knot.
         height = rho[on] * np.cos(part)
-        work = -of(s.mass, riders) * of(s.gravity, riders) * (above[on] - height)
+        work = -s.mass[riders] * s.gravity[riders] * (above[on] - height)
         s.book(riders, np.full(len(riders), surface), work)
         above[on] = height
         s.knots(riders)
@@ -97,7 +96,7 @@ def ride(s: Swarm, who: Ints) -> None:
         w=dot(s.v.take(who, axis=1), c.tangent),
         z=s.z[who],
         rho=rho,
-        gravity=np.full(len(who), of(s.gravity, who)),
+        gravity=s.gravity[who],
         friction=c.friction,
         belt=c.belt,
         slip=s.slip[who],
@@ -114,7 +113,7 @@ def ride(s: Swarm, who: Ints) -> None:
     center = s.p.take(who, axis=1) - rho * c.normal
     _place(s, who[go], rho[go], step.phi[go], step.w[go], center[:, go])
     s.z[who[go]] = step.z[go]
-    mass = of(s.mass, who)
+    mass = s.mass[who]
     s.book(
         who[go],
         c.surface[go],
@@ -217,10 +216,10 @@ def slide(s: Swarm, who: Ints) -> None:
     stops = s.stop[who] - s.age[who]
     dt, hits, meeting = _next(s, motion, np.minimum(np.minimum(grips, ends), stops))
     mean = np.where(s.slip[who] == 0.0, 0.0, slip + 0.5 * rate * dt)
-    mass = of(s.mass, who)
+    mass = s.mass[who]
     s.book(who, c.surface, mass * force * c.belt * dt, 0.0, -mass * force * mean * dt)
     _move(s, motion, dt)
-    s.p[:, who], _ = s.obstacles.snapped(who, on, side, s.p, of(s.radius, who))
+    s.p[:, who], _ = s.obstacles.snapped(who, on, side, s.p, s.radius[who])
     if s.spins:
         s.z[who] += 2.0 * force * dt
     # What was left at the beginning is some way off now.
@@ -251,7 +250,7 @@ def _next(s: Swarm, motion: Motion, until: Floats) -> tuple[Floats, Bools, tuple
 
     Not longer than `until`; a contact at that very time comes first.
     """
-    radius = of(s.radius, motion.rows)
+    radius = s.radius[motion.rows]
     dt, hits, obstacle, side = first_contact(motion, s.obstacles, radius, until)
     s.count_idle(motion.rows, dt)
     return dt, hits, (obstacle, side)
@@ -264,7 +263,7 @@ def _move(s: Swarm, motion: Motion, dt: Floats) -> None:
     s.p[:, at] = place = motion.after(dt)
     if s.past is not None:
         middle = motion.after(0.5 * dt)
-        touch = of(s.obstacles.touch, motion.rows)
+        touch = rows_of(s.obstacles.touch, motion.rows)
         away = (np.abs(place - middle) > CLEAR * touch).any(axis=0)
         s.past.place[:, motion.rows[away]] = middle[:, away]
     s.v[:, at] = motion.velocity + bare(dt) * motion.acceleration
@@ -306,7 +305,7 @@ def _exit(s: Swarm, motion: Motion) -> Floats:
     """Time until a flight leaves the scene; never in a run that lasts a number of seconds."""
     if s.machine.until == "time":
         return np.full(len(motion.rows), np.inf)
-    left, right, bottom, top = (of(side, motion.rows) for side in s.exit_box)
+    left, right, bottom, top = (side[motion.rows] for side in s.exit_box)
     (x, y), (vx, vy) = motion.position, motion.velocity
     fall = rows_of(s.fall, motion.rows)
     time = _when(y - bottom, vy, fall[1])

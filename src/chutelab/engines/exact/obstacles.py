@@ -18,7 +18,6 @@ import numpy as np
 
 from chutelab.machine import Machine, Segments
 from chutelab.util.arrays import Bools, Floats, Ints
-from chutelab.util.many import Value, at, of
 
 NONE = -1
 
@@ -26,7 +25,7 @@ FOLDED = 1e-9
 """Difference of two directions below which one segment lies on the other."""
 
 PER_PARTICLE = (
-    "faces", "length", "center", "rho", "material", "low", "high",
+    "faces", "length", "center", "rho", "material", "low", "high", "touch",
 )  # fmt: skip
 """Arrays of `Obstacles` whose last axis may be the particles."""
 
@@ -59,7 +58,7 @@ class Obstacles:
         Obstacle number of the circle at a segment's first and second end, or -1 for a point.
     pulley : int
         Obstacle number of the pulley, or -1.
-    touch : float, or ndarray, (n,)
+    touch : ndarray, (n,)
         m; gaps smaller than this are rounding.
     """
 
@@ -74,7 +73,7 @@ class Obstacles:
     spots: tuple[tuple[int, int], ...]
     end_circle: Ints
     pulley: int
-    touch: Value
+    touch: Floats
 
     @property
     def segments(self) -> int:
@@ -174,9 +173,7 @@ class Obstacles:
             return self
         assert {f.name for f in fields(self)}.issuperset(PER_PARTICLE)
         return replace(
-            self,
-            **{name: getattr(self, name)[..., first:last] for name in PER_PARTICLE},
-            touch=of(self.touch, slice(first, last)),
+            self, **{name: getattr(self, name)[..., first:last] for name in PER_PARTICLE}
         )
 
     def normal_at(self, rows: Ints, obstacle: Ints, side: Floats, position: Floats) -> Floats:
@@ -202,7 +199,7 @@ class Obstacles:
         return np.where(dot(normal, crown) >= 0.0, 1.0, -1.0)
 
     def snapped(
-        self, rows: Ints, obstacle: Ints, side: Floats, position: Floats, r: Value
+        self, rows: Ints, obstacle: Ints, side: Floats, position: Floats, r: Floats
     ) -> tuple[Floats, Floats]:
         """Positions put exactly at contact distance, so that rounding cannot add up, and normals.
 
@@ -297,7 +294,7 @@ def obstacles(machine: Machine, origin: tuple[float, float] = (0.0, 0.0)) -> Obs
         places = places - origin
     size = size_of(corners, places)
     touch = touch_of(size, far)
-    spots = spots_of(corners[..., 0], JOINT * at(size, 0))
+    spots = spots_of(corners[..., 0], JOINT * size[0].item())
     kept = _distinct(spots)
     if len(kept) < len(spots):
         corners = corners[:, [*kept, *(s + len(spots) for s in kept)]]
@@ -305,7 +302,7 @@ def obstacles(machine: Machine, origin: tuple[float, float] = (0.0, 0.0)) -> Obs
 
     # Segments, then their ends, then the pulley.
     flat = len(length)
-    disks = at(r, 0) > 0.0
+    disks = np.ravel(r)[0] > 0.0
     ends, end_circle = _ends(spots, wheel is not None) if disks else _points(flat)
     where = [s + e * flat for s, e in ends]
     owner = kept + [kept[s] for s, _ in ends]
@@ -350,19 +347,19 @@ def corners_of(machine: Machine) -> Floats:
     return np.concatenate([start, start + along], axis=1)
 
 
-def touch_of(size: Value, far: float = 0.0) -> Value:
+def touch_of(size: Floats, far: float = 0.0) -> Floats:
     """Return `Obstacles.touch` of a scene of a size, counted from a point that far away, m."""
     # Far away the scene's own numbers are rounded, each by half a last place.
     return float_info.epsilon * (TOUCH_ULPS * size + GIVEN_ULPS * far)
 
 
-def size_of(corners: Floats, places: Floats) -> Value:
-    """Return the largest coordinate, m; for each particle, (N,), where each has its own corners."""
-    if corners.shape[-1] == 1:
-        # Not their methods, which take twice as long.
-        sizes = (np.maximum.reduce(np.abs(x), axis=None, initial=0.0) for x in (corners, places))
-        return float(max(sizes))
-    return np.maximum(np.abs(corners).max(axis=(0, 1), initial=0.0), np.abs(places).max(axis=1))
+def size_of(corners: Floats, places: Floats) -> Floats:
+    """Return the largest coordinate, m, (n,): of each particle, where each has its own corners."""
+    count = corners.shape[-1]
+    # Not their methods, which take twice as long.
+    size = np.maximum.reduce(np.abs(corners), axis=(0, 1), initial=0.0)
+    farthest: Floats = np.maximum.reduce(np.abs(places.reshape(count, -1)), axis=1)
+    return np.asarray(np.maximum(size, farthest))
 
 
 def _faces(start: Floats, tangent: Floats, length: Floats) -> Floats:
@@ -385,12 +382,12 @@ def _material(segments: Segments, owner: list[int]) -> tuple[Floats, Ints]:
 
 def _vectors(array: Floats) -> Floats:
     """(S, 2) or (N, S, 2) to (2, S, n)."""
-    return array.T[..., None] if array.ndim == 2 else array.transpose(2, 1, 0).copy()
+    return np.array(np.array(array, ndmin=3, copy=None).T, order="C")
 
 
 def _scalars(array: Floats) -> Floats:
     """(S,) or (N, S) to (S, n)."""
-    return array[:, None] if array.ndim == 1 else array.T.copy()
+    return np.array(np.array(array, ndmin=2, copy=None).T, order="C")
 
 
 def spots_of(ends: Floats, tolerance: float) -> list[tuple[int, int]]:

@@ -17,8 +17,7 @@ from chutelab.machine import Machine, origin
 from chutelab.mechanics.impact import DISK_SHARE
 from chutelab.results import REASONS, Kind
 from chutelab.results.recorder import Recorder, StalledError
-from chutelab.util.arrays import Bools, Floats, Ints
-from chutelab.util.many import Value, at, of
+from chutelab.util.arrays import Bools, Floats, Ints, Numbers
 
 
 @dataclass(eq=False)
@@ -46,11 +45,15 @@ class World:
         return cls(machine, place, obstacles(machine, place))
 
     @cached_property
-    def exit_box(self) -> tuple[Value, Value, Value, Value]:
-        """Left, right, bottom and top of `Machine.exit_box`, from the origin, m."""
-        left, right, bottom, top = self.machine.exit_box
+    def exit_box(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """Left, right, bottom and top of `Machine.exit_box`, from the origin, (N,) each, m."""
+        left, right, bottom, top = map(self.of_each, self.machine.exit_box)
         x, y = self.origin
         return left - x, right - x, bottom - y, top - y
+
+    def of_each(self, value: Numbers) -> Floats:
+        """Return a number of the machine for each particle, (N,)."""
+        return np.broadcast_to(value, self.machine.count)
 
 
 class Mode:
@@ -93,8 +96,8 @@ class Swarm:
         Age (s), position (m), velocity and r ω (m/s), ledger entries (J): a knot, but for the time.
     age, p, v, z, entries : ndarray, (k,), (2, k) or (3, k)
         Views of it.
-    radius, mass, gravity : float, or ndarray, (k,)
-        m, kg, m/s²; arrays in a family of machines.
+    radius, mass, gravity : ndarray, (k,)
+        m, kg, m/s².
     falls, spins, staggered : bool
         Whether there is gravity, whether the particles are free disks, and whether they are
         released at other times than 0.
@@ -127,11 +130,14 @@ class Swarm:
         self.origin = np.reshape(world.origin, (2, 1)) if any(world.origin) else None
         self.journal = Journal(first, count)
         mine, particle = slice(first, last), machine.particle
-        self.radius, self.mass = of(particle.radius, mine), of(particle.mass, mine)
-        self.gravity = of(machine.gravity, mine)
-        self.fall = np.zeros((2, np.size(self.gravity)))
-        self.fall[1] = -self.gravity
-        self.falls, self.spins = at(self.gravity, 0) != 0.0, at(particle.inertia, 0) > 0.0
+        self.radius, self.mass, self.gravity, inertia, end = (
+            world.of_each(value)[mine]
+            for value in (
+                particle.radius, particle.mass, machine.gravity, particle.inertia, machine.end_time,
+            )
+        )  # fmt: skip
+        self.fall = np.stack([np.zeros(count), -self.gravity])
+        self.falls, self.spins = bool(self.gravity[0] != 0.0), bool(inertia[0] > 0.0)
         self.share = DISK_SHARE if self.spins else 1.0
         start = machine.releases
         self.released = start.t[first:last]
@@ -151,20 +157,19 @@ class Swarm:
         self.order, self.idle, self.crawls, self.on, self.left = integers
         self.side, self.left_side, self.slip = np.zeros((3, count))
         self.slip[:] = 1.0
-        self.stop = of(machine.end_time, mine) - self.released
+        self.stop = end - self.released
         self.landed = np.zeros(count, dtype=bool)
         self.past: Past | None = None
-        if at(self.radius, 0) <= at(self.obstacles.touch, 0):
+        if self.radius[0] <= self.obstacles.touch[0]:
             self.past = Past(np.full(count, NONE), np.zeros(count), self.p.copy())
         self.idling = self.crawling = False
         self.first, self.rounds = first, 0
 
     @cached_property
-    def exit_box(self) -> tuple[Value, Value, Value, Value]:
+    def exit_box(self) -> tuple[Floats, Floats, Floats, Floats]:
         """Left, right, bottom and top beyond which each particle has left the scene, m."""
-        left, right, bottom, top = (
-            of(side, slice(self.first, self.first + len(self.mode))) for side in self.world.exit_box
-        )
+        mine = slice(self.first, self.first + len(self.mode))
+        left, right, bottom, top = (side[mine] for side in self.world.exit_box)
         return left, right, bottom, top
 
     @cached_property
@@ -211,7 +216,7 @@ class Swarm:
 
     def omega(self, who: Ints) -> Floats:
         """Angular velocities, rad/s."""
-        return self.z[who] / of(self.radius, who) if self.spins else np.zeros(len(who))
+        return self.z[who] / self.radius[who] if self.spins else np.zeros(len(who))
 
     def contact(
         self, who: Ints, obstacle: Ints, side: Floats, normal: Floats | None = None
@@ -244,7 +249,7 @@ class Swarm:
         if self.origin is not None:
             state[1:3] += self.origin
         if self.spins:
-            state[5] /= self.radius if everyone else of(self.radius, who)
+            state[5] /= self.radius if everyone else self.radius[who]
         return state
 
     def knots(self, who: Ints) -> None:
@@ -294,11 +299,11 @@ class Swarm:
 
     def weight_on(self, who: Ints, normal: Floats) -> Floats:
         """Component of gravity into a surface of that normal, m/s²."""
-        return np.asarray(of(self.gravity, who) * normal[1])
+        return np.asarray(self.gravity[who] * normal[1])
 
     def weight_along(self, who: Ints, normal: Floats) -> Floats:
         """Component of gravity along (n_y, -n_x), m/s²."""
-        return np.asarray(of(self.gravity, who) * normal[0])
+        return np.asarray(self.gravity[who] * normal[0])
 
     def slip_of(self, who: Ints, contact: Contact, w: Floats) -> Floats:
         """Slip of the contact point against the surface at a pace w, (k,), m/s.

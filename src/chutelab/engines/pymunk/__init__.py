@@ -49,15 +49,13 @@ def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Re
     if machine.particle.radius <= 0.0:
         raise ValueError("particle.radius = 0: pymunk needs disks with a radius above 0 m")
     begin, steps = perf_counter(), 0
-    place = origin(machine)
+    recorder, place = Recorder(machine), origin(machine)
     machine = moved(machine, -place[0], -place[1])
-    recorder = Recorder(machine.count, machine.surfaces)
 
     def finished() -> Recording:
         return recorder.finish(
-            scene=machine.text, title=machine.title, engine="pymunk", particle=machine.particle,
-            gravity=machine.gravity, steps=steps, seconds=perf_counter() - begin, origin=place,
-        )  # fmt: skip
+            engine="pymunk", steps=steps, seconds=perf_counter() - begin, origin=place
+        )
 
     report = progress or (lambda _share: None)
     world = World(machine)

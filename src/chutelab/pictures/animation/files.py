@@ -19,10 +19,7 @@ from PIL import Image
 from chutelab.pictures.animation.moments import film, frame_delay, slowness, span
 from chutelab.pictures.animation.palette import BITS, CLEAR, Palette, Pixels
 from chutelab.pictures.animation.stage import SHOWS, Stage, lay_out
-from chutelab.pictures.plots import machine_of
 from chutelab.results import Recording
-from chutelab.results.comparison import scene_of
-from chutelab.theory import predict
 from chutelab.util.arrays import Bools
 from chutelab.util.files import whole
 
@@ -283,7 +280,7 @@ def animate(
         raise ValueError(f"{path.name}: allowed are files that end in {allowed}")
     frame_delay(fps)
     shows = frozenset([show] if isinstance(show, str) else show)
-    machine = machine_of(recording)
+    machine = recording.machine
     layout = lay_out(
         recording,
         machine,
@@ -296,7 +293,7 @@ def animate(
     begin, end = span(recording, layout.window)
     pace = slowness(end - begin) if slow is None else slow
     moments = film(recording, begin, end, fps=fps, slow=pace)
-    stage = Stage(recording, machine, predict(scene_of(recording)), layout, moments, slow=pace)
+    stage = Stage(recording, machine, recording.prediction, layout, moments, slow=pace)
     with whole(path) as unfinished:
         if kind == "gif":
             with unfinished.open("wb") as file:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from math import atan2, degrees, floor, hypot, log10
 from typing import Any
 
@@ -11,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.machine import Machine
-from chutelab.pictures.plots import Window, machine_of
+from chutelab.pictures.plots import Window
 from chutelab.pictures.plots.scenery import STRUCK, action, subset
 from chutelab.pictures.plots.style import quantity
 from chutelab.results import PARTICLES, Kind, Recording
@@ -26,11 +25,6 @@ def surface_words(name: str) -> str:
         "plate": "the plate",
         PARTICLES: "other particles",
     }.get(name, f"“{name}”")
-
-
-@lru_cache(maxsize=1)
-def _machine(recording: Recording) -> Machine:
-    return machine_of(recording)
 
 
 def contact_normal(machine: Machine, event: Any) -> Floats:
@@ -99,7 +93,7 @@ def _impact(recording: Recording, event: Any, kind: Kind, name: str) -> str:
         return f"hits particle {int(event['other'])} at {before:.3g} m/s"
     verb = "lands on" if kind is Kind.LANDING else "strikes"
     text = f"{verb} {surface_words(name)} at {before:.3g} m/s"
-    normal = contact_normal(_machine(recording), event)
+    normal = contact_normal(recording.machine, event)
     into, off = (abs(float(event[v] @ normal)) for v in ("velocity_before", "velocity_after"))
     if into > 0.0:
         text += f", ε = {round(off / into, 3):g}"

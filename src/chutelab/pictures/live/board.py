@@ -5,8 +5,6 @@ This is the only module that needs ipywidgets.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from html import escape
 from math import isnan
@@ -17,7 +15,7 @@ import ipywidgets
 from chutelab.engines.exact import CornerError, run
 from chutelab.machine import build
 from chutelab.pictures.live.picture import View, draw, numbers, table, tracks, view_of
-from chutelab.scene import Scene, SceneError, overridden
+from chutelab.scene import Scene, SceneError
 from chutelab.util.arrays import Floats
 
 
@@ -79,25 +77,6 @@ def controls(scene: Scene) -> tuple[Control, ...]:
     return tuple(found)
 
 
-def changed(scene: Scene, values: Mapping[str, float | bool | str]) -> Scene:
-    """Return a scene with other values.
-
-    Parameters
-    ----------
-    scene : Scene
-        The one to start from.
-    values : mapping
-        By key.
-
-    Raises
-    ------
-    SceneError
-        If it cannot be used.
-    """
-    overrides = [f"{key}={json.dumps(value)}" for key, value in values.items()]
-    return overridden(scene, overrides)
-
-
 def _speed(key: str, label: str, value: float, low: float) -> Control:
     return Control(key, label, min(low, value), max(2.0 * abs(value), 1.0), 0.05, value)
 
@@ -141,7 +120,7 @@ class Board:
     """
 
     def __init__(self, scene: Scene) -> None:
-        self.scene = changed(scene, _simpler(scene))
+        self.scene = scene.with_values(_simpler(scene))
         self.controls = controls(self.scene)
         self.view = self._view()
         self.before: list[Floats] = []
@@ -167,7 +146,7 @@ class Board:
         """Run the scene with the sliders' values, and show it; or say why that cannot be."""
         values = {key: float(slider.value) for key, slider in self.sliders.items()}
         try:
-            scene = changed(self.scene, values)
+            scene = self.scene.with_values(values)
             machine = build(scene)
             recording = run(machine)
         except (SceneError, CornerError) as error:
@@ -192,7 +171,7 @@ class Board:
         for control in self.controls:
             for value in (control.low, control.high):
                 try:
-                    scene = changed(self.scene, {control.key: value})
+                    scene = self.scene.with_values({control.key: value})
                     other = view_of(scene, run(build(scene)))
                 except (SceneError, CornerError):
                     continue
@@ -212,7 +191,7 @@ def _simpler(scene: Scene) -> dict[str, Any]:
     }
     belt, out = scene.incoming, scene.outgoing
     if belt is not None and out is not None and out.drop_from == "impact":
-        machine = build(changed(scene, changes))
+        machine = build(scene.with_values(changes))
         height = machine.segments.start[machine.segments.surface == machine.landing][0, 1]
         changes["outgoing.drop_from"] = "top"
         changes["outgoing.drop"] = belt.pulley_radius - float(height)

@@ -141,7 +141,7 @@ def draw(
     parts += [_line(view, points, TRACK, 1.0, opacity=0.35) for points in paths[1:]]
     parts += [_line(view, points, TRACK, 2.5) for points in paths[:1]]
     parts += _dots(view, recording)
-    title = escape(f"{machine.title}: the track of the particle, and dots every {STROBE} s")
+    title = escape(f"{machine.scene.title}: the track of the particle, and dots every {STROBE} s")
     return (
         f'<svg role="img" aria-label="{title}" width="{width}" height="{height}"'
         f' viewBox="0 0 {width} {height}" style="max-width:100%;height:auto">'

@@ -26,7 +26,7 @@ from chutelab.pictures.plots.panels import (
     draw_velocity,
     flight,
 )
-from chutelab.pictures.plots.scenery import Window, draw_scene, machine_of, window_of
+from chutelab.pictures.plots.scenery import Window, draw_scene, window_of
 from chutelab.pictures.plots.strobe import strobe
 
 __all__ = [
@@ -41,7 +41,6 @@ __all__ = [
     "draw_tracks",
     "draw_velocity",
     "flight",
-    "machine_of",
     "overlay",
     "strobe",
     "window_of",

@@ -23,11 +23,10 @@ from chutelab.pictures.plots.panels import (
     draw_tracks,
     draw_velocity,
 )
-from chutelab.pictures.plots.scenery import draw_scene, machine_of, window_of
+from chutelab.pictures.plots.scenery import draw_scene, window_of
 from chutelab.pictures.plots.style import DPI, Picture
 from chutelab.results import Recording
-from chutelab.results.comparison import scene_of
-from chutelab.theory import Transfer, predict
+from chutelab.theory import Transfer
 from chutelab.theory.figures import Line, Panel, PaperFigure
 
 SIZE = (13.0, 7.6)
@@ -59,7 +58,7 @@ def overlay(
         If the file cannot be written.
     """
     if prediction is None:
-        prediction = predict(scene_of(recording))
+        prediction = recording.prediction
     figure = Picture(figsize=SIZE, dpi=DPI)
     grid = figure.add_gridspec(
         2, 1, height_ratios=(4.2, 1.0), left=0.06, right=0.56, top=0.88, bottom=0.08, hspace=0.28
@@ -90,7 +89,7 @@ def overlay(
 
 def draw_view(ax: Axes, recording: Recording, parts: tuple[Arc, ...]) -> Axes:
     """Draw the scene to scale with tracks, strobe dots and the analytic parabola, and a legend."""
-    machine = machine_of(recording)
+    machine = recording.machine
     style.dress(ax, "x, m", "y, m")
     draw_scene(ax, machine, window_of(recording, machine))
     draw_tracks(draw_analytic(ax, parts), recording)

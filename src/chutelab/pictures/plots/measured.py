@@ -15,7 +15,6 @@ from chutelab.pictures.plots.scenery import (
     FAR,
     around,
     draw_scene,
-    machine_of,
     struck_by_nominal,
     subset,
     track_times,
@@ -23,12 +22,10 @@ from chutelab.pictures.plots.scenery import (
 )
 from chutelab.pictures.plots.style import DPI, Picture
 from chutelab.results import Kind, Recording
-from chutelab.results.comparison import scene_of
 from chutelab.scene.units import write_size
 from chutelab.studies.measured import Fit, Residuals
 from chutelab.studies.measured.result import plus_minus
 from chutelab.studies.measured.track import counted
-from chutelab.theory import predict
 
 PARAMETERS = 6
 """Fitted parameters that are written into the figure."""
@@ -85,14 +82,14 @@ def draw_measured(ax: Axes, found: Residuals, before: Recording | None = None) -
         A run to show dotted: the one that a fit started from.
     """
     recording, position = found.recording, found.track.position
-    machine = machine_of(recording)
+    machine = recording.machine
     window = window_of(recording, machine)
     far = window.padded(*[FAR] * 4)
     corners = np.array([[window.left, window.bottom], [window.right, window.top]])
     style.dress(ax, "x, m", "y, m")
     shown = far.holds(position)
     draw_scene(ax, machine, around(np.concatenate([corners, position[shown]])))
-    parts, _ = analytic_of(recording, predict(scene_of(recording)))
+    parts, _ = analytic_of(recording, recording.prediction)
     draw_analytic(ax, parts)
     if before is not None:
         ax.plot(

@@ -28,7 +28,6 @@ from chutelab.pictures.plots.scenery import (
     upright,
 )
 from chutelab.results import Kind, Recording
-from chutelab.results.comparison import scene_of
 from chutelab.scene import Incoming, Scene
 from chutelab.theory import Transfer
 from chutelab.theory.separation import separation
@@ -144,7 +143,7 @@ FLOOR = 1e-17
 
 def analytic_of(recording: Recording, prediction: Transfer) -> tuple[tuple[Arc, ...], float]:
     """Return the arcs known analytically, and the time (s) of the recording at which they begin."""
-    parts = arcs(prediction, scene_of(recording))
+    parts = arcs(prediction, recording.scene)
     separated = recording.select(Kind.SEPARATION, surface="incoming")
     if not np.any(separated["particle"] == 0):
         return (), 0.0

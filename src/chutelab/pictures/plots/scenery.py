@@ -18,10 +18,9 @@ from matplotlib.patheffects import withStroke
 from matplotlib.text import Annotation
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.machine import Machine, build
+from chutelab.machine import Machine
 from chutelab.pictures.plots import style
 from chutelab.results import REASONS, Kind, Recording
-from chutelab.results.comparison import scene_of
 from chutelab.util.arrays import Bools, Floats, Ints
 
 STRUCK = (Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
@@ -291,11 +290,6 @@ HALO = [withStroke(linewidth=3.0, foreground="white")]
 
 TWO_LINES = 32.0
 """pt; height of two lines of small text."""
-
-
-def machine_of(recording: Recording) -> Machine:
-    """Return the machine that a recording was made on, resolved again from its scene."""
-    return build(scene_of(recording))
 
 
 def show_window(ax: Axes, window: Window) -> Window:

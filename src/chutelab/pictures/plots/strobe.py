@@ -18,8 +18,7 @@ from chutelab.pictures.plots.panels import analytic_of
 from chutelab.pictures.plots.scenery import HALO, round_times, strobe_step, subset
 from chutelab.pictures.plots.style import Picture
 from chutelab.results import Recording
-from chutelab.results.comparison import scene_of
-from chutelab.theory import Transfer, predict
+from chutelab.theory import Transfer
 from chutelab.util.arrays import Floats
 
 SIZE = (9.0, 5.6)
@@ -71,7 +70,7 @@ def strobe(
         If the file cannot be written.
     """
     if prediction is None:
-        prediction = predict(scene_of(recording))
+        prediction = recording.prediction
     figure = Picture(figsize=SIZE, dpi=DPI)
     ax = figure.add_axes((0.095, 0.09, 0.885, 0.77))
     draw_view(ax, recording, analytic_of(recording, prediction)[0])

@@ -17,7 +17,7 @@ from chutelab.engines.simulation import simulate
 from chutelab.results import Recording
 from chutelab.scene import Scene
 from chutelab.scene.units import symbol, with_unit, write_size
-from chutelab.studies.design.evaluation import NO_RUN, Span, varied
+from chutelab.studies.design.evaluation import NO_RUN, Span
 from chutelab.studies.design.roots import Change, Scan
 from chutelab.studies.design.sensitivity import Sensitivity
 from chutelab.util.arrays import Floats
@@ -141,7 +141,8 @@ class Solution(Shown):
     @property
     def scene(self) -> Scene:
         """The scene at the `answer`."""
-        return varied(self.base, [one.key for one in self.ranges], self.answer.values)
+        keys = [one.key for one in self.ranges]
+        return self.base.with_values(dict(zip(keys, self.answer.values, strict=True)))
 
     def recording(self) -> Recording:
         """Run the scene at the `answer`."""

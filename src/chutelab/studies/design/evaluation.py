@@ -7,7 +7,6 @@ numbers are smooth functions of the keys; where it changes, they may jump.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -21,9 +20,9 @@ from chutelab.engines.simulation import simulate
 from chutelab.results import ENTRIES, REASONS, Kind, Recording
 from chutelab.results.comparison import from_events, never
 from chutelab.results.recorder import StalledError
-from chutelab.scene import Scene, SceneError, overridden, rules, to_dict
+from chutelab.scene import Scene, SceneError, rules, to_dict
 from chutelab.scene.overrides import value_at
-from chutelab.scene.variants import is_plain, parse_range, quantity, reason, setting
+from chutelab.scene.variants import is_plain, parse_range, quantity, reason
 from chutelab.studies.design.quantities import (
     DesignError,
     Given,
@@ -114,42 +113,14 @@ def _allowed(scene: Scene, path: str, values: Sequence[float], typed: str) -> No
     refused = []
     for value in values:
         try:
-            varied(scene, [path], [value])
+            scene.with_values({path: value})
         except SceneError as error:
             refused.append(error)
             for fault in error.faults:
                 if fault.key == path and isfinite(value):
-                    raise DesignError(typed, without_source(str(fault))) from None
+                    raise DesignError(typed, str(fault)) from None
     if len(refused) == len(values):
-        raise DesignError(typed, without_source(reason(refused[0])))
-
-
-def without_source(text: str) -> str:
-    """Leave out of a fault which override it came from: none that anybody typed.
-
-    >>> without_source("plate.angle_deg = 90: less than 90 (from --vary plate.angle_deg=90)")
-    'plate.angle_deg = 90: less than 90'
-    """
-    return re.sub(r" \(from --[^)]*\)", "", text)
-
-
-def varied(
-    scene: Scene, keys: Sequence[str], values: Sequence[float], extra: Sequence[str] = ()
-) -> Scene:
-    """Return a scene with other values of some keys.
-
-    Parameters
-    ----------
-    extra : sequence of str
-        Further ``KEY=VALUE``.
-
-    Raises
-    ------
-    SceneError
-        If the scene refuses a value, or two that do not go together.
-    """
-    overrides = [setting(key, float(value)) for key, value in zip(keys, values, strict=True)]
-    return overridden(scene, [*overrides, *extra])
+        raise DesignError(typed, reason(refused[0]))
 
 
 def suits(scene: Scene, keys: Sequence[str], quantities: Sequence[Quantity]) -> bool:
@@ -346,7 +317,7 @@ class Evaluator:
         """Fill in what can be run at once; return the rows that are left."""
         left: set[int] = set()
         for ending, columns in self._endings().items():
-            base = varied(self.scene, [], [], _until(ending))
+            base = self.scene.with_values(_until(ending))
             chosen = [self.quantities[column] for column in columns]
             keys = tuple(self.keys)
             for start in range(0, len(table), BLOCK):
@@ -385,7 +356,8 @@ class Evaluator:
         course = ""
         try:
             for ending, columns in self._endings().items():
-                scene = varied(self.scene, self.keys, point.tolist(), _until(ending))
+                values = dict(zip(self.keys, point.tolist(), strict=True))
+                scene = self.scene.with_values(values | _until(ending))
                 recording = simulate(scene)
                 course = course_of(recording)
                 for column in columns:
@@ -396,8 +368,8 @@ class Evaluator:
         return course, ""
 
 
-def _until(ending: str) -> list[str]:
-    return ['run.until="settled"'] if ending == "settled" else []
+def _until(ending: str) -> dict[str, Any]:
+    return {"run.until": "settled"} if ending == "settled" else {}
 
 
 def value(scene: Scene, name: str) -> float:
@@ -422,5 +394,5 @@ def value(scene: Scene, name: str) -> float:
     0.048
     """
     wanted = measured(scene, name)
-    given = varied(scene, [], [], _until(wanted.ending))
+    given = scene.with_values(_until(wanted.ending))
     return wanted.of(simulate(given), given)

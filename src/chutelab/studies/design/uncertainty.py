@@ -22,13 +22,12 @@ from chutelab.studies.design.evaluation import (
     INSIDE,
     Evaluator,
     Outcomes,
-    varied,
-    without_source,
 )
 from chutelab.studies.design.quantities import DesignError, each_once, measured, scipy
 from chutelab.studies.design.sensitivity import Indices, crossed, design, indices
 from chutelab.util.arrays import Floats
-from chutelab.util.tables import Sheet, Shown, csv_text, frame
+from chutelab.util.files import csv_text
+from chutelab.util.tables import Sheet, Shown, frame
 
 FORM: Final = (
     "must be KEY=MEAN±SPREAD, such as restitution=0.5±0.05 or incoming.speed=2+-1% (or ±SPREAD"
@@ -75,33 +74,26 @@ class Spread:
     @property
     def cut(self) -> float:
         """Share of the distribution that the scene does not allow."""
-        below, above = self._tails()
-        return below + above
-
-    def _tails(self) -> tuple[float, float]:
-        if self.law == "normal":
-            ndtr = scipy("special").ndtr
-            return (
-                float(ndtr((self.low - self.mean) / self.spread)),
-                float(ndtr((self.mean - self.high) / self.spread)),
-            )
-        width = 2.0 * self.spread
-        below = (self.low - self.mean + self.spread) / width
-        above = (self.mean + self.spread - self.high) / width
-        return float(np.clip(below, 0.0, 1.0)), float(np.clip(above, 0.0, 1.0))
+        stats = scipy("stats")
+        whole = stats.norm(self.mean, self.spread)
+        if self.law == "uniform":
+            whole = stats.uniform(self.mean - self.spread, 2.0 * self.spread)
+        return float(whole.cdf(self.low) + whole.sf(self.high))
 
     def values(self, shares: Floats) -> Floats:
         """Return the values below which given shares, 0 to 1, of the (cut) distribution lie."""
-        below, above = self._tails()
-        inside = below + shares * (1.0 - below - above)
-        if self.law == "normal":
-            # Sobol points begin at 0, where a normal distribution has no value.
-            safe = np.clip(inside, 1e-12, 1.0 - 1e-12)
-            found = self.mean + self.spread * scipy("special").ndtri(safe)
+        stats = scipy("stats")
+        if self.law == "uniform":
+            low = max(self.low, self.mean - self.spread)
+            high = min(self.high, self.mean + self.spread)
+            law = stats.uniform(low, high - low)
         else:
-            found = self.mean + self.spread * (2.0 * inside - 1.0)
-        inside_limits: Floats = np.clip(found, self.low, self.high)
-        return inside_limits
+            low, high = ((end - self.mean) / self.spread for end in (self.low, self.high))
+            law = stats.truncnorm(low, high, self.mean, self.spread)
+        # Sobol points begin at 0, where a normal distribution has no value; and rounding must not
+        # take a value past what the scene allows.
+        found: Floats = np.clip(law.ppf(np.clip(shares, 1e-12, 1.0 - 1e-12)), self.low, self.high)
+        return found
 
 
 def spreads(scene: Scene, texts: Sequence[str]) -> tuple[Spread, ...]:
@@ -135,9 +127,9 @@ def _read(scene: Scene, text: str) -> Spread:
     low, high = limits_of(rule_at(parts_of(about.path)) or {}) or (-np.inf, np.inf)
     for value in (mean, float(np.clip(mean + INSIDE * spread, low, high))):
         try:
-            varied(scene, [about.path], [value])
+            scene.with_values({about.path: value})
         except SceneError as error:
-            raise DesignError(typed, without_source(reason(error))) from None
+            raise DesignError(typed, reason(error)) from None
     return Spread(
         about.path, about.unit, mean, spread, "uniform" if law == "uniform" else "normal", low, high
     )

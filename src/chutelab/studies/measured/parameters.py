@@ -14,7 +14,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from chutelab.scene import MISSING, Fault, Scene, SceneError, overridden, shown
+from chutelab.scene import MISSING, Fault, Scene, SceneError, shown
 from chutelab.scene.errors import at_path, joined
 from chutelab.scene.overrides import limits_of, rule_at
 from chutelab.studies.measured.track import MeasuredError, Track
@@ -91,7 +91,7 @@ def changed(
     SceneError
         If the scene refuses a value, or two that do not go together.
     """
-    overrides = []
+    changes: dict[str, float] = {}
     origin = list(track.placement.origin)
     placement: dict[str, Any] = {}
     for parameter, value in zip(parameters, (float(value) for value in values), strict=True):
@@ -103,9 +103,9 @@ def changed(
             case "t0" | "scale":
                 placement[parameter.key] = value
             case key:
-                overrides.append(f"{key}={value!r}")
-    if overrides:
-        scene = overridden(scene, overrides)
+                changes[key] = value
+    if changes:
+        scene = scene.with_values(changes)
     return scene, track.placed(origin=(origin[0], origin[1]), **placement)
 
 

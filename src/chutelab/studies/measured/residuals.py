@@ -11,7 +11,7 @@ import numpy as np
 
 from chutelab.engines.simulation import simulate
 from chutelab.results import Recording
-from chutelab.scene import Fault, Scene, from_dict, to_dict
+from chutelab.scene import Fault, Scene
 from chutelab.scene.units import write_size
 from chutelab.studies.measured.track import MeasuredError, Track, counted
 from chutelab.util.arrays import Bools, Floats
@@ -149,9 +149,7 @@ def inside(recording: Recording, track: Track) -> Bools:
 def run(scene: Scene) -> Recording:
     """Simulate what particle 0 does; of a stream that ignores each other, only particle 0."""
     if scene.stream.count > 1 and not scene.stream.interact:
-        tables = to_dict(scene)
-        tables["stream"] = {**tables.get("stream", {}), "count": 1}
-        scene = from_dict(tables, scene.source)
+        scene = scene.with_values({"stream.count": 1})
     return simulate(scene)
 
 

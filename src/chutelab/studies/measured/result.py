@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -18,6 +16,7 @@ from chutelab.studies.measured.parameters import Parameter
 from chutelab.studies.measured.residuals import Residuals, best_t0, over
 from chutelab.studies.measured.track import MeasuredError
 from chutelab.util.arrays import Floats
+from chutelab.util.files import csv_lines
 from chutelab.util.tables import Sheet, Shown
 
 MAD = 1.4826
@@ -272,16 +271,14 @@ def points_csv(found: Residuals) -> str:
 
     Points outside the simulated time have no simulated position and no residual.
     """
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow(COLUMNS)
     track = found.track
+    rows: list[Sequence[object]] = [COLUMNS]
     for line, t, measured, simulated, off in zip(
         track.lines, track.t, track.position, found.simulated, found.values, strict=True
     ):
         numbers = (t, *measured, *simulated, *off)
-        table.writerow([line, *(f"{value:.9g}" if isfinite(value) else "" for value in numbers)])
-    return text.getvalue()
+        rows.append([line, *(f"{value:.9g}" if isfinite(value) else "" for value in numbers)])
+    return "".join(csv_lines(rows))
 
 
 def _residuals(found: Residuals) -> dict[str, Any]:

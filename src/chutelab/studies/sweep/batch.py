@@ -1,8 +1,8 @@
 """A block of variants run: many at once where they differ in plain numbers only, else one by one.
 
 Many at once, a variant is a particle with a machine of its own. What is slow one by one, validating
-and building, is done on arrays too; and every number is, to the bit, the one that the variant gives
-by itself. What does not fit is left over, to be run alone: that is never wrong, only slower.
+and building, is done on arrays too; numbers agree with those of the variant alone to 1e-12. What
+does not fit is left over, to be run alone: that is never wrong, only slower.
 """
 
 from __future__ import annotations
@@ -231,12 +231,9 @@ class Batch:
             try:
                 machine = build(self._scenes(template, which))
             except RefusedError as refused:
-                out = np.array(list(refused.reasons))
-                for row, fault in zip(which[out].tolist(), refused.reasons.values(), strict=True):
-                    if fault:
-                        self.faults[row] = fault
-                    else:
-                        self.left.append(row)
+                out = list(refused.members)
+                faults = map(str, refused.members.values())
+                self.faults |= dict(zip(which[out].tolist(), faults, strict=True))
                 which = np.delete(which, out)
             else:
                 for alike in kinds(machine):

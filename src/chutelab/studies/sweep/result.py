@@ -13,6 +13,7 @@ import os
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
@@ -25,7 +26,7 @@ from chutelab.scene.variants import Quantity
 from chutelab.studies.sweep.plan import Plan
 from chutelab.studies.sweep.rows import NUMBERS, REASON
 from chutelab.util.arrays import Floats
-from chutelab.util.files import whole
+from chutelab.util.files import csv_lines, whole, write_lines
 from chutelab.util.tables import Sheet, Shown, frame, number
 from chutelab.util.versions import version_of
 
@@ -73,19 +74,15 @@ def write(columns: Rows, path: str | Path, form: str) -> Path:
 
 def write_csv(names: Sequence[str], texts: Iterable[str], path: str | Path) -> Path:
     """Write a head and texts of rows as a CSV file."""
-    with whole(path) as unfinished, unfinished.open("w", encoding="utf-8", newline="") as file:
-        file.write(",".join(map(_quoted, names)) + "\n")
-        file.writelines(texts)
-    return Path(path)
+    return write_lines(path, chain(csv_lines([names]), texts))
 
 
 def text_of(columns: Rows) -> str:
     """Return rows as lines of CSV, from which `columns_of` gets every bit back."""
     cells = [
-        list(map(_quoted, values.tolist())) if name == REASON else _numbers(values)
-        for name, values in columns.items()
+        values.tolist() if name == REASON else _numbers(values) for name, values in columns.items()
     ]
-    return "".join([f"{','.join(row)}\n" for row in zip(*cells, strict=True)])
+    return "".join(csv_lines(zip(*cells, strict=True)))
 
 
 def columns_of(names: Sequence[str], text: str) -> dict[str, NDArray[Any]]:
@@ -102,13 +99,6 @@ def columns_of(names: Sequence[str], text: str) -> dict[str, NDArray[Any]]:
 def _numbers(values: Floats) -> list[str]:
     """Write numbers in as few digits as give them back, whole ones without a point."""
     return ["" if x != x else repr(x).removesuffix(".0") for x in values.tolist()]
-
-
-def _quoted(text: str) -> str:
-    if '"' not in text and "," not in text:
-        return text
-    doubled = text.replace('"', '""')
-    return f'"{doubled}"'
 
 
 def _pyarrow() -> tuple[Any, Any]:

@@ -226,7 +226,7 @@ def sweep(
     """Simulate many variants of a scene.
 
     Variants of one particle that differ in plain numbers go through the exact engine together;
-    every row is the one that `chutelab.simulate` of its variant gives, to the bit.
+    every row agrees with `chutelab.simulate` of its variant to 1e-12, relative.
 
     Parameters
     ----------

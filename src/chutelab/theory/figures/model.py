@@ -16,7 +16,8 @@ from chutelab.scene import Scene
 from chutelab.theory.paper import FALL
 from chutelab.theory.transfer import transfer
 from chutelab.util.arrays import Floats
-from chutelab.util.tables import Sheet, Shown, csv_text
+from chutelab.util.files import csv_text
+from chutelab.util.tables import Sheet, Shown
 
 Form = Literal["as-printed", "corrected"]
 

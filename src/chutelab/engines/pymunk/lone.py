@@ -294,9 +294,12 @@ class Lone:
             return "slips" if self.slipping and end.slips != self.slipping else ""
 
         if change(h):
-            before, after = bisected(change, SHORT * h, h)
+            least = SHORT * h
+            # A belt that grips may drive it into what it touches at once.
+            low, high = (0.0, least) if change(least) == "meets" else (least, h)
+            before, after = bisected(change, low, high)
             what = change(after)
-            if what == "leaves" and before == SHORT * h:
+            if what == "leaves" and before == least:
                 return False
             h = after if what == "slips" else before
         end = trial(h)

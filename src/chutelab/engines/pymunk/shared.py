@@ -182,43 +182,36 @@ class Shared:
     # Releases and rides
 
     def _release(self) -> None:
-        """Release who is due, if nobody is in the place."""
+        """Release who is due, at a time up to now, if nobody is in the place."""
         starts = self.machine.releases
         for i in list(self.waiting):
-            if starts.t[i] > self.t + 1e-9 * self.h:
-                break
             due = float(starts.t[i])
-            moment = due if self.t - due < self.h else self.t
-            position, velocity = starts.position[i], starts.velocity[i]
+            if due > self.t + 1e-9 * self.h:
+                break
+            t = due if self.t - due < self.h else self.t
+            x, v = Vec2d(*starts.position[i].tolist()), Vec2d(*starts.velocity[i].tolist())
             others = np.flatnonzero(self.inside)
             if self.machine.interact and len(others):
-                # Now, and when it was due.
-                late = max(self.t - moment, 0.0)
-                x, v = self.state[1, :2, others], self.state[1, 2:4, others]
-                now = x - position - late * velocity
-                apart = now, now - late * (v - velocity)
+                # Apart now, and when it was due.
+                late = max(self.t - t, 0.0)
+                now = self.state[1, :2, others] - (x + late * v)
+                apart = now, now - late * (self.state[1, 2:4, others] - v)
                 if min(float((d * d).sum(axis=1).min()) for d in apart) < 4.0 * self.r**2:
                     continue
             self.waiting.remove(i)
-            self._begin(i, moment)
-
-    def _begin(self, i: int, t: float) -> None:
-        """Release a particle at a time (s) up to now."""
-        starts = self.machine.releases
-        x, v = Vec2d(*starts.position[i].tolist()), Vec2d(*starts.velocity[i].tolist())
-        self.recorder.events(Kind.RELEASE, i, t, tuple(x), tuple(v))
-        self.inside[i] = True
-        body, circle = self.disks[i]
-        self.world.space.add(body, circle)
-        if starts.carried[i]:
-            ride = self.rides[i] = Carriage(self.machine, self.world, i, t)
-            body.body_type = pymunk.Body.KINEMATIC
-            body.position, body.velocity = ride.at(self.t - 0.5 * self.h - t)
-            self.state[1, :2, i], self.state[1, 2:4, i] = ride.at(self.t - t)
-            # A belt that stands holds it for good.
-            self.calm[i] = -inf if ride.speed else inf
-        else:
-            self._free(i, t, x, v)
+            self.inside[i] = True
+            self.recorder.events(Kind.RELEASE, i, t, tuple(x), tuple(v))
+            body, circle = self.disks[i]
+            self.world.space.add(body, circle)
+            if starts.carried[i]:
+                ride = self.rides[i] = Carriage(self.machine, self.world, i, t)
+                body.body_type = pymunk.Body.KINEMATIC
+                body.position, body.velocity = ride.at(self.t - 0.5 * self.h - t)
+                self.state[1, :2, i], self.state[1, 2:4, i] = ride.at(self.t - t)
+                # A belt that stands holds it for good.
+                self.calm[i] = -inf if ride.speed else inf
+            else:
+                self._free(i, t, x, v)
 
     def _free(self, i: int, t: float, x: Vec2d, v: Vec2d) -> None:
         """Let a particle fly from where it is at a time (s) up to now."""
@@ -319,8 +312,13 @@ class Shared:
         self.recorder.by_surface[-1] += sums[:3] @ pair
         for k in np.flatnonzero(pair) if self.rides else ():
             for row, motion, sign in ((one, mine, -0.5), (other, others, 0.5)):
-                mean = motion[0, :2, k] + motion[1, :2, k]
-                self._hold(int(row[k]), sign * float(jx[k] * mean[0] + jy[k] * mean[1]))
+                if (i := int(row[k])) in self.rides:
+                    # The belt's work on who hits a particle that it carries.
+                    ride = self.rides[i]
+                    ride.write(self.recorder, self.t - self.h)
+                    mean = motion[0, :2, k] + motion[1, :2, k]
+                    work = sign * float(jx[k] * mean[0] + jy[k] * mean[1])
+                    self.recorder.book(i, ride.surface, work)
         sums[:3, pair] *= 0.5
         rows = len(self.surface)
         places = np.concatenate((one, other)) + rows * np.arange(5)[:, None]
@@ -344,13 +342,6 @@ class Shared:
                 other=np.where(pair, other, -1)[told],
                 normal_impulse=push[told], tangential_impulse=rub[told],
             )  # fmt: skip
-
-    def _hold(self, i: int, work: float) -> None:
-        """Book the work (J) that a belt does on who hits a particle that it carries."""
-        if i in self.rides:
-            ride = self.rides[i]
-            ride.write(self.recorder, self.t - self.h)
-            self.recorder.book(i, ride.surface, work)
 
     def _riding(self, who: NDArray[np.int64], surface: NDArray[np.int64]) -> None:
         """Count pushes of surfaces in a row; tell separations at the last one's time."""

@@ -419,22 +419,22 @@ class _Run:
             if k in aside:
                 continue
             if thing.flat:
-                for side, name in ((1.0, "left"), (-1.0, "right")):
-                    gap = self.start(side * thing.distance(self.base) - self.r)
-                    way = side * thing.left
-                    yield name, k, lambda y, gap=gap, way=way: gap + way @ y[X]
+                yield "left", k, self.to_line(thing, 1.0)
+                yield "right", k, self.to_line(thing, -1.0)
             else:
                 yield "meets", k, self.to_circle(thing)
 
-    def start(self, gap: float) -> float:
-        """Return a gap (m) at the start of a phase: 0 to the last bit of what is touched."""
-        return 0.0 if abs(gap) < TOUCH else gap
+    def to_line(self, thing: _Surface, side: float) -> Guard:
+        """Return the gap to a face; of one that is touched it starts as 0, to the last bit."""
+        gap = side * thing.distance(self.base) - self.r
+        gap = 0.0 if abs(gap) < TOUCH else gap
+        return lambda y: gap + side * (thing.left @ y[X])
 
     def to_circle(self, thing: _Surface) -> Guard:
-        """Return the gap to a circle."""
+        """Return the gap to a circle, likewise."""
         away = self.base - thing.place
         far = hypot(*away)
-        ahead = self.start(far - thing.reach)
+        ahead = 0.0 if abs(far - thing.reach) < TOUCH else far - thing.reach
 
         def left(y: Floats) -> Floats:
             d = y[X]
@@ -574,9 +574,12 @@ def _surfaces(machine: Machine) -> list[_Surface]:
     ends: list[tuple[int, Floats, Floats]] = []
     for k, tangent in enumerate(parts.tangent):
         left = np.array([-tangent[1], tangent[0]])
-        values = (float(a[k]) for a in (parts.speed, parts.restitution, parts.friction))
-        length, owner = float(parts.length[k]), int(parts.surface[k])
-        lines.append(_Surface(parts.start[k], tangent, left, length, 0.0, *values, owner))
+        lines.append(
+            _Surface(
+                parts.start[k], tangent, left, float(parts.length[k]), 0.0, float(parts.speed[k]),
+                float(parts.restitution[k]), float(parts.friction[k]), int(parts.surface[k]),
+            )
+        )  # fmt: skip
         ends += [(k, parts.start[k], tangent), (k, parts.end[k], -tangent)]
     circles: list[_Surface] = []
     if pulley is not None:

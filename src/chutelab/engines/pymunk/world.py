@@ -261,7 +261,7 @@ class Carriage:
         start = machine.releases
         self.particle, self.surface, self.t = particle, machine.pulley.surface, t
         self.weight = machine.particle.mass * machine.gravity
-        self.x, self.rho = start.position[particle].tolist()
+        self.x, self.rho = map(float, start.position[particle])
         self.speed = float(start.velocity[particle, 0])
         self.until, self.height, self.written = machine.end_time, self.rho, -inf
         self.top = inf
@@ -284,7 +284,7 @@ class Carriage:
 
     def pull(self, _normal: Vec2d) -> float:
         """Return the least acceleration (m/s²) along any normal."""
-        return -self.speed * self.speed / self.rho
+        return -(self.speed**2) / self.rho
 
     def write(self, recorder: Recorder, end: float) -> None:
         """Write the knots up to a time (s), with what the belt pays: it lets the particle down."""

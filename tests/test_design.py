@@ -26,6 +26,7 @@ from chutelab.studies.design import sensitivity
 from chutelab.studies.design.evaluation import Evaluator, suits
 from chutelab.studies.design.quantities import SHORT, measured, target
 from chutelab.studies.design.uncertainty import spreads
+from chutelab.util.errors import InputError
 
 G, V, R, D, DROP, M = 9.81, 2.0, 0.1, 0.5, 0.5, 0.008
 
@@ -640,7 +641,7 @@ def test_the_command_behind_sweep_refuses_before_it_runs(given, out, plot, said,
     monkeypatch.setattr("chutelab.studies.design.evaluation.simulate", None)
     monkeypatch.setattr("chutelab.studies.sweep.batch.run", None)
     paths = {"out": out and Path(out), "plot": plot and Path(plot)}
-    with pytest.raises(RefusedError, match=said):
+    with pytest.raises((RefusedError, InputError), match=said):
         propagate(machine(), [given], samples=64, seed=0, as_json=False, quiet=True, **paths)
 
 

@@ -59,7 +59,7 @@ def loaded_by(*arguments, cwd=None):
         (["scenes", "--json"], {"click", "pydantic"}),
         (["schema"], {"click", "pydantic"}),
         (["new", "-"], {"click", "pydantic"}),
-        (["check", "perpendicular"], {"click", "pydantic", "numpy"}),
+        (["check", "perpendicular"], {"click", "pydantic", "numpy", "rich"}),
         (["tables", "4", "--json"], {"click", "numpy"}),
         (["run", "perpendicular", "--json"], {"click", "pydantic", "numpy"}),
         (["run", "perpendicular", "--quiet"], {"click", "pydantic", "numpy"}),
@@ -76,7 +76,7 @@ def loaded_by(*arguments, cwd=None):
             ["run", "stream", "--json", "--set", "stream.count=3"],
             {"click", "pydantic", "numpy", "wasmtime"},
         ),
-        (["check", "stream"], {"click", "pydantic", "numpy", "wasmtime"}),
+        (["check", "stream"], {"click", "pydantic", "numpy", "rich", "wasmtime"}),
         (
             ["run", "perpendicular", "--json", "--out", "out", "--only", "csv,npz,json"],
             {"click", "pydantic", "numpy"},

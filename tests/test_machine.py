@@ -189,15 +189,21 @@ def test_a_flight_meets_a_leaning_plate_only_up_to_the_angle_of_the_formula():
 def test_crossing_surfaces_are_warned_of():
     assert built().warnings == ()
     *_, high = built(outgoing={"drop_from": "top", "drop": 0.15}).warnings
-    assert high.startswith("outgoing: it crosses the drive pulley")
+    assert high == machine.Caution("outgoing", crosses=machine.DRIVE_PULLEY)
     leaning = {"angle_deg": -60.0, "distance": 0.02, "below": 0.3}
     (through,) = built(plate=leaning, outgoing={"drop_from": "top"}).warnings
-    assert through.startswith("plate: it crosses the drive pulley")
+    assert str(through) == "plate: it crosses the drive pulley"
     hood = {"name": "hood", "points": [[0.4, 0.0], [0.8, 0.0], [0.8, 0.3]]}
-    (crossed,) = built(surface=[hood]).warnings
-    assert crossed.startswith("hood: it crosses plate")
-    (meeting,) = (built(surface=[{**hood, "points": [[-0.5, R], [-0.5, 1.0]]}]).warnings,)
-    assert meeting == ()
+    assert built(surface=[hood]).warnings == (machine.Caution("hood", crosses="plate"),)
+    assert built(surface=[{**hood, "points": [[-0.5, R], [-0.5, 1.0]]}]).warnings == ()
+
+
+@pytest.mark.parametrize(("below", "hit"), [(0.1, -0.4316), (None, None)])
+def test_a_flight_off_the_finite_plate_is_told_with_its_place(below, hit):
+    # the impact lies g (0.596 / 2)²/2 - r = 0.4316 m below the pulley's top
+    found = built(plate={"below": below} if below else {}, outgoing={"drop_from": "top", "drop": 1})
+    hits = [caution.hit for caution in found.warnings if not caution.crosses]
+    assert hits == ([pytest.approx(hit, abs=5e-5)] if hit else [])
 
 
 def test_the_scene_ends_a_metre_below_or_without_gravity_around_it():

@@ -119,7 +119,8 @@ def test_the_step_that_is_recommended_does():
     assert advice.change.startswith("run.align = true, or run.dt = ")
     dt = advice.change.rpartition(" = ")[2]
     assert look("perpendicular", *bad, f"run.dt={dt}").advice == ()
-    assert look("perpendicular", *bad, "run.align=true").advice == ()
+    assert advice.settings == {"run.align": True}
+    assert applied("perpendicular", bad, advice).advice == ()
 
 
 @pytest.mark.parametrize(
@@ -144,15 +145,16 @@ def test_releases_that_wait_for_a_free_place_are_noticed():
     assert "of 5 particles tried, 4 wait for a free place" in advice.warning
     assert "up to 0.012 s" in advice.warning
     assert advice.change.startswith("stream.rate = ")
-    rate = float(advice.change.split(",")[0].rpartition(" = ")[2])
-    assert look("perpendicular", *overrides, f"stream.rate={rate}").advice == ()
+    assert list(advice.settings) == ["stream.rate"]
+    assert applied("perpendicular", overrides, advice).advice == ()
 
 
 # What it costs: on counts; seconds are the machine's.
 
 
 @pytest.mark.parametrize("name", LONE)
-def test_a_lone_particles_contacts_are_those_of_its_run(name):
+def test_a_lone_particles_contacts_are_those_of_its_run(name, monkeypatch):
+    monkeypatch.setattr(trial, "PATIENCE", 30.0)  # s; whatever else the computer does
     found = look(name)
     assert found.effort.contacts == simulate(sc.load(name)).contacts
     assert not found.effort.at_least
@@ -235,10 +237,12 @@ def test_layers_that_ride_into_each_other_on_a_slow_pulley_are_noticed():
     assert cos(radians(angle)) == pytest.approx(grip, abs=2e-3)
     assert "all layers run at 0.7 m/s" in advice.warning
     # sqrt(9.81 * 0.154) = 1.2291
-    change, _, other = advice.change.partition(", to leave at the top, or ")
-    assert (change, other) == ("incoming.speed = 1.23", "stream.bed_height = 0")
-    for setting in (change, other):
-        again = applied("stream", overrides, setting)
+    assert advice.settings == {"incoming.speed": 1.23}
+    assert advice.change.endswith(", to leave at the top, or stream.bed_height = 0")
+    for again in (
+        applied("stream", overrides, advice),
+        look("stream", *overrides, "stream.bed_height=0"),
+    ):
         assert not [a for a in again.advice if "ride into others" in a.warning]
 
 
@@ -251,10 +255,10 @@ def test_words_say_when_belt_work_can_be_compared():
 # Warnings, each with what to change: applying it must help.
 
 
-def applied(name, overrides, change):
-    """Look again with the change that was recommended."""
-    settings = [part.replace(" = ", "=") for part in change.split(" and ")]
-    return look(name, *overrides, *settings)
+def applied(name, overrides, advice):
+    """Look again with the settings that were recommended."""
+    assert advice.settings
+    return preflight(sc.load(name, overrides).with_values(advice.settings))
 
 
 @pytest.mark.parametrize(
@@ -304,14 +308,8 @@ def test_a_setting_that_is_recommended_does_away_with_its_warning(name, override
     found = look(name, *overrides)
     (advice,) = [advice for advice in found.advice if warning in advice.warning]
     assert advice.change.startswith(f"{key} = ")
-    if "points" in key:
-        overrides = tuple(o for o in overrides if "ramp" not in o)
-        points = advice.change.partition(" = ")[2]
-        tables = sc.to_dict(sc.load(name))
-        tables["surface"][0]["points"] = eval(points)
-        again = preflight(sc.from_dict(tables))
-    else:
-        again = applied(name, overrides, advice.change)
+    assert key in advice.settings
+    again = applied(name, overrides, advice)
     assert not [other for other in again.advice if warning in other.warning]
     assert len(again.advice) < len(found.advice)
 

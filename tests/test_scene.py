@@ -292,7 +292,7 @@ def test_a_scene_is_found_by_name_from_anywhere(tmp_path, monkeypatch):
 
 def test_scenes_of_an_installed_wheel_are_found_in_the_package(tmp_path):
     package = Path(sc.__file__).parents[1]
-    for source in (*package.glob("*.py"), *package.glob("scene/*.*")):
+    for source in (p for d in ("*.py", "scene/*.*", "util/*.py") for p in package.glob(d)):
         target = tmp_path / "chutelab" / source.relative_to(package)
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_bytes(source.read_bytes())

@@ -127,7 +127,7 @@ def test_rows_of_a_batch_are_those_of_single_runs(line):
     name, settings, varies = (part.split() for part in line.split("|"))
     block = block_of(load(*name, settings), varies)
     singles = joined([alone(block, row) for row in range(len(block.values))])
-    assert_same(batch.swept_together(block), singles)
+    assert_same(batch.swept(block), singles)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -141,7 +141,7 @@ def test_samples_over_many_keys_are_single_runs(seed):
     scene = load("perpendicular", ["run.until=settled", "run.max_time=5.0"])
     block = block_of(scene, ranges, sample=60, seed=seed)
     singles = joined([alone(block, row) for row in range(len(block.values))])
-    found = batch.swept_together(block)
+    found = batch.swept(block)
     assert_same(found, singles)
     assert np.isfinite(found["landing.x"]).sum() > 10
 
@@ -162,7 +162,7 @@ def test_surfaces_that_join_in_some_variants_only_are_told_apart():
     alike = kinds(build(family(scene, {"outgoing.drop": heights})))
     assert sorted(map(len, alike)) == [1, 2]
     assert [1] in [part.tolist() for part in alike]
-    found = batch.swept_together(block)
+    found = batch.swept(block)
     singles = joined([alone(block, row) for row in range(len(block.values))])
     assert_same(found, singles)
     # Across the joint the particle slides onto the belt; beside it, it falls onto or under it.
@@ -190,7 +190,7 @@ points = [[6.000000014, 0.0], [6.0, 1.0]]
     varies = ["incoming.speed=0.22,0.23,2", "plate.restitution=0,1"]
     block = block_of(chained, varies)
     singles = joined([alone(block, row) for row in range(len(block.values))])
-    assert_same(batch.swept_together(block), singles)
+    assert_same(batch.swept(block), singles)
 
 
 def test_one_that_the_exact_engine_cannot_follow_spoils_no_other(monkeypatch):
@@ -224,7 +224,7 @@ max_time = 2.0
             raise
 
     monkeypatch.setattr("chutelab.studies.sweep.batch.run", watched)
-    assert_same(batch.swept_together(block), singles)
+    assert_same(batch.swept(block), singles)
     assert refused[0] == 10
     assert 1 <= refused.count(1) < 10
 

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any, Final
 from chutelab.classroom.exercises import ExerciseError, Task, lesson
 from chutelab.classroom.exercises.catalogue import UNNAMED
 from chutelab.classroom.exercises.exercise import plain
+from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, write_lines
 
 if TYPE_CHECKING:  # of the extra "notebook"
@@ -31,7 +32,7 @@ LARGEST: Final = 50 << 20
 """Bytes; a notebook with its pictures is a tenth of it."""
 
 
-class NotebookError(ValueError):
+class NotebookError(InputError):
     """A file that is no notebook; its text says why."""
 
 

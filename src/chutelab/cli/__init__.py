@@ -3,13 +3,12 @@
 ===============  ==================================================================================
 `program`        the command ``chutelab`` itself, and what becomes of errors
 `running`        ``run``, ``show``, ``page``
-`checking`       ``check``, ``verify``
+`checking`       ``check``, ``verify``, ``stress``
 `scenes`         ``scenes``, ``schema``, ``new``, ``tables``, ``figure``
 `comparing`      ``compare``
 `sweeping`       ``sweep``
 `solving`        ``solve``, and ``sweep --uncertainty``
 `lessons`        ``lesson``: list, show, build, new, grade, page
-`stressing`      ``stress``
 `benching`       ``bench``
 `parameters`     what several commands take: scenes, overrides, output
 `output`         the files of ``--out``, all of them or none
@@ -22,14 +21,13 @@ Modules that take long to import are imported inside the commands that need them
 """
 
 from chutelab.cli.benching import bench
-from chutelab.cli.checking import check, verify
+from chutelab.cli.checking import check, stress, verify
 from chutelab.cli.comparing import compare
 from chutelab.cli.lessons import lesson
 from chutelab.cli.program import main
 from chutelab.cli.running import page, run, show
 from chutelab.cli.scenes import figure, new, scenes, schema, tables
 from chutelab.cli.solving import solve
-from chutelab.cli.stressing import stress
 from chutelab.cli.sweeping import sweep
 
 for _command in (

@@ -1,27 +1,27 @@
-"""``check``, the look at a scene before it runs, and ``verify``, what scenes are to show."""
+"""``check``, ``verify`` and ``stress``: is a scene, an answer, a run to be trusted."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import replace
 from itertools import groupby
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from chutelab.cli.parameters import complete_scene, set_option
+from chutelab.cli.parameters import (
+    complete_scene,
+    dt_option,
+    engine_option,
+    loaded_as_told,
+    set_option,
+)
 
 if TYPE_CHECKING:
-    from rich.text import Text
-
-    from chutelab.checks.agreement import Agreement, Finding, Verification
-    from chutelab.checks.preflight import Coverage, Effort, Preflight, Stepping
-    from chutelab.scene import Scene
-
-
-NAMES = 16
-"""Columns for the names at the left."""
+    from chutelab.checks.agreement import Verification
+    from chutelab.checks.preflight import Preflight
+    from chutelab.util.tables import Sheet
 
 
 @click.command(short_help="Look at a scene before it runs, or say all that is wrong.")
@@ -42,6 +42,7 @@ def check(
     from chutelab.checks.preflight import preflight
     from chutelab.cli import console
     from chutelab.scene import SceneError, load
+    from chutelab.util.tables import plain
 
     refused = False
     found: dict[str, Preflight] = {}
@@ -52,120 +53,13 @@ def check(
             refused = True
             click.echo(f"Error: {error}", err=True)
     if as_json:
-        looks = [_plain(name, look) for name, look in found.items()]
+        looks = [{"scene": name, **plain(look)} for name, look in found.items()]
         console.show_json({"format": 1, "scenes": looks})
     else:
-        for number, (name, look) in enumerate(found.items()):
-            if number:
-                click.echo()
-            click.echo("\n".join(_shown(name, look)))
+        titled = (replace(look, title=f"{name}: {look.title}") for name, look in found.items())
+        console.show(*titled)
     if refused:
         ctx.exit(2)
-
-
-def _plain(name: str, look: Preflight) -> dict[str, Any]:
-    out = {"scene": name, **asdict(look)}
-    if look.stepping is not None:
-        out["stepping"]["safe"] = look.stepping.safe
-    return out
-
-
-def _shown(name: str, look: Preflight) -> Iterator[str]:
-    """Yield the lines on one scene."""
-    yield f"{name}: {look.title}"
-    yield "built"
-    for part in look.built:
-        yield from _item(part.name, part.what)
-    yield "skipped"
-    for part in look.skipped:
-        yield from _item(part.name, part.what)
-    yield "how it runs"
-    yield from _item("engine", f"{look.engine}: {look.why}")
-    yield from _item("ends", look.ends)
-    if look.stepping is not None:
-        yield from _steps(look.stepping)
-    yield from _cost(look.effort)
-    yield "closed form"
-    yield from _theory(look.theory)
-    if look.advice:
-        yield "warnings" if len(look.advice) > 1 else "warning"
-    for advice in look.advice:
-        yield from _wrapped(f"- {advice.warning}", "  ", "    ")
-        yield from _wrapped(f"change: {advice.change}", "    ", "            ")
-
-
-def _steps(steps: Stepping) -> Iterator[str]:
-    from chutelab.scene.units import write_size
-
-    longest = write_size(steps.dt, "s")
-    if steps.aligned:
-        yield from _item("steps", f"at most {longest} while contacts last")
-        yield from _item("tunnelling", "none at any speed: blows have their own instants")
-    else:
-        yield from _item("steps", f"all of {longest}")
-        room = f"a surface catches it within {write_size(steps.bound, 'm')}"
-        if steps.way is None or steps.longest is None:
-            yield from _item("tunnelling", f"nothing moved in the trial run; {room}")
-        else:
-            verdict = "none" if steps.safe else "POSSIBLE"
-            yield from _item(
-                "tunnelling",
-                f"{verdict}: at {steps.speed:.3g} m/s a particle covers"
-                f" {write_size(steps.way, 'm')} in a step, and {room}:"
-                f" safe below dt = {write_size(steps.longest, 's')}",
-            )
-
-
-def _cost(effort: Effort) -> Iterator[str]:
-    about = "at least " if effort.at_least else "about "
-    yield from _item("contacts", f"{about}{_rounded(effort.contacts)}")
-    yield from _item("run time", f"{about}{_lasting(effort.seconds)}; {effort.how}")
-
-
-def _lasting(seconds: float) -> str:
-    """Write a duration that is known to one digit."""
-    one = float(f"{seconds:.1g}")
-    return f"{one:g} s" if one >= 0.1 else f"{1e3 * one:g} ms"
-
-
-def _rounded(number: int) -> str:
-    """Write a number with two digits that count, large ones with commas."""
-    return f"{int(float(f'{number:.2g}')):,}" if number > 100 else str(number)
-
-
-def _theory(theory: Coverage) -> Iterator[str]:
-    if theory.covers:
-        yield from _item("covers", ", ".join(theory.covers))
-    if theory.leaves_out:
-        missing = ", ".join(theory.leaves_out) if theory.covers else "all of it"
-        yield from _item("leaves out", missing)
-    yield from _item("because" if theory.reason else "in words", theory.words)
-
-
-def _item(name: str, what: str) -> Iterator[str]:
-    # A long name has its line to itself.
-    if len(name) > NAMES - 3:
-        yield f"  {name}"
-        name = ""
-    yield from _wrapped(what, f"  {name:<{NAMES - 2}}", " " * NAMES)
-
-
-def _wrapped(text: str, first: str, later: str) -> Iterator[str]:
-    from textwrap import wrap
-
-    from chutelab.util.tables import WIDTH
-
-    yield from wrap(
-        text,
-        WIDTH,
-        initial_indent=first,
-        subsequent_indent=later,
-        break_on_hyphens=False,
-        break_long_words=False,
-    )
-
-
-OK, FAILED = "ok", "FAILED"
 
 
 @click.command(short_help="Check what scenes promise; compare independent answers.")
@@ -183,6 +77,7 @@ def verify(ctx: click.Context, scenes: tuple[str, ...], as_json: bool) -> None:
     from chutelab.cli import console
     from chutelab.cli.console import progress
     from chutelab.scene import load, shipped
+    from chutelab.util.tables import Sheet, plain
 
     loaded = {name: load(name) for name in scenes or shipped()}
     found: dict[str, Verification] = {}
@@ -194,127 +89,133 @@ def verify(ctx: click.Context, scenes: tuple[str, ...], as_json: bool) -> None:
     failures = sum(answer.failures for answer in found.values())
     if as_json:
         answers = [
-            _plain_verification(name, loaded[name], answer) for name, answer in found.items()
+            {
+                "scene": name,
+                "title": loaded[name].title,
+                "expectations": [{**plain(row), "holds": row.holds} for row in answer.findings],
+                "agreement": [
+                    {**plain(row), "pair": row.pair.split(", "), "holds": row.holds}
+                    for row in answer.agreements
+                ],
+                "skipped": answer.skipped,
+            }
+            for name, answer in found.items()
         ]
         shares = {name: shared for name, (_, shared) in agreement.ANSWERS.items()}
-        printed = {"format": 1, "failures": failures, "shares": shares, "scenes": answers}
-        console.show_json(printed)
+        console.show_json({"format": 1, "failures": failures, "shares": shares, "scenes": answers})
     else:
-        for name, answer in found.items():
-            console.show(*_shown_findings(name, loaded[name], answer))
-        click.echo("What the answers have in common:")
-        for one, (how, shared) in agreement.ANSWERS.items():
-            click.echo(f"  {one:<9}{how:<30}{shared}")
+        rows = tuple((name, *told) for name, told in agreement.ANSWERS.items())
+        common = Sheet("What the answers have in common", ("", "", ""), rows, texts=3)
+        sheets = (_sheets(f"{name}: {loaded[name].title}", found[name]) for name in found)
+        console.show(*(sheet for both in sheets for sheet in both), common)
         click.echo("Errors and tolerances are relative where they have no unit.")
         click.echo(f"{failures} outside the tolerance" if failures else "all within the tolerance")
     if failures:
         ctx.exit(1)
 
 
-def _plain_verification(name: str, scene: Scene, answer: Verification) -> dict[str, Any]:
-    return {
-        "scene": name,
-        "title": scene.title,
-        "expectations": [
-            {
-                "quantity": row.quantity,
-                "unit": row.unit,
-                "source": row.source,
-                "engine": row.engine,
-                "expected": _or_null(row.expected),
-                "simulated": _or_null(row.simulated),
-                "error": _or_null(row.error),
-                "tolerance": row.tolerance,
-                "relative": row.relative,
-                "holds": row.holds,
-            }
-            for row in answer.findings
-        ],
-        "agreement": [
-            {
-                "pair": row.pair.split(", "),
-                "quantity": row.quantity,
-                "difference": None if row.difference is None else _or_null(row.difference),
-                "tolerance": row.tolerance,
-                "least": row.least,
-                "holds": row.holds,
-            }
-            for row in answer.agreements
-        ],
-        "skipped": answer.skipped,
-    }
+def _sheets(title: str, answer: Verification) -> Iterator[Sheet]:
+    """Yield what a scene is to show, and its particle 0 in one answer against another."""
+    from chutelab.scene.units import with_unit, write_size
+    from chutelab.util.tables import Sheet
 
-
-def _or_null(value: float) -> float | None:
-    return value if isfinite(value) else None
-
-
-def _shown_findings(name: str, scene: Scene, answer: Verification) -> Iterator[Text]:
-    """Yield the lines on one scene."""
-    from rich.text import Text
-
-    from chutelab.scene.units import with_unit
-    from chutelab.util.tables import WIDTH, wrapped
-
-    yield Text(f"{name}: {scene.title}", style="bold")
-    if answer.findings:
-        yield Text(
-            f"  {'expected':>26}{'simulated':>16}{'error':>13}{'tolerance':>13}", style="dim"
-        )
-    for (quantity, source, unit), rows in groupby(
+    rows: list[tuple[str, ...]] = []
+    for (quantity, source, unit), findings in groupby(
         answer.findings, lambda row: (row.quantity, row.source, row.unit)
     ):
-        head = f"{with_unit(quantity, unit)}: {source}"
-        for number, line in enumerate(wrapped(head, WIDTH - 4)):
-            yield Text(f"  {'  ' if number else ''}{line}")
-        for row in rows:
-            yield _judged(_columns(row), row.holds, promised=row.tolerance is not None)
-    for engine, reason in answer.skipped.items():
-        yield Text(f"  {engine} is left out: {reason}")
-    yield Text("  particle 0 alone, one answer against another:")
-    for pair in answer.agreements:
-        yield from _compared(pair)
-    yield Text("")
+        rows.append((f"{with_unit(quantity, unit)}: {source}",))
+        for row in findings:
+            size = "%" if row.relative else row.unit
+            rows.append((
+                row.engine,
+                *(f"{x:.8g}" if isfinite(x) else "-" for x in (row.expected, row.simulated)),
+                write_size(row.error, size, 2) if isfinite(row.error) else "-",
+                "-" if row.tolerance is None else write_size(row.tolerance, size),
+                "" if row.tolerance is None else "ok" if row.holds else "FAILED",
+            ))  # fmt: skip
+    heads: tuple[str, ...] = ("", "expected", "simulated", "error", "tolerance", "")
+    notes = tuple(f"{engine} is left out: {why}" for engine, why in answer.skipped.items())
+    yield Sheet(title, heads if rows else ("",) * 6, tuple(rows), tail=1, notes=notes)
+    pairs, notes = [], ()
+    for one in answer.agreements:
+        said = f"{one.pair.replace(', ', ' - ')}: {one.quantity}"
+        if one.difference is None and one.tolerance is None:
+            notes += (said,)
+            continue
+        form = ".1f" if one.least else ".1e"
+        pairs.append((
+            said,
+            "-" if one.difference is None else f"{one.difference:{form}}",
+            ">= " * one.least + ("-" if one.tolerance is None else f"{one.tolerance:{form}}"),
+            "" if one.tolerance is None else "ok" if one.holds else "FAILED",
+        ))  # fmt: skip
+    alone = "Particle 0 alone, one answer against another"
+    heads = ("", "difference", "tolerance", "")
+    yield Sheet(alone, heads, tuple(pairs), tail=1, notes=notes)
 
 
-def _columns(row: Finding) -> str:
-    from chutelab.scene.units import write_size
+@click.command(short_help="Run a scene and judge it by laws that every run must keep.")
+@click.argument("scene", shell_complete=complete_scene)
+@engine_option
+@dt_option
+@set_option
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@click.pass_context
+def stress(
+    ctx: click.Context,
+    scene: str,
+    engine: str | None,
+    dt: float | None,
+    overrides: tuple[str, ...],
+    as_json: bool,
+) -> None:
+    """Run SCENE and judge the run by laws that it must keep, whatever the scene.
 
-    unit = "%" if row.relative else row.unit
-    error = write_size(row.error, unit, 2) if isfinite(row.error) else "-"
-    tolerance = "-" if row.tolerance is None else write_size(row.tolerance, unit)
-    return (
-        f"    {row.engine:<8}{_number(row.expected):>16}{_number(row.simulated):>16}"
-        f"{error:>13}{tolerance:>13}"
-    )
+    Nobody passes a surface, sinks into one or bounces off nothing; energy never rises but by a
+    belt's work; ledger and momentum close. Each law that has something to say about the scene is a
+    line, with what was found and what it must not exceed. What the engine does not promise for
+    such a scene is told with the reason. Exit code 1 if a law is broken.
+    """
+    from chutelab.checks.stress import Evidence, judge
+    from chutelab.cli import console
+    from chutelab.engines.simulation import simulate
+    from chutelab.machine import build
+    from chutelab.results.recorder import StalledError
+    from chutelab.util.tables import Sheet, plain
 
-
-def _number(value: float) -> str:
-    return f"{value:.8g}" if isfinite(value) else "-"
-
-
-def _judged(columns: str, holds: bool, *, promised: bool) -> Text:
-    from rich.text import Text
-
-    line = Text(columns)
-    if promised:
-        line.append(f"  {OK if holds else FAILED}", style="green" if holds else "bold red")
-    return line
-
-
-def _compared(row: Agreement) -> Iterator[Text]:
-    from chutelab.util.tables import WIDTH, wrapped
-
-    pair = f"{row.pair.replace(', ', ' - ')}: {row.quantity}"
-    if row.difference is None and row.tolerance is None:
-        from rich.text import Text
-
-        for number, line in enumerate(wrapped(pair, WIDTH - 6)):
-            yield Text(f"    {'  ' if number else ''}{line}")
-        return
-    form = ".1f" if row.least else ".1e"
-    difference = "-" if row.difference is None else f"{row.difference:{form}}"
-    tolerance = "-" if row.tolerance is None else f"{row.tolerance:{form}}"
-    least = ">= " if row.least else ""
-    columns = f"    {pair:<48}{difference:>8}{least + tolerance:>13}"
-    yield _judged(columns, row.holds, promised=row.tolerance is not None)
+    loaded = loaded_as_told(scene, overrides, engine, dt)
+    try:
+        with console.progress("simulating") as update:
+            recording = simulate(loaded, progress=update)
+    except StalledError as stalled:
+        raise console.StuckError(str(stalled)) from stalled
+    run = Evidence(build(loaded), recording)
+    found = judge(run)
+    broken = sum(one.broken for one in found)
+    if as_json:
+        about = {"scene": scene, "title": recording.title, "engine": run.engine, "dt": run.dt}
+        laws = [
+            {"law": one.law, **plain(one.verdict), "holds": one.verdict.holds,
+             "unpromised": one.unpromised}
+            for one in found
+        ]  # fmt: skip
+        console.show_json({"format": 1, **about, "broken": broken, "laws": laws})
+    else:
+        rows = []
+        for one in found:
+            kept = "ok" if one.verdict.holds else "FAILED" if one.broken else "-"
+            said = "; not promised: ".join(filter(None, [one.verdict.detail, one.unpromised]))
+            figures = (f"{one.verdict.figure:.2g}", f"{one.verdict.bound:.2g}")
+            rows.append((kept, one.law, *figures, said))
+        steps = "" if run.dt is None else f", steps of {run.dt:.4g} s"
+        title = f"{recording.title}\nengine {run.engine}{steps}"
+        console.show(Sheet(title, ("", "law", "figure", "bound", ""), tuple(rows), texts=2, tail=1))
+        unpromised = sum(bool(one.unpromised) for one in found)
+        if broken:
+            click.echo(f"{broken} of {len(found)} laws broken")
+        elif unpromised:
+            click.echo(f"{len(found) - unpromised} laws kept, {unpromised} not promised")
+        else:
+            click.echo(f"all {len(found)} laws kept")
+    if broken:
+        ctx.exit(1)

@@ -31,7 +31,7 @@ def show(*parts: RenderableType) -> None:
         for part in parts:
             console.print(part)
     # Through click: it flushes, and knows what to do when the reader has gone.
-    click.echo(capture.get(), nl=False)
+    click.echo(capture.get().removeprefix("\n"), nl=False)
 
 
 def show_json(value: Any) -> None:

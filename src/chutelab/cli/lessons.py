@@ -189,14 +189,9 @@ def page(wanted: tuple[str, ...], out: Path, quiet: bool) -> None:
     from chutelab.classroom.lessons.building import bundle
     from chutelab.cli.console import progress
     from chutelab.cli.output import writing
-    from chutelab.pictures.live.runs import PageError
-    from chutelab.scene.variants import VaryError
 
-    try:
-        with writing(instead="another folder"), progress("making the pages", quiet=quiet) as update:
-            made = bundle(_lessons(wanted), out, update)
-    except (PageError, VaryError) as error:
-        raise RefusedError(str(error)) from error
+    with writing(instead="another folder"), progress("making the pages", quiet=quiet) as update:
+        made = bundle(_lessons(wanted), out, update)
     if not quiet:
         size = sum(path.stat().st_size for path in made)
         click.echo(f"wrote {len(made)} files, {size / 1e6:.1f} MB; open {out / 'index.html'}")

@@ -13,6 +13,8 @@ from typing import Any
 
 import click
 
+from chutelab.util.errors import InputError, MissingLibraryError
+
 INTERRUPTED = 130
 """128 + SIGINT, as shells have it."""
 
@@ -62,7 +64,7 @@ class Program(InOrder):
             if _was_interrupted(error):
                 click.echo("\nInterrupted.", err=True)
                 ctx.exit(INTERRUPTED)
-            if _is_refusal(error):
+            if isinstance(error, (InputError, MissingLibraryError)):
                 raise RefusedError(str(error)) from error
             if ctx.params["debug"]:
                 raise
@@ -77,15 +79,6 @@ def _was_interrupted(error: BaseException | None) -> bool:
             return True
         error = error.__cause__ or error.__context__
     return False
-
-
-def _is_refusal(error: Exception) -> bool:
-    if not isinstance(error, ValueError):
-        return False
-    from chutelab.results.storage import RecordingError
-    from chutelab.scene import SceneError
-
-    return isinstance(error, (SceneError, RecordingError))
 
 
 def _failure(error: Exception) -> str:

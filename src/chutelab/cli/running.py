@@ -183,12 +183,9 @@ def tell(
 def _varies(
     _ctx: click.Context, _parameter: click.Parameter, texts: tuple[str, ...]
 ) -> tuple[Vary, ...]:
-    from chutelab.scene.variants import VaryError, parse
+    from chutelab.scene.variants import parse
 
-    try:
-        return tuple(parse(text) for text in texts)
-    except VaryError as error:
-        raise RefusedError(str(error)) from error
+    return tuple(parse(text) for text in texts)
 
 
 @click.command(short_help="Write a page with sliders that any browser opens.")
@@ -228,17 +225,12 @@ def page(
     from chutelab.cli.console import progress
     from chutelab.cli.output import writing
     from chutelab.pictures.live.page import write
-    from chutelab.pictures.live.runs import PageError
     from chutelab.scene import load
-    from chutelab.scene.variants import VaryError
 
     path = _destination(scene, output)
     loaded = load(scene, overrides)
-    try:
-        with writing(str(path)), progress(f"simulating {scene}", quiet=quiet) as update:
-            written = write(loaded, varies, path, progress=update)
-    except (VaryError, PageError) as error:
-        raise RefusedError(str(error)) from error
+    with writing(str(path)), progress(f"simulating {scene}", quiet=quiet) as update:
+        written = write(loaded, varies, path, progress=update)
     if not quiet:
         click.echo(_told(written))
 

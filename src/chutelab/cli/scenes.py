@@ -135,13 +135,9 @@ def figure(number: int, out: Path | None, as_json: bool) -> None:
     """  # noqa: D301 - click wants the backspace
     from chutelab.cli import console
     from chutelab.cli.output import destination
-    from chutelab.theory.figures import FigureError
     from chutelab.theory.figures import figure as compute
 
-    try:
-        found = compute(number)
-    except FigureError as error:
-        raise RefusedError(str(error)) from error
+    found = compute(number)
     written: list[str] = []
     with destination(out, _names(found)) as place:
         if place is not None:

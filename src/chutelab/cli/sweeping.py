@@ -136,15 +136,7 @@ def sweep(
     from chutelab.cli import console
     from chutelab.scene import load
     from chutelab.scene.overrides import Override
-    from chutelab.scene.variants import VaryError
-    from chutelab.studies.sweep import (
-        LostWorkersError,
-        PartError,
-        SampleError,
-        TableError,
-        WorkersError,
-        planned,
-    )
+    from chutelab.studies.sweep import LostWorkersError, planned
 
     if bool(varies) == bool(uncertain):
         raise click.UsageError("Give either --vary, what to vary, or --uncertainty.")
@@ -169,8 +161,6 @@ def sweep(
         plan = planned(loaded, varies, sample=sample, design=design, seed=seed, engine=engine)
         _check_plot(plan, plot, column)
         found = _carried_out(plan, out, resume, jobs, scheduler, quiet=quiet)
-    except (VaryError, SampleError, TableError, PartError, WorkersError) as error:
-        raise RefusedError(str(error)) from error
     except LostWorkersError as error:
         raise click.ClickException(_and_resume(str(error), out)) from error
     if plot is not None:

@@ -7,9 +7,20 @@
 """
 
 from chutelab.machine.builder import RefusedError, build, members
-from chutelab.machine.parts import Machine, Particle, Pulley, Segments, moved, origin
+from chutelab.machine.parts import (
+    DRIVE_PULLEY,
+    Caution,
+    Machine,
+    Particle,
+    Pulley,
+    Segments,
+    moved,
+    origin,
+)
 
 __all__ = [
+    "DRIVE_PULLEY",
+    "Caution",
     "Machine",
     "Particle",
     "Pulley",

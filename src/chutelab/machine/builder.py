@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chutelab.machine.nominal import Discharge, discharge, plate_hit
-from chutelab.machine.parts import Machine, Particle, Pulley, Segments
+from chutelab.machine.parts import Caution, Machine, Particle, Pulley, Segments
 from chutelab.machine.releases import ON_BELT, Releases, draw, release_point
 from chutelab.scene import Fault, Scene, SceneError
 from chutelab.util.arrays import Floats, Ints, Numbers
@@ -195,7 +195,7 @@ class _Builder:
         self.names: list[str] = []
         self.rows: list[tuple[Numbers, ...]] = []
         self.owner: list[int] = []
-        self.warnings: list[str] = []
+        self.warnings: list[Caution] = []
 
     def add(
         self,
@@ -259,7 +259,7 @@ class _Builder:
         low, high = ((x - reach * sine, y + reach * cosine) for reach in (-below, plate.above))
         self.add("plate", [low, high], 0.0, plate.restitution, plate.friction)
         if np.any(missed):
-            self.warnings.append("plate: the nominal particle never meets the plate's line")
+            self.warnings.append(Caution("plate"))
         self._check_hit((y - hit[1]) * -cosine + (x - hit[0]) * sine, below)
         return height
 
@@ -271,17 +271,11 @@ class _Builder:
         too_low, too_high = np.less(along, -below), np.greater(along, above)
         off = np.flatnonzero(too_low | too_high)
 
-        def told(place: int) -> str:
-            where = self._at(along, place)
-            return (
-                f"the nominal particle meets the plate's line {abs(where):.4g} m"
-                f" {'above' if where > 0 else 'below'} the pivot, off the finite plate"
-            )
-
         def allowed(place: int) -> str:
-            enough = ceil(1e4 * abs(self._at(along, place))) / 1e4
+            hit = self._at(along, place)
             return (
-                f"{told(place)}: lengthen it to at least {enough:g} m,"
+                f"{Caution('plate', hit=hit).text}: lengthen it to at least"
+                f" {ceil(1e4 * abs(hit)) / 1e4:g} m,"
                 ' or set outgoing.drop_from = "top"'
             )
 
@@ -289,7 +283,7 @@ class _Builder:
             self._refuse(too_high, "plate.above", above, allowed)
             self._refuse(too_low, "plate.below", below, allowed)
         elif len(off):
-            self.warnings.append(f"plate: {told(int(off[0]))}")
+            self.warnings.append(Caution("plate", hit=self._at(along, int(off[0]))))
 
     def _refuse(
         self, bad: ArrayLike, key: str, value: ArrayLike, allowed: Callable[[int], str]

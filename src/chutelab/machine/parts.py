@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
-from math import ceil, inf, log2
+from math import ceil, inf, isnan, log2, nan
 from typing import Literal
 
 import numpy as np
@@ -21,13 +21,47 @@ from chutelab.machine.releases import Releases
 from chutelab.scene import Scene
 from chutelab.util.arrays import Floats, Ints
 
-FIRST_WINS = "; surfaces may cross, the first contact wins"
+DRIVE_PULLEY = "the drive pulley"
+
+
+@dataclass(frozen=True)
+class Caution:
+    """Something about a machine that works, but may surprise.
+
+    Attributes
+    ----------
+    surface : str
+        The surface it is about.
+    crosses : str
+        What that crosses, another surface or `DRIVE_PULLEY`; "" if the nominal particle misses it.
+    hit : float
+        Where the nominal particle meets the plate's line, m above the pivot; NaN if it never does.
+    """
+
+    surface: str
+    crosses: str = ""
+    hit: float = nan
+
+    @property
+    def text(self) -> str:
+        """It in words, without the name of the surface."""
+        if self.crosses:
+            return f"it crosses {self.crosses}"
+        if isnan(self.hit):
+            return "the nominal particle never meets the plate's line"
+        return (
+            f"the nominal particle meets the plate's line {abs(self.hit):.4g} m"
+            f" {'above' if self.hit > 0 else 'below'} the pivot, off the finite plate"
+        )
+
+    def __str__(self) -> str:
+        return f"{self.surface}: {self.text}"
 
 
 def crossings(
     names: Sequence[str], rows: Floats, owner: Sequence[int], pulley: float | None
-) -> list[str]:
-    """Return a sentence for every two surfaces that cross.
+) -> list[Caution]:
+    """Return every two surfaces that cross: allowed, the first contact wins.
 
     Parameters
     ----------
@@ -49,10 +83,10 @@ def crossings(
     for s, other in combinations(range(len(rows)), 2):
         if owner[s] != owner[other] and _cross(rows[s], rows[other]):
             found[owner[s], owner[other]] = None
-    said = [f"{names[b]}: it crosses {names[a]}{FIRST_WINS}" for a, b in found]
+    said = [Caution(names[b], names[a]) for a, b in found]
     if pulley is not None:
         into = {o for row, o in zip(rows, owner, strict=True) if o != 0 and _reach(row) < pulley}
-        said += [f"{names[o]}: it crosses the drive pulley{FIRST_WINS}" for o in sorted(into)]
+        said += [Caution(names[o], DRIVE_PULLEY) for o in sorted(into)]
     return said
 
 
@@ -201,7 +235,7 @@ class Machine:
         Of two particles.
     engine : {"auto", "exact", "contact", "pymunk"}
         What the scene asks for.
-    plate_warnings : tuple of str
+    plate_warnings : tuple of Caution
         What is to be said of a nominal particle that misses the plate.
     """
 
@@ -221,7 +255,7 @@ class Machine:
     pair_restitution: float
     pair_friction: float
     engine: str
-    plate_warnings: tuple[str, ...]
+    plate_warnings: tuple[Caution, ...]
 
     @property
     def count(self) -> int:
@@ -229,7 +263,7 @@ class Machine:
         return len(self.releases.t)
 
     @cached_property
-    def warnings(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[Caution, ...]:
         """What `chutelab check` tells about a machine that works but may surprise."""
         ends = np.concatenate([self.segments.start, self.segments.end], axis=-1)
         radius = self.pulley.radius if self.pulley is not None else None

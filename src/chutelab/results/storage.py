@@ -14,6 +14,7 @@ import numpy as np
 from chutelab.machine import build
 from chutelab.results.recording import ENTRIES, EVENT, KNOT, REASONS, Kind, Recording
 from chutelab.scene import from_dict
+from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, whole, write_lines
 
 FORMAT = 1
@@ -38,7 +39,7 @@ MOST_SAMPLES = 1_000_000
 so many particles get fewer instants."""
 
 
-class RecordingError(ValueError):
+class RecordingError(InputError):
     """A file is not a recording that this version can read."""
 
 

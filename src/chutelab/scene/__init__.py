@@ -1,6 +1,5 @@
 """Scene files: from TOML text to a frozen, validated `Scene`.
 
-- `errors`: a fault (key, value found, what is allowed) and the one message that lists them all.
 - `units`: sizes with their units, and what a key may hold: strict types and ranges.
 - `rules`: conflicts between keys and between tables; ``[[expect]]``.
 - `schema`: the tables of a scene as frozen Pydantic models, with the defaults.
@@ -9,9 +8,9 @@
 - `variants`: one scene with other values: ``--vary``, combinations, families.
 """
 
-from chutelab.scene.errors import MISSING, Fault, SceneError, shown
 from chutelab.scene.loading import (
     About,
+    SceneError,
     about,
     find,
     from_dict,
@@ -26,6 +25,7 @@ from chutelab.scene.overrides import schema
 from chutelab.scene.rules import Expect
 from chutelab.scene.schema import Incoming, Outgoing, Particle, Plate, Run, Scene, Stream, Surface
 from chutelab.scene.units import RESERVED_NAMES
+from chutelab.util.errors import MISSING, Fault, shown
 
 __all__ = [
     "MISSING",

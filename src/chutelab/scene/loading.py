@@ -19,13 +19,34 @@ from annotated_types import Ge, Gt, Le, Lt, MaxLen
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
-from chutelab.scene.errors import MISSING, Fault, SceneError, at_path, did_you_mean, joined
-from chutelab.scene.overrides import Override, apply
+from chutelab.scene.overrides import Override, apply, at_path, joined
 from chutelab.scene.rules import ConflictError, Look, conflicts
 from chutelab.scene.schema import Scene
 from chutelab.scene.units import MOST_POINTS, Point, Table
+from chutelab.util.errors import MISSING, Fault, InputError, did_you_mean
 
 _TITLE: Final = re.compile(r"""^title\s*=\s*["'](.*?)["']\s*(?:#.*)?$""", re.MULTILINE)
+
+
+class SceneError(InputError):
+    """A scene that cannot be used; its text lists every fault.
+
+    Parameters
+    ----------
+    file
+        The file, or a stand-in such as ``<scene>``.
+    faults
+        What is wrong, at least one.
+    hint
+        What to do next, if there is something better than mending each fault.
+    """
+
+    def __init__(self, file: str, faults: Sequence[Fault], hint: str = "") -> None:
+        first = faults[0]
+        super().__init__(first.allowed, first.key, first.value, file)
+        # As `copy` and `pickle` will call it.
+        self.args = file, faults, hint
+        self.faults, self.hint = list(faults), hint
 
 
 @dataclass(frozen=True)

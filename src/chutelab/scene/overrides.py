@@ -6,19 +6,22 @@
 from __future__ import annotations
 
 import difflib
+import json
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from math import inf, nextafter
 from typing import Any, Final
 
+from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
-from chutelab.scene.errors import MISSING, Fault, joined
 from chutelab.scene.schema import Scene
+from chutelab.util.errors import MISSING, Fault, printable
 
 
 class _TomlSchema(GenerateJsonSchema):
@@ -50,13 +53,64 @@ def schema() -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **described}
 
 
-def parts_of(path: str) -> list[str | int]:
-    """Return the keys and indices of a path.
+_SEGMENT: Final = re.compile(r"([^\s.=\[\]\"']+)((?:\[\d{1,9}\])*)")
+_BARE_KEY: Final = re.compile(r"[\w-]+")
 
-    >>> parts_of("surface[0].speed")
-    ['surface', 0, 'speed']
+
+def parts_of(path: str, surfaces: Sequence[object] = ()) -> list[str | int]:
+    """Return the keys and indices of a full path.
+
+    Parameters
+    ----------
+    path
+        Such as ``stream.at[0]``, ``surface[0].speed`` or ``surface.hood.speed``.
+    surfaces
+        Names of the free surfaces; the name of one of them becomes its index.
+
+    Raises
+    ------
+    ValueError
+        If it is no path.
+
+    Examples
+    --------
+    >>> parts_of("surface[1].speed"), parts_of("surface.hood.speed", ["floor", "hood"])
+    (['surface', 1, 'speed'], ['surface', 1, 'speed'])
     """
-    return [int(part) if part.isdecimal() else part for part in re.findall(r"[^.\[\]]+", path)]
+    parts: list[str | int] = []
+    for segment in path.split("."):
+        match = _SEGMENT.fullmatch(segment)
+        if match is None:
+            raise ValueError(f"no path of a key: {path}")
+        parts += [match[1], *(int(index) for index in re.findall(r"\d+", match[2]))]
+    if parts[0] == "surface" and len(parts) > 1 and isinstance(parts[1], str):
+        with suppress(ValueError):
+            parts[1] = list(surfaces).index(parts[1])
+    return parts
+
+
+def joined(parts: Sequence[str | int]) -> str:
+    """Write a path of keys and indices: ``("surface", 1, "name")`` is ``surface[1].name``."""
+    text = ""
+    for part in parts:
+        if isinstance(part, int):
+            text += f"[{part}]"
+            continue
+        bare = _BARE_KEY.fullmatch(part)
+        name = part if bare else printable(json.dumps(part, ensure_ascii=False))
+        text += f".{name}" if text else name
+    return text
+
+
+def at_path(document: Any, parts: Sequence[str | int]) -> Any:
+    """Follow a path of keys and indices; `MISSING` where it leads nowhere."""
+    found = document
+    for part in parts:
+        try:
+            found = getattr(found, str(part)) if isinstance(found, BaseModel) else found[part]
+        except (AttributeError, KeyError, IndexError, TypeError):
+            return MISSING
+    return found
 
 
 def value_at(scene: Scene, path: str) -> Any:
@@ -64,13 +118,10 @@ def value_at(scene: Scene, path: str) -> Any:
 
     `MISSING` if there is no such thing; an array for a varied key of a family of scenes.
     """
-    found: Any = scene
-    for part in parts_of(path):
-        try:
-            found = found[part] if isinstance(part, int) else getattr(found, part)
-        except (AttributeError, IndexError, TypeError):
-            return MISSING
-    return found
+    try:
+        return at_path(scene, parts_of(path, [free.name for free in scene.surface]))
+    except ValueError:
+        return MISSING
 
 
 def rule_at(parts: Sequence[str | int]) -> Mapping[str, Any] | None:
@@ -118,7 +169,6 @@ def _referred(rule: Mapping[str, Any]) -> Mapping[str, Any]:
     return found
 
 
-_SEGMENT: Final = re.compile(r"([^\s.=\[\]\"']+)((?:\[\d{1,9}\])*)")
 _FORM: Final = "must be KEY=VALUE, such as plate.angle_deg=20 or surface[0].speed=1"
 
 
@@ -175,7 +225,7 @@ def apply(
     for given_one in overrides:
         one = read(given_one) if isinstance(given_one, str) else given_one
         try:
-            path = _resolve(document, _split(one.key))
+            path = _resolved(document, one.key)
             _put(document, path, one.value)
         except _RefusedError as refusal:
             faults.append(Fault(one.typed or one.key, None, str(refusal)))
@@ -198,31 +248,23 @@ def value_of(text: str) -> object:
     return read["value"] if set(read) == {"value"} else text.strip()
 
 
-def _split(key: str) -> list[str | int]:
-    path: list[str | int] = []
-    for segment in key.split("."):
-        match = _SEGMENT.fullmatch(segment)
-        if match is None:
-            raise _RefusedError(_FORM)
-        path.append(match[1])
-        path += [int(index) for index in re.findall(r"\d+", match[2])]
-    return path
-
-
-def _resolve(document: dict[str, Any], path: list[str | int]) -> list[str | int]:
-    """Turn the name of a free surface into its index."""
+def _resolved(document: dict[str, Any], key: str) -> list[str | int]:
+    """Return the parts of a key, free surfaces by index."""
     surfaces = document.get("surface")
+    free = surfaces if isinstance(surfaces, list) else []
+    names = [s.get("name") if isinstance(s, dict) else None for s in free]
+    try:
+        path = parts_of(key, names)
+    except ValueError:
+        raise _RefusedError(_FORM) from None
     if path[0] != "surface" or len(path) < 2 or isinstance(path[1], int):
         return path
     if not isinstance(surfaces, list):
         raise _RefusedError("the scene has no [[surface]]")
-    names = [s.get("name") if isinstance(s, dict) else None for s in surfaces]
-    if path[1] not in names:
-        known = [name for name in names if isinstance(name, str)]
-        near = difflib.get_close_matches(path[1], known, n=1)
-        hint = f"did you mean surface.{near[0]}?" if near else f"there are: {', '.join(known)}"
-        raise _RefusedError(f"no surface has the name {path[1]}; {hint}")
-    return ["surface", names.index(path[1]), *path[2:]]
+    known = [name for name in names if isinstance(name, str)]
+    near = difflib.get_close_matches(path[1], known, n=1)
+    hint = f"did you mean surface.{near[0]}?" if near else f"there are: {', '.join(known)}"
+    raise _RefusedError(f"no surface has the name {path[1]}; {hint}")
 
 
 def _put(document: dict[str, Any], path: list[str | int], value: object) -> None:

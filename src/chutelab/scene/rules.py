@@ -16,8 +16,8 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field
 
-from chutelab.scene.errors import MISSING, Fault, did_you_mean
 from chutelab.scene.units import LARGEST, Number, Table, Text, described, read_size, write_size
+from chutelab.util.errors import MISSING, Fault, did_you_mean
 
 SYMBOLS: Final = {
     "phi1_deg": "degrees", "t2": "s", "x2": "m", "y2": "m", "v2": "m/s", "phi2_deg": "degrees",

@@ -17,13 +17,13 @@ from typing import Annotated, Any, Final
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
-from chutelab.scene.errors import MISSING, SceneError
-from chutelab.scene.loading import from_dict, plain, to_dict
+from chutelab.scene.loading import SceneError, from_dict, plain, to_dict
 from chutelab.scene.overrides import Override, apply
 from chutelab.scene.rules import Look, conflicts
 from chutelab.scene.schema import Scene, plain_number
 from chutelab.scene.units import read_size
 from chutelab.util.arrays import Bools, Floats
+from chutelab.util.errors import MISSING, InputError
 
 MOST_VALUES: Final = 10_000
 """Values of one key; more would be a slip of the keyboard."""
@@ -35,11 +35,12 @@ RANGE_FORM: Final = "must be KEY=FROM:TO, such as plate.angle_deg=-20:70"
 _WITH_UNIT: Final = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) *([^\s\d].*)?")
 
 
-class VaryError(ValueError):
+class VaryError(InputError):
     """What cannot be varied so; the text says what was given, and what is allowed."""
 
     def __init__(self, typed: str, allowed: str) -> None:
-        super().__init__(f"{typed}: {allowed}")
+        super().__init__(allowed, typed)
+        self.args = typed, allowed
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ from chutelab.results.recorder import StalledError
 from chutelab.scene import Scene, SceneError
 from chutelab.scene.units import read_size, write_size
 from chutelab.util.arrays import Floats, Progress
+from chutelab.util.errors import InputError
 
 SMALLEST, LARGEST_SHARE, LARGEST_LENGTH = 1e-15, 0.5, 1e3
 """Nothing is more exact than the rounding of a double; more than half of everything off is no
@@ -38,7 +39,7 @@ ALLOWED = (
 )
 
 
-class AccuracyError(ValueError):
+class AccuracyError(InputError):
     """An accuracy that cannot be asked for; its text says what can."""
 
 

@@ -24,7 +24,7 @@ UNBOUNDED = 10_000
 """Columns of a table that is no wider than its cells."""
 
 STYLES = {"ok": "green", "FAILED": "bold red"}
-"""Colours of a row, in a terminal that has some, by its words for a verdict."""
+"""Colours of verdicts, in a terminal that has some; what failed has it in all of its row."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,7 @@ class Sheet:
         Heads, "" where a column needs none.
     rows, foot : tuple of tuple of str
         Cells; those of the foot stand below a line. The first line of a cell of several is bold.
+        A row of one cell is a heading over the rows that follow.
     texts : int
         How many columns hold words; the others hold numbers and are set to the right.
     tail : int
@@ -59,31 +60,47 @@ class Sheet:
         """Return what rich prints: title, table and notes, a blank line between the parts."""
         from rich import box
         from rich.console import Group
+        from rich.padding import Padding
         from rich.table import Table
         from rich.text import Text
 
-        table = Table(
-            box=box.SIMPLE_HEAD,
-            show_edge=False,
-            pad_edge=False,
-            collapse_padding=True,
-            show_header=any(self.columns),
-        )
         rows = [*self.rows, *self.foot]
-        for index, name in enumerate(self.columns):
-            widest = max((len(row[index]) for row in rows), default=0)
-            if self._has_words(index):
-                # What a row is about stays on one line, unless it is a long path.
-                table.add_column(name, no_wrap=index == 0 and widest < LONG, overflow="fold")
-            else:
-                table.add_column(name, justify="right", min_width=widest)
+        cells = [row for row in rows if len(row) > 1]
+        widest = [max((len(row[i]) for row in cells), default=0) for i in range(len(self.columns))]
+        headed = any(len(row) == 1 for row in rows)
+        parts: list[Any] = [Text(f"\n{self.title}", style="bold")] if self.title else []
+
+        def begun(*, header: bool) -> Table:
+            table = Table(
+                box=box.SIMPLE_HEAD,
+                show_edge=False,
+                pad_edge=False,
+                collapse_padding=True,
+                show_header=header,
+            )
+            for index, (name, width) in enumerate(zip(self.columns, widest, strict=True)):
+                if not self._has_words(index):
+                    # Tables under several headings are to have the same columns.
+                    least = max(width, len(name)) if headed else width
+                    table.add_column(name, justify="right", min_width=least)
+                elif index == 0 and width < LONG:
+                    # What a row is about stays on one line, unless it is a long path.
+                    table.add_column(name, no_wrap=True, min_width=width)
+                else:
+                    table.add_column(name, overflow="fold")
+            parts.append(Padding(table, (0, 0, 0, 2), expand=False) if headed else table)
+            return table
+
+        table = begun(header=True) if rows and any(self.columns) else None
         for number, row in enumerate(rows):
+            if len(row) == 1:
+                parts.append(Text("\n".join(wrapped(row[0]))))
+                table = None
+                continue
+            table = table or begun(header=False)
             if number == len(self.rows):
                 table.add_section()
-            style = next((STYLES[cell] for cell in row if cell in STYLES), "")
-            table.add_row(*map(_cell, row), style=style)
-        parts: list[Any] = [Text(f"\n{self.title}", style="bold")] if self.title else []
-        parts += [table] if rows else []
+            table.add_row(*map(_cell, row), style=STYLES["FAILED"] if "FAILED" in row else "")
         if self.notes:
             notes = [line for note in self.notes for line in wrapped(note)]
             parts.append(Text("\n".join(["", *notes])))
@@ -110,6 +127,9 @@ class Sheet:
     _repr_html_ = html
 
     def _row(self, cells: tuple[str, ...], tag: str = "td") -> str:
+        if len(cells) == 1:
+            head = f'<th colspan="{len(self.columns)}" style="text-align:left">'
+            return f"<tr>{head}{escape(cells[0])}</th></tr>"
         row = ""
         for index, cell in enumerate(cells):
             side = "left" if self._has_words(index) else "right"
@@ -142,7 +162,7 @@ def _cell(text: str) -> Any:
     from rich.text import Text
 
     first, end, rest = text.partition("\n")
-    return Text.assemble((first, "bold"), end, rest) if end else Text(text)
+    return Text.assemble((first, "bold"), end, rest) if end else Text(text, STYLES.get(text, ""))
 
 
 def _printed(shown: Any) -> str:

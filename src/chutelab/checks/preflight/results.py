@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import isfinite
+from typing import Any
 
 import numpy as np
 
 from chutelab.machine import Machine
 from chutelab.results.comparison import QUANTITIES
 from chutelab.scene import Scene
+from chutelab.scene.units import write_size
 from chutelab.theory import Reason, predict
+from chutelab.util.tables import Sheet, Shown
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,8 @@ class Stepping:
         What it must stay below if steps are not aligned: the radius, m.
     longest : float or None
         The longest step that would, s.
+    safe : bool
+        Whether no particle can pass through a surface unseen.
     """
 
     dt: float
@@ -48,11 +53,7 @@ class Stepping:
     way: float | None
     bound: float
     longest: float | None
-
-    @property
-    def safe(self) -> bool:
-        """Whether no particle can pass through a surface unseen."""
-        return self.aligned or self.way is None or self.way < self.bound
+    safe: bool
 
 
 @dataclass(frozen=True)
@@ -106,15 +107,19 @@ class Advice:
     warning : str
         What is the matter.
     change : str
-        What to do; a setting such as ``outgoing.drop = 0.3`` has been tried and does it.
+        What to do, in words.
+    settings : dict
+        What of it is values of the scene's keys, to be changed together, see `Scene.with_values`;
+        empty where no setting is known to help.
     """
 
     warning: str
     change: str
+    settings: Mapping[str, Any]
 
 
-@dataclass(frozen=True)
-class Preflight:
+@dataclass(frozen=True, repr=False)
+class Preflight(Shown):
     """All that `chutelab check` says of a scene.
 
     Attributes
@@ -147,6 +152,53 @@ class Preflight:
     effort: Effort
     theory: Coverage
     advice: tuple[Advice, ...]
+
+    def sheet(self) -> Sheet:
+        """Return all of it, under headings."""
+        rows: list[tuple[str, ...]] = [("built",)]
+        rows += [(part.name, part.what) for part in self.built]
+        rows += [("skipped",), *((part.name, part.what) for part in self.skipped)]
+        rows += [("how it runs",), ("engine", f"{self.engine}: {self.why}"), ("ends", self.ends)]
+        if self.stepping is not None:
+            rows += _told(self.stepping)
+        about = "at least" if self.effort.at_least else "about"
+        # Two digits of contacts and one of the time are known.
+        contacts = int(float(f"{self.effort.contacts:.2g}"))
+        lasting = float(f"{self.effort.seconds:.1g}")
+        lasts = f"{lasting:g} s" if lasting >= 0.1 else f"{1e3 * lasting:g} ms"
+        rows.append(("contacts", f"{about} {contacts:,}"))
+        rows.append(("run time", f"{about} {lasts}; {self.effort.how}"))
+        rows.append(("closed form",))
+        if self.theory.covers:
+            rows.append(("covers", ", ".join(self.theory.covers)))
+        if self.theory.leaves_out:
+            missing = ", ".join(self.theory.leaves_out) if self.theory.covers else "all of it"
+            rows.append(("leaves out", missing))
+        rows.append(("because" if self.theory.reason else "in words", self.theory.words))
+        if self.advice:
+            rows.append(("what to mind",))
+        for advice in self.advice:
+            rows += [("warning", advice.warning), ("change", advice.change)]
+        return Sheet(self.title, ("", ""), tuple(rows), texts=2)
+
+
+def _told(steps: Stepping) -> list[tuple[str, ...]]:
+    """Return the rows on finite steps."""
+    longest = write_size(steps.dt, "s")
+    if steps.aligned:
+        return [
+            ("steps", f"at most {longest} while contacts last"),
+            ("tunnelling", "none at any speed: blows have their own instants"),
+        ]
+    room = f"a surface catches it within {write_size(steps.bound, 'm')}"
+    passing = f"nothing moved in the trial run; {room}"
+    if steps.way is not None and steps.longest is not None:
+        passing = (
+            f"{'none' if steps.safe else 'POSSIBLE'}: at {steps.speed:.3g} m/s a particle covers"
+            f" {write_size(steps.way, 'm')} in a step, and {room}: safe below dt ="
+            f" {write_size(steps.longest, 's')}"
+        )
+    return [("steps", f"all of {longest}"), ("tunnelling", passing)]
 
 
 WORDS = {

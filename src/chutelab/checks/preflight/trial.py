@@ -11,8 +11,9 @@ from time import perf_counter
 
 import numpy as np
 
-from chutelab.checks.preflight.results import Effort
+from chutelab.checks.preflight.results import Effort, Stepping
 from chutelab.engines.simulation import simulate
+from chutelab.machine import Machine
 from chutelab.results import Kind, Recording
 from chutelab.results.recorder import StalledError
 from chutelab.scene import Scene, SceneError
@@ -85,19 +86,19 @@ def trial(scene: Scene, engine: str) -> Trial:
     count = min(scene.stream.count, most)
     landed = crowd and scene.run.until == "settled" and scene.outgoing is not None
     run = {"run.until": "landed"} if landed else {}
-    found = _warm(scene.with_values({"stream.count": count, "expect": None, **run}))
+    some = scene.with_values({"stream.count": count, "expect": None, **run})
+    found = _timed(some)
+    if found.recording is not None and found.seconds <= WARMING:
+        warm = _timed(some)
+        found = replace(warm, warming=max(0.0, found.seconds - warm.seconds))
     if engine == "exact":
         return found
     alone = {"stream.count": 1, "stream.interact": False, "run.engine": "auto", "expect": None}
-    return replace(found, landed=landed, lone=_lone(scene.with_values(alone)))
-
-
-def _warm(scene: Scene) -> Trial:
-    cold = _timed(scene)
-    if cold.recording is None or cold.seconds > WARMING:
-        return cold
-    warm = _timed(scene)
-    return replace(warm, warming=max(0.0, cold.seconds - warm.seconds))
+    try:
+        lone = _timed(scene.with_values(alone)).recording
+    except SceneError:
+        lone = None
+    return replace(found, landed=landed, lone=lone)
 
 
 def _timed(scene: Scene) -> Trial:
@@ -120,11 +121,31 @@ def _timed(scene: Scene) -> Trial:
     return Trial(scene.stream.count, recording, seconds, rounds, trouble=trouble)
 
 
-def _lone(scene: Scene) -> Recording | None:
-    try:
-        return _timed(scene).recording
-    except SceneError:
-        return None
+def stepping(machine: Machine, engine: str, tried: Trial) -> Stepping:
+    """Hold the way of a step against what a surface catches.
+
+    The contact engine finds every blow at its own instant, as the pymunk engine does for a lone
+    particle with aligned steps. Otherwise a contact is seen at the end of a step, and must be
+    before the centre is on the other side: surfaces have no thickness.
+    """
+    bound = machine.particle.radius
+    runs = (run for run in (tried.lone, tried.recording) if run is not None and len(run.knots))
+    speed = way = None
+    if (run := next(runs, None)) is not None:
+        # Not every knot has the speed just before an impact; events do.
+        seen = np.concatenate([run.knots["velocity"], run.events["velocity_before"]])
+        speed = float(np.hypot(*seen.T).max())
+        way = speed * machine.dt
+    aligned = engine == "contact" or (machine.align and not machine.interact)
+    return Stepping(
+        dt=machine.dt,
+        aligned=aligned,
+        speed=speed,
+        way=way,
+        bound=bound,
+        longest=bound / speed if speed else None,
+        safe=aligned or way is None or way < bound,
+    )
 
 
 TOGETHER = 400.0
@@ -150,17 +171,20 @@ while it bounces, each round is one."""
 
 def effort(scene: Scene, engine: str, tried: Trial) -> Effort:
     """Scale a trial up to the whole stream."""
-    if is_crowd(scene) and (tried.landed or tried.recording is None):
-        return _crowd(scene, tried)
     count, some, recording = scene.stream.count, tried.count, tried.recording
-    who = _who(count, some)
+    who = f"the first {some} of {count:,} particles"
+    if some == count:
+        who = "the only particle" if count == 1 else f"all {count} particles"
+    elif some == 1:
+        who = f"the first of {count:,} particles"
+    # How much longer a step takes with all particles than with a few.
+    fuller = (BODIES + count) / (BODIES + some)
+    if is_crowd(scene) and (tried.landed or recording is None):
+        return _crowd(scene, tried, who, fuller)
     if recording is None:
-        if tried.lone is not None:
-            contacts = tried.lone.contacts * count
-        else:
-            contacts = max(1, tried.rounds // ROUNDS) * count
+        each = max(1, tried.rounds // ROUNDS) if tried.lone is None else tried.lone.contacts
         how = f"a trial run of {who} was cut off after {tried.seconds:.1g} s"
-        return Effort(contacts, tried.seconds * count / some, True, how)
+        return Effort(each * count, tried.seconds * count / some, True, how)
     collided = int(np.count_nonzero(recording.events["kind"] == Kind.COLLISION))
     alone, crowding = recording.contacts - collided, sqrt(count / some)
     contacts = round((alone + collided * crowding) * count / some)
@@ -170,48 +194,30 @@ def effort(scene: Scene, engine: str, tried: Trial) -> Effort:
     elif is_crowd(scene):
         lasted = float(recording.ends()[1]["t"].max(initial=0.0))
         later = (count - some) / scene.stream.rate
-        growth = (1.0 + later / lasted if lasted > 0.0 else 1.0) * _bodies(count, some)
+        growth = (1.0 + later / lasted if lasted > 0.0 else 1.0) * fuller
+    seconds = tried.warming + tried.seconds * growth
     how = "timed in" if some == count else "scaled up from"
-    return Effort(
-        contacts, tried.warming + tried.seconds * growth, False, f"{how} a trial run of {who}"
-    )
+    return Effort(contacts, seconds, False, f"{how} a trial run of {who}")
 
 
-def _crowd(scene: Scene, tried: Trial) -> Effort:
+def _crowd(scene: Scene, tried: Trial, who: str, fuller: float) -> Effort:
     """Estimate a crowd that comes to rest, or whose trial was cut off."""
-    count, some, recording = scene.stream.count, tried.count, tried.recording
+    count, recording, out = scene.stream.count, tried.recording, scene.outgoing
     each, step, what = IN_THE_JET, STEP, "nominal figures"
     if recording is not None and recording.steps:
-        each = recording.contacts / some
+        each = recording.contacts / tried.count
         step = tried.seconds / recording.steps
-        what = f"a trial run of {_who(count, some)} up to their landing, and nominal figures"
+        what = f"a trial run of {who} up to their landing, and nominal figures"
     life = scene.run.max_time
     if tried.lone is not None:
         each = max(each, float(tried.lone.contacts))
         life = float(np.ptp(tried.lone.knots["t"]))
     if scene.run.until != "landed":
-        each += TO_REST * _density(scene) * count / (count + NEIGHBOURS)
+        # The share of the outgoing belt that the particles cover, side by side.
+        diameter = 2.0 * scene.particle.radius
+        way = 0.0 if out is None else abs(out.speed) / scene.stream.rate
+        covered = diameter / way if way > diameter else 1.0
+        each += TO_REST * covered * count / (count + NEIGHBOURS)
     contacts = round(each * count)
     steps = (count / scene.stream.rate + life) / scene.run.dt + contacts
-    seconds = steps * step * _bodies(count, some)
-    return Effort(contacts, seconds, False, f"roughly, from {what}")
-
-
-def _density(scene: Scene) -> float:
-    """Return the share of the outgoing belt that the particles cover, side by side; at most 1."""
-    if scene.outgoing is None:
-        return 1.0
-    way = abs(scene.outgoing.speed) / scene.stream.rate
-    diameter = 2.0 * scene.particle.radius
-    return diameter / way if way > diameter else 1.0
-
-
-def _bodies(count: int, some: int) -> float:
-    """Return how much longer a step takes with all particles than with a few."""
-    return (BODIES + count) / (BODIES + some)
-
-
-def _who(count: int, some: int) -> str:
-    if some == 1:
-        return "the only particle" if count == 1 else f"the first of {count:,} particles"
-    return f"all {count} particles" if some == count else f"the first {some} of {count:,} particles"
+    return Effort(contacts, steps * step * fuller, False, f"roughly, from {what}")

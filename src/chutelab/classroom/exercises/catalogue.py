@@ -19,6 +19,7 @@ from chutelab.classroom.exercises.judging import (
     Verdict,
     number_of,
 )
+from chutelab.util.errors import InputError
 
 OPENED: Final[deque[Task]] = deque(maxlen=64)
 """The tasks of this process, the last one last: where grading looks for what was answered."""
@@ -211,7 +212,7 @@ EXERCISES: Final[dict[str, Exercise]] = {
 """All exercises by name, in the order of the lessons."""
 
 
-class ExerciseError(LookupError):
+class ExerciseError(InputError):
     """There is no exercise of such a lesson."""
 
 

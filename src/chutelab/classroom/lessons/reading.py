@@ -15,10 +15,11 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import Field, PrivateAttr, ValidationError
 
 from chutelab.scene import MISSING, Fault, Scene, SceneError, load, shipped
-from chutelab.scene.errors import at_path, did_you_mean, joined
+from chutelab.scene.overrides import at_path, joined
 from chutelab.scene.rules import suggestion, unit_of
 from chutelab.scene.units import Number, Table, Text, Whole
 from chutelab.scene.variants import VaryError, parse, quantity
+from chutelab.util.errors import did_you_mean
 
 LEVELS: Final = ("start", "core", "advanced")
 MOST: Final = 20
@@ -218,7 +219,7 @@ def _misfits(lesson: Lesson) -> Iterator[Fault]:
             scenes[name] = scene_of(lesson, name)
         except SceneError as error:
             for fault in error.faults:
-                yield Fault(here, name, f"{error.source}: {fault}")
+                yield Fault(here, name, f"{error.file}: {fault}")
     if len(scenes) == len(lesson.scenes):  # one that is broken may be the one that has a quantity
         surfaces = [scene.surfaces for scene in scenes.values()]
         for name, words in lesson.quantities.items():

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import isfinite, isnan
-from typing import Any, Final
+from math import isfinite
+from typing import Any, Final, Literal
 
 import numpy as np
 
@@ -21,10 +21,13 @@ from chutelab.studies.design.evaluation import NO_RUN, Span
 from chutelab.studies.design.roots import Change, Scan
 from chutelab.studies.design.sensitivity import Sensitivity
 from chutelab.util.arrays import Floats
-from chutelab.util.tables import Sheet, Shown, frame
+from chutelab.util.tables import Sheet, Shown, frame, plain
 
 DIGITS: Final = 10
 """Significant digits in which an answer is shown; it has more."""
+
+
+Goal = Literal["solve", "minimize", "maximize"]
 
 
 @dataclass(frozen=True)
@@ -76,16 +79,6 @@ class Solution(Shown):
         What the numbers of an answer are.
     answers : tuple of Answer
         All solutions in order of the key, or all minima, the least first; empty if there is none.
-    nearest : Answer or None
-        Without a solution, where the targets are missed by least.
-    everywhere : tuple of (float, float)
-        Ranges of the key in which every value is a solution.
-    jumps : tuple of Change
-        Where the target is jumped over, which is no solution.
-    changes : tuple of Change
-        All values of the key at which the course changes.
-    best : int
-        Which answer `scene` is at: of several solutions, the one nearest to the scene's own value.
     runs, seed : int
         How many variants were run; of the search over several keys.
     notes : tuple of str
@@ -94,24 +87,36 @@ class Solution(Shown):
         What was varied.
     scan : Scan or None
         What was looked at on the way, with one key.
+    nearest : Answer or None
+        Without a solution, where the targets are missed by least.
+    everywhere : tuple of (float, float)
+        Ranges of the key in which every value is a solution.
+    jumps : tuple of Change
+        Where the target is jumped over, which is no solution.
+    best : int
+        Which answer `scene` is at: of several solutions, the one nearest to the scene's own value.
     """
 
     asked: str
-    goal: str
+    goal: Goal
     ranges: tuple[Span, ...]
     quantities: tuple[str, ...]
     units: tuple[str, ...]
     answers: tuple[Answer, ...]
-    nearest: Answer | None
-    everywhere: tuple[tuple[float, float], ...]
-    jumps: tuple[Change, ...]
-    changes: tuple[Change, ...]
-    best: int
     runs: int
     seed: int
     notes: tuple[str, ...]
     base: Scene
-    scan: Scan | None
+    scan: Scan | None = None
+    nearest: Answer | None = None
+    everywhere: tuple[tuple[float, float], ...] = ()
+    jumps: tuple[Change, ...] = ()
+    best: int = 0
+
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """All values of the key at which the course changes."""
+        return () if self.scan is None else self.scan.changes
 
     @property
     def solved(self) -> bool:
@@ -166,38 +171,52 @@ class Solution(Shown):
 
     def sheet(self) -> Sheet:
         """Return the answers in a table, with what to know of them."""
-        shown = self.answers or ((self.nearest,) if self.nearest else ())
-        columns = ["", *(with_unit(one.key, one.unit) for one in self.ranges)]
-        for name, unit in zip(self.quantities, self.units, strict=True):
-            columns.append(with_unit(name, unit))
+        keys = [with_unit(one.key, one.unit) for one in self.ranges]
+        names = [with_unit(*one) for one in zip(self.quantities, self.units, strict=True)]
+        first, other = {
+            "solve": ("solution", "solution"), "minimize": ("least", "also"),
+            "maximize": ("most", "also"),
+        }[self.goal]  # fmt: skip
         rows = []
-        for i, answer in enumerate(shown):
-            name = "nearest" if not self.solved else self._name(i)
-            numbers = (*answer.values, *answer.found)
-            rows.append((name, *(f"{value:.{DIGITS}g}" for value in numbers), answer.course))
-        return Sheet(self.asked, (*columns, "touches"), tuple(rows), notes=tuple(remarks(self)))
+        for i, answer in enumerate(self.answers or filter(None, [self.nearest])):
+            head = (other if i else first) if self.solved else "nearest"
+            if self.goal == "solve" and len(self.answers) > 1:
+                head += f" {i + 1}"
+            numbers = (f"{value:.{DIGITS}g}" for value in (*answer.values, *answer.found))
+            rows.append((head, *numbers, answer.course))
+        columns = ("", *keys, *names, "touches")
+        return Sheet(self.asked, columns, tuple(rows), notes=tuple(remarks(self)))
 
     def slopes(self) -> Sheet:
         """Return what each key does to each quantity at the answer, and what 1 % of it does."""
-        return slopes(self.answer.sensitivities if self.solved else ())
+        rows = []
+        for s in self.answer.sensitivities if self.solved else ():
+            unit = symbol(s.unit)
+            per = f"{s.quantity_unit} per {unit}" if unit else s.quantity_unit
+            size = max(abs(s.lower), abs(s.upper)) if isfinite(s.lower + s.upper) else 0.0
+            nothing = abs(s.derivative * s.step) <= ROUNDING * size
+            number = "0" if nothing else f"{s.derivative:.6g}"
+            slope = f"{number} {per}".strip() if isfinite(s.derivative) else "none here"
+            rows.append((f"{s.quantity} by {s.key}", slope))
+            sides = (("less", s.lower, s.courses[0]), ("more", s.upper, s.courses[1]))
+            for word, value, course in sides:
+                shown = _size(value, s.quantity_unit) if isfinite(value) else course
+                rows.append((f"  with 1 % ({_size(s.step, s.unit)}) {word}", shown))
+        return Sheet("", ("Sensitivity", "slope"), tuple(rows))
 
     def __repr__(self) -> str:
-        parts = (self.sheet(), self.slopes()) if self.solved else (self.sheet(),)
-        return "\n\n".join(map(str, parts))
+        return "\n\n".join(map(str, self.sheets()))
 
     def _repr_html_(self) -> str:
-        parts = (self.sheet(), self.slopes()) if self.solved else (self.sheet(),)
-        return "".join(part.html() for part in parts)
+        return "".join(part.html() for part in self.sheets())
 
-    def _name(self, i: int) -> str:
-        if self.goal == "solve":
-            return "solution" if len(self.answers) == 1 else f"solution {i + 1}"
-        return {"minimize": "least", "maximize": "most"}[self.goal] if i == 0 else "also"
+    def sheets(self) -> list[Sheet]:
+        """Return the tables that are shown: the answers and, if there are any, their slopes."""
+        return [self.sheet(), self.slopes()] if self.solved else [self.sheet()]
 
 
-def finite(value: float) -> float | None:
-    """Return a number as JSON has it: None for NaN and infinities."""
-    return value if isfinite(value) else None
+TOLD: Final = ("key", "quantity", "derivative", "step", "lower", "upper", "courses")
+"""What JSON has of a `Sensitivity`."""
 
 
 def as_dict(solution: Solution) -> dict[str, Any]:
@@ -206,27 +225,17 @@ def as_dict(solution: Solution) -> dict[str, Any]:
     def answer(one: Answer) -> dict[str, Any]:
         return {
             "values": dict(zip((r.key for r in solution.ranges), one.values, strict=True)),
-            "found": dict(zip(solution.quantities, map(finite, one.found), strict=True)),
-            "wanted": [finite(value) for value in one.wanted],
+            "found": dict(zip(solution.quantities, one.found, strict=True)),
+            "wanted": one.wanted,
             "course": one.course,
             "place": one.place,
-            "sensitivities": [
-                {
-                    "key": s.key, "quantity": s.quantity, "derivative": finite(s.derivative),
-                    "step": s.step, "lower": finite(s.lower), "upper": finite(s.upper),
-                    "courses": list(s.courses),
-                }
-                for s in one.sensitivities
-            ],
-        }  # fmt: skip
+            "sensitivities": [{name: getattr(s, name) for name in TOLD} for s in one.sensitivities],
+        }
 
     def change(one: Change) -> dict[str, Any]:
-        return {
-            "at": one.at, "before": finite(one.before), "after": finite(one.after),
-            "courses": list(one.courses), "fault": one.fault,
-        }  # fmt: skip
+        return {name: getattr(one, name) for name in ("at", "before", "after", "courses", "fault")}
 
-    return {
+    told = {
         "format": 1,
         "scene": solution.base.title,
         "asked": solution.asked,
@@ -240,13 +249,14 @@ def as_dict(solution: Solution) -> dict[str, Any]:
         "answers": [answer(one) for one in solution.answers],
         "best": solution.best if solution.solved else None,
         "nearest": answer(solution.nearest) if solution.nearest else None,
-        "everywhere": [list(span) for span in solution.everywhere],
+        "everywhere": solution.everywhere,
         "jumps": [change(one) for one in solution.jumps],
-        "changes": [change(one) for one in solution.changes if not isnan(one.at)],
+        "changes": [change(one) for one in solution.changes],
         "runs": solution.runs,
         "seed": solution.seed,
-        "notes": list(solution.notes),
+        "notes": solution.notes,
     }
+    return dict(plain(told))
 
 
 MOST: Final = 6
@@ -272,49 +282,36 @@ def asked(goal: str, what: str, ranges: Sequence[Span]) -> str:
 def remarks(solution: Solution) -> list[str]:
     """Return sentences to be read below the table of answers."""
     said = [*_outcome(solution)]
-    if solution.ranges and solution.scan is not None:
+    if solution.scan is not None:
         said += _jumps(solution)
     return [*said, *solution.notes]
 
 
 def _outcome(solution: Solution) -> Iterator[str]:
-    key = solution.ranges[0].key
-    unit = solution.ranges[0].unit
+    """Yield what was found: how many answers, where they stop, or how near one came."""
+    one, count = solution.ranges[0], len(solution.answers)
     for low, high in solution.everywhere:
         yield (
-            f"Every {key} from {_size(low, unit)} to {_size(high, unit)} is a solution: the"
-            " target does not depend on it there."
+            f"Every {one.key} from {_size(low, one.unit)} to {_size(high, one.unit)} is a solution:"
+            " the target does not depend on it there."
         )
-    if solution.goal == "solve":
-        yield from _solved(solution)
-        return
-    if not solution.answers:
-        yield "No variant in the range has this quantity."
-        return
-    yield from _placed(solution)
-
-
-def _placed(solution: Solution) -> Iterator[str]:
-    if solution.answer.place == "end":
-        yield "It is at the end of the range: beyond it there may be better ones."
-    elif solution.answer.place == "change":
-        yield "It is a limit: right beyond it the particle goes another way."
-
-
-def _solved(solution: Solution) -> Iterator[str]:
-    count = len(solution.answers)
     if count:
-        yield from _placed(solution)
-    if count > 1:
+        if solution.answer.place == "end":
+            yield "It is at the end of the range: beyond it there may be better ones."
+        elif solution.answer.place == "change":
+            yield "It is a limit: right beyond it the particle goes another way."
+    if solution.goal != "solve":
+        if not count:
+            yield "No variant in the range has this quantity."
+    elif count > 1:
         yield (
             f"{count} solutions; pictures and scene are of solution {solution.best + 1}, the"
             " nearest to the scene's own value. A narrower range chooses another."
         )
-    elif not count and not solution.everywhere:
-        if solution.nearest is None:
-            yield "No solution: no variant in the range has these quantities."
-            return
-        near = solution.nearest
+    elif not count and solution.nearest is None:
+        yield "No solution: no variant in the range has these quantities."
+    elif not count:
+        near = solution.answer
         parts = [
             f"{name} = {_size(found, unit)} instead of {_size(wanted, unit)}"
             for name, unit, found, wanted in zip(
@@ -325,6 +322,7 @@ def _solved(solution: Solution) -> Iterator[str]:
 
 
 def _jumps(solution: Solution) -> Iterator[str]:
+    """Yield where the quantity jumps or ends."""
     unit, quantity = solution.units[0], solution.quantities[0]
     key = solution.ranges[0]
     for jump in solution.jumps[:MOST]:
@@ -333,7 +331,13 @@ def _jumps(solution: Solution) -> Iterator[str]:
             f" the target, from {_size(jump.before, unit)} to {_size(jump.after, unit)}"
             f"{_ways(jump)}."
         )
-    others = [change for change in solution.changes if _tells(change, solution)]
+    others = [
+        change
+        for change in solution.changes
+        if change not in solution.jumps
+        and not abs(change.after - change.before)
+        <= KINK * max(abs(change.after), abs(change.before))
+    ]
     for change in others[:MOST]:
         place = f"At {key.key} = {_size(change.at, key.unit)}"
         if NO_RUN in change.courses:
@@ -351,37 +355,10 @@ def _jumps(solution: Solution) -> Iterator[str]:
         yield f"There are {len(others) - MOST} further changes, see solve.json."
 
 
-def _tells(change: Change, solution: Solution) -> bool:
-    """Tell whether a change is worth a sentence: no kink, and not told as a jump already."""
-    if change in solution.jumps:
-        return False
-    apart = abs(change.after - change.before)
-    return not apart <= KINK * max(abs(change.after), abs(change.before))
-
-
 def _ways(change: Change) -> str:
     if change.courses[0] == change.courses[1]:
         return ""
     return f", as the particle touches [{change.courses[1]}] instead of [{change.courses[0]}]"
-
-
-def slopes(found: Sequence[Sensitivity]) -> Sheet:
-    """Return sensitivities as a table."""
-    rows = []
-    for s in found:
-        unit = symbol(s.unit)
-        per = f"{s.quantity_unit} per {unit}" if unit else s.quantity_unit
-        size = max(abs(s.lower), abs(s.upper)) if isfinite(s.lower + s.upper) else 0.0
-        nothing = abs(s.derivative * s.step) <= ROUNDING * size
-        number = "0" if nothing else f"{s.derivative:.6g}"
-        slope = f"{number} {per}".strip() if isfinite(s.derivative) else "none here"
-        rows.append((f"{s.quantity} by {s.key}", slope))
-        for less, value, course in (
-            ("less", s.lower, s.courses[0]), ("more", s.upper, s.courses[1])
-        ):  # fmt: skip
-            shown = _size(value, s.quantity_unit) if isfinite(value) else course
-            rows.append((f"  with 1 % ({_size(s.step, s.unit)}) {less}", shown))
-    return Sheet("", ("Sensitivity", "slope"), tuple(rows))
 
 
 def _size(value: float, unit: str) -> str:

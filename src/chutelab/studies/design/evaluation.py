@@ -33,7 +33,7 @@ from chutelab.studies.design.quantities import (
     each_once,
     measured,
 )
-from chutelab.studies.sweep.batch import Batch, Block, one_line
+from chutelab.studies.sweep.batch import Block, one_line, together
 from chutelab.util.arrays import Floats, Ints
 
 FORM: Final = "must be KEY=FROM:TO, such as plate.angle_deg=0:80"
@@ -175,9 +175,8 @@ class Family:
         self.quantities = quantities
         self.values = np.full((len(block.values), len(quantities)), np.nan)
         self.courses = [""] * len(block.values)
-        batch = Batch(block, self._read)
-        self.faults = [one_line(batch.faults.get(row, "")) for row in range(len(block.values))]
-        self.left = batch.left
+        faults, self.left = together(block, self._read)
+        self.faults = [one_line(faults.get(row, "")) for row in range(len(block.values))]
 
     def _read(self, recording: Recording, family: Scene, which: Ints) -> None:
         for column, wanted in enumerate(self.quantities):

@@ -14,7 +14,6 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from math import nan
 from typing import Any, Final, Literal, Protocol, TypeVar
 
@@ -26,6 +25,8 @@ from chutelab.scene import MISSING, Scene, rules
 from chutelab.scene.overrides import value_at
 from chutelab.scene.units import read_size
 from chutelab.scene.variants import Vary, VaryError, quantity
+from chutelab.util.errors import InputError
+from chutelab.util.versions import library
 
 
 class Keyed(Protocol):
@@ -39,11 +40,12 @@ class Keyed(Protocol):
 T = TypeVar("T", bound=Keyed)
 
 
-class DesignError(ValueError):
+class DesignError(InputError):
     """A question that makes no sense for the scene; says what was typed, and what is allowed."""
 
     def __init__(self, typed: str, allowed: str) -> None:
-        super().__init__(f"{typed}: {allowed}")
+        super().__init__(allowed, typed)
+        self.args = typed, allowed
 
 
 def each_once(
@@ -74,14 +76,10 @@ def scipy(name: str) -> Any:
 
     Raises
     ------
-    ImportError
+    MissingLibraryError
         Without SciPy; says what to install.
     """
-    try:
-        return import_module(f"scipy.{name}")
-    except ImportError as error:
-        text = 'SciPy is needed: pip install "chutelab[design]"'
-        raise ImportError(text) from error
+    return library(f"scipy.{name}", "SciPy is needed", "design")
 
 
 MANY: Final = 6

@@ -7,24 +7,24 @@ polish.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import isfinite
 from typing import Any, Final, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from chutelab.scene import Scene
-from chutelab.studies.design.answers import Answer, Solution, asked
+from chutelab.studies.design.answers import Answer, Goal, Solution, asked
 from chutelab.studies.design.evaluation import Evaluator, ranges
 from chutelab.studies.design.quantities import (
     DesignError,
     Quantity,
-    Target,
     measured,
     scipy,
     target,
 )
-from chutelab.studies.design.roots import CLOSE, Change, Scan, level, minima, roots, scan
+from chutelab.studies.design.roots import CLOSE, Scan, level, minima, roots, scan
 from chutelab.studies.design.sensitivity import sensitivities
 from chutelab.util.arrays import Floats, Progress
 
@@ -40,21 +40,13 @@ GENERATIONS: Final = 60
 SIMPLEX: Final = {"xatol": 1e-12, "fatol": 1e-15, "maxiter": 600, "adaptive": True}
 
 
-@dataclass(frozen=True, eq=False)
-class Found:
-    """Where the function is least, in shares of the ranges, 0 to 1, and how much it is."""
-
-    at: Floats
-    value: float
-
-
 def least(
     batch: Callable[[Floats], Floats],
     keys: int,
     seed: int,
     residuals: Callable[[Floats], Floats] | None = None,
-) -> Found:
-    """Minimise a function over the unit cube.
+) -> tuple[Floats, float]:
+    """Return where a function over the unit cube is least, shape (keys,), and how much it is.
 
     Parameters
     ----------
@@ -87,43 +79,22 @@ def least(
         vectorized=True,
         updating="deferred",
     )
-    best = Found(np.asarray(searched.x, dtype=np.float64), float(searched.fun))
-    if best.value >= NOWHERE:
-        return Found(best.at, np.nan)
-    for polished in _polished(optimize, batch, best, keys, residuals):
-        value = float(energies(polished[:, np.newaxis])[0])
-        if value < best.value:
-            best = Found(polished, value)
-    return best
-
-
-def _polished(
-    optimize: Any,
-    batch: Callable[[Floats], Floats],
-    best: Found,
-    keys: int,
-    residuals: Callable[[Floats], Floats] | None,
-) -> list[Floats]:
-    """Return points from which the last digits were looked for."""
-
-    def single(point: Floats) -> float:
-        value = float(batch(point[np.newaxis])[0])
-        return value if np.isfinite(value) else NOWHERE
-
-    if residuals is not None:
-
-        def safe(point: Floats) -> Floats:
-            return np.nan_to_num(residuals(point), nan=1e6)
-
-        solved = optimize.least_squares(
-            safe, best.at, bounds=(0.0, 1.0), xtol=1e-15, ftol=1e-15, gtol=1e-15, x_scale=1.0,
-            jac="3-point", diff_step=1e-6, max_nfev=60,
+    if searched.fun >= NOWHERE:
+        return searched.x, np.nan
+    if residuals is None:
+        polished = optimize.minimize(
+            lambda point: float(energies(point)[0]), searched.x, method="Nelder-Mead",
+            bounds=[(0.0, 1.0)] * keys, options=SIMPLEX,
         )  # fmt: skip
-        return [np.clip(solved.x, 0.0, 1.0)]
-    simplex = optimize.minimize(
-        single, best.at, method="Nelder-Mead", bounds=[(0.0, 1.0)] * keys, options=SIMPLEX
-    )
-    return [np.clip(simplex.x, 0.0, 1.0)]
+    else:
+        polished = optimize.least_squares(
+            lambda point: np.nan_to_num(residuals(point), nan=1e6), searched.x, bounds=(0.0, 1.0),
+            xtol=1e-15, ftol=1e-15, gtol=1e-15, x_scale=1.0, jac="3-point", diff_step=1e-6,
+            max_nfev=60,
+        )  # fmt: skip
+    at: Floats = np.clip(polished.x, 0.0, 1.0)
+    value = float(energies(at)[0])
+    return (at, value) if value < searched.fun else (searched.x, float(searched.fun))
 
 
 POINTS: Final = 181
@@ -238,13 +209,6 @@ class _Search:
         self.ranges = ranges(scene, [vary] if isinstance(vary, str) else list(vary))
         self.points, self.seed, self.progress = points, seed, progress
 
-    def _evaluator(self, quantities: Sequence[Quantity]) -> Evaluator:
-        scipy("optimize")
-        keys = [one.key for one in self.ranges]
-        evaluate = Evaluator(self.scene, keys, quantities, self.progress)
-        evaluate.expect(self.points + MORE if len(keys) == 1 else 800 * len(keys))
-        return evaluate
-
     def solve(self, texts: Sequence[str]) -> Solution:
         """Answer `solve`."""
         if not texts:
@@ -257,107 +221,94 @@ class _Search:
             )
         if len({wish.left.key for wish in targets}) < len(targets):
             raise DesignError(f"--target {texts[-1]}", "this quantity has a target already")
-        evaluate = self._evaluator([side for wish in targets for side in (wish.left, wish.right)])
-        if len(self.ranges) == 1:
-            return self._roots(evaluate, targets)
-        return self._system(evaluate, targets)
-
-    def _roots(self, evaluate: Evaluator, targets: Sequence[Target]) -> Solution:
-        (one,), (wish,) = self.ranges, targets
-        seen = scan(evaluate, one.low, one.high, self.points)
-
-        def function(x: float) -> float:
-            left, right = evaluate([[x]]).values[0]
-            return float(left - right)
-
-        sizes = np.abs(seen.values[np.isfinite(seen.values)])
-        found = roots(seen, function, float(sizes.max()) if len(sizes) else 0.0)
-        edges = {x for change in seen.changes for x in (change.low, change.high)}
-        answers = [
-            self._answer(evaluate, np.array([x]), "change" if x in edges else "inside")
-            for x in found.at
-        ]
-        nearest = None
-        if not answers and isfinite(found.nearest):
-            nearest = self._answer(evaluate, np.array([found.nearest]), "inside")
-        own = one.start if one.start is not None else one.low
-        best = int(np.argmin([abs(x - own) for x in found.at])) if answers else 0
-        if not answers and found.everywhere:
-            low, high = found.everywhere[0]
-            answers = [self._answer(evaluate, np.array([min(max(own, low), high)]), "inside")]
-        return Solution(
-            asked("solve", str(wish), self.ranges), "solve", self.ranges, (wish.left.name,),
-            (wish.left.unit,), tuple(answers), nearest, found.everywhere, found.jumps, seen.changes,
-            best, evaluate.runs, self.seed, self._notes(evaluate, seen.complete), self.scene, seen,
-        )  # fmt: skip
-
-    def _system(self, evaluate: Evaluator, targets: Sequence[Target]) -> Solution:
-        sizes = np.ones(len(targets))
-
-        def misses(points: Floats) -> Floats:
-            values = evaluate(self._scaled(points)).values
-            apart: Floats = (values[:, ::2] - values[:, 1::2]) / sizes
-            return apart
-
-        first = evaluate(self._scaled(np.full((1, len(self.ranges)), 0.5))).values[0]
-        for i in range(len(targets)):
-            size = float(np.nanmax(np.abs(first[2 * i : 2 * i + 2]), initial=0.0))
-            sizes[i] = size if size > 0.0 else 1.0
-        found = least(
-            lambda points: np.sum(misses(points) ** 2, axis=1), len(self.ranges), self.seed,
-            lambda point: misses(point[np.newaxis])[0],
-        )  # fmt: skip
-        solved = isfinite(found.value) and found.value**0.5 <= CLOSE
-        answer = None
-        if isfinite(found.value):
-            answer = self._answer(evaluate, self._scaled(found.at), "inside")
-        notes = self._notes(evaluate, True)
-        if len(targets) < len(self.ranges):
-            notes += (
-                f"{len(targets)} target and {len(self.ranges)} keys: this is one of many solutions,"
-                " the one that the search came upon.",
-            )
-        return Solution(
-            asked("solve", ", ".join(map(str, targets)), self.ranges), "solve", self.ranges,
-            tuple(wish.left.name for wish in targets), tuple(wish.left.unit for wish in targets),
-            (answer,) if answer and solved else (), None if solved else answer, (), (), (), 0,
-            evaluate.runs, self.seed, notes, self.scene, None,
-        )  # fmt: skip
+        self._look_at([side for wish in targets for side in (wish.left, wish.right)])
+        found = self._roots() if len(self.ranges) == 1 else self._system(len(targets))
+        return self._solution("solve", ", ".join(map(str, targets)), **found)
 
     def extremum(self, name: str, goal: Literal["minimize", "maximize"]) -> Solution:
         """Answer `minimize` and `maximize`."""
-        quantity = measured(self.scene, name, f"--{goal} {name}")
-        evaluate = self._evaluator([quantity])
+        self._look_at([measured(self.scene, name, f"--{goal} {name}")])
         sign = 1.0 if goal == "minimize" else -1.0
-        seen: Scan | None = None
-        changes: tuple[Change, ...] = ()
-        if len(self.ranges) == 1:
-            (one,) = self.ranges
-            seen = scan(evaluate, one.low, one.high, self.points)
-            lows = minima(seen, lambda x: float(evaluate([[x]]).values[0, 0]), sign)
-            answers = [
-                self._answer(evaluate, np.array([low.at]), low.place, slopes=low is lows[0])
-                for low in lows
-            ]
-            changes, notes = seen.changes, self._notes(evaluate, seen.complete)
-            if level(seen):
-                answers = [replace(answers[0], place="inside")]
-                notes += (f"{name} is the same over the whole range: it does not depend on it.",)
-        else:
-            found = least(
-                lambda points: sign * evaluate(self._scaled(points)).values[:, 0],
-                len(self.ranges), self.seed,
-            )  # fmt: skip
-            answers, notes = [], self._notes(evaluate, True)
-            if isfinite(found.value):
-                end = bool(np.any((found.at <= 1e-9) | (found.at >= 1.0 - 1e-9)))
-                place = "end" if end else "inside"
-                answers = [self._answer(evaluate, self._scaled(found.at), place)]
-        return Solution(
-            asked(goal, name, self.ranges), goal, self.ranges, (quantity.name,), (quantity.unit,),
-            tuple(answers), None, (), (), changes, 0, evaluate.runs, self.seed, notes,
-            self.scene, seen,
-        )  # fmt: skip
+        found = self._minima(name, sign) if len(self.ranges) == 1 else self._minimum(sign)
+        return self._solution(goal, name, **found)
+
+    def _look_at(self, quantities: Sequence[Quantity]) -> None:
+        scipy("optimize")
+        keys = [one.key for one in self.ranges]
+        self.evaluate = Evaluator(self.scene, keys, quantities, self.progress)
+        self.evaluate.expect(self.points + MORE if len(keys) == 1 else 800 * len(keys))
+
+    def _scan(self) -> Scan:
+        (one,) = self.ranges
+        return scan(self.evaluate, one.low, one.high, self.points)
+
+    def _roots(self) -> dict[str, Any]:
+        (one,), seen = self.ranges, self._scan()
+
+        def function(x: float) -> float:
+            left, right = self.evaluate([[x]]).values[0]
+            return float(left - right)
+
+        found = roots(seen, function)
+        own = one.start if one.start is not None else one.low
+        edges = {x for change in seen.changes for x in (change.low, change.high)}
+        answers = [self._answer([x], "change" if x in edges else "inside") for x in found.at]
+        best = int(np.argmin([abs(x - own) for x in found.at])) if answers else 0
+        nearest = None
+        if not answers and isfinite(found.nearest):
+            nearest = self._answer([found.nearest], "inside")
+        if not answers and found.everywhere:
+            low, high = found.everywhere[0]
+            answers = [self._answer([min(max(own, low), high)], "inside")]
+        return {
+            "answers": answers, "nearest": nearest, "everywhere": found.everywhere,
+            "jumps": found.jumps, "best": best, "scan": seen,
+        }  # fmt: skip
+
+    def _system(self, targets: int) -> dict[str, Any]:
+        def apart(shares: Floats) -> Floats:
+            sides = self.evaluate(self._scaled(shares)).values.reshape(-1, targets, 2)
+            return sides[:, :, 0] - sides[:, :, 1]
+
+        middle = self.evaluate(self._scaled(np.full((1, len(self.ranges)), 0.5))).values[0]
+        sizes = np.nanmax(np.abs(middle).reshape(targets, 2), axis=1, initial=0.0)
+        sizes[sizes == 0.0] = 1.0
+        at, value = least(
+            lambda shares: np.sum((apart(shares) / sizes) ** 2, axis=1),
+            len(self.ranges),
+            self.seed,
+            lambda share: apart(share[np.newaxis])[0] / sizes,
+        )
+        answer = self._answer(self._scaled(at), "inside") if isfinite(value) else None
+        notes = []
+        if targets < len(self.ranges):
+            notes.append(
+                f"{targets} target and {len(self.ranges)} keys: this is one of many solutions,"
+                " the one that the search came upon."
+            )
+        if answer and value**0.5 <= CLOSE:
+            return {"answers": [answer], "notes": notes}
+        return {"answers": [], "nearest": answer, "notes": notes}
+
+    def _minima(self, name: str, sign: float) -> dict[str, Any]:
+        seen = self._scan()
+        lows = minima(seen, lambda x: float(self.evaluate([[x]]).values[0, 0]), sign)
+        answers = [self._answer([low.at], low.place, slopes=low is lows[0]) for low in lows]
+        notes = []
+        if level(seen):
+            answers = [replace(answers[0], place="inside")]
+            notes.append(f"{name} is the same over the whole range: it does not depend on it.")
+        return {"answers": answers, "scan": seen, "notes": notes}
+
+    def _minimum(self, sign: float) -> dict[str, Any]:
+        at, value = least(
+            lambda shares: sign * self.evaluate(self._scaled(shares)).values[:, 0],
+            len(self.ranges),
+            self.seed,
+        )
+        end = bool(np.any((at <= 1e-9) | (at >= 1.0 - 1e-9)))
+        place = "end" if end else "inside"
+        return {"answers": [self._answer(self._scaled(at), place)] if isfinite(value) else []}
 
     def _scaled(self, shares: Floats) -> Floats:
         low = np.array([one.low for one in self.ranges])
@@ -366,29 +317,51 @@ class _Search:
         scaled: Floats = np.clip(low + shares * (high - low), low, high)
         return scaled
 
-    def _answer(
-        self, evaluate: Evaluator, at: Floats, place: str, *, slopes: bool = True
-    ) -> Answer:
-        outcome = evaluate(at[np.newaxis])
-        values = [float(value) for value in outcome.values[0]]
+    def _answer(self, at: ArrayLike, place: str, *, slopes: bool = True) -> Answer:
+        point = np.asarray(at, dtype=np.float64)
+        outcome = self.evaluate(point[np.newaxis])
+        values = outcome.values[0].tolist()
         two = len(values) > 1
         columns = range(0, len(values), 2 if two else 1)
         return Answer(
-            tuple(float(value) for value in at),
+            tuple(point.tolist()),
             tuple(values[column] for column in columns),
             tuple(values[1::2]) if two else (),
             outcome.courses[0],
             place,
-            sensitivities(evaluate, self.ranges, at, columns) if slopes else (),
+            sensitivities(self.evaluate, self.ranges, point, columns) if slopes else (),
         )
 
-    def _notes(self, evaluate: Evaluator, complete: bool) -> tuple[str, ...]:
-        notes: tuple[str, ...] = ()
-        if any(quantity.ending == "settled" for quantity in evaluate.quantities):
-            notes += ("What the belt pays is counted until nothing slips on it any more.",)
-        if not complete:
-            notes += (
+    def _solution(
+        self,
+        goal: Goal,
+        what: str,
+        *,
+        answers: Sequence[Answer],
+        notes: Sequence[str] = (),
+        scan: Scan | None = None,
+        **found: Any,
+    ) -> Solution:
+        said = []
+        if any(quantity.ending == "settled" for quantity in self.evaluate.quantities):
+            said.append("What the belt pays is counted until nothing slips on it any more.")
+        if scan is not None and not scan.complete:
+            said.append(
                 "The particle's way changes too often to find every place where it does: narrow"
-                " the range, or raise --points.",
+                " the range, or raise --points."
             )
-        return notes
+        wanted = self.evaluate.quantities[:: 2 if goal == "solve" else 1]
+        return Solution(
+            asked=asked(goal, what, self.ranges),
+            goal=goal,
+            ranges=self.ranges,
+            quantities=tuple(one.name for one in wanted),
+            units=tuple(one.unit for one in wanted),
+            answers=tuple(answers),
+            runs=self.evaluate.runs,
+            seed=self.seed,
+            notes=(*said, *notes),
+            base=self.scene,
+            scan=scan,
+            **found,
+        )

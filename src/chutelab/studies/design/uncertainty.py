@@ -17,7 +17,6 @@ from chutelab.scene import Scene, SceneError
 from chutelab.scene.overrides import limits_of, parts_of, rule_at, value_at
 from chutelab.scene.units import read_size, with_unit
 from chutelab.scene.variants import Vary, quantity, reason
-from chutelab.studies.design.answers import finite
 from chutelab.studies.design.evaluation import (
     INSIDE,
     Evaluator,
@@ -27,7 +26,7 @@ from chutelab.studies.design.quantities import DesignError, each_once, measured,
 from chutelab.studies.design.sensitivity import Indices, crossed, design, indices
 from chutelab.util.arrays import Floats
 from chutelab.util.files import csv_text
-from chutelab.util.tables import Sheet, Shown, frame
+from chutelab.util.tables import Sheet, Shown, frame, plain
 
 FORM: Final = (
     "must be KEY=MEAN±SPREAD, such as restitution=0.5±0.05 or incoming.speed=2+-1% (or ±SPREAD"
@@ -403,25 +402,20 @@ def _indices(values: Floats, samples: int, inputs: int, seed: int) -> Indices:
 
 def as_dict(found: Uncertainty) -> dict[str, Any]:
     """Return the result as plain lists and floats, for JSON; without the samples."""
-    return {
+    inputs = ("key", "unit", "mean", "spread", "law", "cut")
+    told = {
         "format": 1,
         "scene": found.scene,
-        "inputs": [
-            {
-                "key": one.key, "unit": one.unit, "mean": one.mean, "spread": one.spread,
-                "law": one.law, "cut": one.cut,
-            }
-            for one in found.spreads
-        ],
+        "inputs": [{name: getattr(one, name) for name in inputs} for one in found.spreads],
         "quantities": {
             name: {
                 "unit": found.units[m],
-                "nominal": finite(float(found.nominal[m])),
-                "mean": finite(float(found.mean[m])),
-                "deviation": finite(float(found.deviation[m])),
-                "interval": [finite(float(value)) for value in found.interval[m]],
-                "first": [finite(float(value)) for value in found.indices[m].first],
-                "total": [finite(float(value)) for value in found.indices[m].total],
+                "nominal": found.nominal[m],
+                "mean": found.mean[m],
+                "deviation": found.deviation[m],
+                "interval": found.interval[m],
+                "first": found.indices[m].first,
+                "total": found.indices[m].total,
             }
             for m, name in enumerate(found.quantities)
         },
@@ -429,4 +423,5 @@ def as_dict(found: Uncertainty) -> dict[str, Any]:
         "runs": found.runs,
         "samples": found.samples,
         "seed": found.seed,
-    }  # fmt: skip
+    }
+    return dict(plain(told))

@@ -7,7 +7,6 @@ respond to parameters, and which of them they cannot tell apart, is found by dif
 from __future__ import annotations
 
 import difflib
-import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -15,8 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from chutelab.scene import MISSING, Fault, Scene, SceneError, shown
-from chutelab.scene.errors import at_path, joined
-from chutelab.scene.overrides import limits_of, rule_at
+from chutelab.scene.overrides import at_path, joined, limits_of, parts_of, rule_at
 from chutelab.studies.measured.track import MeasuredError, Track
 from chutelab.util.arrays import Floats
 
@@ -123,7 +121,10 @@ def _placed(track: Track, key: str) -> Parameter:
 
 def _of_scene(document: Mapping[str, Any], key: str) -> Parameter | str:
     """Return the parameter of a key of the scene, or why there is none."""
-    parts = _parts(document, key)
+    try:
+        parts = parts_of(key, [surface["name"] for surface in document["surface"]])
+    except ValueError:
+        return _unknown(document, key)
     rule = rule_at(parts)
     head = str(parts[0]) if parts else ""
     if rule is None:
@@ -141,19 +142,6 @@ def _of_scene(document: Mapping[str, Any], key: str) -> Parameter | str:
     return Parameter(path, rule.get("x-unit", ""), float(value), *limits)
 
 
-def _parts(document: Mapping[str, Any], key: str) -> list[str | int]:
-    """Split ``surface.hood.speed`` or ``stream.at[0]`` into keys and indices."""
-    parts: list[str | int] = [
-        int(part) if part.isdecimal() else part
-        for part in re.sub(r"\[(\d{1,9})\]", r".\1", key).split(".")
-    ]
-    if len(parts) > 1 and parts[0] == "surface":
-        names = [surface["name"] for surface in document["surface"]]
-        if parts[1] in names:
-            parts[1] = names.index(parts[1])
-    return parts
-
-
 def _unknown(document: Mapping[str, Any], key: str) -> str:
     known = [*numbers(document), *PLACEMENT]
     near = difflib.get_close_matches(key, known, n=3, cutoff=0.6)
@@ -165,6 +153,7 @@ def _unknown(document: Mapping[str, Any], key: str) -> str:
 
 def numbers(document: Mapping[str, Any]) -> Iterator[str]:
     """Yield the keys of a scene's tables whose values are numbers that can be fitted."""
+    names = [surface["name"] for surface in document["surface"]]
     for head, table in document.items():
         entries = {head: table}
         if isinstance(table, dict):
@@ -176,7 +165,7 @@ def numbers(document: Mapping[str, Any]) -> Iterator[str]:
                 for name, value in surface.items()
             }
         for key, value in entries.items():
-            if isinstance(value, float) and rule_at(_parts(document, key)):
+            if isinstance(value, float) and rule_at(parts_of(key, names)):
                 yield key
 
 

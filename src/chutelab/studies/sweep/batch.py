@@ -29,8 +29,8 @@ from chutelab.scene.variants import (
     setting,
     variant,
 )
-from chutelab.studies.sweep.rows import REASON, Columns, empty, joined, rows
-from chutelab.util.arrays import Bools, Floats, Ints
+from chutelab.studies.sweep.rows import REASON, Columns, empty, rows
+from chutelab.util.arrays import Floats, Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,15 +61,10 @@ Reader = Callable[[Recording, Scene, Ints], None]
 
 
 def screened(block: Block) -> tuple[Scene | None, Ints, dict[int, str]]:
-    """Validate the variants of a block.
+    """Validate the variants of a block, whose keys are plain numbers.
 
-    A value is judged by its key, once for each. The rules between keys judge one variant for each
-    combination of what they ask for; other keys cannot change what they say.
-
-    Parameters
-    ----------
-    block : Block
-        Whose keys are plain numbers.
+    A value is judged by its key, once for each. Rules between keys judge one variant for each
+    combination of the values that they ask for; other keys cannot change what they say.
 
     Returns
     -------
@@ -77,74 +72,37 @@ def screened(block: Block) -> tuple[Scene | None, Ints, dict[int, str]]:
         One of the sound variants (None if there is none), the numbers of all of them, and what is
         wrong with each of the others.
     """
-    values, paths = block.values, block.paths
-    good = np.stack([accepted(path, column) for path, column in zip(paths, values.T, strict=True)])
-    faults = _of_bad_values(block, good)
-    sound = np.flatnonzero(good.all(axis=0))
-    template: Scene | None = None
-    asked: set[int] = set()
-    while len(sound):
-        verdicts: dict[int, Variant] = {}
-        more = set(asked)
-        first, group = _groups(values[sound], sorted(asked))
-        for row in sound[first].tolist():
-            verdicts[row] = _judged(block, row)
-            more |= _asked(block, row)
-        if more != asked:
-            asked = more
-            continue
-        reasons = np.array([verdicts[row].fault for row in sound[first].tolist()], dtype=object)
-        bad = reasons[group] != ""
-        faults |= dict(zip(sound[bad].tolist(), reasons[group][bad].tolist(), strict=True))
-        sound = sound[~bad]
-        template = next((v.scene for v in verdicts.values() if v.scene is not None), None)
-        break
-    return template, sound, faults
-
-
-def _of_bad_values(block: Block, good: Bools) -> dict[int, str]:
-    """Say what is wrong with variants that have a value which its key does not take."""
-    bad = np.flatnonzero(~good.all(axis=0))
-    asked = set(range(len(block.paths)))
-    for row in np.flatnonzero(good.all(axis=0))[:1].tolist():
-        asked = _asked(block, row)
-    faults: dict[int, str] = {}
-    known: dict[tuple[object, ...], str] = {}
-    for row in bad.tolist():
-        wrong = ~good[:, row]
-        # The same faults have the same words.
-        told = tuple(
-            float(value) if wrong[k] or k in asked else None
-            for k, value in enumerate(block.values[row].tolist())
+    values = block.values
+    good = np.stack([accepted(*column) for column in zip(block.paths, values.T, strict=True)]).T
+    sound = np.asarray(good.all(axis=1))
+    asked = np.full(len(block.paths), not sound.any())
+    while True:
+        telling = np.where(good & ~asked, 0.0, values)
+        _, first, group = np.unique(
+            np.hstack([telling, good]), axis=0, return_index=True, return_inverse=True
         )
-        if told not in known:
-            known[told] = _judged(block, row).fault
-        faults[row] = known[told]
-    return faults
+        more = asked.copy()
+        for row in first[sound[first]].tolist():
+            settings = map(setting, block.keys, values[row].tolist())
+            by = judged_by(block.document, [*settings])
+            more |= [path in by for path in block.paths]
+        if (more == asked).all():
+            break
+        asked = more
+    judged = [_variant(block, row) for row in first.tolist()]
+    faults = {n: judged[g].fault for n, g in enumerate(group.ravel().tolist()) if judged[g].fault}
+    template = next((one.scene for one in judged if one.scene is not None), None)
+    return template, np.delete(np.arange(len(values)), list(faults)), faults
 
 
-def _asked(block: Block, row: int) -> set[int]:
-    """Return which of the varied keys the rules ask for in a variant."""
-    values = block.values[row].tolist()
-    asked = judged_by(block.document, [*map(setting, block.keys, values)])
-    return {k for k, path in enumerate(block.paths) if path in asked}
-
-
-def _groups(values: Floats, keys: list[int]) -> tuple[Ints, Ints]:
-    """Return the first variant of each combination of some keys, and the combination of each."""
-    if not keys:
-        return np.zeros(1, dtype=np.int64), np.zeros(len(values), dtype=np.int64)
-    _, first, group = np.unique(values[:, keys], axis=0, return_index=True, return_inverse=True)
-    return first, group.reshape(-1)
-
-
-def _judged(block: Block, row: int) -> Variant:
-    return variant(block.document, block.source, block.keys, tuple(block.values[row].tolist()))
+def _variant(block: Block, row: int) -> Variant:
+    values = tuple(block.values[row].tolist())
+    return variant(block.document, block.source, block.keys, values)
 
 
 def alone(block: Block, row: int) -> Columns:
     """Validate and simulate one variant of a block, and return its row."""
-    made = variant(block.document, block.source, block.keys, tuple(block.values[row].tolist()))
+    made = _variant(block, row)
     return because(made.fault) if made.scene is None else row_of(made.scene, block.engine)
 
 
@@ -171,88 +129,52 @@ def one_line(why: str) -> str:
     return " ".join(why.split())
 
 
-def swept_together(block: Block) -> Columns:
-    """Return the rows of a block whose keys are plain numbers.
-
-    See `chutelab.scene.variants.is_plain`.
-    """
-    found = empty(len(block.values))
-
-    def put(which: Ints, columns: Columns) -> None:
-        for name, values in columns.items():
-            found[name][which] = values
-
-    def read(recording: Recording, scenes: Scene, which: Ints) -> None:
-        put(which, rows(recording, scenes, len(which)))
-
-    batch = Batch(block, read)
-    for row in batch.left:
-        put(np.array([row]), alone(block, row))
-    for row, fault in batch.faults.items():
-        found[REASON][row] = one_line(fault)
-    return found
-
-
-class Batch:
-    """Runs what can be run at once of a block, as it is made.
+def together(block: Block, read: Reader) -> tuple[dict[int, str], list[int]]:
+    """Run what can be run at once of a block whose keys are plain numbers.
 
     Parameters
     ----------
     block : Block
-        Whose keys are plain numbers.
+        See `chutelab.scene.variants.is_plain`.
     read : callable
         Takes a recording with a particle for each of N variants, their scenes as a family, and
         their rows in the block, (N,); called for each group of variants that went through.
 
-    Attributes
-    ----------
-    faults : dict of int to str
-        Why there is no run, by row.
-    left : list of int
-        Rows that have to be run alone.
+    Returns
+    -------
+    faults, left
+        Why there is no run, by row; and the rows that have to be run alone.
     """
+    template, which, faults = screened(block)
+    if template is None or not _fits(template, block.paths, block.engine):
+        return faults, which.tolist()
+    scene = template
 
-    def __init__(self, block: Block, read: Reader) -> None:
-        self.block, self.read = block, read
-        template, sound, self.faults = screened(block)
-        self.left: list[int] = []
-        if template is not None and _fits(template, block.paths, block.engine):
-            self._run(template, sound)
+    def scenes(some: Ints) -> Scene:
+        return family(scene, dict(zip(block.paths, block.values[some].T.copy(), strict=True)))
+
+    groups: list[tuple[Machine, Ints]] = []
+    while len(which) and not groups:
+        try:
+            machine = build(scenes(which))
+        except RefusedError as refused:
+            faults |= {int(which[n]): str(fault) for n, fault in refused.members.items()}
+            which = np.delete(which, list(refused.members))
         else:
-            self.left += sound.tolist()
-
-    def _scenes(self, template: Scene, which: Ints) -> Scene:
-        values = self.block.values[which].T.copy()
-        return family(template, dict(zip(self.block.paths, values, strict=True)))
-
-    def _run(self, template: Scene, which: Ints) -> None:
-        """Build all of them, sorting out those that cannot be built, and run what is alike."""
-        while len(which):
-            try:
-                machine = build(self._scenes(template, which))
-            except RefusedError as refused:
-                out = list(refused.members)
-                faults = map(str, refused.members.values())
-                self.faults |= dict(zip(which[out].tolist(), faults, strict=True))
-                which = np.delete(which, out)
-            else:
-                for alike in kinds(machine):
-                    part = machine if len(alike) == len(which) else members(machine, alike)
-                    self._together(part, which[alike], template)
-                return
-
-    def _together(self, machine: Machine, which: Ints, template: Scene) -> None:
-        """Run machines that are alike; one that does not get through is left over."""
+            groups = [(members(machine, alike), which[alike]) for alike in kinds(machine)]
+    left: list[int] = []
+    while groups:
+        machine, some = groups.pop()
         try:
             recording = run(machine, apart=True)
         except (CornerError, StalledError):
-            if len(which) == 1:
-                self.left += which.tolist()
-                return
-            for half in np.array_split(np.arange(len(which)), 2):
-                self._together(members(machine, half), which[half], template)
-            return
-        self.read(recording, self._scenes(template, which), which)
+            # Whoever does not get through is found by halving.
+            halves = np.array_split(np.arange(len(some)), 2) if len(some) > 1 else []
+            groups += [(members(machine, half), some[half]) for half in halves]
+            left += [] if halves else some.tolist()
+        else:
+            read(recording, scenes(some), some)
+    return faults, left
 
 
 def _fits(scene: Scene, paths: tuple[str, ...], engine: str | None) -> bool:
@@ -267,6 +189,20 @@ def _fits(scene: Scene, paths: tuple[str, ...], engine: str | None) -> bool:
 
 def swept(block: Block) -> Columns:
     """Return the rows of a block: together where that can be, else one by one."""
+    found = empty(len(block.values))
+
+    def put(which: Ints | list[int], columns: Columns) -> None:
+        for name, values in columns.items():
+            found[name][which] = values
+
+    def read(recording: Recording, scenes: Scene, which: Ints) -> None:
+        put(which, rows(recording, scenes, len(which)))
+
+    left = list(range(len(block.values)))
     if all(is_plain(path) for path in block.paths):
-        return swept_together(block)
-    return joined([alone(block, row) for row in range(len(block.values))])
+        faults, left = together(block, read)
+        for row, fault in faults.items():
+            found[REASON][row] = one_line(fault)
+    for row in left:
+        put([row], alone(block, row))
+    return found

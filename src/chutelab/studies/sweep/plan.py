@@ -24,12 +24,13 @@ from chutelab.scene.variants import (
     quantities,
 )
 from chutelab.util.arrays import Floats
+from chutelab.util.errors import InputError
 
 DESIGNS: Final = {"lhs": "LatinHypercube", "sobol": "Sobol"}
 """Names of the designs, and of the classes of `scipy.stats.qmc` that draw them."""
 
 
-class SampleError(ValueError):
+class SampleError(InputError):
     """Samples that cannot be drawn; the text says what is allowed."""
 
 

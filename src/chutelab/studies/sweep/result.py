@@ -26,6 +26,7 @@ from chutelab.scene.variants import Quantity
 from chutelab.studies.sweep.plan import Plan
 from chutelab.studies.sweep.rows import NUMBERS, REASON
 from chutelab.util.arrays import Floats
+from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, whole, write_lines
 from chutelab.util.tables import Sheet, Shown, frame, number
 from chutelab.util.versions import version_of
@@ -36,7 +37,7 @@ SUFFIXES: Final = {".csv": "csv", ".parquet": "parquet"}
 """Endings of files, and the formats they stand for."""
 
 
-class TableError(ValueError):
+class TableError(InputError):
     """A file that cannot be written; the text says what is allowed."""
 
 
@@ -211,7 +212,7 @@ WORDS: Final = {
 """What a sweep can differ in, for people."""
 
 
-class PartError(ValueError):
+class PartError(InputError):
     """A file of finished rows that cannot be used; the text says what to do."""
 
 

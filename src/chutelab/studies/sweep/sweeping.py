@@ -37,6 +37,7 @@ from chutelab.studies.sweep.result import (
     write_csv,
 )
 from chutelab.studies.sweep.rows import NUMBERS, REASON, Columns, joined
+from chutelab.util.errors import InputError
 
 Job = tuple[int, Any]
 
@@ -51,7 +52,7 @@ ADDRESS: Final = re.compile(r"(\w+://)?[^\s:/]+:\d{1,5}")
 """A host and a port."""
 
 
-class WorkersError(ValueError):
+class WorkersError(InputError):
     """Nobody is there to do the work; the text says what is wrong with what was asked for."""
 
 
@@ -70,9 +71,17 @@ class Here(Executor):
 
 
 class Crew:
-    """An executor, how many jobs it is to have at a time, and how to get a new one if it breaks."""
+    """An executor, how many jobs it is to have at a time, and how to get a new one if it breaks.
 
-    def __init__(self, executor: Executor, ahead: int, anew: Callable[[], Executor] | None) -> None:
+    `concurrent.futures` does the work. What it lacks: `Executor.map` takes all jobs at once (2.3 kB
+    each, and there may be a million) and gives results in their order only, so that a slow run
+    would hold back the file of finished rows; and a process that dies breaks the pool with all its
+    jobs. In joblib (1.6) it breaks them too; Dask copes, but installs 15 packages of 41 MB.
+    """
+
+    def __init__(
+        self, executor: Executor, ahead: int, anew: Callable[[], Executor] | None = None
+    ) -> None:
         self.executor, self.ahead, self.anew = executor, ahead, anew
 
     def results(self, work: Callable[[Any], Any], jobs: Iterable[Job]) -> Iterator[tuple[int, Any]]:
@@ -83,46 +92,31 @@ class Crew:
         LostWorkersError
             If processes keep dying, or a cluster is gone.
         """
-        left, broken = iter(jobs), 0
+        left, again, deaths = iter(jobs), list[Job](), 0
         running: dict[Future[Any], Job] = {}
-        again: list[Job] = []
+        job = next(left, None)
         while True:
-            while len(running) < self.ahead:
-                job = again.pop() if again else next(left, None)
-                if job is None:
-                    break
-                try:
+            try:
+                while job is not None and len(running) < self.ahead:
                     running[self.executor.submit(work, job[1])] = job
-                except BrokenExecutor:
-                    again.append(job)
-                    break
-            if not running and not again:
-                return
-            finished = wait(running, return_when=FIRST_COMPLETED).done if running else set()
-            died = not finished
-            for future in finished:
-                job = running.pop(future)
-                try:
+                    job = again.pop() if again else next(left, None)
+                if not running:
+                    return
+                for future in wait(running, return_when=FIRST_COMPLETED).done:
                     result = future.result()
-                except BrokenExecutor:
-                    again.append(job)
-                    died = True
-                else:
-                    broken = 0
-                    yield job[0], result
-            if died:
-                broken += 1
-                again += running.values()
-                running.clear()
-                self._renew(broken)
-
-    def _renew(self, broken: int) -> None:
-        if self.anew is None or broken > ATTEMPTS:
-            raise LostWorkersError(
-                "the worker processes keep dying, perhaps for want of memory: try fewer with --jobs"
-            )
-        self.executor.shutdown(wait=False)
-        self.executor = self.anew()
+                    deaths = 0
+                    yield running.pop(future)[0], result
+            except BrokenExecutor:
+                deaths += 1
+                if self.anew is None or deaths > ATTEMPTS:
+                    raise LostWorkersError(
+                        "the worker processes keep dying, perhaps for want of memory: try fewer"
+                        " with --jobs"
+                    ) from None
+                self.executor.shutdown(wait=False)
+                self.executor = self.anew()
+                again += [*running.values(), *([job] if job is not None else [])]
+                job, running = again.pop(), {}
 
 
 @contextmanager
@@ -146,7 +140,7 @@ def crew(jobs: int = 1, scheduler: str | None = None) -> Iterator[Crew]:
         return
     count = jobs or os.cpu_count() or 1
     if count == 1:
-        yield Crew(Here(), 1, None)
+        yield Crew(Here(), 1)
         return
 
     def processes() -> Executor:
@@ -190,7 +184,7 @@ def _cluster(address: str) -> Iterator[Crew]:
             raise WorkersError(f"--scheduler {address}: it has no workers; start some with `dask`")
         try:
             with client.get_executor(pure=False) as executor:
-                yield Crew(executor, 2 * threads, None)
+                yield Crew(executor, 2 * threads)
         except (KilledWorker, CancelledError) as error:
             raise LostWorkersError(
                 f"--scheduler {address}: the workers or the scheduler are gone: {error}"
@@ -267,7 +261,7 @@ def sweep(
     """
     plan = planned(scene, varies, sample=sample, design=design, seed=seed, engine=engine)
     with ExitStack() as stack:
-        team = Crew(executor, AHEAD, None) if executor else stack.enter_context(crew(jobs))
+        team = Crew(executor, AHEAD) if executor else stack.enter_context(crew(jobs))
         return swept_by(plan, team, progress=progress)
 
 

@@ -18,6 +18,7 @@ from typing import Final
 from chutelab.theory.figures.model import Line, Panel, PaperFigure
 from chutelab.theory.figures.paths import path_figure
 from chutelab.theory.figures.radius import energy_figure, velocity_figure
+from chutelab.util.errors import InputError
 
 NUMBERS: Final = (6, 7, 8, 9, 11, 12, 13)
 """Figures that show results."""
@@ -33,7 +34,7 @@ DRAWINGS: Final = {
 """Figures that show none, and what they are."""
 
 
-class FigureError(LookupError):
+class FigureError(InputError):
     """The paper has no such figure of results."""
 
 

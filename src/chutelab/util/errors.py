@@ -1,13 +1,13 @@
-"""A fault of a scene file, the one error that lists all of them, and what was probably meant."""
+"""What somebody gave and cannot be used: its faults, the error that lists them, what was meant."""
 
 from __future__ import annotations
 
 import difflib
 import json
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 
 def did_you_mean(
@@ -30,9 +30,8 @@ _VALUE_WIDTH: Final = 48
 _KEY_WIDTH: Final = 80
 _TEXT_WIDTH: Final = 400
 _LISTED: Final = 40
-"""Most faults spelled out in one message; `SceneError.faults` always holds all of them."""
+"""Most faults spelled out in one message; `InputError.faults` always holds all of them."""
 
-_BARE_KEY: Final = re.compile(r"[\w-]+")
 _DECIMAL_COMMA: Final = re.compile(r"(?:^|=\s*)([-+]?\d+),(\d+)\s*\S*$")
 
 
@@ -50,13 +49,14 @@ MISSING: Final = _Missing()
 
 @dataclass(frozen=True)
 class Fault:
-    """One thing wrong with a scene.
+    """One thing wrong with what was given.
 
     Parameters
     ----------
     key
-        Full path of the key, such as ``plate.angle_deg`` or ``surface[1].restitution``; a place in
-        the text (``line 3, column 5``) for a syntax error; empty if the whole file is at fault.
+        Full path of the key, such as ``plate.angle_deg`` or ``surface[1].restitution``; an option
+        as it was typed; a place in the text (``line 3, column 5``) for a syntax error; empty if the
+        whole file is at fault.
     value
         What was found there; `MISSING` if the key has to be there and is not; None if there is
         nothing to show (TOML has no null).
@@ -83,36 +83,62 @@ class Fault:
         return f"{key} = {shown(self.value)}: {allowed}"
 
 
-class SceneError(ValueError):
-    """A scene that cannot be used; its text lists every fault.
+class InputError(ValueError):
+    """What somebody gave cannot be used; the text lists every fault.
+
+    The command line ends with it, and exit code 2.
 
     Parameters
     ----------
-    source
-        The file, or a stand-in such as ``<scene>``.
-    faults
-        What is wrong, at least one.
-    hint
+    allowed, key, value
+        The fault, see `Fault`.
+    file
+        Where it is, or a stand-in such as ``<scene>``; "" for none.
+
+    Attributes
+    ----------
+    faults : list of Fault
+        At least one; `key`, `value` and `allowed` are those of the first.
+    hint : str
         What to do next, if there is something better than mending each fault.
     """
 
-    def __init__(self, source: str, faults: Sequence[Fault], hint: str = "") -> None:
-        super().__init__(source, faults, hint)
-        self.source = source
-        self.faults = list(faults)
-        self.hint = hint
+    def __init__(self, allowed: str, key: str = "", value: object = None, file: str = "") -> None:
+        super().__init__(allowed, key, value, file)
+        self.file = file
+        self.faults = [Fault(key, value, allowed)]
+        self.hint = ""
+
+    @property
+    def key(self) -> str:
+        """Full path of the key that is at fault, or the option as it was typed."""
+        return self.faults[0].key
+
+    @property
+    def value(self) -> object:
+        """What was found there."""
+        return self.faults[0].value
+
+    @property
+    def allowed(self) -> str:
+        """What would be right, in words."""
+        return self.faults[0].allowed
 
     def __str__(self) -> str:
-        source = cut(printable(self.source), 200)
+        place = f"{cut(printable(self.file), 200)}: " if self.file else ""
         if len(self.faults) == 1:
-            text = f"{source}: {self.faults[0]}"
+            text = f"{place}{self.faults[0]}"
         else:
-            lines = [f"{source}: {len(self.faults)} faults"]
+            lines = [f"{place}{len(self.faults)} faults"]
             lines += [f"  {fault}" for fault in self.faults[:_LISTED]]
             if len(self.faults) > _LISTED:
                 lines.append(f"  and {len(self.faults) - _LISTED} more")
             text = "\n".join(lines)
         return f"{text}\n{self.hint}" if self.hint else text
+
+
+class MissingLibraryError(ImportError):
+    """A library that Chutelab can do without is not installed; the text says what to install."""
 
 
 def cut(text: str, width: int) -> str:
@@ -155,28 +181,3 @@ def _toml(value: object, depth: int) -> str:
         case None:
             return "nothing"
     return printable(str(value))
-
-
-def joined(parts: Sequence[str | int]) -> str:
-    """Write a path of keys and indices: ``("surface", 1, "name")`` is ``surface[1].name``."""
-    text = ""
-    for part in parts:
-        if isinstance(part, int):
-            text += f"[{part}]"
-            continue
-        name = (
-            part if _BARE_KEY.fullmatch(part) else printable(json.dumps(part, ensure_ascii=False))
-        )
-        text += f".{name}" if text else name
-    return text
-
-
-def at_path(document: Any, parts: Sequence[str | int]) -> object:
-    """Follow a path of keys and indices; `MISSING` where it leads nowhere."""
-    found = document
-    for part in parts:
-        try:
-            found = found[part]
-        except (KeyError, IndexError, TypeError):
-            return MISSING
-    return found

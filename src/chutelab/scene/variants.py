@@ -154,13 +154,13 @@ def _number(typed: str, text: str, form: str) -> tuple[float, str]:
 
 
 def _count(typed: str, text: str) -> int:
-    allowed = f"COUNT = {text.strip() or 'nothing'}; it must be a whole number from 1"
     try:
         count = int(text)
     except ValueError:
-        raise VaryError(typed, f"{allowed} to {MOST_VALUES}") from None
+        count = 0
     if not 1 <= count <= MOST_VALUES:
-        raise VaryError(typed, f"{allowed} to {MOST_VALUES}")
+        given = f"COUNT = {text.strip() or 'nothing'}"
+        raise VaryError(typed, f"{given}; it must be a whole number from 1 to {MOST_VALUES}")
     return count
 
 
@@ -168,15 +168,11 @@ def _even(first: float, last: float, count: int) -> tuple[float, ...]:
     """Return evenly spaced values; 0.3 is 0.3, not 0.30000000000000004."""
     if count == 1:
         return (first,)
-    size = max(abs(first), abs(last))
-    digits = 12
-    values = []
-    for i in range(count):
-        value = first + (last - first) * i / (count - 1)
-        # What is left of a 0 by rounding is a 0.
-        values.append(0.0 if abs(value) < 1e-13 * size else float(f"{value:.{digits}g}"))
-    values[0], values[-1] = first, last
-    return tuple(values)
+    # What is left of a 0 by rounding is a 0.
+    nothing = 1e-13 * max(abs(first), abs(last))
+    inside = (first + (last - first) * i / (count - 1) for i in range(1, count - 1))
+    rounded = (0.0 if abs(value) < nothing else float(f"{value:.12g}") for value in inside)
+    return (first, *rounded, last)
 
 
 @dataclass(frozen=True)

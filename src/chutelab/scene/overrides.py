@@ -121,7 +121,7 @@ def value_at(scene: Scene, path: str) -> Any:
     """
     try:
         return at_path(scene, parts_of(path, [free.name for free in scene.surface]))
-    except ValueError:
+    except InputError:
         return MISSING
 
 

@@ -28,7 +28,6 @@ from chutelab.studies.design.quantities import (
     Given,
     Measured,
     Quantity,
-    course_of,
     courses_of,
     each_once,
     measured,
@@ -358,7 +357,7 @@ class Evaluator:
                 values = dict(zip(self.keys, point.tolist(), strict=True))
                 scene = self.scene.with_values(values | _until(ending))
                 recording = simulate(scene)
-                course = course_of(recording)
+                course = courses_of(recording, 1)[0]
                 for column in columns:
                     out[column] = self.quantities[column].of(recording, scene)
         except (SceneError, StalledError) as error:

@@ -265,11 +265,11 @@ class Uncertainty(Shown):
         ]
         foot = []
         for k, one in enumerate(self.spreads):
-            shares = [100.0 * np.array([i.first[k], *i.first_interval[k]]) for i in self.indices]
-            cells = [f"{s[0]:.1f} % ({s[1]:.0f} .. {s[2]:.0f})" for s in shares]
-            cells = [
-                cell if np.isfinite(s[0]) else "-" for cell, s in zip(cells, shares, strict=True)
-            ]
+            cells = []
+            for found in self.indices:
+                share, low, high = 100.0 * np.array([found.first[k], *found.first_interval[k]])
+                known = np.isfinite(share)
+                cells.append(f"{share:.1f} % ({low:.0f} .. {high:.0f})" if known else "-")
             foot.append((f"share of {one.key}", *cells))
         return Sheet(
             f"{self.scene}: {given}", tuple(columns), tuple(rows), foot=tuple(foot),

@@ -20,7 +20,7 @@ from typing import Any, Final, Literal, Protocol, TypeVar
 import numpy as np
 
 from chutelab.results import REASONS, Kind, Recording
-from chutelab.results.quantities import measure
+from chutelab.results.quantities import each, measure
 from chutelab.scene import MISSING, Scene, rules
 from chutelab.scene.overrides import value_at
 from chutelab.scene.units import read_size
@@ -155,14 +155,19 @@ class Measured:
     key: str
     ending: Ending
 
-    def of(self, recording: Recording, scene: Scene) -> float:
-        """Return its value; NaN if it did not happen."""
-        if self.ending == "settled" and any(
-            REASONS[reason] != "settled" for reason in recording.ended
-        ):
-            return nan
-        value = measure(recording, self.key)
-        return value * scene.stream.rate / recording.count if self.name == "power" else value
+    def of(self, recording: Recording) -> Any:
+        """Return its value, of each scene of a family (N,); NaN where it did not happen."""
+        settled = recording.ended == REASONS.index("settled")
+        rate = recording.scene.stream.rate
+        value: Any
+        if recording.scene.shape:
+            value = each(recording, self.key)
+        else:
+            value = measure(recording, self.key)
+            settled, rate = settled.all(), rate / recording.count
+        if self.ending == "settled":
+            value = np.where(settled, value, nan)
+        return value * rate if self.name == "power" else value
 
 
 @dataclass(frozen=True)
@@ -173,10 +178,10 @@ class Given:
     unit: str
     ending: Ending = "any"
 
-    def of(self, _recording: Recording | None, scene: Scene) -> float:
-        """Return its value in a scene; NaN where it has none."""
-        value = value_at(scene, self.name)
-        return float(value) if isinstance(value, (int, float)) else nan
+    def of(self, recording: Recording) -> Any:
+        """Return its value in the scene that was run; NaN where it has none."""
+        value = value_at(recording.scene, self.name)
+        return nan if value is None or value is MISSING or isinstance(value, str) else value
 
 
 @dataclass(frozen=True)
@@ -192,7 +197,7 @@ class Fixed:
         """The number as text."""
         return f"{self.value:.12g} {self.unit}".strip()
 
-    def of(self, _recording: Recording | None, _scene: Scene) -> float:
+    def of(self, _: Recording) -> float:
         """Return the number."""
         return self.value
 

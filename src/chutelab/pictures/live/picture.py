@@ -14,7 +14,7 @@ import numpy as np
 from chutelab.machine import Machine
 from chutelab.pictures import colours
 from chutelab.results import Kind, Recording
-from chutelab.results.comparison import observed
+from chutelab.results.quantities import observed
 from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet
 
@@ -150,8 +150,7 @@ def numbers(recording: Recording) -> dict[str, float]:
     Work and heat are counted until nothing slips, as `chutelab.theory` does: m* v_b and m*/2 times
     the slip at the landing, with m* = m/3 for a free disk.
     """
-    scene = recording.scene
-    seen = observed(recording, scene)
+    scene, seen = recording.scene, observed(recording)
     found = {
         "phi1": degrees(seen["phi1"]),
         "v2": seen["v2"],

@@ -242,7 +242,7 @@ def figures(study: Study) -> list[dict[str, Any]]:
         unit = unit_of(name, surfaces)
         if unit is None:
             continue
-        values = [nan if run is None else measure(run, name, run.scene) for run in runs]
+        values = [nan if run is None else measure(run, name) for run in runs]
         if not any(map(isfinite, values)):
             continue
         analytic = [numbers.get(name) for numbers in known]

@@ -179,7 +179,7 @@ class Measured:
             REASONS[reason] != "settled" for reason in recording.ended
         ):
             return nan
-        value = measure(recording, self.key, scene)
+        value = measure(recording, self.key)
         return value * scene.stream.rate / recording.count if self.name == "power" else value
 
 

@@ -245,7 +245,7 @@ def sweep(
 
     Raises
     ------
-    VaryError, InputError
+    InputError
         If the variants cannot be made so; before anything runs.
 
     Examples
@@ -295,7 +295,7 @@ def sweep_to(
 
     Raises
     ------
-    InputError, InputError
+    InputError
         If the file is of no known format or a folder, or there are rows of another sweep.
     """
     out, form = Path(out), format_of(out)

@@ -137,8 +137,9 @@ def run(
     def recording() -> Recording:
         return recorder.finish(engine="exact", steps=rounds, seconds=perf_counter() - begin)
 
-    world = World.of(machine)
-    size = _block(len(world.obstacles.surface))
+    world = World(machine)
+    # What particles do does not depend on how many run together.
+    size = max(FEWEST, min(MOST, CELLS // max(1, len(world.obstacles.surface))))
     # Roots that do not exist come out as inf or NaN, and are looked for as such.
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for first in range(0, machine.count, size):
@@ -153,11 +154,6 @@ def run(
             rounds = max(rounds, s.rounds)
             s.hand_over(recorder)
     return recording()
-
-
-def _block(obstacles: int) -> int:
-    """Return how many particles run together; what they do does not depend on it."""
-    return max(FEWEST, min(MOST, CELLS // max(1, obstacles)))
 
 
 def _to_the_end(s: State, progress: Progress | None) -> None:

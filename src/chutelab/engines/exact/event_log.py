@@ -130,25 +130,14 @@ class EventLog:
 
     def _tracks(self, knots: list[tuple[Ints, Floats]]) -> tuple[Floats, Ints]:
         """Return knots, particle by particle, (K, 9), and how many each has, (count,)."""
-        each, count = len(knots), self.count
-        if count == 1:
-            rows = np.concatenate([state for _, state in knots], axis=1).T.copy()
-            return rows, np.array([len(rows)])
-        if not self._old_knots and all(len(index) == count for index, _ in knots):
-            # Everybody in every chunk.
-            rows = np.empty((count, each, STATE))
-            for n, (_, state) in enumerate(knots):
-                rows[:, n] = state.T
-            return rows.reshape(-1, STATE), np.full(count, each)
         owner = _joined(knots, 0)
-        order = _by_particle(owner)
-        place = np.empty_like(order)
-        place[order] = np.arange(len(order))
+        place = np.empty(len(owner), dtype=np.int64)
+        place[_by_particle(owner)] = np.arange(len(owner))
         rows, begin = np.empty((len(owner), STATE)), 0
         for index, state in knots:
             rows[place[begin : begin + len(index)]] = state.T
             begin += len(index)
-        return rows, np.bincount(owner, minlength=count)
+        return rows, np.bincount(owner, minlength=self.count)
 
 
 def _joined(chunks: Sequence[tuple[Any, ...]], part: int) -> NDArray[Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from sys import float_info
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,27 +22,19 @@ from chutelab.util.arrays import Bools, Floats, Ints, Numbers
 
 @dataclass(eq=False)
 class World:
-    """What all blocks share.
-
-    Attributes
-    ----------
-    machine : Machine
-        What is run.
-    origin : tuple of float
-        World point from which the engine counts positions, m.
-    obstacles : Obstacles
-        Its surfaces, from there.
-    """
+    """A machine as all blocks share it."""
 
     machine: Machine
-    origin: tuple[float, float]
-    obstacles: Obstacles
 
-    @classmethod
-    def of(cls, machine: Machine) -> Self:
-        """Resolve a machine."""
-        place = origin(machine)
-        return cls(machine, place, obstacles(machine, place))
+    @cached_property
+    def origin(self) -> tuple[float, float]:
+        """World point from which the engine counts positions, m."""
+        return origin(self.machine)
+
+    @cached_property
+    def obstacles(self) -> Obstacles:
+        """Its surfaces, from there."""
+        return obstacles(self.machine, self.origin)
 
     @cached_property
     def exit_box(self) -> tuple[Floats, Floats, Floats, Floats]:

@@ -61,18 +61,13 @@ def usual(recording, slow, layout, moments):
             bars.append({n: Rectangle((x, 0), 0.8, 0, color=c) for n, c in style.ENERGY.items()})
             for bar in bars[-1].values():
                 stage.bars.ax.add_patch(bar)
-        labels = [stage.clock, *stage.bars.values.values()]
-        sizes = [style.NORMAL] + [style.SMALL] * (len(labels) - 1)
-        texts = [
-            figure.text(
-                label.right / figure.bbox.width,
-                1.0 - (label.top + label.lettering.ascent) / high,
-                "",
-                ha="right",
-                fontsize=size,
-            )
-            for label, size in zip(labels, sizes, strict=True)
-        ]
+        texts = []
+        for one in stage.writings:
+            across, down = one.place
+            align = {"ha": "right"} if one.anchor == "rs" else {"va": "center"}
+            size = one.font.size * 72.0 / figure.dpi
+            place = across / figure.bbox.width, 1.0 - down / high
+            texts.append(figure.text(*place, "", fontsize=size, **align))
 
         def update(index):
             stage.show(index)
@@ -82,8 +77,8 @@ def usual(recording, slow, layout, moments):
                     side[name].set_y(base)
                     side[name].set_height(height)
                     base += height
-            for text, label in zip(texts, labels, strict=True):
-                text.set_text(label.text)
+            for text, one in zip(texts, stage.writings, strict=True):
+                text.set_text(one.text)
             return []
 
         animation = FuncAnimation(figure, update, init_func=list, frames=len(moments))

@@ -17,25 +17,23 @@ from dataclasses import dataclass
 from errno import ENOTDIR
 from html import escape
 from importlib.resources import files
+from io import BytesIO
 from pathlib import Path
 from string import Template
 from typing import Final, Self
 
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
+from PIL import Image, UnidentifiedImageError
 
 from chutelab.classroom.lessons.reading import Lesson, LessonError, read, scene_of
 from chutelab.engines.simulation import simulate
 from chutelab.scene import Fault, Scene, to_dict
-from chutelab.util.files import whole
 from chutelab.util.versions import own_version, version_of
 
 HEAD: Final = "chutelab lesson"
 TRAILER: Final = b"\x3b"
 """Last byte of every GIF."""
-
-_COMMENT: Final = b"\x21\xfe"
-"""Begin of a comment extension; sub-blocks of at most 255 bytes follow, then an empty one."""
 
 _FORM: Final = re.compile(rf"{HEAD}; inputs ([0-9a-f]{{32}}); (.+)")
 
@@ -55,33 +53,20 @@ class Stamp:
     inputs: str
     versions: str
 
-    @property
-    def block(self) -> bytes:
-        """The comment extension that holds it."""
-        text = f"{HEAD}; inputs {self.inputs}; {self.versions}".encode("ascii", "replace")[:255]
-        return _COMMENT + bytes([len(text)]) + text + b"\0"
-
-    def on(self, gif: bytes) -> bytes:
-        """Return a GIF with the stamp as its last block.
-
-        Raises
-        ------
-        ValueError
-            If the bytes are no GIF.
-        """
-        if not gif.startswith(b"GIF8") or not gif.endswith(TRAILER):
-            raise ValueError("only a GIF can be stamped")
-        return gif[:-1] + self.block + TRAILER
+    def __str__(self) -> str:
+        """Return it as the comment of a GIF."""
+        return f"{HEAD}; inputs {self.inputs}; {self.versions}"
 
     @classmethod
     def of(cls, gif: bytes) -> Self | None:
-        """Return the stamp that ends a GIF; None if there is none, or something else there."""
-        begin = gif.rfind(_COMMENT, max(0, len(gif) - 300))
-        if begin < 0 or gif[-2:] != b"\0" + TRAILER:
+        """Return the stamp of a GIF; None if there is none, or the file is not whole."""
+        try:
+            with Image.open(BytesIO(gif)) as picture:
+                comment = picture.info.get("comment", b"")
+        except UnidentifiedImageError:
             return None
-        text = gif[begin + 3 : -2].decode("ascii", "replace")
-        match = _FORM.fullmatch(text)
-        return cls(match[1], match[2]) if match else None
+        match = _FORM.fullmatch(comment.decode("ascii", "replace"))
+        return cls(match[1], match[2]) if match and gif.endswith(TRAILER) else None
 
 
 PICTURE: Final = "lesson.gif"
@@ -136,17 +121,16 @@ def build(
 
     settings = lesson.picture
     path.parent.mkdir(parents=True, exist_ok=True)
-    with whole(path) as unfinished:
-        animate(
-            simulate(scene, progress=progress),
-            unfinished,
-            fps=settings.fps,
-            width=settings.width,
-            height=settings.height,
-            slow=settings.slow,
-            question=lesson.question,
-        )
-        unfinished.write_bytes(wanted.on(unfinished.read_bytes()))
+    animate(
+        simulate(scene, progress=progress),
+        path,
+        fps=settings.fps,
+        width=settings.width,
+        height=settings.height,
+        slow=settings.slow,
+        question=lesson.question,
+        comment=str(wanted),
+    )
     return Built(path, path.stat().st_size, made=True)
 
 

@@ -9,11 +9,13 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.font_manager import FontProperties, findfont
 from matplotlib.lines import Line2D
-from matplotlib.patches import Polygon, Rectangle
+from matplotlib.patches import Rectangle
+from PIL import ImageDraw, ImageFont
 
 from chutelab.machine import Machine
-from chutelab.pictures.animation.palette import Label, Lettering, Pixels, tint
+from chutelab.pictures.colours import tint
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.scenery import round_times, strobe_step, subset, track_times
 from chutelab.results import Recording
@@ -22,78 +24,11 @@ from chutelab.util.arrays import Floats
 LONGEST = 0.10
 """Share of the picture's width that the arrow of the highest speed is long."""
 
-SHAFT, HEAD = 1.5, 7.0
+SHAFT, HEAD = 1.3, 6.0
 """pt; width of an arrow's shaft, and length of its head."""
-
-COMPONENT = 0.7
-"""Share of that for the arrow of a component."""
 
 SEEN = 0.75
 """Heads that a component must be long to be drawn, beside an arrow that it hardly differs from."""
-
-
-class Arrows:
-    """Three arrows that start at one point; the velocity lies over its components.
-
-    Parameters
-    ----------
-    ax : Axes
-        With its final limits, at equal scales.
-    scale : float
-        m that an arrow is long for 1 m/s; 0: none are drawn.
-    """
-
-    def __init__(self, ax: Axes, scale: float) -> None:
-        self.scale = scale
-        self._point = float(np.ptp(ax.get_xlim())) / ax.get_window_extent().width
-        self._point *= ax.figure.dpi / 72.0
-        colours = {**style.VELOCITY, "v": style.INK}
-        self.arrows = {
-            name: Polygon(np.zeros((1, 2)), facecolor=colour, linewidth=0.0, animated=True)
-            for name, colour in colours.items()
-        }
-        for arrow in self.arrows.values():
-            ax.add_patch(arrow)
-
-    @property
-    def artists(self) -> list[Artist]:
-        """What moves, from back to front."""
-        return [arrow for arrow in self.arrows.values() if self.scale and arrow.get_visible()]
-
-    def show(self, position: Floats, velocity: Floats) -> None:
-        """Let the arrows start at a position, m, and show a velocity, m/s; none if it is NaN."""
-        along = self.scale * velocity
-        parts = {"vx": along * (1.0, 0.0), "vy": along * (0.0, 1.0), "v": along}
-        least = SEEN * COMPONENT * HEAD * self._point
-        # A component is drawn where there are two of them.
-        two = bool((np.abs(along) > least).all())
-        for name, part in parts.items():
-            self.arrows[name].set_visible(bool(np.hypot(*part) > 0.0) and (two or name == "v"))
-            if self.arrows[name].get_visible():
-                width = self._point * (1.0 if name == "v" else COMPONENT)
-                self.arrows[name].set_xy(position + outline(part, SHAFT * width, HEAD * width))
-
-    def legend(self, ax: Axes) -> list[Line2D]:
-        """Return a handle for a legend; none without arrows."""
-        if not self.scale:
-            return []
-        return ax.plot([], [], color=style.INK, linewidth=2.0, label="velocity")
-
-
-def outline(along: Floats, shaft: float, head: float) -> Floats:
-    """Return the corners (7, 2) of an arrow from the origin, its head no longer than itself.
-
-    >>> outline(np.array([4.0, 0.0]), 1.0, 2.0).tolist()[:4]
-    [[0.0, 0.5], [2.0, 0.5], [2.0, 0.8], [4.0, 0.0]]
-    """
-    length = float(np.hypot(*along))
-    head = min(head, length)
-    neck, half = length - head, 0.4 * head
-    x = np.array([0.0, neck, neck, length, neck, neck, 0.0])
-    y = np.array([0.5 * shaft, 0.5 * shaft, half, 0.0, -half, -0.5 * shaft, -0.5 * shaft])
-    tangent = along / length
-    return np.asarray(x[:, None] * tangent + y[:, None] * np.array([-tangent[1], tangent[0]]))
-
 
 DRAWN = 300
 """Particles that are drawn at most, particle 0 included."""
@@ -150,7 +85,25 @@ class Nominal:
         self.reach = trail
         (self.trail,) = ax.plot([], [], color=style.TRACK, linewidth=2.0, animated=True)
         self.strobe = _rings(ax, animated=True)
-        self.arrows = Arrows(ax, arrow)
+        self.arrow = arrow
+        # In m/s, `arrow` m long for each: two components and the whole, over them. Heads of short
+        # arrows shrink with them.
+        self.arrows = ax.quiver(
+            *np.zeros((4, 3)),
+            color=[*style.VELOCITY.values(), style.INK],
+            angles="xy",
+            scale_units="xy",
+            scale=1.0 / (arrow or 1.0),
+            units="dots",
+            width=SHAFT * ax.figure.dpi / 72.0,
+            minlength=0.0,
+            headwidth=0.8 * HEAD / SHAFT,
+            headlength=HEAD / SHAFT,
+            headaxislength=HEAD / SHAFT,
+            zorder=2.0,
+            animated=True,
+        )
+        self.least = SEEN * HEAD / _points(ax, 1.0)
         self.dot = _dots(ax, recording.particle.radius, style.STRIKE)
         self._strobes = strobe
 
@@ -159,14 +112,19 @@ class Nominal:
         """What moves, from back to front."""
         artists: list[Artist] = [self.trail] if self.reach else []
         artists += [self.strobe] if self._strobes else []
-        return [*artists, *self.arrows.artists, self.dot]
+        artists += [self.arrows] if self.arrow else []
+        return [*artists, self.dot]
 
     def show(self, index: int) -> None:
         """Show the particle at a time index, nothing of it before release and after the end."""
         t, now = self.times[index], self.position[index]
         self.dot.set_data(*now[:, None])
         self.strobe.set_data(*self.stops[self.round <= t].T)
-        self.arrows.show(now, self.velocity[index])
+        vx, vy = self.velocity[index]
+        # Components are drawn where there are two that can be told from the whole.
+        two = self.arrow * min(abs(vx), abs(vy)) > self.least
+        self.arrows.set_offsets([now] * 3)
+        self.arrows.set_UVC([vx * two, 0.0, vx], [0.0, vy * two, vy])
         here = slice(*np.searchsorted(self.passed, [t - self.reach, t], side="right"))
         self.trail.set_data(*self.path[here].T)
 
@@ -177,7 +135,9 @@ class Nominal:
         if self._strobes:
             handles.append(_rings(ax, animated=False))
             handles[-1].set_label(f"every {self.step:g} s")
-        return [*handles, *self.arrows.legend(ax)]
+        if self.arrow:
+            handles += ax.plot([], [], color=style.INK, linewidth=2.0, label="velocity")
+        return handles
 
 
 class Crowd:
@@ -315,7 +275,38 @@ BASE = 0.78
 """Share of a row above the line that its text stands on."""
 
 
-def stacks(books: dict[str, float]) -> tuple[dict[str, float], dict[str, float]]:
+class Writing:
+    """A text that changes from frame to frame, by Pillow.
+
+    Matplotlib lays a changed text out anew, which for the eight of a frame takes 3.3 ms, ten times
+    as long as Pillow.
+
+    Parameters
+    ----------
+    size, dpi : float
+        pt, and pixels to the inch.
+    x, y : float
+        Its place, pixels from the left and the top.
+    anchor : str
+        What of it is there, as Pillow names it, such as "rs": the right end of the base line.
+    """
+
+    def __init__(self, size: float, dpi: float, x: float, y: float, anchor: str) -> None:
+        path = findfont(FontProperties())
+        self.font = ImageFont.truetype(
+            path, size * dpi / 72.0, layout_engine=ImageFont.Layout.BASIC
+        )
+        self.place, self.anchor = (round(x), round(y)), anchor
+        self.text = ""
+
+    def paint(self, draw: ImageDraw.ImageDraw) -> None:
+        """Write it onto a picture."""
+        draw.text(
+            self.place, self.text, style.INK, self.font, self.anchor, spacing=0.35 * self.font.size
+        )
+
+
+def stacks(books: dict[str, Floats]) -> tuple[dict[str, Floats], dict[str, Floats]]:
     """Split a ledger into what was put in and where it is, all values positive.
 
     An entry of the other sign changes sides: work that a braking belt takes out belongs to where
@@ -323,14 +314,12 @@ def stacks(books: dict[str, float]) -> tuple[dict[str, float], dict[str, float]]
 
     Parameters
     ----------
-    books : dict of float
-        J, at one time, as `chutelab.pictures.plots.scenery.energies` names them.
+    books : dict of ndarray, shape (T,)
+        J, as `chutelab.pictures.plots.scenery.energies` names them.
     """
-    put_in, is_now = {}, {}
-    for name, sign in SIGNS.items():
-        value = sign * books[name]
-        put_in[name], is_now[name] = max(value, 0.0), max(-value, 0.0)
-    return put_in, is_now
+    signed = {name: sign * books[name] for name, sign in SIGNS.items()}
+    put_in = {name: np.maximum(values, 0.0) for name, values in signed.items()}
+    return put_in, {name: np.maximum(-values, 0.0) for name, values in signed.items()}
 
 
 class Bars:
@@ -346,62 +335,46 @@ class Bars:
 
     def __init__(self, ax: Axes, table: Axes, books: dict[str, Floats]) -> None:
         self.books = books
-        heights = [sum(stacks(self._at(i))[0].values()) for i in range(len(books["start"]))]
-        self.factor, self.unit = style.scaled(max(heights), "J")
+        self.stacks = stacks(books)
+        highest = float(np.max(sum(self.stacks[0].values())))
+        self.factor, self.unit = style.scaled(highest, "J")
         self.ax = style.dress(ax, title=f"Energy, {self.unit}")
         ax.grid(visible=False, axis="x")
         ax.set_xlim(-0.6, 1.6)
-        ax.set_ylim(0.0, 1.06 * self.factor * max(heights) or 1.0)
+        ax.set_ylim(0.0, 1.06 * self.factor * highest or 1.0)
         ax.set_xticks([0, 1], ["put in", "is now"], fontsize=style.SMALL)
         ax.tick_params(axis="x", length=0)
-        self.heights: tuple[dict[str, float], dict[str, float]] = ({}, {})
         table.set_axis_off()
         table.set_xlim(0.0, 1.0)
         table.set_ylim(len(SIGNS), 0.0)
-        lettering = Lettering(style.SMALL, ax.figure.dpi)
-        high = ax.figure.bbox.height
+        dpi, high = ax.figure.dpi, ax.figure.bbox.height
         self.values = {}
         for row, name in enumerate(SIGNS):
             table.add_patch(Rectangle((0.0, row + 0.2), 0.05, 0.6, color=style.ENERGY[name]))
             table.text(0.08, row + BASE, style.ENERGY_LABEL[name], fontsize=style.SMALL)
             right, up = table.transData.transform((1.0, row + BASE))
-            self.values[name] = Label(lettering, right, high - up)
+            self.values[name] = Writing(style.SMALL, dpi, right, high - up, "rs")
 
     def show(self, index: int) -> None:
         """Set the bars and figures to the books at a time index."""
-        now = self._at(index)
-        put_in, is_now = (
-            {name: self.factor * value for name, value in side.items()} for side in stacks(now)
-        )
-        self.heights = put_in, is_now
-        for name, label in self.values.items():
-            label.text = (
-                style.scientific(now[name], "J")
-                if name == "residual"
-                else f"{round(self.factor * now[name], 1) + 0.0:.1f}".replace("-", "−")
-            )
+        self.heights = [
+            {name: self.factor * float(values[index]) for name, values in side.items()}
+            for side in self.stacks
+        ]
+        for name, writing in self.values.items():
+            value = float(self.books[name][index])
+            shown = f"{round(self.factor * value, 1) + 0.0:.1f}".replace("-", "−")
+            writing.text = style.scientific(value, "J") if name == "residual" else shown
 
-    def paint(self, pixels: Pixels) -> None:
-        """Paint bars and figures onto a picture, (height, width), in whole pixels."""
+    def paint(self, draw: ImageDraw.ImageDraw, high: int) -> None:
+        """Paint the bars onto a picture that is so many pixels high, in whole pixels."""
         for x, heights in zip((0.0, 1.0), self.heights, strict=True):
-            edges = np.cumsum([0.0, *heights.values()])
-            across, up = self.ax.transData.transform(
-                np.column_stack([np.resize([x - 0.4, x + 0.4], len(edges)), edges])
-            ).T
-            columns = slice(round(across[0]), round(across[1]))
-            rows = np.rint(len(pixels) - up).astype(int)
-            for name, top, bottom in zip(heights, rows[1:], rows, strict=False):
-                pixels[top:bottom, columns] = _COLOURS[name]
-        for label in self.values.values():
-            label.paint(pixels)
-
-    def _at(self, index: int) -> dict[str, float]:
-        return {name: float(self.books[name][index]) for name in SIGNS}
-
-
-def _pixel(colour: str) -> np.uint32:
-    """Return an opaque pixel, red in the lowest byte."""
-    return np.uint32(int.from_bytes(bytes.fromhex(colour.removeprefix("#")) + b"\xff", "little"))
-
-
-_COLOURS = {name: _pixel(colour) for name, colour in style.ENERGY.items()}
+            base = 0.0
+            for name, height in heights.items():
+                corners = self.ax.transData.transform([(x - 0.4, base), (x + 0.4, base + height)])
+                (left, bottom), (right, top) = np.rint(corners).astype(int).tolist()
+                base += height
+                if top > bottom:
+                    # Pillow paints the last pixel too.
+                    box = (left, high - top, right - 1, high - bottom - 1)
+                    draw.rectangle(box, fill=style.ENERGY[name])

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from textwrap import shorten
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
-from numpy.typing import NDArray
+from PIL import Image, ImageDraw
 
 from chutelab.machine import Machine
-from chutelab.pictures.animation.actors import LONGEST, Bars, Crowd, Drives, Nominal
+from chutelab.pictures.animation.actors import LONGEST, Bars, Crowd, Drives, Nominal, Writing
 from chutelab.pictures.animation.moments import Moment, span
-from chutelab.pictures.animation.palette import Label, Lettering, Pixels, canvas_of, pixels_of
 from chutelab.pictures.plots import Window, analytic_of, draw_analytic, draw_scene, style, window_of
 from chutelab.pictures.plots.scenery import around, energies, round_step, subset, track_times
 from chutelab.results import Recording
@@ -167,8 +167,11 @@ LINE = 0.065
 RIGHT = 0.99
 """Where text ends, as a share of the picture's width."""
 
-CAPTION = 0.125
-"""Share of the picture's height, at the bottom, that the caption has to itself."""
+CAPTION = 0.055
+"""Height of the caption's middle, as a share of the picture's."""
+
+GAP = 0.015
+"""Share of the picture's width between the clock and how it runs."""
 
 
 class Stage:
@@ -205,7 +208,7 @@ class Stage:
         # A hundredth of a pixel more: the canvas rounds down.
         inches = (layout.width + 0.01) / layout.dpi, (layout.height + 0.01) / layout.dpi
         self.figure = Figure(figsize=inches, dpi=layout.dpi)
-        self.canvas = canvas_of(self.figure)
+        self.canvas = cast(Any, FigureCanvasAgg(self.figure))  # its methods are not annotated
         self.view = self.figure.add_axes(layout.view)
         shows = layout.shows
         _draw_background(self.view, machine, layout.window)
@@ -228,9 +231,7 @@ class Stage:
         self._add_legend()
         self._add_text(layout, pace_words(slow))
         self.canvas.draw()
-        self.pixels = pixels_of(self.canvas)
-        self._background = self.pixels.copy()
-        self._captions: dict[str, Pixels] = {}
+        self._background = self.canvas.copy_from_bbox(self.figure.bbox)
 
     def show(self, index: int) -> None:
         """Move everything to one moment."""
@@ -239,37 +240,33 @@ class Stage:
         self.crowd.show(index)
         self.nominal.show(index)
         self.clock.text = f"t = {moment.t:.3f} s"
-        self.words.set_text(moment.words)
+        self.words.text = moment.words
         if self.bars is not None:
             self.bars.show(index)
 
-    def paint(self, index: int) -> Pixels:
-        """Return the picture of one moment, (height, width), to be read before the next."""
+    def frame(self, index: int) -> Image.Image:
+        """Return the picture of one moment, RGB."""
         self.show(index)
-        self.pixels[:] = self._background
+        self.canvas.restore_region(self._background)
         renderer = self.canvas.get_renderer()
         for actor in (self.drives, self.crowd, self.nominal):
             for artist in actor.artists:
                 artist.draw(renderer)
+        size = self.canvas.get_width_height()
+        shown = Image.frombuffer("RGBA", size, self.canvas.buffer_rgba(), "raw", "RGBA", 0, 1)
+        picture = shown.convert("RGB")
+        draw = ImageDraw.Draw(picture)
         if self.bars is not None:
-            self.bars.paint(self.pixels)
-        self.clock.paint(self.pixels)
-        self._write_words(renderer)
-        return self.pixels
+            self.bars.paint(draw, size[1])
+        for writing in self.writings:
+            writing.paint(draw)
+        return picture
 
-    def frame(self, index: int) -> NDArray[np.uint8]:
-        """Return the picture of one moment, (height, width, 3)."""
-        height, width = self.pixels.shape
-        return self.paint(index).view(np.uint8).reshape(height, width, 4)[..., :3].copy()
-
-    def _write_words(self, renderer: Any) -> None:
-        """Draw the caption, or paste it: it stays the same for many frames."""
-        said = self.words.get_text()
-        below = self.pixels[self._caption_top :]
-        if said not in self._captions:
-            self.words.draw(renderer)
-            self._captions[said] = below.copy()
-        below[:] = self._captions[said]
+    @property
+    def writings(self) -> list[Writing]:
+        """Texts that change, with what they say now."""
+        figures = [] if self.bars is None else list(self.bars.values.values())
+        return [*figures, self.clock, self.words]
 
     def _add_legend(self) -> None:
         """Name what is drawn above the scene; the components of the velocity by their colours."""
@@ -292,7 +289,7 @@ class Stage:
             columnspacing=0.8,
             handletextpad=0.3,
         )
-        if self.nominal.arrows.scale:
+        if self.nominal.arrow:
             for place, (name, colour) in enumerate(style.VELOCITY.items()):
                 self.view.annotate(
                     f"$v_{name[1]}$",
@@ -317,12 +314,10 @@ class Stage:
         # Near what moves: the rectangle around all of it is what a frame of the file costs.
         above = layout.view[1] + layout.view[3] + 0.02
         slowed = text(RIGHT, above, pace, fontsize=style.NORMAL, ha="right")
-        lettering = Lettering(style.NORMAL, layout.dpi)
-        right = slowed.get_window_extent().x0 - 2.5 * lettering.widths[" "]
-        self.clock = Label(lettering, right, layout.height * (1.0 - above))
-        self.words = text(0.02, 0.055, "", fontsize=style.NORMAL, va="center", linespacing=1.25)
-        self.words.set_animated(True)
-        self._caption_top = round(layout.height * (1.0 - CAPTION))
+        right = slowed.get_window_extent().x0 - GAP * layout.width
+        self.clock = Writing(style.NORMAL, layout.dpi, right, layout.height * (1.0 - above), "rs")
+        place = 0.02 * layout.width, (1.0 - CAPTION) * layout.height
+        self.words = Writing(style.NORMAL, layout.dpi, *place, "lm")
 
 
 def _shorten(text: Text, right: float) -> None:

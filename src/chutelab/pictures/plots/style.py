@@ -21,7 +21,6 @@ from chutelab.util.files import whole
 
 INK = "#000000"
 MUTED = "#595959"
-GRID = "#E3E3E3"
 STEEL = colours.GREY
 STEEL_LIGHT = "#E6E6E6"
 
@@ -92,7 +91,7 @@ def dress(ax: Axes, x: str = "", y: str = "", title: str = "") -> Axes:
     ax.set_ylabel(y, fontsize=NORMAL)
     ax.set_title(title, fontsize=NORMAL, loc="left", fontweight="bold")
     ax.tick_params(labelsize=SMALL, color=MUTED)
-    ax.grid(visible=True, color=GRID, linewidth=0.6)
+    ax.grid(visible=True, color=STEEL_LIGHT, linewidth=0.6)
     ax.set_axisbelow(True)
     for side in ("top", "right"):
         ax.spines[side].set_visible(False)

@@ -178,9 +178,9 @@ class Family:
         faults, self.left = together(block, self._read)
         self.faults = [one_line(faults.get(row, "")) for row in range(len(block.values))]
 
-    def _read(self, recording: Recording, family: Scene, which: Ints) -> None:
+    def _read(self, recording: Recording, which: Ints) -> None:
         for column, wanted in enumerate(self.quantities):
-            self.values[which, column] = _column(recording, family, wanted)
+            self.values[which, column] = _column(recording, recording.scene, wanted)
         for row, course in zip(which.tolist(), courses_of(recording), strict=True):
             self.courses[row] = course
 

@@ -8,18 +8,16 @@ from __future__ import annotations
 
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from chutelab.scene import Scene
 from chutelab.theory.obstacles import Flight, Segments, corner_times, first_in_flight, first_on_arc
 from chutelab.theory.results import Reason, Transfer, cut, unanswered
 from chutelab.theory.transfer import Rebound, transfer
 from chutelab.util.arrays import Floats
-
-if TYPE_CHECKING:
-    from chutelab.scene import Incoming, Plate, Scene
 
 LEAST_CLEARANCE = 0.05
 """m of the default plate's lower end above the outgoing belt, for particles below 17 mm."""
@@ -39,8 +37,8 @@ class Course:
         assert scene.plate is not None
         self.scene = scene
         self.rebound = rebound
-        self.belt: Incoming = scene.incoming
-        self.plate: Plate = scene.plate
+        self.belt = scene.incoming
+        self.plate = scene.plate
         self.radius = scene.particle.radius
         self.ride_radius = self.belt.pulley_radius + self.radius
         self.angle = np.radians(self.plate.angle_deg)

@@ -8,12 +8,11 @@ import numpy as np
 from rich.console import RenderableType
 from rich.text import Text
 
-from chutelab.machine.releases import Squeeze, squeeze
+from chutelab.machine.releases import Squeeze
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
-from chutelab.results.quantities import Waits, waits
-from chutelab.results.summary import rolling
+from chutelab.results.quantities import Rolling, Waits, rolling, squeezed, waits
 from chutelab.studies.accuracy import Accuracy, Wanted
 from chutelab.util.tables import Sheet, number, wrapped
 
@@ -28,14 +27,12 @@ def report(recording: Recording, accuracy: Accuracy | None = None) -> list[Rende
     if compared.notes and (way := _way(recording)).rows:
         parts.append(way)
     parts.append(ledger(recording))
-    if (late := waits(recording.scene, recording)) is not None:
+    if (late := waits(recording)) is not None:
         parts.append(Text("\n" + "\n".join(wrapped(_waited(late)))))
-    released = recording.select(Kind.RELEASE)
-    pressed = squeeze(recording.scene, released["t"], released["position"])
-    if pressed is not None:
+    if (pressed := squeezed(recording)) is not None:
         parts.append(Text("\n" + "\n".join(wrapped(_squeezed(pressed)))))
     if (left := rolling(recording)) is not None:
-        parts.append(Text("\n" + "\n".join(wrapped(_rolling(**left)))))
+        parts.append(Text("\n" + "\n".join(wrapped(_rolling(left)))))
     return parts if accuracy is None else [*parts, _reached(accuracy)]
 
 
@@ -93,13 +90,14 @@ def _squeezed(pressed: Squeeze) -> str:
     )
 
 
-def _rolling(particles: int, belt_work: float, belt_work_carried: float) -> str:
+def _rolling(left: Rolling) -> str:
     """Say that free disks roll on the outgoing belt, and what carrying them would have cost."""
-    disks = "1 disk rolls" if particles == 1 else f"{particles} disks roll"
+    disks = "1 disk rolls" if left.particles == 1 else f"{left.particles} disks roll"
     return (
         f"{disks} on the outgoing belt: nothing slips, and nothing is carried along. The belt has"
-        f" paid {number(belt_work)} J, loads that are carried take {number(belt_work_carried)} J (a"
-        " disk that arrives without turning takes a third of a carried load's work)."
+        f" paid {number(left.belt_work)} J, loads that are carried take"
+        f" {number(left.belt_work_carried)} J (a disk that arrives"
+        " without turning takes a third of a carried load's work)."
     )
 
 

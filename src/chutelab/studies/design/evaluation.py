@@ -9,16 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from math import isfinite
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chutelab.engines.simulation import simulate
-from chutelab.results import ENTRIES, REASONS, Kind, Recording
-from chutelab.results.comparison import from_events, never
+from chutelab.results import ENTRIES, REASONS, Recording
+from chutelab.results.quantities import each
 from chutelab.results.recorder import StalledError
 from chutelab.scene import Scene, SceneError, rules, to_dict
 from chutelab.scene.overrides import value_at
@@ -191,50 +190,10 @@ def _column(recording: Recording, family: Scene, quantity: Quantity) -> Any:
         return value_at(family, quantity.name)
     if not isinstance(quantity, Measured):
         return quantity.value
-    found = _measured(recording, family, quantity.key)
+    found = each(recording, quantity.key)
     if quantity.ending == "settled":
         found = np.where(recording.ended == REASONS.index("settled"), found, np.nan)
     return found * family.stream.rate if quantity.name == "power" else found
-
-
-def _measured(recording: Recording, family: Scene, name: str) -> Any:
-    match name.split("."):
-        case ["ledger", "by_surface", surface, entry]:
-            table = recording.by_surface.reshape(recording.count, -1, len(ENTRIES))
-            if surface not in recording.surfaces:
-                return np.zeros(recording.count)
-            return table[:, recording.surface_index(surface), ENTRIES.index(entry)]
-        case ["ledger", entry]:
-            return recording.ends()[1]["entries"][:, ENTRIES.index(entry)]
-        case ["separation" | "impact" | "landing" as event, *column]:
-            return _of_event(recording, event, column)
-    first = [_first(recording, event) for event in ("separation", "impact", "landing")]
-    # Without the one before, the next says nothing in the paper's frame.
-    for before, after in pairwise(first):
-        after[np.isnan(before["t"])] = never(1)
-    values = from_events(family, *first)
-    return np.degrees(values[name.removesuffix("_deg")]) if name.endswith("_deg") else values[name]
-
-
-def _of_event(recording: Recording, event: str, column: list[str]) -> Floats:
-    surface = column.pop(0) if len(column) > 1 else None
-    first = _first(recording, event, surface)
-    key = column[0]
-    if key in ("x", "y"):
-        return np.asarray(first["position"][:, "xy".index(key)])
-    if key == "t":
-        return np.asarray(first["t"])
-    when = "after" if key.endswith("_after") else "before"
-    return np.asarray(first[f"velocity_{when}"][:, "xy".index(key[1])])
-
-
-def _first(recording: Recording, event: str, surface: str | None = None) -> NDArray[Any]:
-    """Return the first such event of each particle, NaN where there is none."""
-    kind = {"separation": Kind.SEPARATION, "impact": Kind.IMPACT, "landing": Kind.LANDING}[event]
-    found = recording.first(recording.select(kind, surface=surface or rules.NEEDED[event]))
-    every = never(recording.count)
-    every[found["particle"]] = found
-    return every
 
 
 MANY: Final = 8

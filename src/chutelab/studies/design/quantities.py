@@ -14,7 +14,6 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from math import nan
 from typing import Any, Final, Literal, Protocol, TypeVar
 
@@ -27,6 +26,7 @@ from chutelab.scene.overrides import value_at
 from chutelab.scene.units import read_size
 from chutelab.scene.variants import Vary, VaryError, quantity
 from chutelab.util.errors import InputError
+from chutelab.util.versions import library
 
 
 class Keyed(Protocol):
@@ -76,14 +76,10 @@ def scipy(name: str) -> Any:
 
     Raises
     ------
-    ImportError
+    MissingLibraryError
         Without SciPy; says what to install.
     """
-    try:
-        return import_module(f"scipy.{name}")
-    except ImportError as error:
-        text = 'SciPy is needed: pip install "chutelab[design]"'
-        raise ImportError(text) from error
+    return library(f"scipy.{name}", "SciPy is needed", "design")
 
 
 MANY: Final = 6
@@ -183,7 +179,7 @@ class Measured:
             REASONS[reason] != "settled" for reason in recording.ended
         ):
             return nan
-        value = measure(recording, self.key, scene)
+        value = measure(recording, self.key)
         return value * scene.stream.rate / recording.count if self.name == "power" else value
 
 

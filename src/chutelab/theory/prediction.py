@@ -8,16 +8,19 @@ from __future__ import annotations
 
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chutelab.scene import Scene
 from chutelab.theory.obstacles import Flight, Segments, corner_times, first_in_flight, first_on_arc
 from chutelab.theory.results import Reason, Transfer, cut, unanswered
 from chutelab.theory.transfer import Rebound, transfer
 from chutelab.util.arrays import Floats
+
+if TYPE_CHECKING:
+    # The paper's tables are there without the model of a scene.
+    from chutelab.scene import Scene
 
 LEAST_CLEARANCE = 0.05
 """m of the default plate's lower end above the outgoing belt, for particles below 17 mm."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -143,14 +142,14 @@ def compare(
 
 
 def _write(found: Residuals, fit: Fit | None, place: Path) -> None:
+    from chutelab.cli.output import write_json
     from chutelab.pictures.plots.measured import measured
     from chutelab.studies.measured.result import as_dict, points_csv
 
     measured(found, fit, path=place / "compare.png")
     (place / "points.csv").write_text(points_csv(found), encoding="utf-8")
     if fit is not None:
-        text = json.dumps(as_dict(found, fit), indent=1, allow_nan=False)
-        (place / "fit.json").write_text(text + "\n", encoding="utf-8")
+        write_json(as_dict(found, fit), place / "fit.json")
 
 
 def _tell(found: Residuals, fit: Fit | None, out: Path | None) -> None:

@@ -6,7 +6,6 @@ out.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -138,14 +137,14 @@ def solve(
 
 
 def _write(found: Solution, place: Path) -> None:
+    from chutelab.cli.output import write_json
     from chutelab.engines.simulation import simulate
     from chutelab.pictures.plots import overlay
     from chutelab.pictures.plots.design import scan
     from chutelab.scene import to_toml
     from chutelab.studies.design.answers import as_dict
 
-    text = json.dumps(as_dict(found), indent=1, allow_nan=False)
-    (place / "solve.json").write_text(text + "\n", encoding="utf-8")
+    write_json(as_dict(found), place / "solve.json")
     if found.scan is not None:
         scan(found, path=place / "scan.png")
     if not (found.solved or found.nearest):

@@ -68,8 +68,9 @@ def first(recording: Recording, event: str, surface: str | None = None) -> NDArr
 def never(count: int) -> NDArray[Any]:
     """Return events (count,) that did not happen: NaN throughout."""
     events = np.zeros(count, dtype=EVENT)
-    for name in ("t", "position", "velocity_before", "velocity_after"):
-        events[name] = nan
+    for name in EVENT.names or ():
+        if EVENT[name].base.kind == "f":
+            events[name] = nan
     return events
 
 

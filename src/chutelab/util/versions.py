@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 import platform
+from collections.abc import Mapping
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -68,6 +69,11 @@ def environment() -> dict[str, str]:
     }
     versions = {package: version_of(package) for package in PACKAGES}
     return found | {package: version for package, version in versions.items() if version}
+
+
+def measured_on(about: Mapping[str, str]) -> str:
+    """Return an `environment` as a line of text."""
+    return f"measured on {', '.join(f'{key} {value}' for key, value in about.items())}"
 
 
 def _processor() -> str:

@@ -163,7 +163,9 @@ def planned(
     if len(varied) > MOST_KEYS:
         raise VaryError(varied[MOST_KEYS].typed, f"at most {MOST_KEYS} keys can be varied")
     about = quantities(scene, varied)
-    _check_whole(varied, about)
+    for vary, one in zip(varied, about, strict=True):
+        if one.whole and not all(value.is_integer() for value in vary.values):
+            raise VaryError(vary.typed, f"{one.path} takes whole numbers only")
     samples = None
     if sample is not None:
         samples = drawn(varied, about, sample, design, seed, MOST_VARIANTS)
@@ -193,9 +195,3 @@ def _varies(varies: Sequence[Vary | str] | Mapping[str, Any], *, ranges: bool) -
         kind(key, tuple((np.asarray(values, dtype=np.float64).ravel() + 0.0).tolist()))
         for key, values in varies.items()
     ]
-
-
-def _check_whole(varies: Sequence[Vary], about: Sequence[Quantity]) -> None:
-    for vary, one in zip(varies, about, strict=True):
-        if one.whole and not all(value.is_integer() for value in vary.values):
-            raise VaryError(vary.typed, f"{one.path} takes whole numbers only")

@@ -166,9 +166,7 @@ def draw_distribution(ax: Axes, found: Uncertainty, row: int) -> Axes:
     )
     ax.axvspan(low, high, color=style.STEEL_LIGHT, zorder=0.5)
     ax.axvline(factor * found.mean[row], color=style.INK, linewidth=1.4, zorder=4.0)
-    ax.set_title(
-        f"95 %: {low:.4g} to {high:.4g}", fontsize=style.SMALL, loc="right", color=style.MUTED
-    )
+    style.note(ax, f"95 %: {low:.4g} to {high:.4g}")
     return ax
 
 

@@ -208,4 +208,4 @@ def _alike(left: Axes, right: Axes) -> None:
         ax.set_xlim(low[0] - margin[0], high[0] + margin[0])
         ax.set_ylim(low[1] - margin[1], high[1] + margin[1])
         if low[1] > 2.0 * margin[1]:
-            ax.set_title("axis not from 0", fontsize=style.SMALL, loc="right", color=style.MUTED)
+            style.note(ax, "axis not from 0")

@@ -98,6 +98,11 @@ def dress(ax: Axes, x: str = "", y: str = "", title: str = "") -> Axes:
     return ax
 
 
+def note(ax: Axes, text: str) -> None:
+    """Write a remark above axes, at the right."""
+    ax.set_title(text, fontsize=SMALL, loc="right", color=MUTED)
+
+
 def legend_above(ax: Axes, columns: int) -> None:
     """Add a legend right above axes, in one line if it fits."""
     ax.legend(
@@ -109,6 +114,13 @@ def legend_above(ax: Axes, columns: int) -> None:
         borderaxespad=0.3,
         handlelength=2.2,
     )
+
+
+DASHED: dict[str, Any] = {"color": ANALYTIC, "lw": 4.0, "ls": (0, (2.2, 1.1))}
+"""How lines known analytically are drawn, under those that are simulated."""
+
+RINGS: dict[str, Any] = {"ls": "none", "marker": "o", "mfc": "white", "mec": TRACK}
+"""How strobe dots are drawn."""
 
 
 def scientific(value: float, unit: str) -> str:

@@ -236,8 +236,7 @@ def _points(ax: Axes, length: float) -> float:
 def _dots(ax: Axes, radius: float, color: str) -> Line2D:
     """Return disks to scale (m), or of `SMALLEST` size."""
     size = max(_points(ax, 2.0 * radius), SMALLEST)
-    look = {"mew": 0.4, "mec": "white", "mfc": color}
-    (dots,) = ax.plot([], [], "o", ms=size, **look, animated=True)
+    (dots,) = ax.plot([], [], "o", color=color, ms=size, mew=0.4, mec="white", animated=True)
     return dots
 
 

@@ -21,7 +21,7 @@ from chutelab.pictures.plots.scenery import (
     track_times,
     window_of,
 )
-from chutelab.pictures.plots.style import DPI, Picture
+from chutelab.pictures.plots.style import Picture
 from chutelab.results import Kind, Recording
 from chutelab.scene.units import write_size
 from chutelab.studies.measured import Fit, Residuals
@@ -54,7 +54,7 @@ def measured(found: Residuals, fit: Fit | None = None, *, path: str | Path | Non
     OSError
         If the file cannot be written.
     """
-    figure = Picture(figsize=SIZE, dpi=DPI)
+    figure = Picture(SIZE)
     lines = 0 if fit is None else min(len(fit.parameters), PARAMETERS)
     top = 0.88 - 0.032 * max(0, lines - 1)
     view = figure.add_subplot(
@@ -95,12 +95,13 @@ def draw_measured(ax: Axes, found: Residuals, before: Recording | None = None) -
     draw_scene(ax, machine, around(np.concatenate([corners, position[shown]])))
     parts, _ = analytic_of(recording, recording.prediction)
     draw_analytic(ax, parts)
-    for run, gid, look in (
-        (before, "before", {"color": style.MUTED, "lw": 1.4, "ls": ":", "label": "before the fit"}),
-        (recording, "track", {"color": style.TRACK, "lw": 1.6, "label": "simulation"}),
+    for run, gid, colour, line, label in (
+        (before, "before", style.MUTED, ":", "before the fit"),
+        (recording, "track", style.TRACK, "-", "simulation"),
     ):
         if run is not None:
-            ax.plot(*nominal(run, track_times(run))[0].T, **look, zorder=5.0, gid=gid)
+            path, _ = nominal(run, track_times(run))
+            ax.plot(*path.T, line, color=colour, lw=1.6, zorder=5.0, gid=gid, label=label)
     for chosen, colour, label in (
         (found.used, style.STRIKE, "measured"),
         (~found.used, style.STEEL, "measured, left out"),
@@ -122,7 +123,7 @@ def draw_residuals(ax: Axes, found: Residuals, axis: int) -> Axes:
     """Draw measured minus simulated x (axis 0) or y (axis 1) over time, with the impacts."""
     used = found.used
     times, values = found.track.t[used], found.values[used, axis]
-    factor, unit = style.scaled(float(np.abs(values).max()), "m")
+    factor, unit = style.scaled(values, "m")
     name, rms = AXES[axis], found.rms[axis]
     style.dress(
         ax,

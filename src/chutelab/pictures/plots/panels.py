@@ -255,8 +255,8 @@ def draw_velocity(
     for axis, (name, label) in enumerate((("vx", "forward"), ("vy", "up"))):
         if parts:
             ax.plot(start + clock, known[:, axis], **style.DASHED, gid=f"analytic {name}")
-        line = {"color": style.VELOCITY[name], "label": f"$v_{name[1]}$, {label}", "gid": name}
-        ax.plot(times, velocity[:, axis], lw=1.6, **line)
+        (line,) = ax.plot(times, velocity[:, axis], color=style.VELOCITY[name], lw=1.6, gid=name)
+        line.set_label(f"$v_{name[1]}$, {label}")
     ax.set_xlim(times[0], _beyond(times))
     ax.legend(fontsize=style.SMALL, loc="best", framealpha=0.85)
     return ax
@@ -280,7 +280,7 @@ def draw_ledger(ax: Axes, recording: Recording, count: int = 240) -> Axes:
     times = np.append(times, _beyond(times))
     books = energies(recording, times)
     supplied = books["start"] + books["belt_work"]
-    factor, unit = style.scaled(float(np.abs(supplied).max()), "J")
+    factor, unit = style.scaled(supplied, "J")
     names = ("kinetic", "potential", "restitution_loss", "friction_loss")
     ax.stackplot(
         times,
@@ -289,8 +289,8 @@ def draw_ledger(ax: Axes, recording: Recording, count: int = 240) -> Axes:
         labels=[style.ENERGY_LABEL[name] for name in names],
         linewidth=0.0,
     )
-    line = {"color": style.INK, "lw": 1.6, "ls": (0, (4, 1.5)), "gid": "supplied"}
-    ax.plot(times, factor * supplied, **line, label="at release + belt work")
+    (line,) = ax.plot(times, factor * supplied, color=style.INK, lw=1.6, gid="supplied")
+    line.set(linestyle=(0, (4, 1.5)), label="at release + belt work")
     residual = style.scientific(float(books["residual"][-1]), "J")
     style.dress(ax, "time, s", f"energy, {unit}", f"Energy ledger: residual {residual}")
     ax.set_xlim(times[0], times[-1])

@@ -62,7 +62,7 @@ def strobe(
     """
     if prediction is None:
         prediction = recording.prediction
-    figure = Picture(figsize=SIZE, dpi=DPI)
+    figure = Picture(SIZE, DPI)
     ax = figure.add_axes((0.095, 0.09, 0.885, 0.77))
     draw_view(ax, recording, analytic_of(recording, prediction)[0])
     _write_times(ax, recording)

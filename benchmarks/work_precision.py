@@ -18,13 +18,13 @@ from rich.text import Text
 
 import workprecision as wp
 from chutelab.checks.workprecision import REPEATS
-from chutelab.cli.benching import duration, environment_line
+from chutelab.cli.benching import duration
 from chutelab.cli.console import progress, show, show_json
 from chutelab.cli.output import destination
 from chutelab.cli.parameters import folder
 from chutelab.util.files import tsv_text
 from chutelab.util.tables import Sheet
-from chutelab.util.versions import environment
+from chutelab.util.versions import environment, measured_on
 from workprecision import picture
 from workprecision.claims import exponent
 
@@ -225,7 +225,10 @@ def main(
             told["claims"] = [asdict(one) for one in said]
         show_json({"format": 1, "environment": about, **told})
         return
-    show(*(size_tables(rows) if scaling else record_tables(rows, said)), environment_line(about))
+    show(
+        *(size_tables(rows) if scaling else record_tables(rows, said)),
+        Text(f"\n{measured_on(about)}"),
+    )
     if out is not None:
         click.echo(f"wrote into {out}: {name}.tsv, {name}.png")
 

@@ -19,6 +19,7 @@ from chutelab.machine import build
 from chutelab.results import REASONS, Kind
 from chutelab.results.ledger import ledger
 from chutelab.scene import SceneError, from_dict
+from references import free_from, surface_depths
 
 KINDS = ("box", "funnel", "belts", "transfer")
 
@@ -245,11 +246,16 @@ def faults(machine, recording):
     return found
 
 
-def step_of(machine):
+def hop_step(machine, longest):
     """Return the longest step, s; a hop g h²/8 is a thousandth of the radius at most."""
     if machine.gravity == 0.0:
-        return machine.dt
-    return min(machine.dt, sqrt(8e-3 * machine.particle.radius / machine.gravity))
+        return longest
+    return min(longest, sqrt(8e-3 * machine.particle.radius / machine.gravity))
+
+
+def step_of(machine):
+    """Return the steps that the contact engine takes, s."""
+    return hop_step(machine, machine.dt)
 
 
 def _releases(machine, recording):
@@ -269,15 +275,6 @@ def _releases(machine, recording):
     return found
 
 
-def _free_from(machine, recording):
-    """Return the time from which each disk is not carried by adhesion."""
-    free = np.where(machine.releases.carried, inf, -inf)
-    for event in recording.select(Kind.SEPARATION)[::-1]:
-        if machine.releases.carried[event["particle"]]:
-            free[event["particle"]] = event["t"]
-    return free
-
-
 def _depths(machine, recording):
     """Tell who is pressed into another or into a surface, and for how long."""
     r, h = machine.particle.radius, step_of(machine)
@@ -287,7 +284,7 @@ def _depths(machine, recording):
     stride = STRIDE * r / fast if fast > 0.0 else inf
     apart = min(0.5 * h, max(stride, (end - begin) / LOOKS))
     times = np.linspace(begin, end, ceil((end - begin) / apart) + 1)
-    free = _free_from(machine, recording)
+    free = free_from(recording, machine.releases.carried)
     runs, found, look = {}, {}, 0  # of each who is deep: first look of this run, last, worst
     for some in np.array_split(times, max(1, len(times) // 200)):
         for t, x in zip(some, recording.at(some)[0], strict=True):
@@ -324,20 +321,12 @@ def _deep(machine, x, free):
         if free[i] or free[j]:
             yield (i, j), 2.0 - np.hypot(*(x[i] - x[j])) / r
     here = here[free[here]]
-    for name, depth in _in_surfaces(machine, x[here]):
+    for which, depths in surface_depths(machine, x[here]).items():
+        depth, name = depths / r, which
+        if which != "pulley":
+            name = f"{machine.surfaces[machine.segments.surface[which]]}[{which}]"
         for k in np.flatnonzero(depth > DEEP):
             yield (int(here[k]), name), float(depth[k])
-
-
-def _in_surfaces(machine, x):
-    """Yield the name of each segment or pulley, and how deep disks at x (k, 2) are in it, radii."""
-    r, s = machine.particle.radius, machine.segments
-    for k in range(len(s.length)):
-        d = x - s.start[k]
-        d = d - np.clip(d @ s.tangent[k], 0.0, s.length[k])[:, None] * s.tangent[k]
-        yield f"{machine.surfaces[s.surface[k]]}[{k}]", 1.0 - np.hypot(*d.T) / r
-    if machine.pulley is not None:
-        yield "pulley", (machine.pulley.radius - np.hypot(*x.T)) / r + 1.0
 
 
 def _crossings(machine, recording):

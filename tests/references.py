@@ -249,22 +249,26 @@ def likeness(found, recording, most=3, tolerance=1e-10):
 
 def _impacts_of(recording):
     """Return the impacts of each particle in a recording."""
-    own, m = [[] for _ in range(recording.count)], recording.particle.mass
-    pairs = set()
+    own, pairs = [[] for _ in range(recording.count)], set()
     for event in recording.select(Kind.IMPACT, Kind.LANDING, Kind.COLLISION):
         i, j, t = int(event["particle"]), int(event["other"]), float(event["t"])
         if j < 0:
-            # m Δv = J_n n + J_t (n_y, -n_x), solved for n.
-            change = m * (event["velocity_after"] - event["velocity_before"])
-            n, rub = event["normal_impulse"], event["tangential_impulse"]
-            normal = (n * change + rub * np.array([-change[1], change[0]])) / (n * n + rub * rub)
-            approach = -float(event["velocity_before"] @ normal)
+            approach = -float(event["velocity_before"] @ normal_of(recording, event))
             own[i].append(Impact(t, recording.surfaces[event["surface"]], approach))
         elif (t, min(i, j), max(i, j)) not in pairs:
             pairs.add((t, min(i, j), max(i, j)))
             own[i].append(Impact(t, j, np.nan))
             own[j].append(Impact(t, i, np.nan))
     return own
+
+
+def normal_of(recording, blow):
+    """Return the normal of a blow: m Δv = J_n n + J_t (n_y, -n_x), solved for n."""
+    change = recording.particle.mass * (blow["velocity_after"] - blow["velocity_before"])
+    n, rub = blow["normal_impulse"], blow["tangential_impulse"]
+    if n == 0.0:
+        return change
+    return (n * change + rub * np.array([-change[1], change[0]])) / (n * n + rub * rub)
 
 
 def _solids(machine, r):
@@ -638,25 +642,37 @@ def pair_overlaps(x, r):
 
 def inside_surfaces(recording, machine, times):
     """Return how deep free disks are in surfaces at times (T,), s, as `Depth`."""
-    r, s, found = recording.particle.radius, machine.segments, []
-    for x in _free(recording, times):
-        d = x[:, None] - s.start
-        foot = np.clip((d * s.tangent).sum(axis=2), 0.0, s.length)
-        d = d - foot[:, :, None] * s.tangent
-        found.append((r - np.hypot(d[..., 0], d[..., 1])).ravel())
-        if machine.pulley is not None:
-            found.append(machine.pulley.radius + r - np.hypot(x[:, 0], x[:, 1]))
-    return Depth.of(found, r)
+    found = [
+        depth for x in _free(recording, times) for depth in surface_depths(machine, x).values()
+    ]
+    return Depth.of(found, recording.particle.radius)
+
+
+def surface_depths(machine, x):
+    """Return how deep (m) disks at x (k, 2) are in each segment, by number, and in the pulley."""
+    r, s, found = machine.particle.radius, machine.segments, {}
+    for k in range(len(s.length)):
+        d = x - s.start[k]
+        d = d - np.clip(d @ s.tangent[k], 0.0, s.length[k])[:, None] * s.tangent[k]
+        found[k] = r - np.hypot(*d.T)
+    if machine.pulley is not None:
+        found["pulley"] = machine.pulley.radius + r - np.hypot(*x.T)
+    return found
+
+
+def free_from(recording, carried):
+    """Return the time (s) from which each disk is not carried by adhesion, inf if always."""
+    free = np.where(carried, inf, -inf)
+    for event in recording.select(Kind.SEPARATION)[::-1]:
+        if carried[event["particle"]]:
+            free[event["particle"]] = event["t"]
+    return free
 
 
 def _free(recording, times):
     """Yield places (k, 2) of the disks that are there, and not carried, at each time."""
-    carried = recording.machine.releases.carried
-    free_from = np.where(carried, inf, -inf)
-    for event in recording.select(Kind.SEPARATION)[::-1]:
-        if carried[event["particle"]]:
-            free_from[event["particle"]] = event["t"]
+    free = free_from(recording, recording.machine.releases.carried)
     times = np.atleast_1d(times)
     for some in np.array_split(times, max(1, len(times) // 100)):
         for t, x in zip(some, recording.at(some)[0], strict=True):
-            yield x[np.isfinite(x[:, 0]) & (free_from <= t)]
+            yield x[np.isfinite(x[:, 0]) & (free <= t)]

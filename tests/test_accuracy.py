@@ -14,7 +14,8 @@ from chutelab.engines.reference import UnableError
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
 from chutelab.results import Kind
-from chutelab.results.comparison import QUANTITIES, compare
+from chutelab.results.comparison import compare
+from chutelab.results.quantities import QUANTITIES
 from chutelab.studies.accuracy import (
     FLOOR,
     MOST_STEPS,

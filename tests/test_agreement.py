@@ -16,7 +16,8 @@ from chutelab.engines import exact, reference
 from chutelab.engines.exact import contacts
 from chutelab.mechanics import ballistics, impact
 from chutelab.results import REASONS, Kind
-from chutelab.results.comparison import QUANTITIES, compare
+from chutelab.results.comparison import compare
+from chutelab.results.quantities import QUANTITIES
 from chutelab.studies.accuracy import reach
 from drawn import draw
 

@@ -11,7 +11,8 @@ import pytest
 from chutelab import scene, theory
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind
-from chutelab.results.comparison import QUANTITIES, compare, relative_error
+from chutelab.results.comparison import compare, relative_error
+from chutelab.results.quantities import QUANTITIES
 
 M, R, r = 0.008, 0.1, 0.004
 

@@ -349,9 +349,10 @@ def test_streams_and_released_particles_run_one_by_one():
 
 def test_units_and_sides_of_a_target():
     given = machine()
-    assert target(given, "landing.x = 300 mm").right.of(None, given) == pytest.approx(0.3)
+    run = chutelab.simulate(given)
+    assert target(given, "landing.x = 300 mm").right.of(run) == pytest.approx(0.3)
     assert target(given, "landing.x=0.3").right.unit == "m"
-    assert target(given, "landing.vx=incoming.speed").right.of(None, given) == V
+    assert target(given, "landing.vx=incoming.speed").right.of(run) == V
     assert target(given, "landing.vx=impact.vx").right.key == "impact.vx"
     for name in SHORT:
         assert measured(given, name).unit in ("J", "W")

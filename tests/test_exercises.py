@@ -89,6 +89,20 @@ def test_most_exercises_accept_one_draw_in_ten(name):
     assert sum(fits) >= 4
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_every_number_of_an_exercise_is_used(name):
+    exercise = EXERCISES[name]
+    formulas = [*exercise.formulas.values(), *exercise.fits, *exercise.tell]
+    texts = [exercise.story]
+    for question in exercise.questions:
+        formulas += [question.answer, *(mistake.formula for mistake in question.mistakes)]
+        texts += [question.text, *question.hints, question.working]
+        texts += [mistake.says for mistake in question.mistakes]
+    used = set(re.findall(r"\w+", " ".join(formulas)))
+    used |= set(re.findall(r"\{(\w+)\}", " ".join(texts)))
+    assert {*exercise.formulas, *(parameter.name for parameter in exercise.parameters)} <= used
+
+
 def test_draws_stay_where_the_lesson_is():
     for student in [f"domain {i}" for i in range(25)]:
         for name in ("letting-go", "grip-or-slip"):

@@ -100,7 +100,7 @@ def test_names_are_the_keys_of_the_json_and_give_its_numbers(name):
     for key, value in flat(found):
         if unit_of(key, surfaces) is None:
             continue
-        measured = measure(recording, key, scene)
+        measured = measure(recording, key)
         first = value[0] if isinstance(value, list) else value
         assert measured == first or (first is None and isnan(measured)), key
         compared += 1
@@ -111,7 +111,7 @@ def test_names_are_the_keys_of_the_json_and_give_its_numbers(name):
 
 
 def test_statistics_are_over_all_particles_it_happened_to():
-    scene, recording = shipped("stream-independent", "stream.count=40", "outgoing.length=2.452")
+    _, recording = shipped("stream-independent", "stream.count=40", "outgoing.length=2.452")
     landed = recording.first(recording.select(Kind.LANDING))
     x = landed["position"][:, 0]
     assert 0 < len(x) < 40, "the belt ends in the middle of the stream"
@@ -123,28 +123,28 @@ def test_statistics_are_over_all_particles_it_happened_to():
         "x.max": sorted(x)[-1],
         "vx_after.mean": landed["velocity_after"][:, 0].sum() / len(x),
     }.items():
-        found = measure(recording, f"landing.{statistic}", scene)
+        found = measure(recording, f"landing.{statistic}")
         assert found == pytest.approx(value, rel=1e-13)
-    assert measure(recording, "ended.landed", scene) == len(x)
-    assert measure(recording, "ended.exit", scene) == 40 - len(x)
-    assert measure(recording, "ended.settled", scene) == 0
+    assert measure(recording, "ended.landed") == len(x)
+    assert measure(recording, "ended.exit") == 40 - len(x)
+    assert measure(recording, "ended.settled") == 0
 
 
 def test_what_did_not_happen_is_nan_and_unknown_names_are_errors():
-    scene, recording = shipped("perpendicular", "outgoing.length=0.1")
-    assert isnan(measure(recording, "landing.x", scene))
-    assert isnan(measure(recording, "landing.x.mean", scene))
-    assert measure(recording, "landing.count", scene) == 0.0
+    _, recording = shipped("perpendicular", "outgoing.length=0.1")
+    assert isnan(measure(recording, "landing.x"))
+    assert isnan(measure(recording, "landing.x.mean"))
+    assert measure(recording, "landing.count") == 0.0
     with pytest.raises(KeyError):
-        measure(recording, "landings", scene)
+        measure(recording, "landings")
 
 
 def test_stored_energies_have_a_start_and_an_end():
-    scene, recording = shipped("perpendicular")
-    assert measure(recording, "ledger.kinetic.start", scene) == 0.5 * 0.008 * 2.0**2
+    _, recording = shipped("perpendicular")
+    assert measure(recording, "ledger.kinetic.start") == 0.5 * 0.008 * 2.0**2
     last = recording.track(0)[-1]
     end = 0.008 * G * last["position"][1]
-    assert measure(recording, "ledger.potential.end", scene) == pytest.approx(end, rel=1e-15)
+    assert measure(recording, "ledger.potential.end") == pytest.approx(end, rel=1e-15)
 
 
 # Tolerances.
@@ -193,8 +193,8 @@ def test_a_ledger_entry_is_measured_by_itself_and_the_residual_by_what_was_turne
     # The plate takes ½ m v² (1 - ε²) = 12 mJ.
     row = only(verify(expecting("ledger.restitution_loss", 0.1, 1)), "exact")
     assert row.error == pytest.approx(abs(row.simulated - 0.1) / 0.1, rel=1e-12)
-    scene, recording = shipped("perpendicular")
-    turned_over = measure(recording, "ledger.turned_over", scene)
+    _, recording = shipped("perpendicular")
+    turned_over = measure(recording, "ledger.turned_over")
     row = only(verify(expecting("ledger.residual", 0.01, 1)), "exact")
     assert row.error == pytest.approx(0.01 / turned_over, rel=1e-9)
 

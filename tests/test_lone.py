@@ -30,7 +30,9 @@ from chutelab.engines.pymunk.world import DIGITS, HAIR
 from chutelab.machine import build
 from chutelab.results import Kind
 from chutelab.studies.accuracy import apart, each, sizes, stirred
+from crowds import hop_step
 from drawn import draw, only_blows
+from references import normal_of
 
 LONGEST = 4e-3
 """s; the first step tried."""
@@ -52,9 +54,7 @@ ORDERS = {contact: 1.6, pymunk: 0.9}
 
 def step_of(engine, machine):
     """Return the first step, s. A hop in the contact engine, g h²/8, is at most r/1000."""
-    if engine is pymunk or machine.gravity == 0.0:
-        return LONGEST
-    return min(LONGEST, sqrt(8e-3 * machine.particle.radius / machine.gravity))
+    return LONGEST if engine is pymunk else hop_step(machine, LONGEST)
 
 
 def together(recording, least):
@@ -95,15 +95,6 @@ def flies_back(recording, machine):
     tilt = DIGITS * np.abs(x) / machine.particle.radius
     back = (x * vx < 0.0) & (np.abs(y - height) <= tilt * np.abs(x))
     return min(knots["t"][back] - x[back] / vx[back], default=inf)
-
-
-def normal_of(recording, blow):
-    """Return the normal of a blow: m Δv = J_n n + J_t (n_y, -n_x), solved for n."""
-    change = recording.particle.mass * (blow["velocity_after"] - blow["velocity_before"])
-    n, rub = blow["normal_impulse"], blow["tangential_impulse"]
-    if n == 0.0:
-        return change
-    return (n * change + rub * np.array([-change[1], change[0]])) / (n * n + rub * rub)
 
 
 def told(recording, soft, until, surfaces):

@@ -13,7 +13,7 @@ from chutelab.checks.preflight import preflight, trial
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
 from chutelab.results import REASONS, Kind
-from chutelab.results.comparison import QUANTITIES
+from chutelab.results.quantities import QUANTITIES
 from chutelab.results.recorder import StalledError
 from machines import PERPENDICULAR
 

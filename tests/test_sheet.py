@@ -142,3 +142,16 @@ def test_json_has_lists_for_arrays_and_null_for_what_is_not_finite():
     assert found["n"] is None
     assert found["sheet"]["columns"] == ["name", "unit", "value"]
     assert plain(np.float64(np.nan)) is None
+
+
+def test_a_row_of_one_cell_is_a_heading_and_columns_stay_below_each_other():
+    rows = (("first",), ("a", "1.25", "ok"), ("second",), ("longer", "10", "FAILED"))
+    sheet = Sheet("", ("", "value", ""), rows, tail=1)
+    head, _, *body = str(sheet).splitlines()
+    assert head.index("value") + 5 == body[1].index("1.25") + 4 == body[3].index("10") + 2
+    assert body == ["first", "  a        1.25  ok", "second", "  longer     10  FAILED"]
+    assert '<th colspan="3" style="text-align:left">second</th>' in sheet._repr_html_()
+    terminal = Console(file=io.StringIO(), force_terminal=True, color_system="standard")
+    terminal.print(sheet)
+    assert "\x1b[1;31mlonger" in terminal.file.getvalue()
+    assert "\x1b[32mok" in terminal.file.getvalue()

@@ -308,7 +308,7 @@ def _skipped(scene: Scene) -> dict[str, str]:
 def _found(
     scene: Scene, expect: Expect, engine: str, recording: Recording, prediction: Transfer
 ) -> Finding:
-    simulated = measure(recording, expect.quantity, scene)
+    simulated = measure(recording, expect.quantity)
     scale = None
     if expect.quantity.startswith("ledger."):
         # Each entry is measured by itself, but what should be nothing by what was turned over.

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,9 +11,8 @@ import click
 from chutelab.cli.parameters import complete_scene, folder, retitled, set_option
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
-
     from chutelab.checks.workprecision import Timing
+    from chutelab.util.tables import Sheet
 
 METHODS = ("exact", "contact", "pymunk", "fixed")
 REPEATS = 9
@@ -87,7 +85,7 @@ def bench(
     from chutelab.cli.output import destination
     from chutelab.scene import load
     from chutelab.util.files import tsv_text
-    from chutelab.util.versions import environment
+    from chutelab.util.versions import environment, measured_on
 
     loaded = retitled(load(scene, list(overrides)), overrides)
     about = environment()
@@ -102,19 +100,16 @@ def bench(
             (into / files[0]).write_text(text, encoding="utf-8")
             workprecision(timings, loaded.title, about, path=into / files[1])
     if as_json:
-        records = [asdict(one) for one in timings]
-        shown = {"format": 1, "scene": loaded.title, "environment": about, "records": records}
-        console.show_json(shown)
+        told = {"scene": loaded.title, "environment": about, "records": timings}
+        console.show_json({"format": 1, **told})
         return
-    console.show(*tables(loaded.title, timings), environment_line(about))
+    console.show(_table(loaded.title, timings, measured_on(about)))
     if out is not None:
         click.echo(f"wrote into {out}: {', '.join(files)}")
 
 
-def tables(title: str, timings: Sequence[Timing]) -> list[RenderableType]:
-    """Return the table of a scene, why runs failed, and how errors are known."""
-    from rich.text import Text
-
+def _table(title: str, timings: Sequence[Timing], measured: str) -> Sheet:
+    """Return the table of a scene, why runs failed, how errors are known, and what it ran on."""
     from chutelab.util.tables import Sheet
 
     rows = [
@@ -130,23 +125,15 @@ def tables(title: str, timings: Sequence[Timing]) -> list[RenderableType]:
         for one, before in zip(timings, [None, *timings], strict=False)
     ]
     heads = ("engine", "dt", "first", "median", "runs", "error", "of")
-    lines = [
+    notes = [
         f"{one.method} failed{'' if one.value is None else f' at dt {one.value:.0e}'}: {one.failed}"
         for one in timings
         if one.failed
     ]
     for how in dict.fromkeys(one.how for one in timings if one.how):
         who = dict.fromkeys(one.method for one in timings if one.how == how)
-        lines.append(f"error of {', '.join(who)}: {how}")
-    return [Sheet(title, heads, tuple(rows)), Text("\n".join(lines), style="italic")]
-
-
-def environment_line(about: Mapping[str, str]) -> RenderableType:
-    """Return the line that says where it was measured."""
-    from rich.text import Text
-
-    measured = ", ".join(f"{key} {value}" for key, value in about.items())
-    return Text(f"\nmeasured on {measured}", style="italic")
+        notes.append(f"error of {', '.join(who)}: {how}")
+    return Sheet(title, heads, tuple(rows), tail=1, notes=(*notes, measured))
 
 
 def duration(seconds: float | None) -> str:

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from chutelab.cli.parameters import complete_scene, folder, set_option
-from chutelab.cli.program import RefusedError
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from chutelab.scene import Scene
-    from chutelab.studies.measured import Fit, Residuals, Track
+    from chutelab.studies.measured import Fit, Residuals
 
 
 FILES = ("compare.png", "points.csv", "fit.json")
@@ -121,10 +118,11 @@ def compare(
     s² (JᵀJ)⁻¹ from how the points respond to the parameters (J) and how much they scatter (s): they
     hold if errors are independent and the model is right. Needs pip install "chutelab[fit]".
     """  # noqa: D301 - click wants the backspace
-    from chutelab.cli.console import progress
+    from chutelab.cli.console import progress, show_json
     from chutelab.cli.output import destination
     from chutelab.scene import load
     from chutelab.studies import measured
+    from chutelab.studies.measured.result import as_dict
 
     if robust and not keys:
         raise click.UsageError("--robust is for fits: name what to fit with --fit.")
@@ -132,58 +130,41 @@ def compare(
     film = measured.read(data, scale=scale, origin=origin, flip_y=flip_y, t0=t0, track=track)
     with destination(out, FILES) as place:
         with progress("fitting" if keys else "comparing"):
-            found, fit = _compared(loaded, film, keys, robust=robust)
+            fit = measured.fit(loaded, film, keys, robust=robust) if keys else None
+            found = measured.residuals(loaded, film) if fit is None else fit.after
         if place is not None:
             with progress("drawing"):
                 _write(found, fit, place)
-    _tell(found, fit, out, as_json=as_json)
-
-
-def _compared(
-    scene: Scene, film: Track, keys: tuple[str, ...], *, robust: bool
-) -> tuple[Residuals, Fit | None]:
-    from chutelab.studies import measured
-
-    if not keys:
-        return measured.residuals(scene, film), None
-    try:
-        fit = measured.fit(scene, film, keys, robust=robust)
-    except ImportError as error:
-        raise RefusedError(f"--fit: {error}") from error
-    return fit.after, fit
+    if as_json:
+        show_json(as_dict(found, fit))
+    else:
+        _tell(found, fit, out)
 
 
 def _write(found: Residuals, fit: Fit | None, place: Path) -> None:
+    from chutelab.cli.output import write_json
     from chutelab.pictures.plots.measured import measured
     from chutelab.studies.measured.result import as_dict, points_csv
 
     measured(found, fit, path=place / "compare.png")
     (place / "points.csv").write_text(points_csv(found), encoding="utf-8")
     if fit is not None:
-        text = json.dumps(as_dict(found, fit), indent=1, allow_nan=False)
-        (place / "fit.json").write_text(text + "\n", encoding="utf-8")
+        write_json(as_dict(found, fit), place / "fit.json")
 
 
-def _tell(found: Residuals, fit: Fit | None, out: Path | None, *, as_json: bool) -> None:
-    from chutelab.cli import console
-
-    if as_json:
-        from chutelab.studies.measured.result import as_dict
-
-        console.show_json(as_dict(found, fit))
-        return
+def _tell(found: Residuals, fit: Fit | None, out: Path | None) -> None:
     from rich.text import Text
 
+    from chutelab.cli.console import show
     from chutelab.studies.measured.result import advice
     from chutelab.util.tables import wrapped
 
     head = Text(found.recording.title, style="bold")
     head.append(f"\n{found.track.said()}", style="not bold")
-    parts: list[RenderableType] = [head]
-    parts += [found] if fit is None else [fit, found]
+    parts: list[RenderableType] = [head, found] if fit is None else [head, fit, found]
     if fit is None and (advised := advice(found)):
         parts.append(Text("\n" + "\n".join(wrapped(f"note: {advised}"))))
-    console.show(*parts)
+    show(*parts)
     if out is not None:
         names = [name for name in FILES if fit is not None or name != "fit.json"]
         click.echo(f"wrote into {out}: {', '.join(names)}")

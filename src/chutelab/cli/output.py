@@ -6,13 +6,13 @@ import json
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from chutelab.cli.console import progress
-from chutelab.cli.parameters import KINDS
+from chutelab.cli.parameters import FILMS, KINDS
 from chutelab.cli.program import RefusedError
+from chutelab.util.tables import plain
 
 if TYPE_CHECKING:
     from chutelab.results import Recording
@@ -130,33 +130,26 @@ def write(
     """Write the files of the given `KINDS` into an existing folder."""
     for kind in kinds:
         with progress(f"writing {' and '.join(KINDS[kind])}", quiet=quiet):
-            _write(recording, folder, kind, accuracy)
+            if kind in FILMS:
+                from chutelab.pictures.animation import animate
+
+                animate(recording, folder / KINDS[kind][0])
+            elif kind in ("png", "strobe"):
+                from chutelab.pictures import plots
+
+                draw = plots.overlay if kind == "png" else plots.strobe
+                draw(recording, path=folder / KINDS[kind][0])
+            elif kind == "csv":
+                recording.to_csv(folder)
+            elif kind == "npz":
+                recording.save(folder / KINDS[kind][0])
+            else:
+                from chutelab.results.summary import summary
+
+                reached = None if accuracy is None else vars(accuracy)
+                write_json(summary(recording, reached), folder / KINDS[kind][0])
 
 
-def _write(recording: Recording, folder: Path, kind: str, accuracy: Accuracy | None) -> None:
-    match kind:
-        case "png":
-            from chutelab.pictures.plots import overlay
-
-            overlay(recording, path=folder / "overlay.png")
-        case "strobe":
-            from chutelab.pictures.plots import strobe
-
-            strobe(recording, path=folder / "strobe.png")
-        case "gif" | "mp4" | "webm":
-            from chutelab.pictures.animation import animate
-
-            animate(recording, folder / f"lesson.{kind}")
-        case "csv":
-            recording.to_csv(folder)
-        case "npz":
-            recording.save(folder / "recording.npz")
-        case "json":
-            from chutelab.results.summary import summary
-
-            text = json.dumps(
-                summary(recording, asdict(accuracy) if accuracy else None),
-                indent=1,
-                allow_nan=False,
-            )
-            (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
+def write_json(value: Any, path: Path) -> None:
+    """Write one JSON object into a file, see `chutelab.util.tables.plain`."""
+    path.write_text(json.dumps(plain(value), indent=1, allow_nan=False) + "\n", encoding="utf-8")

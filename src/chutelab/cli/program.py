@@ -13,7 +13,7 @@ from typing import Any
 
 import click
 
-from chutelab.util.errors import InputError
+from chutelab.util.errors import InputError, MissingLibraryError
 
 INTERRUPTED = 130
 """128 + SIGINT, as shells have it."""
@@ -64,7 +64,7 @@ class Program(InOrder):
             if _was_interrupted(error):
                 click.echo("\nInterrupted.", err=True)
                 ctx.exit(INTERRUPTED)
-            if isinstance(error, InputError):
+            if isinstance(error, (InputError, MissingLibraryError)):
                 raise RefusedError(str(error)) from error
             if ctx.params["debug"]:
                 raise

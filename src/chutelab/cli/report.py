@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 
 import numpy as np
 from rich.console import RenderableType
 from rich.text import Text
 
-from chutelab.machine.releases import Squeeze, squeeze
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
-from chutelab.results.quantities import Waits, waits
-from chutelab.results.summary import rolling
+from chutelab.results.quantities import rolling, squeezed, waits
 from chutelab.studies.accuracy import Accuracy, Wanted
 from chutelab.util.tables import Sheet, number, wrapped
 
@@ -23,20 +22,37 @@ STATIONS = 6
 
 def report(recording: Recording, accuracy: Accuracy | None = None) -> list[RenderableType]:
     """Return what a run leaves to read: particle 0 beside the theory, the ledger, the accuracy."""
+    counted = Counter(recording.ended.tolist())
+    head = Text(recording.title, style="bold")
+    head.append(
+        f"\nengine {recording.engine}, {_many(recording.count, 'particle')},"
+        f" {_many(recording.contacts, 'contact')},"
+        f" {recording.steps} {'rounds' if recording.engine == 'exact' else 'steps'},"
+        f" {recording.seconds:.3g} s\n"
+        f"ended: {', '.join(f'{counted[k]} {REASONS[k]}' for k in sorted(counted))}",
+        style="not bold",
+    )
     compared = compare(recording).sheet()
-    parts: list[RenderableType] = [_head(recording), compared]
+    parts: list[RenderableType] = [head, compared]
     if compared.notes and (way := _way(recording)).rows:
         parts.append(way)
     parts.append(ledger(recording))
-    if (late := waits(recording.scene, recording)) is not None:
-        parts.append(Text("\n" + "\n".join(wrapped(_waited(late)))))
-    released = recording.select(Kind.RELEASE)
-    pressed = squeeze(recording.scene, released["t"], released["position"])
-    if pressed is not None:
-        parts.append(Text("\n" + "\n".join(wrapped(_squeezed(pressed)))))
-    if (left := rolling(recording)) is not None:
-        parts.append(Text("\n" + "\n".join(wrapped(_rolling(**left)))))
-    return parts if accuracy is None else [*parts, _reached(accuracy)]
+    parts += [Sheet("", (), (), notes=(note,)) for note in _notes(recording)]
+    if accuracy is not None:
+        wanted = Wanted(accuracy.asked, "m" if accuracy.unit == "m" else "relative")
+        what = "relative error" if accuracy.unit == "relative" else "error of places"
+        said = "cannot be told"
+        if accuracy.reached is not None:
+            said = f"about {wanted.written(accuracy.reached)} ({accuracy.worst})"
+        met = "reached" if accuracy.met else "NOT REACHED"
+        found = wrapped(f"{what} {said}; asked for {wanted}, {met}")
+        how = wrapped(f"how it is known: {accuracy.method}")
+        parts += [Text("\nAccuracy", style="bold"), Text("\n".join([*found, *how]))]
+    return parts
+
+
+def _many(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
 def _way(recording: Recording) -> Sheet:
@@ -53,68 +69,30 @@ def _way(recording: Recording) -> Sheet:
     return Sheet("Particle 0, its first contacts", heads, tuple(rows))
 
 
-def _head(recording: Recording) -> Text:
-    one = recording.count == 1
-    counted = Counter(recording.ended.tolist())
-    endings = ", ".join(f"{counted[k]} {REASONS[k]}" for k in sorted(counted))
-    rounds = "rounds" if recording.engine == "exact" else "steps"
-    head = Text(recording.title, style="bold")
-    head.append(
-        f"\nengine {recording.engine}, {recording.count} particle{'' if one else 's'},"
-        f" {recording.contacts} contact{'' if recording.contacts == 1 else 's'},"
-        f" {recording.steps} {rounds}, {recording.seconds:.3g} s",
-        style="not bold",
-    )
-    head.append(f"\nended: {endings}", style="not bold")
-    return head
-
-
-def _waited(late: Waits) -> str:
-    """Say how many found their place taken, and how long."""
-    said = []
-    if late.particles:
-        waited = "1 particle" if late.particles == 1 else f"{late.particles} particles"
-        said.append(
-            f"{waited} waited for a free place to be released, {number(late.longest)} s at most"
-            f" and {number(late.mean)} s on average"
+def _notes(recording: Recording) -> Iterator[str]:
+    """Yield what happened that is easily overlooked."""
+    if (late := waits(recording)) is not None:
+        said = []
+        if late.particles:
+            said.append(
+                f"{_many(late.particles, 'particle')} waited for a free place to be released,"
+                f" {number(late.longest)} s at most and {number(late.mean)} s on average"
+            )
+        if late.never:
+            said.append(f"{late.never} found no free place until the end")
+        yield "; ".join(said) + "."
+    if (pressed := squeezed(recording)) is not None:
+        yield (
+            f"{pressed.particles} particles rode into others round the pulley,"
+            f" {number(pressed.deepest)} m deep at most: adhesion carries all layers at one speed,"
+            f" the lower ones on smaller circles, and v²/(g rho) = {pressed.grip:.3g} keeps the"
+            " highest there past the top."
         )
-    if late.never:
-        said.append(f"{late.never} found no free place until the end")
-    return "; ".join(said) + "."
-
-
-def _squeezed(pressed: Squeeze) -> str:
-    """Say how many ride into each other, how deep and why."""
-    return (
-        f"{pressed.particles} particles rode into others round the pulley,"
-        f" {number(pressed.deepest)} m deep at most: adhesion carries all layers at one speed, the"
-        f" lower ones on smaller circles, and v²/(g rho) = {pressed.grip:.3g} keeps the highest"
-        " there past the top."
-    )
-
-
-def _rolling(particles: int, belt_work: float, belt_work_carried: float) -> str:
-    """Say that free disks roll on the outgoing belt, and what carrying them would have cost."""
-    disks = "1 disk rolls" if particles == 1 else f"{particles} disks roll"
-    return (
-        f"{disks} on the outgoing belt: nothing slips, and nothing is carried along. The belt has"
-        f" paid {number(belt_work)} J, loads that are carried take {number(belt_work_carried)} J (a"
-        " disk that arrives without turning takes a third of a carried load's work)."
-    )
-
-
-def _reached(accuracy: Accuracy) -> Text:
-    """Say how accurate the run is, and how that is known."""
-    wanted = Wanted(accuracy.asked, "m" if accuracy.unit == "m" else "relative")
-    what = "relative error" if accuracy.unit == "relative" else "error of places"
-    if accuracy.reached is None:
-        said = f"cannot be told; asked for {wanted}"
-    else:
-        found = wanted.written(accuracy.reached)
-        said = f"about {found} ({accuracy.worst}); asked for {wanted}"
-    text = Text("\nAccuracy\n", style="bold")
-    line = f"{what} {said}, {'reached' if accuracy.met else 'NOT REACHED'}"
-    text.append("\n".join(wrapped(line)), style="not bold")
-    how = f"how it is known: {accuracy.method}"
-    text.append("\n" + "\n".join(wrapped(how)), style="not bold")
-    return text
+    if (left := rolling(recording)) is not None:
+        disks = "1 disk rolls" if left.particles == 1 else f"{left.particles} disks roll"
+        yield (
+            f"{disks} on the outgoing belt: nothing slips, and nothing is carried along. The belt"
+            f" has paid {number(left.belt_work)} J, loads that are carried take"
+            f" {number(left.belt_work_carried)} J (a disk that arrives without turning takes a"
+            " third of a carried load's work)."
+        )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,22 +22,9 @@ from chutelab.cli.parameters import (
 from chutelab.cli.program import RefusedError
 
 if TYPE_CHECKING:
-    from chutelab.pictures.live.page import Written
     from chutelab.results import Recording
     from chutelab.scene.variants import Vary
     from chutelab.studies.accuracy import Accuracy, Wanted
-
-
-class MissedError(click.ClickException):
-    """The accuracy that was asked for could not be reached."""
-
-    exit_code = 1
-
-    def __init__(self, asked: Wanted, reached: Accuracy) -> None:
-        best = "how much was, cannot be told"
-        if reached.reached is not None:
-            best = f"{asked.written(reached.reached)} was"
-        super().__init__(f"the accuracy of {asked} was not reached; {best}")
 
 
 def _accuracy(_ctx: click.Context, _parameter: click.Parameter, text: str | None) -> Wanted | None:
@@ -109,11 +95,14 @@ def run(
             recording, stuck = salvaged(simulated, keep=partial)
         if folder is not None:
             write(recording, folder, kinds, quiet=quiet, accuracy=reached)
-    tell(recording, out, kinds, as_json=as_json, quiet=quiet, accuracy=reached)
+    _tell(recording, out, kinds, as_json=as_json, quiet=quiet, accuracy=reached)
     if stuck is not None:
         raise stuck
     if accuracy is not None and reached is not None and not reached.met:
-        raise MissedError(accuracy, reached)
+        best = "how much was, cannot be told"
+        if reached.reached is not None:
+            best = f"{accuracy.written(reached.reached)} was"
+        raise click.ClickException(f"the accuracy of {accuracy} was not reached; {best}")
 
 
 @click.command(short_help="Print the summary of a recording.npz; make its files again.")
@@ -136,26 +125,21 @@ def show(
     try:
         loaded = Recording.load(recording)
     except RecordingError as error:
-        raise RefusedError(f"{error}{_advice(recording)}") from error
+        from chutelab.scene import shipped
+
+        meant = ""
+        if (inside := recording / KINDS["npz"][0]).is_file():
+            meant = f"; did you mean {inside}?"
+        elif recording.suffix == ".toml" or str(recording) in shipped():
+            meant = f"; show takes a recording.npz; for a scene: chutelab run {recording}"
+        raise RefusedError(f"{error}{meant}") from error
     with destination(out, files_of(kinds)) as folder:
         if folder is not None:
             write(loaded, folder, kinds, quiet=quiet)
-    tell(loaded, out, kinds, as_json=as_json, quiet=quiet)
+    _tell(loaded, out, kinds, as_json=as_json, quiet=quiet)
 
 
-def _advice(given: Path) -> str:
-    """Say what was probably meant by what is no recording."""
-    from chutelab.scene import shipped
-
-    inside = given / KINDS["npz"][0]
-    if inside.is_file():
-        return f"; did you mean {inside}?"
-    if given.suffix == ".toml" or str(given) in shipped():
-        return f"; show takes a recording.npz; for a scene: chutelab run {given}"
-    return ""
-
-
-def tell(
+def _tell(
     recording: Recording,
     out: Path | None,
     kinds: Sequence[str],
@@ -166,18 +150,18 @@ def tell(
 ) -> None:
     """Print a recording's summary and what was written, as JSON or as tables."""
     from chutelab.cli import console
+    from chutelab.cli.output import files_of
 
     if as_json:
         from chutelab.results.summary import summary
 
-        console.show_json(summary(recording, asdict(accuracy) if accuracy else None))
+        console.show_json(summary(recording, None if accuracy is None else vars(accuracy)))
     elif not quiet:
         from chutelab.cli.report import report
 
         console.show(*report(recording, accuracy))
         if out is not None:
-            names = ", ".join(name for kind in kinds for name in KINDS[kind])
-            click.echo(f"wrote into {out}: {names}")
+            click.echo(f"wrote into {out}: {', '.join(files_of(kinds))}")
 
 
 def _varies(
@@ -227,32 +211,19 @@ def page(
     from chutelab.pictures.live.page import write
     from chutelab.scene import load
 
-    path = _destination(scene, output)
-    loaded = load(scene, overrides)
-    with writing(str(path)), progress(f"simulating {scene}", quiet=quiet) as update:
-        written = write(loaded, varies, path, progress=update)
-    if not quiet:
-        click.echo(_told(written))
-
-
-def _destination(scene: str, output: Path | None) -> Path:
-    """Return the file to write, before anything runs."""
-    path = Path(f"{Path(scene).name.removesuffix('.toml')}.html") if output is None else output
+    path = output or Path(f"{Path(scene).name.removesuffix('.toml')}.html")
     if path.is_dir():
         raise RefusedError(f"{path} is a folder; give the name of a file, such as {path}/page.html")
     if not path.parent.is_dir():
         raise RefusedError(f"{path}: there is no folder {path.parent}")
-    return path
-
-
-def _told(written: Written) -> str:
-    variants = "1 variant" if written.variants == 1 else f"{written.variants} variants"
-    lines = [f"wrote {written.path}, {written.size / 1000:.0f} kB: {variants}"]
-    if written.faults:
-        values, fault = next(iter(written.faults.items()))
-        at = ", ".join(f"{value:g}" for value in values)
-        lines.append(
-            f"{len(written.faults)} of them cannot be run, and the page says why; the first,"
-            f" at {at}: {fault}"
-        )
-    return "\n".join(lines)
+    loaded = load(scene, overrides)
+    with writing(str(path)), progress(f"simulating {scene}", quiet=quiet) as update:
+        written = write(loaded, varies, path, progress=update)
+    if not quiet:
+        variants = "1 variant" if written.variants == 1 else f"{written.variants} variants"
+        click.echo(f"wrote {written.path}, {written.size / 1000:.0f} kB: {variants}")
+        for values, fault in list(written.faults.items())[:1]:
+            click.echo(
+                f"{len(written.faults)} of them cannot be run, and the page says why; the first,"
+                f" at {', '.join(f'{value:g}' for value in values)}: {fault}"
+            )

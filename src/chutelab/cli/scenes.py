@@ -17,8 +17,7 @@ from chutelab.cli.parameters import folder
 from chutelab.cli.program import RefusedError
 
 if TYPE_CHECKING:
-    from chutelab.theory import Table
-    from chutelab.theory.figures import PaperFigure
+    pass
 
 
 STANDARD_OUTPUT = Path("-")
@@ -33,10 +32,7 @@ def scenes(as_json: bool) -> None:
 
     found = about()
     if as_json:
-        listed = [
-            {"name": s.name, "title": s.title, "look": list(s.look), "path": str(s.path)}
-            for s in found
-        ]
+        listed = [{**asdict(scene), "path": str(scene.path)} for scene in found]
         console.show_json({"format": 1, "scenes": listed})
         return
     from chutelab.util.tables import Sheet
@@ -103,13 +99,10 @@ def tables(number: str | None, rebound: Literal["as-printed", "corrected"], as_j
 
     found = [table(n, rebound) for n in ([int(number)] if number else NUMBERS)]
     if as_json:
-        console.show_json({"format": 1, "tables": [_plain(t) for t in found]})
+        told = [{**asdict(t), "cells": t.cells, "differing": t.differing} for t in found]
+        console.show_json({"format": 1, "tables": told})
     else:
         console.show(*found)
-
-
-def _plain(table: Table) -> dict[str, object]:
-    return {**asdict(table), "cells": table.cells, "differing": table.differing}
 
 
 @click.command(short_help="Draw the paper's figures anew, printed beside corrected.")
@@ -135,14 +128,20 @@ def figure(number: int, out: Path | None, as_json: bool) -> None:
     """  # noqa: D301 - click wants the backspace
     from chutelab.cli import console
     from chutelab.cli.output import destination
+    from chutelab.scene import to_toml
     from chutelab.theory.figures import figure as compute
 
     found = compute(number)
-    written: list[str] = []
-    with destination(out, _names(found)) as place:
+    picture, numbers = f"figure-{found.number}.png", f"figure-{found.number}.csv"
+    files = {f"{name}.toml": to_toml(scene, found.title) for name, scene in found.scenes.items()}
+    files[numbers] = found.csv()
+    with destination(out, [picture, *files]) as place:
         if place is not None:
-            _write(found, place)
-            written = sorted(file.name for file in place.iterdir())
+            from chutelab.pictures.plots.figure import paper_figure
+
+            paper_figure(found, path=place / picture)
+            for name, text in files.items():
+                (place / name).write_text(text, encoding="utf-8")
     if as_json:
         console.show_json(
             {
@@ -157,25 +156,9 @@ def figure(number: int, out: Path | None, as_json: bool) -> None:
         return
     console.show(found)
     if out is not None:
-        click.echo(f"\nwrote into {out}: {', '.join(written)}")
+        click.echo(f"\nwrote into {out}: {', '.join(sorted([picture, *files]))}")
         if found.sweep:
             click.echo(
                 "The corrected side with the engine, where landing.vx and landing.vy are -v3x and"
                 f" -v3y: {found.sweep}"
             )
-
-
-def _names(found: PaperFigure) -> list[str]:
-    name = f"figure-{found.number}"
-    return [f"{name}.png", f"{name}.csv", *(f"{scene}.toml" for scene in found.scenes)]
-
-
-def _write(found: PaperFigure, place: Path) -> None:
-    from chutelab.pictures.plots.figure import paper_figure
-    from chutelab.scene import to_toml
-
-    picture, table, *scenes = _names(found)
-    paper_figure(found, path=place / picture)
-    (place / table).write_text(found.csv(), encoding="utf-8")
-    for name, scene in zip(scenes, found.scenes.values(), strict=True):
-        (place / name).write_text(to_toml(scene, found.title), encoding="utf-8")

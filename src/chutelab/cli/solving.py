@@ -6,19 +6,17 @@ out.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from chutelab.cli.parameters import complete_scene, folder, retitled, set_option
-from chutelab.cli.program import RefusedError
 
 if TYPE_CHECKING:
     from chutelab.scene import Scene
-    from chutelab.studies.design import Solution, Uncertainty
+    from chutelab.studies.design import Solution
 
 FILES = ("overlay.png", "scan.png", "solution.toml", "nearest.toml", "solve.json")
 """What ``--out`` may write: scan.png with one key, nearest.toml if there is no solution."""
@@ -102,64 +100,51 @@ def solve(
     is 1 if there is no solution; the nearest thing to one is shown then. It needs
     pip install "chutelab[design]".
     """  # noqa: D301 - click wants the backspace
-    from chutelab.cli.console import progress
+    from chutelab.cli.console import progress, show, show_json
     from chutelab.cli.output import destination
     from chutelab.scene import load
+    from chutelab.studies import design
+    from chutelab.studies.design.answers import as_dict
 
-    goals = [goal for goal in (targets, minimize, maximize) if goal]
-    if len(goals) != 1:
+    if len([goal for goal in (targets, minimize, maximize) if goal]) != 1:
         raise click.UsageError("Give one of --target, --minimize and --maximize.")
     loaded = load(scene, overrides)
     written = []
     with destination(out, FILES) as place:
         with progress("searching", quiet=quiet) as meter:
-            found = _solved(loaded, vary, targets, minimize, maximize, points, seed, meter)
+            if targets:
+                found = design.solve(
+                    loaded, vary, targets, points=points, seed=seed, progress=meter
+                )
+            else:
+                extremum = design.minimize if minimize else design.maximize
+                quantity = minimize or maximize or ""
+                found = extremum(loaded, vary, quantity, points=points, seed=seed, progress=meter)
         if place is not None:
             with progress("drawing", quiet=quiet):
                 _write(found, place)
             written = sorted(file.name for file in place.iterdir())
     if as_json:
-        _tell_json(found)
+        show_json(as_dict(found))
     elif not quiet:
-        _tell(found)
+        from rich.text import Text
+
+        show(Text(found.base.title, style="bold"), *found.sheets())
         if out is not None:
             click.echo(f"\nwrote into {out}: {', '.join(written)}")
     if not found.solved:
         click.get_current_context().exit(1)
 
 
-def _solved(
-    scene: Scene,
-    vary: tuple[str, ...],
-    targets: tuple[str, ...],
-    minimize: str | None,
-    maximize: str | None,
-    points: int,
-    seed: int,
-    meter: Callable[[float], None] | None,
-) -> Solution:
-    from chutelab.studies import design
-
-    try:
-        if targets:
-            return design.solve(scene, vary, targets, points=points, seed=seed, progress=meter)
-        extremum, quantity = (
-            (design.minimize, minimize) if minimize else (design.maximize, maximize or "")
-        )
-        return extremum(scene, vary, quantity, points=points, seed=seed, progress=meter)
-    except ImportError as error:
-        raise RefusedError(str(error)) from error
-
-
 def _write(found: Solution, place: Path) -> None:
+    from chutelab.cli.output import write_json
     from chutelab.engines.simulation import simulate
     from chutelab.pictures.plots import overlay
     from chutelab.pictures.plots.design import scan
     from chutelab.scene import to_toml
     from chutelab.studies.design.answers import as_dict
 
-    text = json.dumps(as_dict(found), indent=1, allow_nan=False)
-    (place / "solve.json").write_text(text + "\n", encoding="utf-8")
+    write_json(as_dict(found), place / "solve.json")
     if found.scan is not None:
         scan(found, path=place / "scan.png")
     if not (found.solved or found.nearest):
@@ -170,23 +155,6 @@ def _write(found: Solution, place: Path) -> None:
     comment = f"{found.asked}: {'solution' if found.solved else 'no solution, the nearest to one'}."
     (place / name).write_text(to_toml(scene, comment), encoding="utf-8")
     overlay(simulate(scene), path=place / "overlay.png")
-
-
-def _tell_json(found: Solution) -> None:
-    from chutelab.cli import console
-    from chutelab.studies.design.answers import as_dict
-
-    console.show_json(as_dict(found))
-
-
-def _tell(found: Solution) -> None:
-    from rich.text import Text
-
-    from chutelab.cli import console
-
-    console.show(Text(found.base.title, style="bold"), found.sheet())
-    if found.solved:
-        console.show(found.slopes())
 
 
 def propagate(
@@ -213,49 +181,28 @@ def propagate(
     out, plot : Path or None
         A CSV file for all samples, and a picture.
     """
-    from chutelab.cli import console
-    from chutelab.cli.console import progress
+    from chutelab.cli.console import progress, show, show_json
     from chutelab.cli.output import PICTURES, check_file, writing
+    from chutelab.studies import design
     from chutelab.studies.design.uncertainty import SAMPLES, as_dict
+    from chutelab.util.files import write_lines
 
     check_file("--out", out, (".csv",))
     check_file("--plot", plot, PICTURES)
     count = SAMPLES if samples is None else samples
     with progress("propagating", quiet=quiet) as meter:
-        found = _found(scene, given, count, seed, meter)
+        found = design.uncertainty(scene, given, samples=count, seed=seed, progress=meter)
     with writing():
-        _write_uncertainty(found, out, plot)
+        if out is not None:
+            write_lines(out, [found.csv()])
+        if plot is not None:
+            from chutelab.pictures.plots.design import spread
+
+            spread(found, path=plot)
     if as_json:
-        console.show_json(as_dict(found))
+        show_json(as_dict(found))
     elif not quiet:
-        console.show(found)
+        show(found)
         for path in (out, plot):
             if path is not None:
                 click.echo(f"wrote {path}")
-
-
-def _found(
-    scene: Scene,
-    given: Sequence[str],
-    samples: int,
-    seed: int,
-    meter: Callable[[float], None] | None,
-) -> Uncertainty:
-    from chutelab.studies.design import uncertainty
-
-    try:
-        return uncertainty(scene, given, samples=samples, seed=seed, progress=meter)
-    except ImportError as error:
-        raise RefusedError(str(error)) from error
-
-
-def _write_uncertainty(found: Uncertainty, out: Path | None, plot: Path | None) -> None:
-    if out is not None:
-        from chutelab.util.files import whole
-
-        with whole(out) as unfinished:
-            unfinished.write_text(found.csv(), encoding="utf-8")
-    if plot is not None:
-        from chutelab.pictures.plots.design import spread
-
-        spread(found, path=plot)

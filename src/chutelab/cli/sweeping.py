@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 from click.shell_completion import CompletionItem
 
 from chutelab.cli.parameters import complete_scene, set_option
 from chutelab.cli.program import RefusedError
-
-if TYPE_CHECKING:
-    from chutelab.studies.sweep import Plan, Sweep
 
 
 def _complete_column(
@@ -134,9 +131,17 @@ def sweep(
     in chutelab solve and with --uncertainty.
     """
     from chutelab.cli import console
+    from chutelab.cli.output import PICTURES, check_file, writing
     from chutelab.scene import load
     from chutelab.scene.overrides import Override
-    from chutelab.studies.sweep import LostWorkersError, planned
+    from chutelab.studies.sweep import (
+        NUMBERS,
+        LostWorkersError,
+        crew,
+        planned,
+        sweep_to,
+        swept_by,
+    )
 
     if bool(varies) == bool(uncertain):
         raise click.UsageError("Give either --vary, what to vary, or --uncertainty.")
@@ -157,18 +162,37 @@ def sweep(
         )  # fmt: skip
         return
     loaded = load(scene, overrides)
+    if column not in NUMBERS:
+        raise RefusedError(f"--of {column}: one of {', '.join(NUMBERS)}")
+    check_file("--plot", plot, PICTURES)
     try:
         plan = planned(loaded, varies, sample=sample, design=design, seed=seed, engine=engine)
-        _check_plot(plan, plot, column)
-        found = _carried_out(plan, out, resume, jobs, scheduler, quiet=quiet)
+        varied = sum(len(set(vary.values)) > 1 for vary in plan.varies)
+        if plot is not None and varied > 2:
+            raise RefusedError(f"--plot draws one or two varied keys, not {varied}")
+        what = f"{plan.count:,} variants"
+        with (
+            crew(jobs, scheduler) as team,
+            console.progress(what, quiet=quiet, left=True) as update,
+            writing(f"--out {out}") if out is not None else nullcontext(),
+        ):
+            if out is None:
+                found = swept_by(plan, team, progress=update)
+            else:
+                found = sweep_to(plan, out, team, resume=resume, progress=update)
     except LostWorkersError as error:
-        raise click.ClickException(_and_resume(str(error), out)) from error
+        raise click.ClickException(f"{error} {_kept(out)}".strip()) from error
+    except KeyboardInterrupt:
+        if said := _kept(out):
+            click.echo(f"\n{said}", err=True)
+        raise
     if plot is not None:
         from chutelab.pictures.plots.design import sweep_figure
 
         sweep_figure(found, column, path=plot)
     if as_json:
-        console.show_json(_plain(found))
+        told = {"scene": found.title, "variants": len(found), "columns": found.columns}
+        console.show_json({"format": 1, **told})
     elif not quiet:
         console.show(found)
         for path in (out, plot):
@@ -176,58 +200,10 @@ def sweep(
                 click.echo(f"wrote {path}")
 
 
-def _carried_out(
-    plan: Plan, out: Path | None, resume: bool, jobs: int, scheduler: str | None, *, quiet: bool
-) -> Sweep:
-    from chutelab.cli.console import progress
-    from chutelab.cli.output import writing
-    from chutelab.studies.sweep import crew, sweep_to, swept_by
-
-    what = f"{plan.count:,} variants"
-    try:
-        with crew(jobs, scheduler) as team, progress(what, quiet=quiet, left=True) as update:
-            if out is None:
-                return swept_by(plan, team, progress=update)
-            with writing(f"--out {out}"):
-                return sweep_to(plan, out, team, resume=resume, progress=update)
-    except KeyboardInterrupt:
-        if said := _and_resume("", out):
-            click.echo(f"\n{said}", err=True)
-        raise
-
-
-def _and_resume(said: str, out: Path | None) -> str:
-    """Add where the finished rows are, if there are some."""
+def _kept(out: Path | None) -> str:
+    """Say where the finished rows are, if there are some."""
     from chutelab.studies.sweep.result import part_of
 
     if out is None or not part_of(out).exists():
-        return said
-    return f"{said} {part_of(out)} has the finished rows; --resume goes on.".strip()
-
-
-def _check_plot(plan: Plan, plot: Path | None, column: str) -> None:
-    """Refuse, before anything runs, a picture that cannot be drawn."""
-    from chutelab.cli.output import PICTURES, check_file
-    from chutelab.studies.sweep import NUMBERS
-
-    if column not in NUMBERS:
-        raise RefusedError(f"--of {column}: one of {', '.join(NUMBERS)}")
-    check_file("--plot", plot, PICTURES)
-    if plot is None:
-        return
-    varied = sum(len(set(vary.values)) > 1 for vary in plan.varies)
-    if varied > 2:
-        raise RefusedError(f"--plot draws one or two varied keys, not {varied}")
-
-
-def _plain(found: Sweep) -> dict[str, object]:
-    """Return all columns as lists, None for what there is not."""
-    from math import isfinite
-
-    from chutelab.studies.sweep import REASON
-
-    columns = {
-        name: [value if name == REASON or isfinite(value) else None for value in values.tolist()]
-        for name, values in found.columns.items()
-    }
-    return {"format": 1, "scene": found.title, "variants": len(found), "columns": columns}
+        return ""
+    return f"{part_of(out)} has the finished rows; --resume goes on."

@@ -13,7 +13,7 @@ it cannot follow (rest in a corner, more than `MOST_PHASES` contacts) is refused
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import hypot, inf, sqrt
 from typing import Any
 
@@ -59,48 +59,41 @@ class UnableError(RuntimeError):
 
 
 @dataclass(frozen=True, eq=False)
-class _Line:
-    """A segment: both faces, without its ends."""
+class _Surface:
+    """Both faces of a segment, without its ends; or a circle round which a centre can go.
 
-    start: Floats
-    tangent: Floats
-    left: Floats
-    length: float
-    speed: float
-    restitution: float
-    friction: float
-    surface: int
-
-    def distance(self, place: Floats) -> Floats:
-        """Distance of places (2, k) from the line, left positive, m."""
-        return np.asarray(self.left @ (place - self.start[:, None]))
-
-    def foot(self, place: Floats) -> Floats:
-        """How far along the segment the nearest point is, m."""
-        return np.asarray(self.tangent @ (place - self.start[:, None]))
-
-    def within(self, place: Floats) -> bool:
-        """Whether a place (2, 1) lies beside the segment."""
-        return bool(-TOUCH <= self.foot(place)[0] <= self.length + TOUCH)
-
-
-@dataclass(frozen=True, eq=False)
-class _Circle:
-    """The pulley, the end of a segment, or the way round the pulley in a bed; `reach` includes r.
-
-    `left` points to the middle of the half that goes on as left faces: the sum of the left normals
-    of the segments that end here; None on the pulley. `joined` holds the segments that touch the
-    circle: which, where, and the direction from there along it.
+    Circles (`reach` > 0) are the pulley, the ends of segments, and the way round the pulley in a
+    bed. `left` is a segment's left normal; of an end the sum of those of the segments that meet
+    there, which points to the middle of the half that goes on as left faces; 0 of the pulley.
     """
 
-    center: Floats
-    reach: float
-    left: Floats | None
-    joined: tuple[tuple[int, Floats, Floats], ...]
+    place: Floats  # first end of a segment, centre of a circle, m
+    tangent: Floats  # 0 of a circle
+    left: Floats
+    length: float
+    reach: float  # includes r; 0 of a segment
     speed: float
     restitution: float
     friction: float
-    surface: int
+    owner: int  # index into `Machine.surfaces`
+    # Of a circle, the segments that touch it: which, where, the direction from there along it.
+    joined: tuple[tuple[int, Floats, Floats], ...] = ()
+
+    @property
+    def flat(self) -> bool:
+        return self.reach == 0.0
+
+    def distance(self, place: Floats) -> float:
+        """Distance of a place (2,) from a segment's line, left positive, m."""
+        return float(self.left @ (place - self.place))
+
+    def foot(self, place: Floats) -> float:
+        """How far along a segment the nearest point is, m."""
+        return float(self.tangent @ (place - self.place))
+
+    def within(self, place: Floats) -> bool:
+        """Whether a place lies beside a segment."""
+        return -TOUCH <= self.foot(place) <= self.length + TOUCH
 
 
 @dataclass(frozen=True)
@@ -111,7 +104,7 @@ class _Lasting:
     normal: Floats | None  # of a face; None round a circle
     slip: int
     belt: float
-    carried: bool
+    carried: bool = False
 
 
 def run(machine: Machine) -> Recording:
@@ -150,15 +143,19 @@ class _Run:
         self.state = np.zeros(7)
         self.state[V] = releases.velocity[0]
         self.log = Recorder(machine)
-        self.things = _obstacles(machine)
-        # Face of each segment that was struck last: of a point on a line there is no telling.
-        self.sides: dict[int, float] = {}
+        self.things = _surfaces(machine)
+        # Whether the left face of a segment was struck last.
+        self.sides: dict[int, bool] = {}
         self.steps, self.landed, self.reason = 0, False, ""
 
     def result(self) -> Recording:
         self.tell(Kind.RELEASE, -1)
         self.knot()
-        lasting = self.first()
+        lasting: _Lasting | None
+        if self.machine.releases.carried[0]:
+            lasting = _Lasting(0, np.array([0.0, 1.0]), 0, self.things[0].speed, carried=True)
+        else:
+            lasting = self.contact()
         for _ in range(MOST_PHASES):
             if self.reason:
                 break
@@ -170,47 +167,38 @@ class _Run:
 
     # What touches.
 
-    def first(self) -> _Lasting | None:
-        """Return the contact that a particle is released into."""
-        if not self.machine.releases.carried[0]:
-            return self.contact()
-        belt = self.things[0]
-        return _Lasting(0, np.array([0.0, 1.0]), 0, belt.speed, carried=True)
-
-    def normal(self, index: int, place: Floats) -> Floats:
-        """Return the unit normals (2, k) from a thing to places beside it."""
+    def normal(self, index: int) -> Floats:
+        """Return the unit normal (2,) from a surface to the particle."""
         thing = self.things[index]
-        if isinstance(thing, _Line):
-            aside = np.where(thing.distance(place) >= 0.0, 1.0, -1.0)
-            return np.outer(thing.left, aside if self.r > 0.0 else self.sides.get(index, 1.0))
-        away = place - thing.center[:, None]
-        return np.asarray(away / np.hypot(*away))
+        if not thing.flat:
+            away = self.base - thing.place
+            return np.asarray(away / hypot(*away))
+        # Of a point on a line there is no telling: the face that it struck last.
+        side = thing.distance(self.base) >= 0.0 if self.r > 0.0 else self.sides.get(index, True)
+        return thing.left if side else -thing.left
 
     def belt(self, index: int, normal: Floats) -> float:
         """Return the surface's speed along (n_y, -n_x), m/s."""
         thing = self.things[index]
-        if thing.left is None:
-            return thing.speed
         return thing.speed if normal @ thing.left >= 0.0 else -thing.speed
 
-    def touching(self) -> list[int]:
-        """Return what the particle touches; ends of what it touches do not count besides."""
-        place = self.base[:, None]
-        found: list[int] = []
+    def touching(self) -> dict[int, Floats]:
+        """Return what the particle touches, with its normal; not the ends of what it touches."""
+        found: dict[int, Floats] = {}
         for k, thing in enumerate(self.things):
-            if isinstance(thing, _Line):
-                if abs(abs(thing.distance(place)[0]) - self.r) < TOUCH and thing.within(place):
-                    found.append(k)
-            elif abs(hypot(*(self.base - thing.center)) - thing.reach) < TOUCH and not any(
-                j in found for j, _, _ in thing.joined
-            ):
-                found.append(k)
+            if thing.flat:
+                touches = abs(abs(thing.distance(self.base)) - self.r) < TOUCH
+                touches = touches and thing.within(self.base)
+            else:
+                touches = abs(hypot(*(self.base - thing.place)) - thing.reach) < TOUCH
+                touches = touches and not any(j in found for j, _, _ in thing.joined)
+            if touches:
+                found[k] = self.normal(k)
         return found
 
     def contact(self) -> _Lasting | None:
         """Resolve blows until nothing touched is approached; return the contact that lasts then."""
-        v = self.state[V]
-        touched = {k: self.normal(k, self.base[:, None])[:, 0] for k in self.touching()}
+        v, touched = self.state[V], self.touching()
         for _ in range(MOST_PHASES):
             hit = next((k for k, n in touched.items() if v @ n < -REST), None)
             if hit is None:
@@ -233,7 +221,7 @@ class _Run:
         """Return the normal force per mass, m/s²: the weight, less what bends the path."""
         thing = self.things[index]
         pressing = -float(self.g @ n)
-        if isinstance(thing, _Circle):
+        if not thing.flat:
             pressing -= float(v @ [n[1], -n[0]]) ** 2 / thing.reach
         return pressing
 
@@ -260,15 +248,15 @@ class _Run:
                 sign = 1 if need < 0.0 else -1
         if sign == 0:
             if begins:
-                self.tell(Kind.STICK, thing.surface)
-            steady = (pull == 0.0 or not self.lever) and (isinstance(thing, _Line) or not v.any())
-            rests = belt == 0.0 or thing.surface == self.machine.landing
+                self.tell(Kind.STICK, thing.owner)
+            steady = (pull == 0.0 or not self.lever) and (thing.flat or not v.any())
+            rests = belt == 0.0 or thing.owner == self.machine.landing
             if self.machine.until == "settled" and steady and rests:
-                self.tell(Kind.SETTLE, thing.surface)
+                self.tell(Kind.SETTLE, thing.owner)
                 self.reason = "settled"
                 return None
-        face = n if isinstance(thing, _Line) else None
-        found = _Lasting(index, face, sign, belt, carried=False)
+        face = n if thing.flat else None
+        found = _Lasting(index, face, sign, belt)
         push = self.rates(found, self.state)[V]
         for k, m in touched.items():
             if k != index and v @ m < REST and push @ m < -1e-9:
@@ -284,8 +272,7 @@ class _Run:
             n = on.normal[:, None] + np.zeros_like(y[X])
             bend = 0.0
         else:
-            assert isinstance(thing, _Circle)
-            n = y[X] + (self.base - thing.center)[:, None]
+            n = y[X] + (self.base - thing.place)[:, None]
             n = n / np.hypot(*n)
             bend = (y[2] * n[1] - y[3] * n[0]) ** 2 / thing.reach
         load = -(self.g @ n) - bend
@@ -322,13 +309,13 @@ class _Run:
             self.state[OMEGA] += self.lever * tangential / self.r
         after = slip + (1.0 + self.lever) * tangential
         loss = 0.5 * mass * (1.0 - thing.restitution**2) * closing**2
-        self.log.book(0, thing.surface, mass * tangential * belt, loss,
+        self.log.book(0, thing.owner, mass * tangential * belt, loss,
                       -0.5 * mass * tangential * (slip + after))  # fmt: skip
         self.log.contacts += 1
-        lands = thing.surface == self.machine.landing and not self.landed
+        lands = thing.owner == self.machine.landing and not self.landed
         self.landed |= lands
         self.tell(
-            Kind.LANDING if lands else Kind.IMPACT, thing.surface, before, spin,
+            Kind.LANDING if lands else Kind.IMPACT, thing.owner, before, spin,
             mass * normal, mass * tangential,
         )  # fmt: skip
         self.knot()
@@ -340,21 +327,18 @@ class _Run:
     def phase(self, on: _Lasting | None) -> _Lasting | None:
         """Integrate until something happens, and resolve it."""
         self.state[X] = self.state[WORK] = self.state[HEAT] = 0.0
-        touched = self.touching()
         guards = list(self.meetings(on))
         guards += list(self.changes(on) if on is not None else self.exits())
         left, first = self.machine.end_time - self.t0, None
         if on is None:
-            for k in touched:
-                n = self.normal(k, self.base[:, None])[:, 0]
+            for n in self.touching().values():
                 away, fall = float(self.state[V] @ n), -float(self.g @ n)
                 if away >= REST and fall > 0.0:
                     first = min(first or inf, 0.5 * away / fall)
         what = self.integrate(on, guards, left, first)
         if on is not None:
-            surface = self.things[on.index].surface
-            mass = self.machine.particle.mass
-            self.log.book(0, surface, mass * self.state[WORK], 0.0, mass * self.state[HEAT])
+            owner, mass = self.things[on.index].owner, self.machine.particle.mass
+            self.log.book(0, owner, mass * self.state[WORK], 0.0, mass * self.state[HEAT])
         self.base = self.base + self.state[X]
         self.state[X] = 0.0
         self.knot()
@@ -369,9 +353,7 @@ class _Run:
             return "time", -1
         reach = PIECES * max(PIECE, self.r)
         if on is not None and on.normal is None:
-            thing = self.things[on.index]
-            assert isinstance(thing, _Circle)
-            reach = min(reach, ARC * thing.reach)
+            reach = min(reach, ARC * self.things[on.index].reach)
 
         def longest(y: Floats) -> float:
             # The way of a step at this speed, and under the weight, is at most `reach`.
@@ -394,13 +376,15 @@ class _Run:
             times = np.linspace(step.t_old, step.t, PIECES + 1)[1:]
             found = np.hstack([dense(times[:-1]), step.y[:, None]])
             earliest, which = inf, -1
-            for k, (_, _, guard) in enumerate(guards):
+            for k, (name, index, guard) in enumerate(guards):
                 seen = np.concatenate([[values[k]], guard(found)])
                 values[k] = seen[-1]
                 for at in np.flatnonzero((seen[:-1] > 0.0) & (seen[1:] <= 0.0)).tolist():
                     low = step.t_old if at == 0 else times[at - 1]
                     t = self.moment(dense, guard, low, times[at])
-                    if t < earliest and self.met(guards[k], dense(t)):
+                    place = self.base + dense(t)[X]
+                    beside = name not in ("left", "right") or self.things[index].within(place)
+                    if t < earliest and beside:
                         earliest, which = t, k
             if which >= 0:
                 self.state, self.t0 = dense(earliest), self.t0 + earliest
@@ -409,14 +393,6 @@ class _Run:
                 self.knot(step.t, step.y)
         self.state, self.t0 = step.y.copy(), self.machine.end_time
         return "time", -1
-
-    def met(self, guard: tuple[str, int, Guard], y: Floats) -> bool:
-        """Whether the gap to a line that closes is that to the segment."""
-        name, k, _ = guard
-        thing = self.things[k]
-        return name not in ("left", "right") or (
-            isinstance(thing, _Line) and thing.within((self.base + y[X])[:, None])
-        )
 
     def moment(self, dense: Any, guard: Guard, low: float, high: float) -> float:
         """Return when a guard falls to 0 between two times."""
@@ -436,27 +412,27 @@ class _Run:
             aside = {on.index}
             aside |= {
                 k for k, thing in enumerate(self.things)
-                if (isinstance(thing, _Circle) and on.index in [j for j, _, _ in thing.joined])
-                or (on.carried and thing.surface == lies.surface)
+                if on.index in [j for j, _, _ in thing.joined]
+                or (on.carried and thing.owner == lies.owner)
             }  # fmt: skip
         for k, thing in enumerate(self.things):
             if k in aside:
                 continue
-            if isinstance(thing, _Circle):
+            if thing.flat:
+                yield "left", k, self.to_line(thing, 1.0)
+                yield "right", k, self.to_line(thing, -1.0)
+            else:
                 yield "meets", k, self.to_circle(thing)
-                continue
-            yield "left", k, self.to_line(thing, 1.0)
-            yield "right", k, self.to_line(thing, -1.0)
 
-    def to_line(self, thing: _Line, side: float) -> Guard:
+    def to_line(self, thing: _Surface, side: float) -> Guard:
         """Return the gap to a face; of one that is touched it starts as 0, to the last bit."""
-        gap = side * float(thing.distance(self.base[:, None])[0]) - self.r
+        gap = side * thing.distance(self.base) - self.r
         gap = 0.0 if abs(gap) < TOUCH else gap
         return lambda y: gap + side * (thing.left @ y[X])
 
-    def to_circle(self, thing: _Circle) -> Guard:
+    def to_circle(self, thing: _Surface) -> Guard:
         """Return the gap to a circle, likewise."""
-        away = self.base - thing.center
+        away = self.base - thing.place
         far = hypot(*away)
         ahead = 0.0 if abs(far - thing.reach) < TOUCH else far - thing.reach
 
@@ -492,15 +468,13 @@ class _Run:
                 return np.asarray(thing.friction * load - np.abs(need))
 
             yield "slips", on.index, spare
-        if isinstance(thing, _Line):
-            along = float(thing.foot(self.base[:, None])[0])
+        if thing.flat:
+            along = thing.foot(self.base)
             yield "ends", 0, lambda y: along + thing.tangent @ y[X]
             yield "ends", 1, lambda y: thing.length - along - thing.tangent @ y[X]
             return
         for k, point, inward in thing.joined:
             # Beside the end of a segment: there its face goes on, if it lies that way.
-            line = self.things[k]
-            assert isinstance(line, _Line)
             from_end = self.base - point
 
             def outside(y: Floats, a: Floats = from_end, i: Floats = inward) -> Floats:
@@ -509,9 +483,9 @@ class _Run:
                 return np.where(near, -(i @ place), np.nan)
 
             yield "joins", k, outside
-        if thing.left is not None:
-            side = 1.0 if (self.base - thing.center) @ thing.left >= 0.0 else -1.0
-            tip = self.base - thing.center
+        if thing.left.any():
+            tip = self.base - thing.place
+            side = 1.0 if tip @ thing.left >= 0.0 else -1.0
             yield "lasts", on.index, lambda y: side * (thing.left @ (tip[:, None] + y[X]))
 
     def next(self, on: _Lasting | None, what: tuple[str, int]) -> _Lasting | None:
@@ -525,61 +499,50 @@ class _Run:
         elif name in ("left", "right", "meets"):
             if on is not None and on.carried:
                 raise UnableError("something is in the way of the ride")
-            self.sides[k] = -1.0 if name == "right" else 1.0
-            self.blow(k, self.normal(k, self.base[:, None])[:, 0])
+            self.sides[k] = name != "right"
+            self.blow(k, self.normal(k))
             lasting = None if self.reason else self.contact()
             if on is not None and (lasting is None or lasting.index != on.index):
-                self.tell(Kind.SEPARATION, self.things[on.index].surface)
+                self.tell(Kind.SEPARATION, self.things[on.index].owner)
             return lasting
         elif name == "lifts":
             assert on is not None
-            self.tell(Kind.SEPARATION, self.things[on.index].surface)
+            self.tell(Kind.SEPARATION, self.things[on.index].owner)
         elif name == "grips":
             assert on is not None
-            return self.law(k, self.around(on), begins=True)
+            normal = self.forces(on, self.state[:, None])[0][:, 0]
+            return self.law(k, {**self.touching(), k: normal}, begins=True)
         elif name == "slips":
             assert on is not None
-            self.tell(Kind.SLIP, self.things[k].surface)
+            self.tell(Kind.SLIP, self.things[k].owner)
             need = float(self.forces(on, self.state[:, None])[4][0])
-            return _Lasting(on.index, on.normal, -1 if need > 0.0 else 1, on.belt, carried=False)
+            return _Lasting(on.index, on.normal, -1 if need > 0.0 else 1, on.belt)
         elif name == "ends":
             assert on is not None
             return self.round_the_end(on, k)
         else:
             assert on is not None
-            return self.law(k, {k: self.normal(k, self.base[:, None])[:, 0]})
+            return self.law(k, {k: self.normal(k)})
         return None
-
-    def around(self, on: _Lasting) -> dict[int, Floats]:
-        """Return all that is touched, with its normal."""
-        found = {k: self.normal(k, self.base[:, None])[:, 0] for k in self.touching()}
-        found[on.index] = self.forces(on, self.state[:, None])[0][:, 0]
-        return found
 
     def round_the_end(self, on: _Lasting, end: int) -> _Lasting | None:
         """Go on at the end of a face: round the pulley, round the end, or in flight."""
         face = self.things[on.index]
-        assert isinstance(face, _Line)
-        point = face.start + (face.length if end else 0.0) * face.tangent
+        point = face.place + (face.length if end else 0.0) * face.tangent
         for k, thing in enumerate(self.things):
-            if isinstance(thing, _Line):
-                continue
             if any(
                 j == on.index and np.allclose(at, point, atol=TOUCH) for j, at, _ in thing.joined
             ):
-                n = self.normal(k, self.base[:, None])[:, 0]
+                n = self.normal(k)
                 if on.carried:
-                    reach = float(hypot(*self.base))
-                    self.things.append(
-                        _Circle(thing.center, reach, None, (), thing.speed, 0.0, inf, thing.surface)
-                    )
-                    ride = _Lasting(len(self.things) - 1, None, 0, on.belt, carried=True)
-                    if self.load(ride.index, n, self.state[V]) > 0.0:
-                        return ride
-                elif self.load(k, n, self.state[V]) > 0.0:
+                    k = len(self.things)
+                    self.things.append(replace(thing, reach=hypot(*self.base), joined=()))
+                if self.load(k, n, self.state[V]) > 0.0:
+                    if on.carried:
+                        return _Lasting(k, None, 0, on.belt, carried=True)
                     return self.law(k, {k: n})
                 break
-        self.tell(Kind.SEPARATION, face.surface)
+        self.tell(Kind.SEPARATION, face.owner)
         return None
 
     # What is written down.
@@ -599,36 +562,40 @@ class _Run:
         )  # fmt: skip
 
 
-def _obstacles(machine: Machine) -> list[_Line | _Circle]:
+def _surfaces(machine: Machine) -> list[_Surface]:
     """Return segments, then the pulley, then free ends of segments."""
-    s, r, pulley = machine.segments, machine.particle.radius, machine.pulley
-    lines: list[_Line | _Circle] = []
+    parts, r, pulley, nothing = (
+        machine.segments,
+        machine.particle.radius,
+        machine.pulley,
+        np.zeros(2),
+    )
+    lines: list[_Surface] = []
     ends: list[tuple[int, Floats, Floats]] = []
-    for k in range(len(s.length)):
-        tangent = s.tangent[k]
+    for k, tangent in enumerate(parts.tangent):
         left = np.array([-tangent[1], tangent[0]])
         lines.append(
-            _Line(s.start[k], tangent, left, float(s.length[k]), float(s.speed[k]),
-                  float(s.restitution[k]), float(s.friction[k]), int(s.surface[k]))
+            _Surface(
+                parts.start[k], tangent, left, float(parts.length[k]), 0.0, float(parts.speed[k]),
+                float(parts.restitution[k]), float(parts.friction[k]), int(parts.surface[k]),
+            )
         )  # fmt: skip
-        ends += [(k, s.start[k], tangent), (k, s.end[k], -tangent)]
-    circles: list[_Line | _Circle] = []
+        ends += [(k, parts.start[k], tangent), (k, parts.end[k], -tangent)]
+    circles: list[_Surface] = []
     if pulley is not None:
-        on_it = tuple(end for end in ends if abs(hypot(*end[1]) - pulley.radius) <= TOUCH)
         circles.append(
-            _Circle(np.zeros(2), pulley.radius + r, None, on_it, pulley.speed, pulley.restitution,
-                    pulley.friction, pulley.surface)
+            _Surface(
+                nothing, nothing, nothing, 0.0, pulley.radius + r, pulley.speed,
+                pulley.restitution, pulley.friction, pulley.surface,
+                tuple(end for end in ends if abs(hypot(*end[1]) - pulley.radius) <= TOUCH),
+            )
         )  # fmt: skip
         ends = [end for end in ends if hypot(*end[1]) > pulley.radius + TOUCH]
     for k, point, _ in ends if r > 0.0 else []:
         line = lines[k]
-        assert isinstance(line, _Line)
         joined = tuple(end for end in ends if np.abs(end[1] - point).max() <= TOUCH)
         if joined[0][0] == k:  # of several that end here, the first
-            same = [lines[j] for j, _, _ in joined if s.surface[j] == line.surface]
-            crown = sum((other.left for other in same if isinstance(other, _Line)), np.zeros(2))
-            circles.append(
-                _Circle(point, r, crown, joined, line.speed, line.restitution, line.friction,
-                        line.surface)
-            )  # fmt: skip
+            left = np.sum([lines[j].left for j, _, _ in joined if lines[j].owner == line.owner], 0)
+            circle = {"place": point, "tangent": nothing, "left": left, "length": 0.0, "reach": r}
+            circles.append(replace(line, joined=joined, **circle))
     return lines + circles

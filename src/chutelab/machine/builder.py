@@ -164,27 +164,18 @@ def build(scene: Scene) -> Machine:
         place the outgoing belt, the impact lies off the finite plate, or a particle starts inside a
         surface.
     """
+    builder = _Builder(scene)
     # A flight that never meets the plate's line has NaN for its impact.
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        return _build(scene)
-
-
-def _build(scene: Scene) -> Machine:
-    builder = _Builder(scene)
-    belt_height = builder.incoming_and_plate(discharge(scene))
-    if scene.outgoing is not None:
-        assert belt_height is not None
-        out = scene.outgoing
-        builder.add(
-            "outgoing",
-            [(out.start, belt_height), (out.start + out.length, belt_height)],
-            out.speed,
-            out.restitution,
-            out.friction,
-        )
-    for free in scene.surface:
-        builder.add(free.name, free.points, free.speed, free.restitution, free.friction)
-    return builder.machine()
+        belt_height = builder.incoming_and_plate(discharge(scene))
+        if scene.outgoing is not None:
+            assert belt_height is not None
+            out = scene.outgoing
+            ends = [(out.start, belt_height), (out.start + out.length, belt_height)]
+            builder.add("outgoing", ends, out.speed, out.restitution, out.friction)
+        for free in scene.surface:
+            builder.add(free.name, free.points, free.speed, free.restitution, free.friction)
+        return builder.machine()
 
 
 class _Builder:

@@ -81,32 +81,26 @@ def crossings(
     """
     found: dict[tuple[int, int], None] = {}
     for s, other in combinations(range(len(rows)), 2):
-        if owner[s] != owner[other] and _cross(rows[s], rows[other]):
+        if owner[s] == owner[other]:
+            continue
+        if _parts(rows[s], rows[other]) and _parts(rows[other], rows[s]):
             found[owner[s], owner[other]] = None
     said = [Caution(names[b], names[a]) for a, b in found]
     if pulley is not None:
-        into = {o for row, o in zip(rows, owner, strict=True) if o != 0 and _reach(row) < pulley}
+        start, along = rows[:, :2], rows[:, 2:] - rows[:, :2]
+        share = np.clip(-(start * along).sum(axis=1) / (along * along).sum(axis=1), 0.0, 1.0)
+        distance = np.hypot(*(start + share[:, None] * along).T)
+        into = {o for o, far in zip(owner, distance, strict=True) if o != 0 and far < pulley}
         said += [Caution(names[o], DRIVE_PULLEY) for o in sorted(into)]
     return said
 
 
-def _cross(one: Floats, other: Floats) -> bool:
-    """Tell whether the ends of each lie strictly on two sides of the other."""
-    return _parts(one, other) and _parts(other, one)
-
-
 def _parts(line: Floats, ends: Floats) -> bool:
+    """Tell whether two ends lie strictly on two sides of a line."""
     (x0, y0, x1, y1), (u0, v0, u1, v1) = line, ends
     first = (x1 - x0) * (v0 - y0) - (y1 - y0) * (u0 - x0)
     second = (x1 - x0) * (v1 - y0) - (y1 - y0) * (u1 - x0)
     return bool(first * second < 0.0)
-
-
-def _reach(row: Floats) -> float:
-    """Distance (m) of a segment from the origin."""
-    start, along = row[:2], row[2:] - row[:2]
-    share = np.clip(-(start @ along) / (along @ along), 0.0, 1.0)
-    return float(np.hypot(*(start + share * along)))
 
 
 EXIT_MARGIN = 1.0

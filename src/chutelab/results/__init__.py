@@ -3,8 +3,8 @@
 - `recording`: `Recording`, a finished run: knots, events, and the ledger entries they carry.
 - `recorder`: what engines write a run into.
 - `ledger`: where the energy went, in total and by surface.
+- `quantities`: the one reader of a run's numbers, by name and by particle.
 - `comparison`: `compare`, particle 0 against the theory.
-- `quantities`: a run's quantities by name.
 - `summary`: all of it as the JSON object of ``chutelab run --json``.
 - `storage`: recordings as files.
 """

@@ -12,22 +12,14 @@ from math import degrees, isfinite, nan
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from chutelab.results.ledger import ledger
-from chutelab.results.recording import EVENT, REASONS, Kind, Recording
+from chutelab.results.quantities import QUANTITIES, observed
+from chutelab.results.recording import Recording
 from chutelab.scene import Scene
 from chutelab.theory import Transfer
 from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet, Shown, number
-
-QUANTITIES = {
-    "phi1": "angle", "t2": "time", "x2": "length", "y2": "length", "v2": "speed", "phi2": "angle",
-    "phi2r": "angle", "v2r": "speed", "t3": "time", "x3": "length", "y3": "length",
-    "v3x": "speed", "v3y": "speed", "v3": "speed", "d3": "length", "dEk": "energy", "P": "power",
-    "belt_work": "energy", "slip_heat": "energy",
-}  # fmt: skip
-"""What is compared, under the paper's symbols, and what kind of quantity it is."""
 
 UNITS = {
     "angle": "°", "time": "s", "length": "m", "speed": "m/s", "energy": "J", "power": "W",
@@ -55,10 +47,6 @@ MEANINGS = {
     "belt_work": "belt work until no slip",
     "slip_heat": "slip heat until then",
 }
-
-
-ALONG = 1e-14
-"""Share of the rebound speed below which its part away from the plate is rounding."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -116,7 +104,7 @@ def compare(recording: Recording) -> Comparison:
     """Compare particle 0 with the theory's prediction for its scene."""
     scene, prediction = recording.scene, recording.prediction
     theory = {name: float(getattr(prediction, name)) for name in QUANTITIES}
-    found = observed(recording, scene)
+    found = observed(recording)
     sizes = scales(scene, prediction)
     return Comparison(
         simulated=found,
@@ -164,89 +152,3 @@ def scales(scene: Scene, prediction: Transfer) -> dict[str, Any]:
         "power": energy * scene.stream.rate,
     }
     return {kind: float(size) if np.ndim(size) == 0 else size for kind, size in found.items()}
-
-
-def observed(recording: Recording, scene: Scene) -> dict[str, float]:
-    """Return the `QUANTITIES` of particle 0 as the recording has them, see `from_events`."""
-    out = dict.fromkeys(QUANTITIES, nan)
-    own = recording.events[recording.events["particle"] == 0]
-    left = _first(recording, own, "incoming", Kind.SEPARATION)
-    hit = _first(recording, own, "plate", Kind.IMPACT)
-    down = _first(recording, own, "outgoing", Kind.LANDING)
-    landing = recording.surface_index("outgoing")
-    hit = hit if left is not None else None
-    down = down if hit is not None else None
-    events = (_NEVER if event is None else event for event in (left, hit, down))
-    out |= {name: float(value) for name, value in from_events(scene, *events).items()}
-    # What the belt pays until there is no slip is known only of a particle that got there, and had
-    # nothing but the belt to do with since it landed.
-    settled = recording.count == 1 and REASONS[recording.ended[0]] == "settled"
-    if down is not None and settled and (own["surface"][own["t"] > down["t"]] == landing).all():
-        entries = ledger(recording).by_surface.get("outgoing")
-        if entries is not None:
-            out["belt_work"], out["slip_heat"] = entries["belt_work"], entries["friction_loss"]
-    return out
-
-
-def from_events(scene: Scene, left: Any, hit: Any, down: Any) -> dict[str, Any]:
-    """Return what separation, impact and landing tell of the `QUANTITIES`, in the paper's frame.
-
-    x2, y2 are counted from the separation point, y down; x3 and v3x back from the plate.
-
-    Parameters
-    ----------
-    scene : Scene
-        One, or a family of them, see `chutelab.scene.variants`.
-    left, hit, down : of dtype `EVENT`
-        One of each, or arrays (N,); with NaN, as `never` has it, where one did not happen.
-    """
-    plate, top, belt = scene.plate, nan, nan
-    if scene.incoming is not None:
-        top = scene.incoming.pulley_radius
-    if scene.outgoing is not None:
-        belt = scene.outgoing.speed
-    alpha = np.radians(nan if plate is None else plate.angle_deg)
-    (x1, y1), (x2, y2), (x3, y3) = (np.moveaxis(e["position"], -1, 0) for e in (left, hit, down))
-    (ux, uy), (wx, wy) = (np.moveaxis(hit[f"velocity_{w}"], -1, 0) for w in ("before", "after"))
-    vx, vy = np.moveaxis(down["velocity_before"], -1, 0)
-    sine, cosine = np.sin(alpha), np.cos(alpha)
-    away, along = -(wx * cosine + wy * sine), wx * sine - wy * cosine
-    # Rounding must not choose between π and -π for a rebound up along the plate.
-    away = np.where(np.abs(away) <= ALONG * np.hypot(wx, wy), 0.0, away)
-    energy = 0.5 * scene.particle.mass * (vx * vx + belt * belt)
-    return {
-        "phi1": np.arctan2(x1, y1),
-        "t2": hit["t"] - left["t"],
-        "x2": x2 - x1,
-        "y2": y1 - y2,
-        "v2": np.hypot(ux, uy),
-        "v2r": np.hypot(wx, wy),
-        "phi2": np.arctan2(ux * cosine + uy * sine, ux * sine - uy * cosine),
-        "phi2r": np.arctan2(away, along + 0.0),  # + 0.0: the angle of no rebound is 0, not -π
-        "t3": down["t"] - hit["t"],
-        "x3": x2 - x3,
-        "y3": y2 - y3,
-        "v3x": -vx,
-        "v3y": -vy,
-        "v3": np.hypot(vx, vy),
-        "d3": top + scene.particle.radius - y3,
-        "dEk": energy,
-        "P": energy * scene.stream.rate,
-    }
-
-
-def never(count: int) -> NDArray[Any]:
-    """Return events (count,) that did not happen: NaN throughout."""
-    events = np.zeros(count, dtype=EVENT)
-    for name in ("t", "position", "velocity_before", "velocity_after"):
-        events[name] = nan
-    return events
-
-
-_NEVER = never(1)[0]
-
-
-def _first(recording: Recording, events: Any, surface: str, kind: Kind) -> Any | None:
-    """Return the first event of a kind on a surface, None if there is none."""
-    match = (events["kind"] == kind) & (events["surface"] == recording.surface_index(surface))
-    return events[match][0] if match.any() else None

@@ -1,27 +1,134 @@
-"""A run's quantities by name, such as ``landing.x.mean``, and who waited for a place."""
+"""A run's quantities: the one place where numbers are read off a recording.
+
+`first` gives the first separation, impact or landing of each particle, `each` a quantity of each
+particle by its name, such as ``landing.x``, `measure` one of the run, such as ``landing.x.mean``,
+and `observed` those of particle 0 under the paper's symbols. Then there is what happened to a crowd
+as a whole: who waited for a place, who rode into others, who rolls where it should be carried.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import degrees, nan
+from math import nan
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from chutelab.machine.releases import schedule
-from chutelab.results.comparison import observed
+from chutelab.machine.releases import Squeeze, schedule, squeeze
 from chutelab.results.ledger import ledger
-from chutelab.results.recording import REASONS, Kind, Recording
+from chutelab.results.recording import ENTRIES, EVENT, REASONS, Kind, Recording
 from chutelab.scene import Scene
+from chutelab.scene.rules import NEEDED
 from chutelab.util.arrays import Floats
+
+QUANTITIES = {
+    "phi1": "angle", "t2": "time", "x2": "length", "y2": "length", "v2": "speed", "phi2": "angle",
+    "phi2r": "angle", "v2r": "speed", "t3": "time", "x3": "length", "y3": "length",
+    "v3x": "speed", "v3y": "speed", "v3": "speed", "d3": "length", "dEk": "energy", "P": "power",
+    "belt_work": "energy", "slip_heat": "energy",
+}  # fmt: skip
+"""What theory and runs both have, under the paper's symbols, and what kind of quantity it is."""
+
+ALONG = 1e-14
+"""Share of the rebound speed below which its part away from the plate is rounding."""
+
+CARRIED = 1e-3
+"""m/s from the belt's speed, up to which a particle rides with it: the slip that counts as none."""
 
 _STATISTICS: dict[str, Callable[[Floats], Any]] = {
     "mean": np.mean, "spread": np.std, "min": np.min, "max": np.max,
 }  # fmt: skip
 
 
-def measure(recording: Recording, name: str, scene: Scene) -> float:
+def first(recording: Recording, event: str, surface: str | None = None) -> NDArray[Any]:
+    """Return the first event of a kind of each particle, (N,), dtype `EVENT`.
+
+    Parameters
+    ----------
+    recording : Recording
+        The run.
+    event : {"separation", "impact", "landing"}
+        From the incoming belt, on the plate and on the outgoing belt.
+    surface : str, optional
+        Another surface.
+
+    Returns
+    -------
+    ndarray
+        NaN throughout where it did not happen.
+    """
+    found = recording.first(recording.select(Kind[event.upper()], surface=surface or NEEDED[event]))
+    events = never(recording.count)
+    events[found["particle"]] = found
+    return events
+
+
+def never(count: int) -> NDArray[Any]:
+    """Return events (count,) that did not happen: NaN throughout."""
+    events = np.zeros(count, dtype=EVENT)
+    for name in ("t", "position", "velocity_before", "velocity_after"):
+        events[name] = nan
+    return events
+
+
+def column(events: NDArray[Any], name: str) -> Floats:
+    """Return ``t``, ``x``, ``y``, ``vx``, ``vy``, ``vx_after`` or ``vy_after`` of events, SI."""
+    if name == "t":
+        return np.asarray(events["t"])
+    if name in ("x", "y"):
+        return np.asarray(events["position"][:, "xy".index(name)])
+    when = "after" if name.endswith("_after") else "before"
+    return np.asarray(events[f"velocity_{when}"][:, "xy".index(name[1])])
+
+
+def end_times(recording: Recording) -> Floats:
+    """Return when the particles' tracks end, s, (N,); NaN of those that were never released."""
+    times = np.full(recording.count, nan)
+    times[recording.released] = recording.ends()[1]["t"]
+    return times
+
+
+def each(recording: Recording, name: str) -> Floats:
+    """Return a quantity of each particle, (N,), in the unit its name has; NaN without one.
+
+    Of a family of scenes, each particle is a scene of its own.
+
+    Parameters
+    ----------
+    recording : Recording
+        The run.
+    name : str
+        Such as ``x2``, ``landing.x``, ``impact.hood.t``, ``ended.t`` or ``ledger.belt_work``.
+        ``ledger.by_surface`` has particles apart in the recording of a family only.
+
+    Raises
+    ------
+    KeyError
+        If there is no such quantity.
+    """
+    match name.split("."):
+        case ["ended", "t"]:
+            return end_times(recording)
+        case ["ledger", entry]:
+            values = np.full(recording.count, nan)
+            values[recording.released] = recording.ends()[1]["entries"][:, ENTRIES.index(entry)]
+            return values
+        case ["ledger", "by_surface", surface, entry]:
+            if surface not in recording.surfaces:
+                return np.zeros(recording.count)
+            owner = recording.surface_index(surface)
+            return np.asarray(recording.by_surface[:, owner, ENTRIES.index(entry)])
+        case ["impact", surface, key]:
+            return column(first(recording, "impact", surface), key)
+        case ["separation" | "impact" | "landing" as event, key]:
+            return column(first(recording, event), key)
+    values = symbols(recording)[name.removesuffix("_deg")]
+    return np.degrees(values) if name.endswith("_deg") else values
+
+
+def measure(recording: Recording, name: str) -> float:
     """Return a quantity of a recording, in the unit its name has; NaN if it did not happen.
 
     Parameters
@@ -31,8 +138,6 @@ def measure(recording: Recording, name: str, scene: Scene) -> float:
     name : str
         Such as ``x2``, ``landing.x.mean`` or ``ledger.by_surface.plate.restitution_loss``. A
         name without statistic is particle 0's; ``spread`` is the standard deviation.
-    scene : Scene
-        The recording's, `recording.scene`.
 
     Raises
     ------
@@ -42,61 +147,93 @@ def measure(recording: Recording, name: str, scene: Scene) -> float:
     match name.split("."):
         case ["contacts"]:
             return float(recording.contacts)
-        case ["ended", "t", *statistic]:
-            released = np.flatnonzero(np.diff(recording.offsets) > 0)
-            return _of_column(released, recording.ends()[1]["t"], statistic)
-        case ["ended", ending]:
-            return float(np.count_nonzero(recording.ended == REASONS.index(ending)))
-        case ["ledger", *entry]:
-            return _booked(recording, entry)
-        case ["separation" | "impact" | "landing" as event, *column]:
-            return _of_event(recording, event, column)
-        case [symbol]:
-            values = observed(recording, scene)
-            if symbol.endswith("_deg"):
-                return degrees(values[symbol.removesuffix("_deg")])
-            return values[symbol]
-    raise KeyError(name)
+        case ["ended", reason] if reason in REASONS:
+            return float(np.count_nonzero(recording.ended == REASONS.index(reason)))
+        case ["ledger", "by_surface", surface, entry]:
+            return ledger(recording).by_surface[surface][entry]
+        case ["ledger", stored, end]:
+            return float(getattr(ledger(recording), stored)[("start", "end").index(end)])
+        case ["ledger", entry]:
+            return float(getattr(ledger(recording), entry))
+        case [*event, "count"]:
+            return float(np.isfinite(each(recording, ".".join([*event, "t"]))).sum())
+        case [*quantity, statistic] if statistic in _STATISTICS:
+            values = each(recording, ".".join(quantity))
+            values = values[np.isfinite(values)]
+            return float(_STATISTICS[statistic](values)) if len(values) else nan
+    return float(each(recording, name)[0])
 
 
-def _of_event(recording: Recording, event: str, column: list[str]) -> float:
-    kind, surface = {
-        "separation": (Kind.SEPARATION, "incoming"),
-        "impact": (Kind.IMPACT, "plate"),
-        "landing": (Kind.LANDING, "outgoing"),
-    }[event]
-    if event == "impact" and column[0] in recording.surfaces:
-        surface, column = column[0], column[1:]
-    first = recording.first(recording.select(kind, surface=surface))
-    if column == ["count"]:
-        return float(len(first))
-    key = column[0]
-    if key == "t":
-        values = first["t"]
-    elif key in ("x", "y"):
-        values = first["position"][:, "xy".index(key)]
-    else:
-        when = "after" if key.endswith("_after") else "before"
-        values = first[f"velocity_{when}"][:, "xy".index(key[1])]
-    return _of_column(first["particle"], values, column[1:])
+def observed(recording: Recording) -> dict[str, float]:
+    """Return the `QUANTITIES` of particle 0, see `symbols`."""
+    return {name: float(values[0]) for name, values in symbols(recording).items()}
 
 
-def _of_column(particle: Any, values: Floats, statistic: list[str]) -> float:
-    """Return particle 0's value, or a statistic of all."""
-    if statistic:
-        return float(_STATISTICS[statistic[0]](values)) if len(values) else nan
-    own = values[particle == 0]
-    return float(own[0]) if len(own) else nan
+def symbols(recording: Recording) -> dict[str, Floats]:
+    """Return the `QUANTITIES` of each particle, (N,), SI units and radians; NaN without one."""
+    left, hit, down = (first(recording, event) for event in NEEDED)
+    # In the paper's frame an impact is counted from the separation, a landing from the impact.
+    hit[np.isnan(left["t"])] = never(1)
+    down[np.isnan(hit["t"])] = never(1)
+    unpaid = dict.fromkeys(("belt_work", "slip_heat"), np.full(recording.count, nan))
+    found = from_events(recording.scene, left, hit, down) | unpaid
+    # What the belt pays until there is no slip is known only of a particle that got there, and had
+    # nothing but the belt to do with since it landed.
+    if recording.count == 1 and REASONS[recording.ended[0]] == "settled":
+        since = recording.events["t"] > down["t"][0]
+        belt = recording.surface_index("outgoing")
+        if np.isfinite(down["t"][0]) and (recording.events["surface"][since] == belt).all():
+            paid = ledger(recording).by_surface["outgoing"]
+            found["belt_work"] = np.array([paid["belt_work"]])
+            found["slip_heat"] = np.array([paid["friction_loss"]])
+    return found
 
 
-def _booked(recording: Recording, entry: list[str]) -> float:
-    books = ledger(recording)
-    match entry:
-        case ["by_surface", surface, name]:
-            return books.by_surface[surface][name]
-        case [stored, end]:
-            return float(getattr(books, stored)[("start", "end").index(end)])
-    return float(getattr(books, entry[0]))
+def from_events(
+    scene: Scene, left: NDArray[Any], hit: NDArray[Any], down: NDArray[Any]
+) -> dict[str, Floats]:
+    """Return what separation, impact and landing tell of the `QUANTITIES`, in the paper's frame.
+
+    x2, y2 are counted from the separation point, y down; x3 and v3x back from the plate.
+
+    Parameters
+    ----------
+    scene : Scene
+        One, or a family of N, see `chutelab.scene.variants`.
+    left, hit, down : ndarray, (N,), dtype `EVENT`
+        NaN, as `never` has it, where one did not happen.
+    """
+    plate = scene.plate
+    top = nan if scene.incoming is None else scene.incoming.pulley_radius
+    belt = nan if scene.outgoing is None else scene.outgoing.speed
+    alpha = np.radians(nan if plate is None else plate.angle_deg)
+    (x1, y1), (x2, y2), (x3, y3) = (event["position"].T for event in (left, hit, down))
+    (ux, uy), (wx, wy) = hit["velocity_before"].T, hit["velocity_after"].T
+    vx, vy = down["velocity_before"].T
+    sine, cosine = np.sin(alpha), np.cos(alpha)
+    away, along = -(wx * cosine + wy * sine), wx * sine - wy * cosine
+    # Rounding must not choose between π and -π for a rebound up along the plate.
+    away = np.where(np.abs(away) <= ALONG * np.hypot(wx, wy), 0.0, away)
+    energy = 0.5 * scene.particle.mass * (vx * vx + belt * belt)
+    return {
+        "phi1": np.arctan2(x1, y1),
+        "t2": hit["t"] - left["t"],
+        "x2": x2 - x1,
+        "y2": y1 - y2,
+        "v2": np.hypot(ux, uy),
+        "v2r": np.hypot(wx, wy),
+        "phi2": np.arctan2(ux * cosine + uy * sine, ux * sine - uy * cosine),
+        "phi2r": np.arctan2(away, along + 0.0),  # + 0.0: the angle of no rebound is 0, not -π
+        "t3": down["t"] - hit["t"],
+        "x3": x2 - x3,
+        "y3": y2 - y3,
+        "v3x": -vx,
+        "v3y": -vy,
+        "v3": np.hypot(vx, vy),
+        "d3": top + scene.particle.radius - y3,
+        "dEk": energy,
+        "P": energy * scene.stream.rate,
+    }
 
 
 @dataclass(frozen=True)
@@ -119,18 +256,61 @@ class Waits:
     never: int
 
 
-def waits(scene: Scene, recording: Recording) -> Waits | None:
-    """Return who waited for its place in a run of a scene; None if nobody did."""
-    due = schedule(scene)[: recording.count]
+def waits(recording: Recording) -> Waits | None:
+    """Return who waited for its place; None if nobody did."""
+    due, dt = schedule(recording.scene), recording.scene.run.dt
     # The pymunk engine releases at the beginning of a step: up to a step late is not waiting.
-    least = (1.0 + 1e-6) * scene.run.dt if recording.engine == "pymunk" else 1e-9
+    least = (1.0 + 1e-6) * dt if recording.engine == "pymunk" else 1e-9
     released = recording.select(Kind.RELEASE)
     late = released["t"] - due[released["particle"]]
     late = late[late > least]
-    missing = np.diff(recording.offsets) == 0
     end = recording.knots["t"].max(initial=0.0)
-    never = int(np.count_nonzero(due[missing] < end - scene.run.dt))
-    if not len(late) and not never:
+    missing = int(np.count_nonzero(due[~recording.released] < end - dt))
+    if not len(late) and not missing:
         return None
     longest, mean = (float(late.max()), float(late.mean())) if len(late) else (0.0, 0.0)
-    return Waits(len(late), longest, mean, never)
+    return Waits(len(late), longest, mean, missing)
+
+
+def squeezed(recording: Recording) -> Squeeze | None:
+    """Return who rode into others by adhesion, see `machine.releases.squeeze`; None if nobody."""
+    released = recording.select(Kind.RELEASE)
+    return squeeze(recording.scene, released["t"], released["position"])
+
+
+@dataclass(frozen=True)
+class Rolling:
+    """Disks that settled on the outgoing belt without being carried by it.
+
+    A free disk stops slipping when its contact point runs with the belt. Its centre, v_x, may then
+    be far from the belt's speed v_b: it rolls, and the belt pays no more. Belt work so far and
+    m v_b (v_b - v_x) together are what loads that are carried take.
+
+    Attributes
+    ----------
+    particles : int
+        How many roll.
+    belt_work : float
+        What the outgoing belt has paid for all particles, J.
+    belt_work_carried : float
+        What it would have paid if those that roll were carried, J.
+    """
+
+    particles: int
+    belt_work: float
+    belt_work_carried: float
+
+
+def rolling(recording: Recording) -> Rolling | None:
+    """Return what settled on the outgoing belt without being carried; None if nothing did."""
+    belt = recording.scene.outgoing
+    if belt is None or belt.speed is None or recording.particle.inertia == 0.0:
+        return None
+    settled = recording.select(Kind.SETTLE, surface="outgoing")
+    missing = belt.speed - settled["velocity_after"][:, 0]
+    missing = missing[np.abs(missing) > CARRIED]
+    if not len(missing):
+        return None
+    paid = ledger(recording).by_surface["outgoing"]["belt_work"]
+    due = recording.particle.mass * belt.speed * float(missing.sum())
+    return Rolling(len(missing), paid, paid + due)

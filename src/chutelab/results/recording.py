@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from chutelab.machine import Machine, Particle
 from chutelab.scene import Scene
 from chutelab.theory import Transfer, predict
-from chutelab.util.arrays import Floats, Ints
+from chutelab.util.arrays import Bools, Floats, Ints
 from chutelab.util.tables import Sheet, Shown
 
 ENTRIES = ("belt_work", "restitution_loss", "friction_loss")
@@ -345,6 +345,11 @@ class Recording(Shown):
         """Number of particles."""
         return len(self.offsets) - 1
 
+    @property
+    def released(self) -> Bools:
+        """Which particles were released, (N,)."""
+        return self.offsets[1:] > self.offsets[:-1]
+
     def sheet(self) -> Sheet:
         """Return what it holds, in a few lines."""
         first, last = self.ends()
@@ -392,11 +397,8 @@ class Recording(Shown):
 
     def ends(self) -> tuple[NDArray[Any], NDArray[Any]]:
         """Return the first and last knots of all released particles, each of shape (n,)."""
-        released = self.offsets[1:] > self.offsets[:-1]
-        return (
-            self.knots[self.offsets[:-1][released]],
-            self.knots[self.offsets[1:][released] - 1],
-        )
+        first, end = self.offsets[:-1][self.released], self.offsets[1:][self.released]
+        return self.knots[first], self.knots[end - 1]
 
     def surface_index(self, name: str) -> int:
         """Return the index of a surface, or -1 if the scene has none of that name."""

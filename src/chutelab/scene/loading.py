@@ -8,21 +8,18 @@ from __future__ import annotations
 import difflib
 import re
 import tomllib
-import types
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, Union, get_args, get_origin
+from typing import Any, Final
 
 import tomli_w
-from annotated_types import Ge, Gt, Le, Lt, MaxLen
 from pydantic import ValidationError
-from pydantic.fields import FieldInfo
 
-from chutelab.scene.overrides import Override, apply, at_path, joined
+from chutelab.scene.overrides import Override, apply, at_path, joined, rule_at
 from chutelab.scene.rules import ConflictError, Look, conflicts
 from chutelab.scene.schema import Scene
-from chutelab.scene.units import MOST_POINTS, Point, Table
 from chutelab.util.errors import MISSING, Fault, InputError, did_you_mean
 
 _TITLE: Final = re.compile(r"""^title\s*=\s*["'](.*?)["']\s*(?:#.*)?$""", re.MULTILINE)
@@ -60,15 +57,27 @@ class About:
 
 
 def shipped() -> dict[str, Path]:
-    """Return the files of the shipped scenes by name, in alphabetical order."""
-    folder = _folder()
-    found = {path.stem: path for path in folder.glob("*.toml")} if folder else {}
-    return dict(sorted(found.items()))
+    """Return the files of the shipped scenes by name, in alphabetical order.
+
+    They are in the package or, in a checkout, beside ``src``.
+    """
+    package = Path(__file__).parents[1]
+    folder = package / "data" / "scenes"
+    if not folder.is_dir() and (package.parents[1] / "pyproject.toml").is_file():
+        folder = package.parents[1] / "scenes"
+    return dict(sorted((path.stem, path) for path in folder.glob("*.toml")))
 
 
 def about() -> list[About]:
     """Describe the shipped scenes by their titles and the comments they begin with."""
-    return [_about(name, path) for name, path in shipped().items()]
+    found = []
+    for name, path in shipped().items():
+        text = path.read_text(encoding="utf-8")
+        title = _TITLE.search(text)
+        comment = takewhile(lambda line: line.startswith("#"), text.splitlines())
+        look = tuple(line.lstrip("# ") for line in comment if not line.startswith("#:"))
+        found.append(About(name, title[1] if title else name, look, path))
+    return found
 
 
 def find(name_or_path: str | Path) -> Path:
@@ -103,33 +112,6 @@ def template() -> str:
     return (Path(__file__).parent / "starter.toml").read_text(encoding="utf-8")
 
 
-def _about(name: str, path: Path) -> About:
-    text = path.read_text(encoding="utf-8")
-    title = _TITLE.search(text)
-    look = []
-    for line in text.splitlines():
-        if not line.startswith("#"):
-            break
-        if not line.startswith("#:"):
-            look.append(line.lstrip("# "))
-    return About(name, title[1] if title else name, tuple(look), path)
-
-
-def _folder() -> Path | None:
-    """Find the folder of shipped scenes: in the package or, in a checkout, beside ``src``."""
-    # Imported here: a scene given as text or mapping needs no files.
-    from importlib.resources import files
-
-    package = Path(str(files("chutelab.scene"))).parent
-    packaged = package / "data" / "scenes"
-    checkout = package.parent.parent
-    if packaged.is_dir():
-        return packaged
-    if (checkout / "pyproject.toml").is_file() and (checkout / "scenes").is_dir():
-        return checkout / "scenes"
-    return None
-
-
 Location = tuple[str | int, ...]
 """Path of keys and indices, as Pydantic gives it."""
 
@@ -139,12 +121,13 @@ _NEAR: Final = 0.55
 LISTS: Final = ("surface", "expect")
 """Tables of which there may be several."""
 
-_WORDS: Final[dict[Any, str]] = {
-    float: "a number",
-    int: "a whole number",
-    bool: "true or false",
-    str: "a string",
+_WORDS: Final = {
+    "number": "a number",
+    "integer": "a whole number",
+    "boolean": "true or false",
+    "string": "a string",
 }
+_SIGNS: Final = {"minimum": ">=", "exclusiveMinimum": ">", "maximum": "<=", "exclusiveMaximum": "<"}
 
 
 def faults_of(error: ValidationError, document: Mapping[str, Any]) -> list[Fault]:
@@ -180,94 +163,43 @@ def faults_of(error: ValidationError, document: Mapping[str, Any]) -> list[Fault
     return [fault for parts, fault in faults.items() if parts not in broken_lists]
 
 
-def misspelt_tables(document: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the tables that an unknown top-level key was probably meant to be."""
-    for key in document:
-        if key not in Scene.model_fields:
-            yield from _nearest(key, Scene.model_fields)
-
-
-def _keys(table: type[Table] | type[Scene]) -> dict[str, FieldInfo]:
-    return {field.alias or name: field for name, field in table.model_fields.items()}
-
-
 def _allowed(parts: Location) -> tuple[Location, str]:
     """Say what is allowed at a location, and cut off what follows the last key or index."""
-    head = str(parts[0])
-    table = Scene.tables().get(head)
-    field, depth = Scene.model_fields[head], 1
-    annotation, metadata = field.annotation, field.metadata
-    if head in LISTS and len(parts) > 1:
-        annotation, metadata, depth = table, [], 2
-    if table is not None and len(parts) > depth:
-        field = _keys(table)[str(parts[depth])]
-        annotation, metadata, depth = field.annotation, field.metadata, depth + 1
-    while depth < len(parts) and isinstance(parts[depth], int):
-        annotation, metadata, depth = _item(annotation), [], depth + 1
-    extra = field.json_schema_extra
-    unit = f", in {extra['x-unit']}" if isinstance(extra, dict) else ""
-    return parts[:depth], _listed(_phrases(annotation, metadata)) + unit
+    while (rule := rule_at(parts)) is None:
+        parts = parts[:-1]
+    last_key = max(depth for depth, part in enumerate(parts) if isinstance(part, str))
+    unit = (rule_at(parts[: last_key + 1]) or {}).get("x-unit")
+    return parts, _listed(_phrases(rule)) + (f", in {unit}" if unit else "")
 
 
-def _item(annotation: Any) -> Any:
-    """Return the type of the entries of a tuple, optional or not."""
-    if get_origin(annotation) is tuple:
-        return get_args(annotation)[0]
-    return _item(get_args(annotation)[0])
-
-
-def _phrases(annotation: Any, metadata: Iterable[Any] = ()) -> list[str]:
-    """Say a type with its limits in words: a phrase for each alternative."""
-    origin, arguments = get_origin(annotation), get_args(annotation)
-    if origin is Annotated:
-        return _phrases(arguments[0], [*_flat(arguments[1:]), *metadata])
-    if origin in (Union, types.UnionType):
-        members = [member for member in arguments if member is not types.NoneType]
-        return [phrase for member in members for phrase in _phrases(member, metadata)]
-    if origin is Literal:
-        return [f'"{choice}"' for choice in arguments]
-    if annotation == Point:
-        return ["a point [x, y] of two numbers"]
-    if annotation == tuple[Point, ...]:
-        return [f"a list of 2 to {MOST_POINTS} points [[x, y], ...]"]
-    if origin is tuple:
-        (most,) = (limit.max_length for limit in metadata if isinstance(limit, MaxLen))
-        return [f"at most {most} tables, each headed by [[{arguments[0].__name__.lower()}]]"]
-    if isinstance(annotation, type) and issubclass(annotation, Table):
+def _phrases(rule: Mapping[str, Any]) -> list[str]:
+    """Say a rule of the JSON Schema in words: a phrase for each alternative."""
+    if "anyOf" in rule:
+        return [phrase for choice in rule["anyOf"] for phrase in _phrases(choice)]
+    if "enum" in rule or "const" in rule:
+        return [f'"{choice}"' for choice in rule.get("enum", [rule.get("const")])]
+    if rule["type"] == "object":
         return ["a table of keys and values"]
-    return [_WORDS[annotation] + _range(metadata)]
+    if rule["type"] != "array":
+        return [_WORDS[rule["type"]] + _range(rule)]
+    if "prefixItems" in rule:
+        return ["a point [x, y] of two numbers"]
+    if "$ref" in rule["items"]:
+        table = rule["items"]["$ref"].rpartition("/")[2].lower()
+        return [f"at most {rule['maxItems']} tables, each headed by [[{table}]]"]
+    return [f"a list of {rule['minItems']} to {rule['maxItems']} points [[x, y], ...]"]
 
 
-def _flat(metadata: Iterable[Any]) -> Iterator[Any]:
-    # A Field inside Annotated carries its limits one level down.
-    for item in metadata:
-        if isinstance(item, FieldInfo):
-            yield from item.metadata
-        else:
-            yield item
+def _range(rule: Mapping[str, Any]) -> str:
+    if "maxLength" in rule:
+        return f" of at most {rule['maxLength']} characters"
+    if "minimum" in rule and "maximum" in rule:
+        return f" from {_bound(rule['minimum'])} to {_bound(rule['maximum'])}"
+    limits = [f"{sign} {_bound(rule[key])}" for key, sign in _SIGNS.items() if key in rule]
+    return f" {' and '.join(limits)}" if limits else ""
 
 
-def _range(metadata: Iterable[Any]) -> str:
-    lower, upper = "", ""
-    for limit in metadata:
-        match limit:
-            case Ge(ge=bound):
-                lower = f">= {_bound(bound)}"
-            case Gt(gt=bound):
-                lower = f"> {_bound(bound)}"
-            case Le(le=bound):
-                upper = f"<= {_bound(bound)}"
-            case Lt(lt=bound):
-                upper = f"< {_bound(bound)}"
-            case MaxLen(max_length=bound):
-                upper = f"of at most {bound} characters"
-    if lower.startswith(">= ") and upper.startswith("<= "):
-        return f" from {lower[3:]} to {upper[3:]}"
-    limits = " and ".join(part for part in (lower, upper) if part)
-    return f" {limits}" if limits else ""
-
-
-def _bound(value: Any) -> str:
+def _bound(value: float) -> str:
     return f"{value:g}" if isinstance(value, float) and abs(value) < 1e6 else str(int(value))
 
 
@@ -283,19 +215,22 @@ def _nearest(key: str, known: Iterable[str]) -> list[str]:
 def _unknown(parts: Location) -> str:
     """Say that a key is unknown, and which one was probably meant."""
     *above, last = parts
-    key = str(last)
-    table = Scene.tables()[str(above[0])] if above else Scene
-    known = _keys(table)
+    key, known = str(last), _keys(above)
     if near := _nearest(key, known):
         return f"unknown key; did you mean {joined((*above, *near))}?"
     homes = [
         f"[[{name}]]" if name in LISTS else f"[{name}]"
-        for name, other in Scene.tables().items()
-        if key in _keys(other)
+        for name in Scene.tables()
+        if key in _keys([name, 0] if name in LISTS else [name])
     ]
     if homes:
         return f"unknown key here; it belongs in {_listed(homes)}"
     return f"unknown key; known here are {', '.join(known)}"
+
+
+def _keys(table: Sequence[str | int]) -> list[str]:
+    rule = rule_at(table)
+    return list(rule["properties"]) if rule else []
 
 
 _LARGEST_FILE: Final = 1 << 20
@@ -363,7 +298,10 @@ def from_dict(
         scene = Scene.model_validate(document)
     except ValidationError as error:
         found = faults_of(error, document)
-        faulty = {fault.key for fault in found} | set(misspelt_tables(document))
+        faulty = {fault.key for fault in found}
+        # A table that is only misspelt is not missing.
+        for key in document.keys() - Scene.model_fields.keys():
+            faulty.update(_nearest(key, Scene.model_fields))
         found += conflicts(Look(document, Scene, faulty))
         faults += [_traced(fault, given) for fault in found]
     if scene is None or faults:

@@ -21,7 +21,7 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
 from chutelab.scene.schema import Scene
-from chutelab.util.errors import MISSING, Fault, printable
+from chutelab.util.errors import MISSING, Fault, InputError, printable
 
 
 class _TomlSchema(GenerateJsonSchema):
@@ -54,6 +54,7 @@ def schema() -> dict[str, Any]:
 
 
 _SEGMENT: Final = re.compile(r"([^\s.=\[\]\"']+)((?:\[\d{1,9}\])*)")
+_FORM: Final = "must be KEY=VALUE, such as plate.angle_deg=20 or surface[0].speed=1"
 _BARE_KEY: Final = re.compile(r"[\w-]+")
 
 
@@ -69,7 +70,7 @@ def parts_of(path: str, surfaces: Sequence[object] = ()) -> list[str | int]:
 
     Raises
     ------
-    ValueError
+    InputError
         If it is no path.
 
     Examples
@@ -81,7 +82,7 @@ def parts_of(path: str, surfaces: Sequence[object] = ()) -> list[str | int]:
     for segment in path.split("."):
         match = _SEGMENT.fullmatch(segment)
         if match is None:
-            raise ValueError(f"no path of a key: {path}")
+            raise InputError(_FORM)
         parts += [match[1], *(int(index) for index in re.findall(r"\d+", match[2]))]
     if parts[0] == "surface" and len(parts) > 1 and isinstance(parts[1], str):
         with suppress(ValueError):
@@ -120,7 +121,7 @@ def value_at(scene: Scene, path: str) -> Any:
     """
     try:
         return at_path(scene, parts_of(path, [free.name for free in scene.surface]))
-    except ValueError:
+    except InputError:
         return MISSING
 
 
@@ -169,9 +170,6 @@ def _referred(rule: Mapping[str, Any]) -> Mapping[str, Any]:
     return found
 
 
-_FORM: Final = "must be KEY=VALUE, such as plate.angle_deg=20 or surface[0].speed=1"
-
-
 @dataclass(frozen=True)
 class Override:
     """A value to be laid over a scene.
@@ -196,10 +194,6 @@ def read(text: str) -> Override:
     """Read what ``--set`` takes, ``KEY=VALUE``; VALUE is a TOML value or else a string."""
     key, equals, value = text.partition("=")
     return Override(key.strip() if equals else "", value_of(value), f"--set {text}")
-
-
-class _RefusedError(Exception):
-    """Why an override cannot be laid over the scene."""
 
 
 def apply(
@@ -227,8 +221,8 @@ def apply(
         try:
             path = _resolved(document, one.key)
             _put(document, path, one.value)
-        except _RefusedError as refusal:
-            faults.append(Fault(one.typed or one.key, None, str(refusal)))
+        except InputError as error:
+            faults.append(Fault(one.typed or one.key, None, str(error)))
         else:
             given[joined(path)] = one.typed
     return faults, given
@@ -253,18 +247,15 @@ def _resolved(document: dict[str, Any], key: str) -> list[str | int]:
     surfaces = document.get("surface")
     free = surfaces if isinstance(surfaces, list) else []
     names = [s.get("name") if isinstance(s, dict) else None for s in free]
-    try:
-        path = parts_of(key, names)
-    except ValueError:
-        raise _RefusedError(_FORM) from None
+    path = parts_of(key, names)
     if path[0] != "surface" or len(path) < 2 or isinstance(path[1], int):
         return path
     if not isinstance(surfaces, list):
-        raise _RefusedError("the scene has no [[surface]]")
+        raise InputError("the scene has no [[surface]]")
     known = [name for name in names if isinstance(name, str)]
     near = difflib.get_close_matches(path[1], known, n=1)
     hint = f"did you mean surface.{near[0]}?" if near else f"there are: {', '.join(known)}"
-    raise _RefusedError(f"no surface has the name {path[1]}; {hint}")
+    raise InputError(f"no surface has the name {path[1]}; {hint}")
 
 
 def _put(document: dict[str, Any], path: list[str | int], value: object) -> None:
@@ -273,14 +264,14 @@ def _put(document: dict[str, Any], path: list[str | int], value: object) -> None
         last = depth == len(path) - 1
         if isinstance(part, int):
             if not isinstance(place, list):
-                raise _RefusedError(f"{joined(path[:depth])} is no list")
+                raise InputError(f"{joined(path[:depth])} is no list")
             if part >= len(place):
-                raise _RefusedError(f"{joined(path[:depth])} has {len(place)} entries, from [0]")
+                raise InputError(f"{joined(path[:depth])} has {len(place)} entries, from [0]")
         elif not isinstance(place, dict):
-            raise _RefusedError(f"{joined(path[:depth])} is no table")
+            raise InputError(f"{joined(path[:depth])} is no table")
         elif not last and part not in place:
             if isinstance(path[depth + 1], int):
-                raise _RefusedError(f"{joined(path[: depth + 1])} is not there; give it whole")
+                raise InputError(f"{joined(path[: depth + 1])} is not there; give it whole")
             place[part] = {}
         if last and value is None and isinstance(place, dict):
             place.pop(part, None)

@@ -206,7 +206,8 @@ def expectation_conflicts(
             example = example if unit else "3"
             none = ' or "none"' if key != "tolerance" else ""
             text = f'must be a number from 0 to 1 (relative), a string such as "{example}"{none}'
-            yield Fault(f"{path}.{key}", tolerance, f"{text}; {name} is {_measured(unit)}")
+            kind = f"in {unit}" if unit else "a number of things"
+            yield Fault(f"{path}.{key}", tolerance, f"{text}; {name} is {kind}")
 
 
 def _fits(tolerance: str, unit: str) -> bool:
@@ -215,10 +216,6 @@ def _fits(tolerance: str, unit: str) -> bool:
     except ValueError:
         return False
     return size >= 0.0 and found in (unit, "%")
-
-
-def _measured(unit: str) -> str:
-    return f"in {unit}" if unit else "a number of things"
 
 
 ON_BELT: Final = 1e-9

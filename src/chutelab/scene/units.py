@@ -36,7 +36,8 @@ UNITS: Final = {
 """Units that are understood, each as an SI unit (degrees for angles) and how many of those it is;
 % is a share, and "" what is only counted."""
 
-_SIZE: Final = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) *([^\s\d]*)")
+SIZE: Final = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) *([^\s\d].*)?")
+"""A number and its unit, if there is one."""
 
 
 def read_size(text: str) -> tuple[float, str]:
@@ -53,12 +54,13 @@ def read_size(text: str) -> tuple[float, str]:
     ((0.0005, 'm'), (0.02, '%'), (3.0, ''))
     """
     # Both signs of micro are on keyboards; they look alike.
-    match = _SIZE.fullmatch(text.strip().replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}"))
+    match = SIZE.fullmatch(text.strip().replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}"))
     if match is None:
         raise ValueError("no number with a unit")
-    if match[2] not in UNITS:
-        raise ValueError(f"unknown unit {match[2]}")
-    unit, size = UNITS[match[2]]
+    written = match[2] or ""
+    if written not in UNITS:
+        raise ValueError(f"unknown unit {written}")
+    unit, size = UNITS[written]
     # The shorter of two roundings: 0.5 mm is 0.0005 m, not 0.5 * 0.001 m.
     number = float(match[1]) / round(1.0 / size) if size < 1.0 else float(match[1]) * size
     if not isfinite(number):

@@ -5,7 +5,6 @@ Scenes that differ in numbers only can be held as one, a family, whose varied ke
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,10 +17,10 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
 from chutelab.scene.loading import SceneError, from_dict, plain, to_dict
-from chutelab.scene.overrides import Override, apply
+from chutelab.scene.overrides import Override, apply, joined, limits_of, parts_of, rule_at
 from chutelab.scene.rules import Look, conflicts
 from chutelab.scene.schema import Scene, plain_number
-from chutelab.scene.units import read_size
+from chutelab.scene.units import SIZE, read_size
 from chutelab.util.arrays import Bools, Floats
 from chutelab.util.errors import MISSING, InputError
 
@@ -31,8 +30,6 @@ MOST_VALUES: Final = 10_000
 FORM: Final = "must be KEY=FROM:TO:COUNT, such as plate.angle_deg=-20:70:46, or KEY=a,b,c"
 
 RANGE_FORM: Final = "must be KEY=FROM:TO, such as plate.angle_deg=-20:70"
-
-_WITH_UNIT: Final = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) *([^\s\d].*)?")
 
 
 class VaryError(InputError):
@@ -149,7 +146,7 @@ def _number(typed: str, text: str, form: str) -> tuple[float, str]:
         return read_size(text)
     except ValueError:
         # A unit without prefixes, such as kg, is as good if it is the key's.
-        match = _WITH_UNIT.fullmatch(text.strip())
+        match = SIZE.fullmatch(text.strip())
     value = float(match[1]) if match else float("nan")
     if match is None or not isfinite(value):
         raise VaryError(typed, f"{text.strip() or 'nothing'} is not a number; it {form}")
@@ -157,13 +154,13 @@ def _number(typed: str, text: str, form: str) -> tuple[float, str]:
 
 
 def _count(typed: str, text: str) -> int:
-    allowed = f"COUNT = {text.strip() or 'nothing'}; it must be a whole number from 1"
     try:
         count = int(text)
     except ValueError:
-        raise VaryError(typed, f"{allowed} to {MOST_VALUES}") from None
+        count = 0
     if not 1 <= count <= MOST_VALUES:
-        raise VaryError(typed, f"{allowed} to {MOST_VALUES}")
+        given = f"COUNT = {text.strip() or 'nothing'}"
+        raise VaryError(typed, f"{given}; it must be a whole number from 1 to {MOST_VALUES}")
     return count
 
 
@@ -171,19 +168,11 @@ def _even(first: float, last: float, count: int) -> tuple[float, ...]:
     """Return evenly spaced values; 0.3 is 0.3, not 0.30000000000000004."""
     if count == 1:
         return (first,)
-    size = max(abs(first), abs(last))
-    digits = 12
-    values = []
-    for i in range(count):
-        value = first + (last - first) * i / (count - 1)
-        # What is left of a 0 by rounding is a 0.
-        values.append(0.0 if abs(value) < 1e-13 * size else float(f"{value:.{digits}g}"))
-    values[0], values[-1] = first, last
-    return tuple(values)
-
-
-_VARIABLE: Final = ("particle", "incoming", "plate", "outgoing", "surface", "stream", "run")
-"""Tables whose numbers change what happens."""
+    # What is left of a 0 by rounding is a 0.
+    nothing = 1e-13 * max(abs(first), abs(last))
+    inside = (first + (last - first) * i / (count - 1) for i in range(1, count - 1))
+    rounded = (0.0 if abs(value) < nothing else float(f"{value:.12g}") for value in inside)
+    return (first, *rounded, last)
 
 
 @dataclass(frozen=True)
@@ -216,20 +205,19 @@ def quantity(scene: Scene, vary: Vary) -> Quantity:
     VaryError
         If the scene knows no such key, or it holds no number.
     """
-    # Through JSON, so that there are lists to lay a value into, as in a file.
-    document = json.loads(json.dumps(to_dict(scene)))
-    faults, given = apply(document, [setting(vary.key, vary.values[0])])
+    document = plain(to_dict(scene))
+    faults, _ = apply(document, [setting(vary.key, vary.values[0])])
     if faults:
         raise VaryError(vary.typed, faults[0].allowed)
-    (path,) = given
-    table, _, name = path.partition(".")
-    home = Scene if table == path else Scene.tables().get(table.partition("[")[0])
-    key = (name or table).partition("[")[0]
-    if home is None or key not in {f.alias or n for n, f in home.model_fields.items()}:
+    parts = parts_of(vary.key, [free.name for free in scene.surface])
+    path, indexed = joined(parts), isinstance(parts[-1], int)
+    while isinstance(parts[-1], int):
+        parts.pop()
+    about = rule_at(parts)
+    if about is None:
         raise VaryError(vary.typed, _unknown(document, path))
-    about = home.model_json_schema()["properties"][key]
-    indexed = (name or table) != key
-    if not (indexed or _numeric(about)) or (home is not Scene and not table.startswith(_VARIABLE)):
+    kinds = {kind.get("type") for kind in about.get("anyOf", [about])}
+    if not (indexed or kinds & {"number", "integer"}) or parts[0] == "expect":
         raise VaryError(vary.typed, f"{path} is no number, and only numbers can be varied")
     unit = str(about.get("x-unit") or "")
     if vary.unit not in ("", unit) and (vary.unit, unit) != ("%", ""):
@@ -239,18 +227,9 @@ def quantity(scene: Scene, vary: Vary) -> Quantity:
         return Quantity(path, path, unit)
     label = re.split("[;:]", str(about.get("description", path)))[0].removesuffix(".")
     label = label.removesuffix(f" ({unit})").replace("->", "→")
-    if table.startswith("surface["):
-        name = document["surface"][int(table[8:-1])].get("name")
-        label = f"{name}: {label[0].lower()}{label[1:]}"
-    return Quantity(path, label, unit, whole="number" not in _kinds(about))
-
-
-def _numeric(about: dict[str, Any]) -> bool:
-    return bool(_kinds(about) & {"number", "integer"})
-
-
-def _kinds(about: dict[str, Any]) -> set[Any]:
-    return {about.get("type"), *(option.get("type") for option in about.get("anyOf", ()))}
+    if parts[0] == "surface" and isinstance(parts[1], int):
+        label = f"{scene.surface[parts[1]].name}: {label[0].lower()}{label[1:]}"
+    return Quantity(path, label, unit, whole="number" not in kinds)
 
 
 def _unknown(document: dict[str, Any], path: str) -> str:
@@ -384,34 +363,14 @@ def reason(error: SceneError) -> str:
     return "; ".join(str(fault) for fault in error.faults)
 
 
-_PATH: Final = re.compile(r"(?:(\w+)(?:\[(\d+)\])?\.)?(\w+)")
-
 _DEPENDENT: Final = {"plate": "pivot_height", "outgoing": "speed"}
 """Keys whose defaults are other keys."""
 
 
-def _parted(path: str) -> tuple[str | None, int | None, str] | None:
-    """Take ``surface[0].speed`` apart: table, index, key; None if it goes deeper."""
-    match = _PATH.fullmatch(path)
-    if match is None:
-        return None
-    return match[1], None if match[2] is None else int(match[2]), match[3]
-
-
 def is_plain(path: str) -> bool:
     """Tell whether a key holds a number that is no whole one, nor part of a list."""
-    parts = _parted(path)
-    if parts is None:
-        return False
-    table, index, key = parts
-    if table not in (None, *Scene.tables()) or (index is not None) != (table == "surface"):
-        return False
-    field = (Scene if table is None else Scene.tables()[table]).model_fields.get(key)
-    return (
-        field is not None
-        and "float" in str(field.annotation)
-        and "tuple" not in str(field.annotation)
-    )
+    parts = parts_of(path)
+    return isinstance(parts[-1], str) and limits_of(rule_at(parts) or {}) is not None
 
 
 def accepted(path: str, values: Floats) -> Bools:
@@ -427,9 +386,8 @@ def accepted(path: str, values: Floats) -> Bools:
 @cache
 def _adapter(path: str) -> TypeAdapter[Any]:
     """Return what validates a list of values of a key as its model does."""
-    parts = _parted(path)
-    assert parts is not None
-    field = (Scene if parts[0] is None else Scene.tables()[parts[0]]).model_fields[parts[2]]
+    *home, key = parts_of(path)
+    field = (Scene.tables()[str(home[0])] if home else Scene).model_fields[str(key)]
     kind: Any = field.annotation
     for limit in field.metadata:
         kind = Annotated[kind, limit]
@@ -484,18 +442,16 @@ def family(scene: Scene, columns: Mapping[str, Floats]) -> Scene:
     """
     changes: dict[str, Any] = {}
     for path, values in columns.items():
-        parts = _parted(path)
-        assert parts is not None
-        table, index, key = parts
-        if table is None:
-            changes[key] = values
-        elif index is None:
-            given = changes.get(table, getattr(scene, table))
-            changes[table] = given.model_copy(update={key: values})
-        else:
-            surfaces = list(changes.get(table, scene.surface))
-            surfaces[index] = surfaces[index].model_copy(update={key: values})
-            changes[table] = tuple(surfaces)
+        match parts_of(path):
+            case [str(key)]:
+                changes[key] = values
+            case [str(table), str(key)]:
+                given = changes.get(table, getattr(scene, table))
+                changes[table] = given.model_copy(update={key: values})
+            case [_, int(index), key]:
+                surfaces = list(changes.get("surface", scene.surface))
+                surfaces[index] = surfaces[index].model_copy(update={key: values})
+                changes["surface"] = tuple(surfaces)
     for table, key in _DEPENDENT.items():
         given = changes.get(table, getattr(scene, table))
         if given is not None and key not in given.model_fields_set:

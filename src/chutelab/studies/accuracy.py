@@ -21,8 +21,9 @@ from chutelab.engines import reference
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
 from chutelab.results import ENTRIES, REASONS, Kind, Recording
-from chutelab.results.comparison import QUANTITIES, compare, scales
+from chutelab.results.comparison import compare, scales
 from chutelab.results.ledger import ledger
+from chutelab.results.quantities import QUANTITIES
 from chutelab.results.recorder import StalledError
 from chutelab.scene import Scene, SceneError
 from chutelab.scene.units import read_size, write_size

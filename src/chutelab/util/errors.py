@@ -137,6 +137,10 @@ class InputError(ValueError):
         return f"{text}\n{self.hint}" if self.hint else text
 
 
+class MissingLibraryError(ImportError):
+    """A library that Chutelab can do without is not installed; the text says what to install."""
+
+
 def cut(text: str, width: int) -> str:
     """Shorten a text to at most `width` characters, the last three of them dots."""
     return text if len(text) <= width else text[: width - 3] + "..."

@@ -1,11 +1,19 @@
-"""Versions of installed packages, and what figures were measured on: nothing that names anybody."""
+"""Packages that are installed or not, their versions, and what figures were measured on.
+
+Nothing in it names anybody.
+"""
 
 from __future__ import annotations
 
 import os
 import platform
+from collections.abc import Mapping
+from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
+
+from chutelab.util.errors import MissingLibraryError
 
 
 def version_of(package: str) -> str | None:
@@ -18,6 +26,26 @@ def version_of(package: str) -> str | None:
         return version(package)
     except PackageNotFoundError:
         return None
+
+
+def library(module: str, what: str, extra: str) -> Any:
+    """Return a module of a package that only one of Chutelab's extras brings.
+
+    Parameters
+    ----------
+    what : str
+        What to say without it, such as "a fit needs SciPy".
+
+    Raises
+    ------
+    MissingLibraryError
+        Without it; says what to install.
+    """
+    try:
+        return import_module(module)
+    except ImportError as error:
+        text = f'{what}: pip install "chutelab[{extra}]"'
+        raise MissingLibraryError(text, name=error.name) from error
 
 
 def own_version() -> str:
@@ -41,6 +69,11 @@ def environment() -> dict[str, str]:
     }
     versions = {package: version_of(package) for package in PACKAGES}
     return found | {package: version for package, version in versions.items() if version}
+
+
+def measured_on(about: Mapping[str, str]) -> str:
+    """Return an `environment` as a line of text."""
+    return f"measured on {', '.join(f'{key} {value}' for key, value in about.items())}"
 
 
 def _processor() -> str:

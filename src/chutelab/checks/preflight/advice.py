@@ -90,7 +90,7 @@ def advice(
         yield from _ending(scene, machine, tried.recording)
     if tried.trouble:
         yield _advised(f"a trial run did not come to an end: {tried.trouble}")
-    waited = None if tried.recording is None else waits(scene, tried.recording)
+    waited = None if tried.recording is None else waits(tried.recording)
     if waited is not None and waited.particles:
         # Each waits for all that waited before it.
         period = 1.0 / scene.stream.rate + waited.longest / max(1, tried.count - 1)

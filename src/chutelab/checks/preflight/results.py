@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from chutelab.machine import Machine
-from chutelab.results.comparison import QUANTITIES
+from chutelab.results.quantities import QUANTITIES
 from chutelab.scene import Scene
 from chutelab.scene.units import write_size
 from chutelab.theory import Reason, predict

@@ -136,22 +136,14 @@ def _energy_of_crowd(e: Evidence) -> Verdict:
     at, scale = int(np.argmax(rise)), ledger(e.recording).turned_over
     where = f"of {scale:.3g} J, at t = {times[at]:.6g} s"
     # An overlap that is parted lifts a disk by no more than it was deep.
-    lifted = e.recording.count * e.machine.particle.mass * e.machine.gravity * e.late
-    allowed = _energy_bound(e) + (lifted + _thinned(e)) / scale
-    return Verdict(float(rise[at]) / scale, allowed, where)
-
-
-def _thinned(e: Evidence) -> float:
-    """Bound the energy (J) that a touch of two may seem to change where it left no knot.
-
-    The pymunk engine leaves out what moves a track by less than `ROUGH` of the radius. A cubic
-    whose end velocity is off by w is off by 4/27 w τ in place, and τ is a step or more.
-    """
-    if not e.alike or e.dt is None:
-        return 0.0
     p = e.machine.particle
-    off = 27.0 / 4.0 * ROUGH * p.radius / e.dt
-    return 2.0 * p.mass * e.speed * off
+    allowed = e.recording.count * p.mass * e.machine.gravity * e.late
+    if e.alike and e.dt is not None:
+        # The pymunk engine leaves out touches that move a track by less than `ROUGH` of the radius.
+        # A cubic whose end velocity is off by w is off by 4/27 w τ in place, τ a step or more.
+        allowed += 2.0 * p.mass * e.speed * 27.0 / 4.0 * ROUGH * p.radius / e.dt
+    allowed = _energy_bound(e) + allowed / scale
+    return Verdict(float(rise[at]) / scale, allowed, where)
 
 
 def residual(e: Evidence) -> Verdict | None:

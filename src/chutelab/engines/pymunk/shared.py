@@ -23,7 +23,7 @@ import pymunk
 from numpy.typing import NDArray
 from pymunk import Vec2d, batch
 
-from chutelab.engines.pymunk.world import PARTICLE, Carriage, Tracks, World, time_out
+from chutelab.engines.pymunk.world import PARTICLE, Carriage, Flight, Tracks, World
 from chutelab.machine import Machine
 from chutelab.results import REASONS, Kind
 from chutelab.results.recorder import Recorder
@@ -52,7 +52,12 @@ friction hops for some steps at a time; the ride ends with its last push."""
 CALM, STILL = 0.1, 1e-3
 """s and m/s: who slips and moves less for that long has settled."""
 
-_BODY = batch.BodyFields.POSITION | batch.BodyFields.VELOCITY | batch.BodyFields.ANGULAR_VELOCITY
+_BODY = (
+    batch.BodyFields.BODY_ID
+    | batch.BodyFields.POSITION
+    | batch.BodyFields.VELOCITY
+    | batch.BodyFields.ANGULAR_VELOCITY
+)
 _ARBITER = (
     batch.ArbiterFields.BODY_A_ID
     | batch.ArbiterFields.BODY_B_ID
@@ -145,7 +150,6 @@ class Shared:
         ids = np.array([body.id for body in bodies], dtype=np.uintp)
         self.row = ids.argsort()
         self.ids = ids[self.row]
-        self.order: NDArray[np.int64] | None = None
 
     def _round_end(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
         """Have the end of a belt move along its rim; beside the face it is not met."""
@@ -178,43 +182,36 @@ class Shared:
     # Releases and rides
 
     def _release(self) -> None:
-        """Release who is due, if nobody is in the place."""
+        """Release who is due, at a time up to now, if nobody is in the place."""
         starts = self.machine.releases
         for i in list(self.waiting):
-            if starts.t[i] > self.t + 1e-9 * self.h:
-                break
             due = float(starts.t[i])
-            moment = due if self.t - due < self.h else self.t
-            position, velocity = starts.position[i], starts.velocity[i]
+            if due > self.t + 1e-9 * self.h:
+                break
+            t = due if self.t - due < self.h else self.t
+            x, v = Vec2d(*starts.position[i].tolist()), Vec2d(*starts.velocity[i].tolist())
             others = np.flatnonzero(self.inside)
             if self.machine.interact and len(others):
-                # Now, and when it was due.
-                late = max(self.t - moment, 0.0)
-                x, v = self.state[1, :2, others], self.state[1, 2:4, others]
-                now = x - position - late * velocity
-                apart = now, now - late * (v - velocity)
+                # Apart now, and when it was due.
+                late = max(self.t - t, 0.0)
+                now = self.state[1, :2, others] - (x + late * v)
+                apart = now, now - late * (self.state[1, 2:4, others] - v)
                 if min(float((d * d).sum(axis=1).min()) for d in apart) < 4.0 * self.r**2:
                     continue
             self.waiting.remove(i)
-            self._begin(i, moment)
-
-    def _begin(self, i: int, t: float) -> None:
-        """Release a particle at a time (s) up to now."""
-        starts = self.machine.releases
-        x, v = Vec2d(*starts.position[i].tolist()), Vec2d(*starts.velocity[i].tolist())
-        self.recorder.events(Kind.RELEASE, i, t, tuple(x), tuple(v))
-        self.inside[i], self.order = True, None
-        body, circle = self.disks[i]
-        self.world.space.add(body, circle)
-        if starts.carried[i]:
-            ride = self.rides[i] = Carriage(self.machine, self.world, i, t)
-            body.body_type = pymunk.Body.KINEMATIC
-            body.position, body.velocity = ride.state(self.t - 0.5 * self.h)
-            self.state[1, :2, i], self.state[1, 2:4, i] = ride.state(self.t)
-            # A belt that stands holds it for good.
-            self.calm[i] = -inf if ride.speed else inf
-        else:
-            self._free(i, t, x, v)
+            self.inside[i] = True
+            self.recorder.events(Kind.RELEASE, i, t, tuple(x), tuple(v))
+            body, circle = self.disks[i]
+            self.world.space.add(body, circle)
+            if starts.carried[i]:
+                ride = self.rides[i] = Carriage(self.machine, self.world, i, t)
+                body.body_type = pymunk.Body.KINEMATIC
+                body.position, body.velocity = ride.at(self.t - 0.5 * self.h - t)
+                self.state[1, :2, i], self.state[1, 2:4, i] = ride.at(self.t - t)
+                # A belt that stands holds it for good.
+                self.calm[i] = -inf if ride.speed else inf
+            else:
+                self._free(i, t, x, v)
 
     def _free(self, i: int, t: float, x: Vec2d, v: Vec2d) -> None:
         """Let a particle fly from where it is at a time (s) up to now."""
@@ -237,7 +234,7 @@ class Shared:
             body, circle = self.disks[i]
             if ride.until <= self.t:
                 ride.write(self.recorder, ride.until)
-                x, v = ride.state(ride.until)
+                x, v = ride.at(ride.until - ride.t)
                 self.recorder.events(
                     Kind.SEPARATION, i, ride.until, tuple(x), tuple(v), surface=ride.surface
                 )
@@ -248,10 +245,9 @@ class Shared:
                 body.body_type = pymunk.Body.DYNAMIC
                 body.mass, body.moment = p.mass, p.inertia or inf
                 self.world.space.add(body, circle)
-                self.order = None
                 self._free(i, ride.until, x, v)
             elif ahead > ride.top:
-                body.velocity = (ride.state(ahead)[0] - body.position) / self.h
+                body.velocity = (ride.at(ahead - ride.t)[0] - body.position) / self.h
 
     # Steps
 
@@ -271,15 +267,11 @@ class Shared:
 
     def _states(self) -> None:
         """Read the state of all bodies."""
-        space, buffer = self.world.space, self.buffer
-        if self.order is None:
-            buffer.clear()
-            batch.get_space_bodies(space, batch.BodyFields.BODY_ID, buffer)
-            self.order = self._rows(np.frombuffer(buffer.int_buf(), dtype=np.uintp))
-        buffer.clear()
-        batch.get_space_bodies(space, _BODY, buffer)
+        self.buffer.clear()
+        batch.get_space_bodies(self.world.space, _BODY, self.buffer)
+        rows = self._rows(np.frombuffer(self.buffer.int_buf(), dtype=np.uintp))
         self.state[0], after = self.state[1], self.state[1]
-        after[:, self.order] = np.frombuffer(buffer.float_buf()).reshape(-1, 5).T
+        after[:, rows] = np.frombuffer(self.buffer.float_buf()).reshape(-1, 5).T
         after[:2] += (0.5 * self.h) * after[2:4]
         after[:, self.count :] = 0.0
 
@@ -320,8 +312,13 @@ class Shared:
         self.recorder.by_surface[-1] += sums[:3] @ pair
         for k in np.flatnonzero(pair) if self.rides else ():
             for row, motion, sign in ((one, mine, -0.5), (other, others, 0.5)):
-                mean = motion[0, :2, k] + motion[1, :2, k]
-                self._hold(int(row[k]), sign * float(jx[k] * mean[0] + jy[k] * mean[1]))
+                if (i := int(row[k])) in self.rides:
+                    # The belt's work on who hits a particle that it carries.
+                    ride = self.rides[i]
+                    ride.write(self.recorder, self.t - self.h)
+                    mean = motion[0, :2, k] + motion[1, :2, k]
+                    work = sign * float(jx[k] * mean[0] + jy[k] * mean[1])
+                    self.recorder.book(i, ride.surface, work)
         sums[:3, pair] *= 0.5
         rows = len(self.surface)
         places = np.concatenate((one, other)) + rows * np.arange(5)[:, None]
@@ -346,13 +343,6 @@ class Shared:
                 normal_impulse=push[told], tangential_impulse=rub[told],
             )  # fmt: skip
 
-    def _hold(self, i: int, work: float) -> None:
-        """Book the work (J) that a belt does on who hits a particle that it carries."""
-        if i in self.rides:
-            ride = self.rides[i]
-            ride.write(self.recorder, self.t - self.h)
-            self.recorder.book(i, ride.surface, work)
-
     def _riding(self, who: NDArray[np.int64], surface: NDArray[np.int64]) -> None:
         """Count pushes of surfaces in a row; tell separations at the last one's time."""
         over = self.left[0] < self.t - HOP * self.h
@@ -375,7 +365,7 @@ class Shared:
         for i in np.flatnonzero(out & self.free).tolist():
             begin = Vec2d(*self.state[0, :2, i].tolist())
             v = Vec2d(*self.state[0, 2:4, i].tolist())
-            late = time_out(self.machine, begin, v)
+            late = Flight(begin, v, self.pull).leaves(self.machine.exit_box)
             if late < self.h and (entries[:, i] == self.entries[:, i]).all():
                 # It flew, and left within the step.
                 after = v + late * self.pull
@@ -413,4 +403,3 @@ class Shared:
         self.recorder.ended[i] = REASONS.index(reason)
         self.world.space.remove(*self.disks[i])
         self.inside[i] = self.free[i] = False
-        self.order = None

@@ -1,21 +1,21 @@
-"""The machine as a `pymunk.Space`, rides on the belt that holds, and the tracks."""
+"""The machine as a `pymunk.Space`, paths between contacts, and the tracks."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import acos, ceil, cos, inf, sin, sqrt
+from typing import NamedTuple
 
 import numpy as np
 import pymunk
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pymunk import Vec2d
 
 from chutelab.machine import Machine
 from chutelab.results import KNOT
 from chutelab.results.recorder import Recorder
-
-Floats = NDArray[np.float64]
+from chutelab.util.arrays import Bools, Floats
 
 PARTICLE, SURFACE = 1, 2
 """Collision types of disks and of everything they meet."""
@@ -30,12 +30,17 @@ sees a contact where centre and surface are one radius apart. Levers are off by 
 DIGITS = 16.0 * float(np.finfo(float).eps)
 """Share of the machine's size below which a gap is rounding."""
 
+TINY = 1e-12
+"""Share of 1 m/s plus the particle's speed; an approach this slow is a touch, no blow."""
+
+LOW = 2.0
+"""Hairs; bounces lower than this cannot be told from lying on the surface."""
+
+FIRST = 1e-3
+"""Share of a step after which a surface just left is looked at again."""
+
 ROUGH = 1e-4
 """Share of the radius by which a track may be off between two knots."""
-
-GRAZE = 0.01
-"""Share of the radius between looks at a surface beside a ride; it misses what is met over less,
-which is 1e-5 of the radius deep."""
 
 ARC = 0.025
 """rad between knots round the pulley: ρ Δφ⁴/384, the curve's error, is 1e-9 of the radius."""
@@ -91,6 +96,38 @@ class Face:
         return -self.speed
 
 
+class Flight(NamedTuple):
+    """Free flight from a place (m) at a velocity (m/s); `g` is gravity (m/s²)."""
+
+    x: Vec2d
+    v: Vec2d
+    g: Vec2d
+
+    def at(self, after: float) -> tuple[Vec2d, Vec2d]:
+        """Return place (m) and velocity (m/s) after a time (s)."""
+        return self.x + after * (self.v + 0.5 * after * self.g), self.v + after * self.g
+
+    def pull(self, normal: Vec2d) -> float:
+        """Return the acceleration (m/s²) along a normal."""
+        return self.g.dot(normal)
+
+    def leaves(self, box: tuple[float, float, float, float]) -> float:
+        """Return the time (s) after which it leaves the exit box, inf if never."""
+        left, right, bottom, top = box
+        if self.g.y < 0.0:
+            rise = -self.v.y / self.g.y
+            fall = -2.0 * (self.x.y - bottom) / self.g.y
+            return rise + sqrt(max(rise**2 + fall, 0.0))
+        out = inf
+        for x, v, low, high in (
+            (self.x.x, self.v.x, left, right),
+            (self.x.y, self.v.y, bottom, top),
+        ):
+            if v != 0.0:
+                out = min(out, max(((high if v > 0.0 else low) - x) / v, 0.0))
+        return out
+
+
 class World:
     """A Space with all surfaces of a machine.
 
@@ -105,6 +142,8 @@ class World:
         In the order of the segments, the pulley last.
     hair : float
         m; gaps up to this one are contact.
+    tiny : float
+        Share of speeds below which one into a surface is rounding, which tilts normals.
     """
 
     def __init__(self, machine: Machine) -> None:
@@ -114,6 +153,7 @@ class World:
         size = float(np.abs([*parts.start.ravel(), *parts.end.ravel(), r]).max())
         self.rounding = DIGITS * size
         self.hair = max(HAIR * r, 4.0 * self.rounding)
+        self.tiny = max(TINY, self.rounding / r)
         self.faces: list[Face] = []
         for n, (start, end) in enumerate(
             zip(parts.start.tolist(), parts.end.tolist(), strict=True)
@@ -124,8 +164,7 @@ class World:
                 Vec2d(*parts.tangent[n].tolist()), float(parts.speed[n]),
                 float(parts.restitution[n]), float(parts.friction[n]),
             )  # fmt: skip
-        if machine.pulley is not None:
-            wheel = machine.pulley
+        if (wheel := machine.pulley) is not None:
             body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
             body.angular_velocity = -wheel.speed / wheel.radius
             self._add(
@@ -152,6 +191,53 @@ class World:
         circle.collision_type = PARTICLE
         return body, circle
 
+    def curved(self, face: Face, x: Vec2d) -> bool:
+        """Tell whether what is nearest of a surface is the pulley or the end of a segment."""
+        point = face.shape.point_query(x).point
+        return not face.ends or min((point - e).length for e in face.ends) <= self.hair
+
+    def meets(
+        self, path: Flight | Carriage, face: Face, span: float, leaving: bool = False
+    ) -> float:
+        """Return after what time (s) a disk on a path meets a surface, inf if not within `span`.
+
+        All surfaces are convex, and so lie behind the plane through their nearest point: the gap
+        stays above gap + rate τ + a τ²/2, a the least acceleration along the normal there. Stepping
+        from root to root of that bound never passes a contact, and converges like Newton's method.
+        A surface that is being left along its tangent gives no bound; it is looked at after times
+        that grow by half.
+        """
+        r, g, hair = face.radius, self.machine.gravity, self.hair
+        t = last = 0.0
+        while True:
+            x, v = path.at(t)
+            gap, normal = face.gap(x)
+            rate, pull, ahead = v.dot(normal), path.pull(normal), max(gap, 0.0)
+            slow = self.tiny * (1.0 + v.length)
+            if leaving:
+                if gap < -hair and t > 0.0:
+                    return bisected(lambda t: face.gap(path.at(t)[0])[0] < -0.5 * hair, last, t)[0]
+                leaving = gap <= hair and (rate <= slow or rate * rate <= 2.0 * LOW * g * hair)
+            elif gap <= self.rounding:
+                # A hair deep or less a curve is grazed, not met.
+                graze = v.length * sqrt(2.0 * hair / r)
+                if rate < -slow and (rate < -graze or not self.curved(face, x)):
+                    return t
+                leaving = True
+            square = rate * rate - 2.0 * pull * ahead
+            tau = inf
+            if square >= 0.0 and rate < 0.0:
+                tau = 2.0 * ahead / (sqrt(square) - rate)
+            elif pull < 0.0:
+                tau = (rate + sqrt(square)) / -pull
+            if leaving and (speed := v.length + g * self.machine.dt) > 0.0:
+                tau = max(tau, min(0.5 * t + FIRST * self.machine.dt, r / speed))
+            if t + tau == t:
+                return t
+            if t == span:
+                return inf
+            last, t = t, min(t + tau, span)
+
 
 class Carriage:
     """Ride of one particle at the belt's speed, not turning, at the height it is released at.
@@ -175,46 +261,30 @@ class Carriage:
         start = machine.releases
         self.particle, self.surface, self.t = particle, machine.pulley.surface, t
         self.weight = machine.particle.mass * machine.gravity
-        self.x, self.rho = start.position[particle].tolist()
+        self.x, self.rho = map(float, start.position[particle])
         self.speed = float(start.velocity[particle, 0])
         self.until, self.height, self.written = machine.end_time, self.rho, -inf
         self.top = inf
         if self.speed > 0.0:
             cosine = self.speed**2 / (machine.gravity * self.rho) if machine.gravity > 0.0 else inf
             path = max(0.0, -self.x) + self.rho * acos(min(cosine, 1.0))
-            path = min(path, self.speed * (self.until - t))
-            path = self._clear(world, machine.particle.radius, path)
-            self.until = min(t + path / self.speed, self.until)
+            span = min(path / self.speed, self.until - t)
+            others = (face for face in world.faces if face.surface != self.surface)
+            span = min((world.meets(self, face, span) for face in others), default=span)
+            self.until = min(t + path / self.speed, self.until, t + span)
             self.top = t + max(0.0, -self.x / self.speed)
 
-    def state(self, t: float) -> tuple[Vec2d, Vec2d]:
-        """Return place (m) and velocity (m/s) at a time (s)."""
-        return self._at(self.x + self.speed * (t - self.t))
-
-    def _at(self, along: float) -> tuple[Vec2d, Vec2d]:
+    def at(self, after: float) -> tuple[Vec2d, Vec2d]:
+        """Return place (m) and velocity (m/s) a time (s) after the start."""
+        along = self.x + self.speed * after
         if along <= 0.0:
             return Vec2d(along, self.rho), Vec2d(self.speed, 0.0)
         c, s = cos(along / self.rho), sin(along / self.rho)
         return Vec2d(self.rho * s, self.rho * c), Vec2d(self.speed * c, -self.speed * s)
 
-    def _clear(self, world: World, radius: float, path: float) -> float:
-        """Return how much of a path (m) is clear of surfaces other than the own belt."""
-        # An end that is only touched is approached like this where the gap is rounding.
-        slow = 2.0 * self.speed * sqrt(2.0 * world.rounding / radius)
-
-        def free(along: float) -> tuple[float, bool]:
-            x, v = self._at(self.x + along)
-            gap, normal = face.gap(x)
-            return gap, gap > (world.rounding if v.dot(normal) < -slow else -world.hair)
-
-        for face in world.faces:
-            along = last = 0.0
-            while face.surface != self.surface and along < path:
-                gap, clear = free(along)
-                if not clear:
-                    path = longest(lambda way: free(way)[1], along, last, upper=True)
-                last, along = along, along + max(gap, GRAZE * radius)
-        return path
+    def pull(self, _normal: Vec2d) -> float:
+        """Return the least acceleration (m/s²) along any normal."""
+        return -(self.speed**2) / self.rho
 
     def write(self, recorder: Recorder, end: float) -> None:
         """Write the knots up to a time (s), with what the belt pays: it lets the particle down."""
@@ -222,7 +292,7 @@ class Carriage:
         round_it = np.linspace(self.top, end, ceil(turn / ARC) + 1).tolist() if turn else []
         for t in (self.t, *round_it, end):
             if t > self.written:
-                x, v = self.state(t)
+                x, v = self.at(t - self.t)
                 recorder.book(self.particle, self.surface, self.weight * (x.y - self.height))
                 recorder.knots(self.particle, t, tuple(x), tuple(v), 0.0)
                 self.height, self.written = x.y, t
@@ -246,9 +316,7 @@ class Tracks:
         self.recorder.knots(self.first + i, t, x, v, omega)
         self.t[i], self.x[:, i], self.v[:, i], self.fresh[i] = t, x, v, True
 
-    def step(
-        self, rows: NDArray[np.bool_], times: tuple[float, float], state: Floats, entries: Floats
-    ) -> None:
+    def step(self, rows: Bools, times: tuple[float, float], state: Floats, entries: Floats) -> None:
         """Note a step of the particles in some rows; write knots of the states before where due.
 
         `times` (s) and `state` (2, 5, N), of x, y, vx, vy and ω, are those at both ends; `entries`
@@ -275,26 +343,9 @@ class Tracks:
             self.pull[:, due] = (v[:, due] - before[2:4]) / (times[1] - times[0])
 
 
-def time_out(machine: Machine, x: Vec2d, v: Vec2d) -> float:
-    """Return the time (s) in which a free flight leaves the scene, inf if never."""
-    left, right, bottom, top = machine.exit_box
-    if machine.gravity > 0.0:
-        rise = v.y / machine.gravity
-        return float(rise + sqrt(max(rise**2 + 2.0 * (x.y - bottom) / machine.gravity, 0.0)))
-    out = inf
-    for place, speed, low, high in ((x.x, v.x, left, right), (x.y, v.y, bottom, top)):
-        if speed != 0.0:
-            out = min(out, max(((high if speed > 0.0 else low) - place) / speed, 0.0))
-    return out
-
-
-def longest(
-    test: Callable[[float], bool], high: float, low: float, *, upper: bool = False
-) -> float:
-    """Return the value up to which a test that fails at `high` is passed, to a bit.
-
-    With `upper` the first one that fails it.
-    """
-    while low < (middle := 0.5 * (low + high)) < high and high - low > 1e-15 * high:
-        low, high = (middle, high) if test(middle) else (low, middle)
-    return high if upper else low
+def bisected(test: Callable[[float], object], low: float, high: float) -> tuple[float, float]:
+    """Return neighbouring values of which a test, true at `high`, is false and true."""
+    least = 1e-15 * high
+    while low < (middle := 0.5 * (low + high)) < high and high - low > least:
+        low, high = (low, middle) if test(middle) else (middle, high)
+    return low, high

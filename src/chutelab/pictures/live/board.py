@@ -147,16 +147,15 @@ class Board:
         values = {key: float(slider.value) for key, slider in self.sliders.items()}
         try:
             scene = self.scene.with_values(values)
-            machine = build(scene)
-            recording = run(machine)
+            recording = run(build(scene))
         except (SceneError, CornerError) as error:
             faults = getattr(error, "faults", [error])
             why = "; ".join(str(fault) for fault in faults)
             self._say(f"This setting cannot be run: {why}. The picture is the one before.")
             return
-        drawn = draw(machine, recording, self.view, self.before)
+        drawn = draw(recording, self.view, self.before)
         self.before = tracks(recording)[:1]
-        found = numbers(scene, recording)
+        found = numbers(recording)
         lost = scene.outgoing is not None and isnan(found["x"])
         self._say("It does not land on the outgoing belt." if lost else "")
         self.picture.value = f"{drawn}{table(found).html()}"
@@ -166,13 +165,13 @@ class Board:
 
     def _view(self) -> View:
         """Return a view that need not jump: of the scene as it is, and at the sliders' ends."""
-        view = view_of(self.scene, run(build(self.scene)))
+        view = view_of(run(build(self.scene)))
         widest = view.padded(REACH)
         for control in self.controls:
             for value in (control.low, control.high):
                 try:
                     scene = self.scene.with_values({control.key: value})
-                    other = view_of(scene, run(build(scene)))
+                    other = view_of(run(build(scene)))
                 except (SceneError, CornerError):
                     continue
                 view = view.joined(other.within(widest))

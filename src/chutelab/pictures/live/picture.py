@@ -14,8 +14,7 @@ import numpy as np
 from chutelab.machine import Machine
 from chutelab.pictures import colours
 from chutelab.results import Kind, Recording
-from chutelab.results.comparison import observed
-from chutelab.scene import Scene
+from chutelab.results.quantities import observed
 from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet
 
@@ -91,8 +90,9 @@ class View:
         return View(self.left - by, self.right + by, self.bottom - by, self.top + by)
 
 
-def view_of(scene: Scene, recording: Recording) -> View:
+def view_of(recording: Recording) -> View:
     """Return a view of particle 0's track, the pulley and the plate's pivot."""
+    scene = recording.scene
     track = recording.track(0)["position"]
     points = [track[track[:, 0] >= -BEFORE]] if scene.incoming is not None else [track]
     if scene.incoming is not None:
@@ -116,18 +116,13 @@ def tracks(recording: Recording) -> list[Floats]:
     return [path[np.isfinite(path[:, 0])] for path in paths]
 
 
-def draw(
-    machine: Machine,
-    recording: Recording,
-    view: View,
-    before: list[Floats],
-) -> str:
+def draw(recording: Recording, view: View, before: list[Floats]) -> str:
     """Return the picture of a run as SVG.
 
     Parameters
     ----------
-    machine, recording
-        What was run, and the run.
+    recording : Recording
+        The run.
     view : View
         What to show.
     before : list of ndarray, (P, 2)
@@ -136,12 +131,12 @@ def draw(
     height = round(view.scale * (view.top - view.bottom))
     width = round(view.scale * (view.right - view.left))
     parts = [_line(view, points, GHOST, 1.5, dash="4 4") for points in before[:1]]
-    parts += _machine(view, machine)
+    parts += _machine(view, recording.machine)
     paths = tracks(recording)
     parts += [_line(view, points, TRACK, 1.0, opacity=0.35) for points in paths[1:]]
     parts += [_line(view, points, TRACK, 2.5) for points in paths[:1]]
     parts += _dots(view, recording)
-    title = escape(f"{machine.scene.title}: the track of the particle, and dots every {STROBE} s")
+    title = escape(f"{recording.title}: the track of the particle, and dots every {STROBE} s")
     return (
         f'<svg role="img" aria-label="{title}" width="{width}" height="{height}"'
         f' viewBox="0 0 {width} {height}" style="max-width:100%;height:auto">'
@@ -149,13 +144,13 @@ def draw(
     )
 
 
-def numbers(scene: Scene, recording: Recording) -> dict[str, float]:
+def numbers(recording: Recording) -> dict[str, float]:
     """Return what the table shows, in its units; NaN where there is nothing to tell.
 
     Work and heat are counted until nothing slips, as `chutelab.theory` does: m* v_b and m*/2 times
     the slip at the landing, with m* = m/3 for a free disk.
     """
-    seen = observed(recording, scene)
+    scene, seen = recording.scene, observed(recording)
     found = {
         "phi1": degrees(seen["phi1"]),
         "v2": seen["v2"],

@@ -8,17 +8,16 @@ from __future__ import annotations
 
 from base64 import b64encode
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from math import atan2, degrees, hypot, isfinite, nan
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.engines.simulation import simulate
-from chutelab.machine import Machine, build
 from chutelab.pictures.animation.moments import sentence
-from chutelab.pictures.plots import Arc, Window, analytic_of, style, window_of
+from chutelab.pictures.plots import analytic_of, style, window_of
 from chutelab.pictures.plots.scenery import STRUCK, action, strobe_step
 from chutelab.results import ENTRIES, REASONS, Kind, Recording
 from chutelab.results.quantities import measure
@@ -28,7 +27,6 @@ from chutelab.scene.overrides import value_at
 from chutelab.scene.rules import unit_of
 from chutelab.scene.units import symbol
 from chutelab.scene.variants import Quantity, Variant, Vary, parse, quantities, reason, variants
-from chutelab.theory import predict
 from chutelab.util.arrays import Floats
 from chutelab.util.errors import InputError
 
@@ -50,31 +48,6 @@ class PageError(InputError):
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
-    """One variant that ran.
-
-    Attributes
-    ----------
-    scene, machine, recording : Scene, Machine, Recording
-        What was run, and what came of it.
-    arcs, began : tuple of Arc, float
-        The analytic parabola, and the time (s) of the recording at which it begins.
-    reason : str
-        Why the analytic parabola ends early, or is not there; "" if it goes to the landing.
-    window : Window
-        Where something happens.
-    """
-
-    scene: Scene
-    machine: Machine
-    recording: Recording
-    arcs: tuple[Arc, ...]
-    began: float
-    reason: str
-    window: Window
-
-
-@dataclass(frozen=True, eq=False)
 class Outcome:
     """A variant: what became of it, or why nothing did.
 
@@ -82,7 +55,7 @@ class Outcome:
     ----------
     values : tuple of float
         One for each slider.
-    run : Run or None
+    recording : Recording or None
         None if these values make no scene, or it cannot be run. With a fault it is the run of the
         scene without its outgoing belt, which shows why that has no place.
     fault : str
@@ -90,7 +63,7 @@ class Outcome:
     """
 
     values: tuple[float, ...]
-    run: Run | None
+    recording: Recording | None
     fault: str = ""
 
 
@@ -114,14 +87,9 @@ class Study:
     outcomes: tuple[Outcome, ...]
 
     @property
-    def runs(self) -> tuple[Run, ...]:
-        """What there is to draw."""
-        return tuple(outcome.run for outcome in self.outcomes if outcome.run is not None)
-
-    @property
-    def sound(self) -> tuple[Run, ...]:
+    def sound(self) -> list[Recording]:
         """Runs of the variants that have no fault."""
-        return tuple(o.run for o in self.outcomes if o.run is not None and not o.fault)
+        return [o.recording for o in self.outcomes if o.recording is not None and not o.fault]
 
 
 def study(
@@ -154,8 +122,8 @@ def study(
     knots = 0
     for number, variant in enumerate(found):
         outcomes.append(_outcome(variant))
-        run = outcomes[-1].run
-        knots += 0 if run is None else len(run.recording.knots)
+        recording = outcomes[-1].recording
+        knots += 0 if recording is None else len(recording.knots)
         if knots > MOST_KNOTS:
             raise PageError(
                 f"{number + 1} of {len(found)} variants have {knots} knots already, at most"
@@ -192,40 +160,22 @@ def _check(found: Sequence[Variant]) -> None:
 
 
 def _outcome(variant: Variant) -> Outcome:
-    if variant.scene is None:
+    scene = variant.scene
+    if scene is None:
         return Outcome(variant.values, None, variant.fault)
     try:
-        return Outcome(variant.values, _run(variant.scene))
-    except SceneError as error:
-        return Outcome(variant.values, _without_belt(variant.scene), reason(error))
+        return Outcome(variant.values, simulate(scene))
     except StalledError as error:
         return Outcome(variant.values, None, f"the run got stuck: {error}")
-
-
-def _without_belt(scene: Scene) -> Run | None:
-    """Run a scene whose outgoing belt has no place, because the flight misses the plate."""
-    if scene.outgoing is None:
-        return None
-    try:
-        return _run(scene.with_values(dict.fromkeys(("outgoing", "run", "expect"))))
-    except (SceneError, StalledError):
-        return None
-
-
-def _run(scene: Scene) -> Run:
-    machine = build(scene)
-    recording = simulate(scene)
-    prediction = predict(scene)
-    arcs, began = analytic_of(recording, prediction)
-    return Run(
-        scene=scene,
-        machine=machine,
-        recording=recording,
-        arcs=arcs,
-        began=began,
-        reason=str(prediction.reason),
-        window=window_of(recording, machine),
-    )
+    except SceneError as error:
+        fault = reason(error)
+    recording = None
+    if scene.outgoing is not None:
+        # Its belt has no place, because the flight misses the plate: shown without it.
+        with suppress(SceneError, StalledError):
+            bare = scene.with_values(dict.fromkeys(("outgoing", "run", "expect")))
+            recording = simulate(bare)
+    return Outcome(variant.values, recording, fault)
 
 
 LABELS = {
@@ -264,83 +214,67 @@ MOST_FREE = 3
 """Free surfaces whose first impact is listed."""
 
 
-@dataclass(frozen=True)
-class Figure:
-    """One row of numbers.
+def figures(study: Study) -> list[dict[str, Any]]:
+    """Return the rows of numbers of a study that have a number in any variant.
 
-    Attributes
-    ----------
-    group : str
-        Whose number it is, where there are several particles.
-    name : str
-        As `chutelab.scene.rules` has it.
-    label, unit : str
-        For people; "degrees" for angles.
-    simulated, analytic : tuple of float or None
-        One for each variant of the study; None where it did not happen, or nothing is known.
+    Each has its group (whose number it is, where there are several particles), its name as in
+    `chutelab.scene.rules`, label and unit for people, and a number for each variant, simulated and
+    analytic: None where it did not happen, or nothing is known.
     """
-
-    group: str
-    name: str
-    label: str
-    unit: str
-    simulated: tuple[float | None, ...]
-    analytic: tuple[float | None, ...]
-
-
-def figures(study: Study) -> tuple[Figure, ...]:
-    """Return the rows of a study that have a number in any variant."""
-    first = study.sound[0]
-    surfaces = first.recording.surfaces[:-1]
+    surfaces = study.sound[0].surfaces[:-1]
+    free = [name for name in surfaces if name not in ("incoming", "plate", "outgoing")]
     labels = dict(LABELS)
-    for name in _free(surfaces):
+    for name in free[:MOST_FREE]:
         labels[f"impact.{name}.t"] = f"Strikes “{name}” at"
         labels[f"impact.{name}.x"] = f"Strikes “{name}” at x"
-    crowd = max(run.recording.count for run in study.sound) > 1
+    crowd = max(recording.count for recording in study.sound) > 1
     rows = [("First particle" if crowd else "", *row) for row in labels.items()]
     books = [("All particles" if crowd else "", *row) for row in BOOKS.items()]
     if crowd:
         rows = [("All particles", *row) for row in CROWD.items()] + books + rows
     else:
         rows += books
+    # Without its outgoing belt a scene has other books, and no landing.
+    runs = [None if outcome.fault else outcome.recording for outcome in study.outcomes]
+    known = [{} if run is None else _analytic(run) for run in runs]
     found = []
     for group, name, label in rows:
         unit = unit_of(name, surfaces)
         if unit is None:
             continue
-        # Without its outgoing belt a scene has other books, and no landing.
-        runs = [None if outcome.fault else outcome.run for outcome in study.outcomes]
-        simulated = tuple(_simulated(run, name) for run in runs)
-        analytic = tuple(_analytic(run).get(name) for run in runs)
-        if any(value is not None for value in simulated):
-            found.append(Figure(group, name, label, unit, simulated, analytic))
-    return tuple(found)
+        values = [nan if run is None else measure(run, name) for run in runs]
+        if not any(map(isfinite, values)):
+            continue
+        analytic = [numbers.get(name) for numbers in known]
+        found.append(
+            {
+                "group": group,
+                "name": name,
+                "label": label,
+                "unit": symbol(unit),
+                "simulated": [value if isfinite(value) else None for value in values],
+                "analytic": analytic if any(value is not None for value in analytic) else [],
+            }
+        )
+    return found
 
 
-def _free(surfaces: Sequence[str]) -> list[str]:
-    return [s for s in surfaces if s not in ("incoming", "plate", "outgoing")][:MOST_FREE]
-
-
-def _simulated(run: Run | None, name: str) -> float | None:
-    value = nan if run is None else measure(run.recording, name, run.scene)
-    return value if isfinite(value) else None
-
-
-def _analytic(run: Run | None) -> dict[str, float]:
+def _analytic(run: Recording) -> dict[str, float]:
     """Return what the arcs say: where and how fast each of them begins and ends."""
-    if run is None or not run.arcs:
+    arcs, began = analytic_of(run, run.prediction)
+    if not arcs:
         return {}
-    known = {"separation.t": run.began, "phi1_deg": degrees(atan2(*run.arcs[0].position))}
+    known = {"separation.t": began, "phi1_deg": degrees(atan2(*arcs[0].position))}
     ends = []
-    for arc in run.arcs:
+    for arc in arcs:
         (where,), (pace,) = (values.tolist() for values in arc.at([arc.end]))
-        ends.append((run.began + arc.end, *where, *pace))
+        ends.append((began + arc.end, *where, *pace))
     t, _, y, vx, vy = ends[0]
     known |= {"impact.t": t, "impact.y": y, "v2": hypot(vx, vy)}
     if len(ends) > 1:
         t, x, _, vx, vy = ends[1]
         known |= {"landing.t": t, "landing.x": x, "landing.vx": vx, "landing.vy": vy}
-        known["v2r"] = hypot(*run.arcs[1].velocity)
+        known["v2r"] = hypot(*arcs[1].velocity)
     return known
 
 
@@ -369,11 +303,23 @@ def pack(study: Study) -> dict[str, Any]:
     Numbers are little-endian doubles, so that nothing is lost: what the page draws is what the
     engine computed, to the rounding of the curve's evaluation.
     """
-    runs = study.runs
-    knots = np.concatenate([run.recording.knots for run in runs])
+    runs = [one.recording for one in study.outcomes if one.recording is not None]
+    knots = np.concatenate([run.knots for run in runs])
+    columns = {
+        "t": knots["t"],
+        "x": knots["position"][:, 0],
+        "y": knots["position"][:, 1],
+        "vx": knots["velocity"][:, 0],
+        "vy": knots["velocity"][:, 1],
+        "omega": knots["omega"],
+        **{name: knots["entries"][:, i] for i, name in enumerate(ENTRIES)},
+    }
+    segments = [run.machine.segments for run in runs]
+    # A row for each straight surface: ends (m), speed (m/s), restitution, friction.
+    rows = [np.column_stack([s.start, s.end, s.speed, s.restitution, s.friction]) for s in segments]
     return {
         "format": FORMAT,
-        "engine": sorted({run.recording.engine for run in runs}),
+        "engine": sorted({run.engine for run in runs}),
         "sliders": [
             {
                 "key": vary.key,
@@ -386,28 +332,15 @@ def pack(study: Study) -> dict[str, Any]:
                 zip(study.varies, study.quantities, strict=True)
             )
         ],
-        "columns": {name: _base64(values) for name, values in _columns(knots).items()},
+        # A column of zeros only is left out.
+        "columns": {name: _base64(values) for name, values in columns.items() if values.any()},
         "knots": len(knots),
-        "segments": _base64(np.concatenate([_segments(run) for run in runs])),
+        "segments": _base64(np.concatenate(rows)),
         "window": _window(study),
-        "energies": [
-            {"name": name, "label": label} for name, label in style.ENERGY_LABEL.items()
-        ],
-        "figures": [
-            {
-                "group": figure.group,
-                "name": figure.name,
-                "label": figure.label,
-                "unit": symbol(figure.unit),
-                "simulated": list(figure.simulated),
-                "analytic": list(figure.analytic) if any(
-                    value is not None for value in figure.analytic
-                ) else [],
-            }
-            for figure in figures(study)
-        ],
+        "energies": [{"name": name, "label": label} for name, label in style.ENERGY_LABEL.items()],
+        "figures": figures(study),
         "variants": [_variant(outcome) for outcome in study.outcomes],
-    }  # fmt: skip
+    }
 
 
 def _nearest(study: Study, axis: int) -> int:
@@ -418,28 +351,8 @@ def _nearest(study: Study, axis: int) -> int:
     return int(np.argmin(np.abs(np.array(study.varies[axis].values) - found)))
 
 
-def _columns(knots: NDArray[Any]) -> dict[str, Floats]:
-    """Return the knots by column; one that holds zeros only is left out."""
-    columns = {
-        "t": knots["t"],
-        "x": knots["position"][:, 0],
-        "y": knots["position"][:, 1],
-        "vx": knots["velocity"][:, 0],
-        "vy": knots["velocity"][:, 1],
-        "omega": knots["omega"],
-        **{name: knots["entries"][:, i] for i, name in enumerate(ENTRIES)},
-    }
-    return {name: values for name, values in columns.items() if values.any()}
-
-
 def _base64(values: Floats) -> str:
     return b64encode(np.ascontiguousarray(values, dtype="<f8").tobytes()).decode("ascii")
-
-
-def _segments(run: Run) -> Floats:
-    """Return a row for each straight surface: ends (m), speed (m/s), restitution, friction."""
-    s = run.machine.segments
-    return np.column_stack([s.start, s.end, s.speed, s.restitution, s.friction])
 
 
 def _window(study: Study) -> list[float]:
@@ -455,44 +368,38 @@ def _window(study: Study) -> list[float]:
     return [float(side) for side in np.clip(reach, usual - room, usual + room)]
 
 
-def _sides(run: Run) -> list[float]:
-    return [run.window.left, run.window.right, run.window.bottom, run.window.top]
+def _sides(run: Recording) -> list[float]:
+    window = window_of(run, run.machine)
+    return [window.left, window.right, window.bottom, window.top]
 
 
 def _variant(outcome: Outcome) -> dict[str, Any]:
-    run = outcome.run
+    run = outcome.recording
     if run is None:
         return {"fault": outcome.fault}
-    segments = run.machine.segments
-    recording = run.recording
-    begin, end = _span(recording)
-    particle, pulley = recording.particle, run.machine.pulley
+    arcs, began = analytic_of(run, run.prediction)
+    # Between these times (s) there is something to see.
+    begin, end = action(run)
+    begin = max(float(run.track(0)["t"][0]), begin - LEAD * (end - begin))
+    end = max(end, float(run.knots["t"].max()))
+    particle, pulley = run.particle, run.machine.pulley
     return {
         "fault": outcome.fault,
-        "surfaces": list(recording.surfaces),
-        "owner": segments.surface.tolist(),
-        "offsets": recording.offsets.tolist(),
-        "ended": [REASONS[i] for i in recording.ended.tolist()],
-        "body": [particle.radius, particle.mass, particle.inertia, recording.gravity],
+        "surfaces": list(run.surfaces),
+        "owner": run.machine.segments.surface.tolist(),
+        "offsets": run.offsets.tolist(),
+        "ended": [REASONS[i] for i in run.ended.tolist()],
+        "body": [particle.radius, particle.mass, particle.inertia, run.gravity],
         "pulley": None if pulley is None else [pulley.radius, pulley.speed],
-        "arcs": [
-            [arc.begin, arc.end, *arc.position, *arc.velocity, arc.gravity] for arc in run.arcs
-        ],
-        "began": run.began,
-        "zero": float(recording.knots["position"][:, 1].min()),
+        "arcs": [[arc.begin, arc.end, *arc.position, *arc.velocity, arc.gravity] for arc in arcs],
+        "began": began,
+        "zero": float(run.knots["position"][:, 1].min()),
         "window": _sides(run),
-        "reason": run.reason,
+        "reason": str(run.prediction.reason),
         "span": [begin, end],
-        "strobe": strobe_step(recording),
-        "events": _events(recording),
+        "strobe": strobe_step(run),
+        "events": _events(run),
     }
-
-
-def _span(recording: Recording) -> tuple[float, float]:
-    """Return the times (s) between which there is something to see."""
-    begin, end = action(recording)
-    begin = max(float(recording.track(0)["t"][0]), begin - LEAD * (end - begin))
-    return begin, max(end, float(recording.knots["t"].max()))
 
 
 def _events(recording: Recording) -> list[list[Any]]:

@@ -6,7 +6,7 @@ The analytic parabola of a transfer is made of arcs, which can be drawn and comp
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import ceil, cos, isfinite, log10, sin, sqrt
+from math import ceil, cos, isfinite, isnan, log10, sin, sqrt
 from textwrap import fill, shorten
 
 import numpy as np
@@ -28,7 +28,8 @@ from chutelab.pictures.plots.scenery import (
     track_times,
     upright,
 )
-from chutelab.results import Kind, Recording
+from chutelab.results import Recording
+from chutelab.results.quantities import measure
 from chutelab.scene import Incoming, Scene
 from chutelab.theory import Transfer
 from chutelab.theory.separation import separation
@@ -145,8 +146,7 @@ FLOOR = 1e-17
 def analytic_of(recording: Recording, prediction: Transfer) -> tuple[tuple[Arc, ...], float]:
     """Return the arcs known analytically, and the time (s) of the recording at which they begin."""
     parts = arcs(prediction, recording.scene)
-    separated = recording.select(Kind.SEPARATION, surface="incoming")
-    if not np.any(separated["particle"] == 0):
+    if isnan(measure(recording, "separation.t")):
         return (), 0.0
     return parts, action(recording)[0]
 

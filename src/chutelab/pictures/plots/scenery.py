@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import floor, log10
+from math import floor, isnan, log10
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from chutelab.machine import Machine
 from chutelab.pictures.plots import style
 from chutelab.results import REASONS, Kind, Recording
+from chutelab.results.quantities import measure
 from chutelab.util.arrays import Bools, Floats, Ints
 
 STRUCK = (Kind.IMPACT, Kind.LANDING, Kind.COLLISION)
@@ -81,10 +82,8 @@ def action(recording: Recording) -> tuple[float, float]:
     one.
     """
     track = recording.track(0)
-    separation = recording.select(Kind.SEPARATION, surface="incoming")
-    separation = separation[separation["particle"] == 0]
-    begin = separation["t"][0] if len(separation) else track["t"][0]
-    return float(begin), float(track["t"][-1])
+    begin = measure(recording, "separation.t")
+    return float(track["t"][0]) if isnan(begin) else begin, float(track["t"][-1])
 
 
 def struck_by_nominal(recording: Recording) -> NDArray[Any]:

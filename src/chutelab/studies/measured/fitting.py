@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from chutelab.results import Recording
 from chutelab.scene import Fault, Scene, SceneError
 from chutelab.studies.measured import result
 from chutelab.studies.measured.parameters import (
@@ -23,6 +25,7 @@ from chutelab.studies.measured.residuals import LEAST, Residuals, best_t0, follo
 from chutelab.studies.measured.result import Fit
 from chutelab.studies.measured.track import MeasuredError, Track
 from chutelab.util.arrays import Bools, Floats
+from chutelab.util.versions import library
 
 
 class Problem:
@@ -53,19 +56,10 @@ class Problem:
         """Return the error that says why there is no result."""
         return MeasuredError(self.track.source, [Fault("fit", None, text) for text in said])
 
-    def at(self, values: Floats) -> tuple[Scene, Track]:
-        """Return scene and track with these values."""
-        return changed(self.scene, self.track, self.parameters, list(values))
-
-    def laid(self, values: Floats) -> Residuals:
-        """Return all points over the simulation with these values."""
-        scene, track = self.at(values)
-        return over(run(scene), track)
-
-    def within(self, values: Floats) -> Bools:
-        """Return which points lie within the simulated time with these values."""
-        scene, track = self.at(values)
-        return inside(run(scene), track)
+    def run(self, values: Floats) -> tuple[Recording, Track]:
+        """Return simulation and track with these values."""
+        scene, track = changed(self.scene, self.track, self.parameters, values.tolist())
+        return run(scene), track
 
     def tried(self, values: Floats) -> Floats:
         """Return the residuals, or very large ones if the scene refuses the values."""
@@ -77,18 +71,16 @@ class Problem:
 
     def residuals(self, values: Floats) -> Floats:
         """Return measured minus simulated coordinates of the points that count, m."""
-        scene, track = self.at(values)
-        recording = run(scene)
+        recording, track = self.run(values)
         left = track.position[self.used] - follow(recording, track.t[self.used])
         return left.ravel()
 
-    def derivatives(self, values: Floats, steps: Floats | None = None) -> Floats:
+    def derivatives(self, values: Floats, steps: ArrayLike = 0.0) -> Floats:
         """Return how the residuals change with the values, (M, p), by differences.
 
         The steps are small ones, or those given, if they are larger.
         """
-        small = STEP * self.sizes
-        wanted = small if steps is None else np.maximum(steps, small)
+        wanted = np.maximum(steps, STEP * self.sizes)
         return jacobian(self.residuals, values, wanted, self.parameters)
 
 
@@ -127,25 +119,23 @@ def fit(scene: Scene, track: Track, keys: Sequence[str], *, robust: bool = False
         tell the parameters, or nothing is found.
     SceneError
         If the scene cannot be run.
-    ImportError
+    MissingLibraryError
         Without SciPy; says what to install.
     """
-    least_squares, student = _scipy()
+    _scipy("optimize")
     parameters = resolve(scene, track, keys)
     if scene.stream.interact and scene.stream.count > 1:
         text = "must be false for a fit, which follows one particle that meets no others"
         raise MeasuredError(scene.source, [Fault("stream.interact", True, text)])
     if "t0" in keys:
-        started = track.placed(t0=best_t0(run(scene), track))
-        parameters = resolve(scene, started, keys)
-    else:
-        started = track
-    problem = Problem(scene, started, parameters)
-    before = problem.laid(problem.start)
+        track = track.placed(t0=best_t0(run(scene), track))
+        parameters = resolve(scene, track, keys)
+    problem = Problem(scene, track, parameters)
+    before = over(*problem.run(problem.start))
     problem.use(before.used)
     if said := without_effect(problem.derivatives(problem.start), parameters):
         raise problem.refused(*said)
-    best = _descended(problem, problem.start, least_squares, robust=robust)
+    best = _descended(problem, problem.start, robust=robust)
     if best is None:
         reason = result.advice(before) or "start nearer to the result"
         raise problem.refused(f"nothing was found near the starting values; {reason}")
@@ -153,14 +143,12 @@ def fit(scene: Scene, track: Track, keys: Sequence[str], *, robust: bool = False
         if not result.alike(problem.residuals(best.values)):
             break
         other = _elsewhere(problem, best.values)
-        found = None
-        if other is not None:
-            found = _descended(problem, other, least_squares, robust=robust)
+        found = None if other is None else _descended(problem, other, robust=robust)
         if found is None or found.cost >= best.cost or found.used.sum() < KEPT * best.used.sum():
             problem.use(best.used)
             break
         best = found
-    return _judged(problem, best, before, student, robust=robust)
+    return _judged(problem, best, before, robust=robust)
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,21 +166,20 @@ class _Minimum:
     settled: bool
 
 
-def _descended(
-    problem: Problem, values: Floats, least_squares: Any, *, robust: bool
-) -> _Minimum | None:
+def _descended(problem: Problem, values: Floats, *, robust: bool) -> _Minimum | None:
     """Return the minimum below some values, with the points that lie within its simulated time.
 
     None if it lies so far off that hardly any do.
     """
     parameters = problem.parameters
     threshold, settled = 1.0, False
-    used = problem.within(values)
+    used = inside(*problem.run(values))
     for turn in range(2 * ROUNDS if robust else ROUNDS):
         if used.sum() < LEAST:
             return None
         problem.use(used)
-        solved = least_squares(
+        # Its own derivatives would take steps that the scene refuses, and no other way then.
+        solved = _scipy("optimize").least_squares(
             problem.tried,
             values,
             jac=problem.derivatives,
@@ -206,10 +193,11 @@ def _descended(
         )
         values = np.asarray(solved.x)
         left = problem.residuals(values)
-        previous, threshold = threshold, _threshold(left)
-        within = problem.within(values)
+        # Neither 0, for points without noise, nor so large that it could not be told from none.
+        deviation = result.MAD * float(np.median(np.abs(left)))
+        previous, threshold = threshold, min(max(TUNING * deviation, 1e-9), 0.99)
         # From the third turn on points only leave: one at the very end could come and go forever.
-        within &= used | (turn < 2)
+        within = inside(*problem.run(values)) & (used | (turn < 2))
         settled = bool((within == used).all()) and bool(solved.success)
         if settled and (not robust or abs(threshold - previous) < 1e-3 * threshold):
             break
@@ -234,16 +222,12 @@ def _elsewhere(problem: Problem, values: Floats) -> Floats | None:
     return best
 
 
-def _threshold(left: Floats) -> float:
-    """Return the residual, m, from which on a robust fit believes a point less."""
-    # Neither 0, for points without noise, nor so large that it could not be told from none.
-    return min(max(TUNING * result.MAD * float(np.median(np.abs(left))), 1e-9), 0.99)
+def _judged(problem: Problem, best: _Minimum, before: Residuals, *, robust: bool) -> Fit:
+    """Return the result with its uncertainties; refuse what the points cannot tell.
 
-
-def _judged(
-    problem: Problem, best: _Minimum, before: Residuals, student: Any, *, robust: bool
-) -> Fit:
-    """Return the result with its uncertainties; refuse what the points cannot tell."""
+    `scipy.optimize.curve_fit` has the covariance of a plain fit, and neither that of a robust one
+    nor a word about parameters that cannot be told apart.
+    """
     parameters, values = problem.parameters, best.values
     derivatives = problem.derivatives(values)
     if said := without_effect(derivatives, parameters) or inseparable(derivatives, parameters):
@@ -258,13 +242,13 @@ def _judged(
         scatter = best.threshold / TUNING
     lengths = np.linalg.norm(derivatives, axis=0)
     inverse = np.linalg.inv((derivatives / lengths).T @ (derivatives / lengths))
-    errors = np.sqrt(variance * np.diag(inverse)) / lengths
     spread = np.sqrt(np.diag(inverse))
-    reach = float(student(freedom, 0.975)) * errors
-    scene, track = problem.at(values)
-    after = over(run(scene), track)
+    errors = np.sqrt(variance) * spread / lengths
+    reach = float(_scipy("special").stdtrit(freedom, 0.975)) * errors
     wide = problem.derivatives(values, errors)
-    return Fit(
+    after = over(*problem.run(values))
+    scene, _ = changed(problem.scene, problem.track, parameters, values.tolist())
+    found = Fit(
         parameters=parameters,
         values=values,
         errors=errors,
@@ -277,27 +261,11 @@ def _judged(
         after=after,
         scene=scene,
         robust=robust,
-        notes=tuple(
-            result.notes(
-                parameters,
-                values,
-                errors,
-                inverse / np.outer(spread, spread),
-                derivatives,
-                wide,
-                after,
-                robust=robust,
-                settled=best.settled,
-            )
-        ),
+        notes=(),
     )
+    bent = np.linalg.norm(wide - derivatives, axis=0) / lengths
+    return replace(found, notes=tuple(result.notes(found, bent, settled=best.settled)))
 
 
-def _scipy() -> tuple[Any, Any]:
-    try:
-        from scipy.optimize import least_squares
-        from scipy.special import stdtrit
-    except ImportError as error:
-        text = 'a fit needs SciPy: pip install "chutelab[fit]"'
-        raise ImportError(text, name=error.name) from error
-    return least_squares, stdtrit
+def _scipy(name: str) -> Any:
+    return library(f"scipy.{name}", "a fit needs SciPy", "fit")

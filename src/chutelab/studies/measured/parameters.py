@@ -6,8 +6,8 @@ respond to parameters, and which of them they cannot tell apart, is found by dif
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -17,6 +17,7 @@ from chutelab.scene import MISSING, Fault, Scene, SceneError, shown
 from chutelab.scene.overrides import at_path, joined, limits_of, parts_of, rule_at
 from chutelab.studies.measured.track import MeasuredError, Track
 from chutelab.util.arrays import Floats
+from chutelab.util.errors import did_you_mean
 
 PLACEMENT: Final = {
     "t0": ("s", -np.inf, np.inf),
@@ -67,7 +68,12 @@ def resolve(scene: Scene, track: Track, keys: Sequence[str]) -> tuple[Parameter,
     if not keys:
         faults.append(Fault("fit", None, "name at least one key, such as plate.restitution"))
     for key in keys:
-        known = _placed(track, key) if key in PLACEMENT else _of_scene(document, key)
+        known: Parameter | str
+        if key in PLACEMENT:
+            unit, low, high = PLACEMENT[key]
+            known = Parameter(key, unit, _placement(track)[key], low, high)
+        else:
+            known = _of_scene(document, key)
         if isinstance(known, str):
             faults.append(Fault(f"fit {key}", None, known))
         elif any(known.key == other.key for other in found):
@@ -89,46 +95,37 @@ def changed(
     SceneError
         If the scene refuses a value, or two that do not go together.
     """
-    changes: dict[str, float] = {}
-    origin = list(track.placement.origin)
-    placement: dict[str, Any] = {}
-    for parameter, value in zip(parameters, (float(value) for value in values), strict=True):
-        match parameter.key:
-            case "origin.x":
-                origin[0] = value
-            case "origin.y":
-                origin[1] = value
-            case "t0" | "scale":
-                placement[parameter.key] = value
-            case key:
-                changes[key] = value
-    if changes:
-        scene = scene.with_values(changes)
-    return scene, track.placed(origin=(origin[0], origin[1]), **placement)
+    given = dict(zip((one.key for one in parameters), map(float, values), strict=True))
+    changes = {key: value for key, value in given.items() if key not in PLACEMENT}
+    place = _placement(track) | given
+    origin = place["origin.x"], place["origin.y"]
+    moved = track.placed(t0=place["t0"], scale=place["scale"], origin=origin)
+    return scene.with_values(changes) if changes else scene, moved
 
 
-def _placed(track: Track, key: str) -> Parameter:
-    unit, low, high = PLACEMENT[key]
-    placement = track.placement
-    start = {
-        "t0": placement.t0,
-        "scale": placement.scale,
-        "origin.x": placement.origin[0],
-        "origin.y": placement.origin[1],
-    }[key]
-    return Parameter(key, unit, start, low, high)
+def _placement(track: Track) -> dict[str, float]:
+    place = track.placement
+    return {
+        "t0": place.t0,
+        "scale": place.scale,
+        "origin.x": place.origin[0],
+        "origin.y": place.origin[1],
+    }
 
 
 def _of_scene(document: Mapping[str, Any], key: str) -> Parameter | str:
     """Return the parameter of a key of the scene, or why there is none."""
-    try:
+    rule = None
+    with suppress(ValueError):
         parts = parts_of(key, [surface["name"] for surface in document["surface"]])
-    except ValueError:
-        return _unknown(document, key)
-    rule = rule_at(parts)
-    head = str(parts[0]) if parts else ""
+        rule = rule_at(parts)
     if rule is None:
-        return _unknown(document, key)
+        known = [*numbers(document), *PLACEMENT]
+        last = key.rpartition(".")[2]
+        near = [name for name in known if name.rpartition(".")[2] == last]
+        advice = f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(known)}"
+        return f"unknown key; {did_you_mean(key, known, advice, most=3)}"
+    head = str(parts[0])
     if document.get(head) in (None, ()):
         return f"the scene has no [{head}]"
     value: Any = at_path(document, parts)
@@ -140,15 +137,6 @@ def _of_scene(document: Mapping[str, Any], key: str) -> Parameter | str:
     if limits is None or isinstance(value, (str, bool)):
         return f"{shown(value)} is not a number that can vary continuously"
     return Parameter(path, rule.get("x-unit", ""), float(value), *limits)
-
-
-def _unknown(document: Mapping[str, Any], key: str) -> str:
-    known = [*numbers(document), *PLACEMENT]
-    near = difflib.get_close_matches(key, known, n=3, cutoff=0.6)
-    if not near:
-        near = [name for name in known if name.rpartition(".")[2] == key.rpartition(".")[2]]
-    advice = f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(known)}"
-    return f"unknown key; {advice}"
 
 
 def numbers(document: Mapping[str, Any]) -> Iterator[str]:

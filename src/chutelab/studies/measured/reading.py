@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
-from math import isfinite
 from pathlib import Path
 from typing import Final
 
@@ -29,10 +29,8 @@ from chutelab.util.errors import did_you_mean
 LARGEST_FILE: Final = 20_000_000
 """Bytes; an hour of film at 50 frames a second is a quarter of it."""
 
-SEPARATORS: Final = ("\t", ";", ",", " ")
+SEPARATORS: Final = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "spaces"}
 """Tried in this order: a comma may be a decimal mark where a tab or a semicolon stands."""
-
-NAMES: Final = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "spaces"}
 
 _NUMBER: Final = re.compile(r"[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?")
 
@@ -86,11 +84,6 @@ def cells_of(line: str, separator: str) -> list[str]:
     return [cell.strip() for cell in rows[0]] if rows else []
 
 
-def is_empty(cell: str) -> bool:
-    """Tell whether a cell stands for no value."""
-    return cell.lower() in _EMPTY
-
-
 def number(cell: str) -> float | None:
     """Return the number in a cell, with decimal point or comma; None if there is none.
 
@@ -101,11 +94,6 @@ def number(cell: str) -> float | None:
     if len(cell) > 60 or not _NUMBER.fullmatch(cell):
         return None
     return float(cell.replace(",", "."))
-
-
-def marks(cells: Iterable[str]) -> set[str]:
-    """Return which decimal marks the numbers use: of "." and ","."""
-    return {mark for cell in cells for mark in ".," if mark in cell}
 
 
 def refused(source: object, place: str, allowed: str, value: object = None) -> MeasuredError:
@@ -145,16 +133,11 @@ def find(name_or_path: str | Path) -> Path:
         If there is neither.
     """
     path = Path(name_or_path)
-    try:
+    with suppress(OSError, ValueError):
         if str(name_or_path) and path.exists():
             return path
-    except (OSError, ValueError):
-        pass
-    tracks = {
-        file.stem: file
-        for folder in {scene.parent for scene in shipped().values()}
-        for file in sorted((folder / "data").glob("*.csv"))
-    }
+    folders = {scene.parent for scene in shipped().values()}
+    tracks = {file.stem: file for one in folders for file in sorted((one / "data").glob("*.csv"))}
     if (name := str(name_or_path).removesuffix(".csv")) in tracks:
         return tracks[name]
     advice = did_you_mean(path.stem, tracks, f"shipped: {', '.join(tracks) or 'none'}")
@@ -203,16 +186,16 @@ def read(
     header, separator = _header(source, lines)
     above = cells_of(lines[header - 1], separator) if header else []
     columns = _chosen(source, _tracks(cells_of(lines[header], separator), above), track, header)
-    seconds, points, numbers, skipped = _rows(source, lines, header, separator, columns)
-    if len(seconds) < LEAST:
-        text = f"{len(seconds)} points with a time and a position; at least {LEAST} are needed"
+    points, numbers, skipped = _rows(source, lines, header, separator, columns)
+    if len(points) < LEAST:
+        text = f"{len(points)} points with a time and a position; at least {LEAST} are needed"
         raise refused(source, "", text)
-    clock = TIMES[columns.units["t"]]
+    table = np.array(points)
     return Track(
         name=columns.name,
         source=str(source),
-        seconds=clock * np.array(seconds),
-        points=np.array(points),
+        seconds=TIMES[columns.units["t"]] * table[:, 0],
+        points=table[:, 1:],
         lines=np.array(numbers),
         placement=Placement(_scale(source, columns, header, scale), origin, flip_y, t0),
         skipped=skipped,
@@ -293,53 +276,46 @@ def _chosen(source: Path, tracks: Sequence[_Columns], wanted: str | None, header
 
 def _rows(
     source: Path, lines: Sequence[str], header: int, separator: str, columns: _Columns
-) -> tuple[list[float], list[tuple[float, float]], list[int], int]:
-    """Return times, positions and line numbers, and how many lines have no position."""
+) -> tuple[list[tuple[float, ...]], list[int], int]:
+    """Return time, x and y of each point, their lines, and how many lines have no position."""
     width = len(cells_of(lines[header], separator))
-    seconds: list[float] = []
-    points: list[tuple[float, float]] = []
+    points: list[tuple[float, ...]] = []
     numbers: list[int] = []
     skipped = 0
-    used: set[str] = set()
+    marks: set[str] = set()
     for line, text in enumerate(lines[header + 1 :], start=header + 2):
         if not text.strip() or text.lstrip().startswith("#"):
             continue
+        place = f"line {line}"
         row = cells_of(text, separator)
         if len(row) > width and any(row[width:]):
             allowed = f"{len(row)} cells under {width} columns"
             if separator == ",":
                 allowed += "; with decimal commas, export with tabs or semicolons between cells"
-            raise refused(source, f"line {line}", allowed, text.strip())
+            raise refused(source, place, allowed, text.strip())
         row += [""] * (width - len(row))
         wanted = {key: row[cell] for key, cell in columns.cells.items()}
-        if any(is_empty(cell) for cell in wanted.values()):
+        if any(cell.lower() in _EMPTY for cell in wanted.values()):
             skipped += 1
             continue
-        t, x, y = (_value(source, line, key, cell) for key, cell in wanted.items())
-        used |= marks(wanted.values())
-        if len(used) > 1:
-            place = f"line {line}"
-            allowed = (
-                f"decimal points and decimal commas in one file (cells apart by {NAMES[separator]})"
-            )
+        found = {key: number(cell) for key, cell in wanted.items()}
+        for key, value in found.items():
+            if value is None or not abs(value) <= LARGEST:
+                allowed = f"must be a number from {-LARGEST:g} to {LARGEST:g}, or empty"
+                raise refused(source, f"{place}, column {key}", allowed, wanted[key])
+        point = tuple(value for value in found.values() if value is not None)
+        marks |= {mark for cell in wanted.values() for mark in ".," if mark in cell}
+        if len(marks) > 1:
+            apart = f"cells apart by {SEPARATORS[separator]}"
+            allowed = f"decimal points and decimal commas in one file ({apart})"
             raise refused(source, place, allowed, text.strip())
-        if seconds and t <= seconds[-1]:
-            allowed = (
-                f"times must increase; the point before has {seconds[-1]:g} (line {numbers[-1]})"
-            )
-            raise refused(source, f"line {line}, column t", allowed, t)
-        seconds.append(t)
-        points.append((x, y))
+        if points and point[0] <= points[-1][0]:
+            before = f"the point before has {points[-1][0]:g} (line {numbers[-1]})"
+            allowed = f"times must increase; {before}"
+            raise refused(source, f"{place}, column t", allowed, point[0])
+        points.append(point)
         numbers.append(line)
-    return seconds, points, numbers, skipped
-
-
-def _value(source: Path, line: int, column: str, cell: str) -> float:
-    value = number(cell)
-    if value is None or not isfinite(value) or abs(value) > LARGEST:
-        allowed = f"must be a number from {-LARGEST:g} to {LARGEST:g}, or empty"
-        raise refused(source, f"line {line}, column {column}", allowed, cell)
-    return value
+    return points, numbers, skipped
 
 
 def _scale(source: Path, columns: _Columns, header: int, given: float | None) -> float:

@@ -17,7 +17,7 @@ from chutelab.studies.measured.residuals import Residuals, best_t0, over
 from chutelab.studies.measured.track import MeasuredError
 from chutelab.util.arrays import Floats
 from chutelab.util.files import csv_lines
-from chutelab.util.tables import Sheet, Shown
+from chutelab.util.tables import Sheet, Shown, plain
 
 MAD = 1.4826
 """Standard deviations of a normal distribution in its median absolute deviation."""
@@ -67,57 +67,47 @@ def advice(found: Residuals) -> str:
     )
 
 
-def notes(
-    parameters: Sequence[Parameter],
-    values: Floats,
-    errors: Floats,
-    correlation: Floats,
-    derivatives: Floats,
-    wide: Floats,
-    after: Residuals,
-    *,
-    robust: bool,
-    settled: bool,
-) -> Iterator[str]:
-    """Yield what should be said beside the result.
+def notes(fit: Fit, bent: Floats, *, settled: bool) -> Iterator[str]:
+    """Yield what should be said beside a result.
 
     Parameters
     ----------
-    derivatives, wide : ndarray, shape (M, p)
-        The Jacobian by a small step, and by one as large as the uncertainties.
+    bent : ndarray, shape (p,)
+        By how much the response to each parameter changes within its uncertainty, relatively.
     settled : bool
         Whether the fit came to an end with the same points within the simulated time.
     """
-    if doubt := advice(after):
+    if doubt := advice(fit.after):
         # Then nothing else that could be said means anything.
         yield doubt
         return
-    for k, parameter in enumerate(parameters):
-        if values[k] <= parameter.low + errors[k] or values[k] >= parameter.high - errors[k]:
-            yield f"{parameter.key} is at the edge of what is allowed: its uncertainty is one-sided"
-        elif errors[k] > max(abs(values[k]), parameter.size):
-            yield f"{parameter.key} is hardly told by these points: uncertain by its own size"
-    for i, k in combinations(range(len(parameters)), 2):
-        if abs(correlation[i, k]) > CORRELATED:
+    for key, parameter, value, error in zip(
+        fit.keys, fit.parameters, fit.values, fit.errors, strict=True
+    ):
+        if value <= parameter.low + error or value >= parameter.high - error:
+            yield f"{key} is at the edge of what is allowed: its uncertainty is one-sided"
+        elif error > max(abs(value), parameter.size):
+            yield f"{key} is hardly told by these points: uncertain by its own size"
+    for i, k in combinations(range(len(fit.keys)), 2):
+        if abs(fit.correlation[i, k]) > CORRELATED:
             yield (
-                f"{parameters[i].key} and {parameters[k].key} are correlated"
-                f" ({correlation[i, k]:+.3f}): the points tell a combination of them better"
+                f"{fit.keys[i]} and {fit.keys[k]} are correlated ({fit.correlation[i, k]:+.3f}):"
+                " the points tell a combination of them better"
             )
-    change = np.linalg.norm(wide - derivatives, axis=0) / np.linalg.norm(derivatives, axis=0)
-    for parameter, bent in zip(parameters, change, strict=True):
-        if bent > BENT:
+    for key, much in zip(fit.keys, bent, strict=True):
+        if much > BENT:
             yield (
-                f"within its uncertainty the track does not respond to {parameter.key} along a"
+                f"within its uncertainty the track does not respond to {key} along a"
                 " straight line: the uncertainty is rough"
             )
-    left = after.values[after.used]
+    left = fit.after.values[fit.after.used]
     deviation = MAD * float(np.median(np.abs(left)))
     distance = np.hypot(*left.T)
     far = np.flatnonzero(distance > max(FAR * deviation, 1e-12))
     if 0 < len(far) <= NAMED:
-        lines = after.track.lines[after.used]
+        lines = fit.after.track.lines[fit.after.used]
         said = ", ".join(f"line {lines[i]} ({write_size(float(distance[i]), 'm')})" for i in far)
-        less = "" if robust else "; a robust fit gives such points less weight"
+        less = "" if fit.robust else "; a robust fit gives such points less weight"
         yield f"far off the others: {said}{less}"
     elif alike(left.ravel()):
         yield (
@@ -244,26 +234,22 @@ COLUMNS = (
 
 def as_dict(found: Residuals, fit: Fit | None = None) -> dict[str, Any]:
     """Return what is known of a comparison, SI units, ready for JSON."""
-    track, place = found.track, found.track.placement
-    return {
+    track = found.track
+    told = {
         "format": 1,
         "scene": found.recording.title,
         "data": track.source,
         "track": track.name,
         "points": len(track),
-        "used": int(found.used.sum()),
+        "used": found.used.sum(),
         "left_out": found.left_out(),
         "skipped": track.skipped,
-        "placement": {
-            "scale": place.scale,
-            "origin": list(place.origin),
-            "flip_y": place.flip_y,
-            "t0": place.t0,
-        },
+        "placement": track.placement,
         "residuals": _residuals(found),
         "advice": advice(found),
         "fit": None if fit is None else _fit(fit),
     }
+    return dict(plain(told))
 
 
 def points_csv(found: Residuals) -> str:
@@ -283,39 +269,23 @@ def points_csv(found: Residuals) -> str:
 
 def _residuals(found: Residuals) -> dict[str, Any]:
     i = found.worst
-    (rms_x, rms_y), (mean_x, mean_y) = found.rms, found.mean
-    return {
-        "rms_x": rms_x,
-        "rms_y": rms_y,
-        "mean_x": mean_x,
-        "mean_y": mean_y,
-        "worst": {
-            "line": int(found.track.lines[i]),
-            "t": float(found.track.t[i]),
-            "x": float(found.values[i, 0]),
-            "y": float(found.values[i, 1]),
-        },
-    }
+    (rms_x, rms_y), (mean_x, mean_y), (x, y) = found.rms, found.mean, found.values[i]
+    worst = {"line": found.track.lines[i], "t": found.track.t[i], "x": x, "y": y}
+    return {"rms_x": rms_x, "rms_y": rms_y, "mean_x": mean_x, "mean_y": mean_y, "worst": worst}
 
 
 def _fit(fit: Fit) -> dict[str, Any]:
-    columns = zip(fit.parameters, fit.values, fit.errors, fit.low, fit.high, strict=True)
+    names = ("value", "error", "low", "high", "start", "unit")
+    columns = zip(fit.values, fit.errors, fit.low, fit.high, strict=True)
     return {
         "parameters": {
-            parameter.key: {
-                "value": float(value),
-                "error": float(error),
-                "low": float(low),
-                "high": float(high),
-                "start": parameter.start,
-                "unit": parameter.unit,
-            }
-            for parameter, value, error, low, high in columns
+            one.key: dict(zip(names, (*numbers, one.start, one.unit), strict=True))
+            for one, numbers in zip(fit.parameters, columns, strict=True)
         },
-        "correlation": fit.correlation.tolist(),
+        "correlation": fit.correlation,
         "scatter": fit.scatter,
         "freedom": fit.freedom,
         "robust": fit.robust,
-        "notes": list(fit.notes),
+        "notes": fit.notes,
         "before": _residuals(fit.before),
     }

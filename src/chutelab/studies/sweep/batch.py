@@ -8,7 +8,7 @@ does not fit is left over, to be run alone: that is never wrong, only slower.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -165,6 +165,7 @@ def together(block: Block, read: Reader) -> tuple[dict[int, str], list[int]]:
     left: list[int] = []
     while groups:
         machine, some = groups.pop()
+        machine = replace(machine, scene=scenes(some))
         try:
             recording = run(machine, apart=True)
         except (CornerError, StalledError):
@@ -173,7 +174,7 @@ def together(block: Block, read: Reader) -> tuple[dict[int, str], list[int]]:
             groups += [(members(machine, half), some[half]) for half in halves]
             left += [] if halves else some.tolist()
         else:
-            read(recording, scenes(some), some)
+            read(recording, machine.scene, some)
     return faults, left
 
 

@@ -14,7 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.results import ENTRIES, REASONS, Kind, Recording, balance
-from chutelab.results.comparison import QUANTITIES, from_events, never, relative_errors, scales
+from chutelab.results.comparison import relative_errors, scales
+from chutelab.results.quantities import (
+    QUANTITIES,
+    column,
+    end_times,
+    first,
+    from_events,
+    never,
+)
 from chutelab.scene import Scene
 from chutelab.theory import unbounded
 from chutelab.util.arrays import Bools, Floats
@@ -174,32 +182,18 @@ def rows(recording: Recording, scene: Scene, variants: int = 1) -> Columns:
     """
     found = empty(variants)
     shape = variants, recording.count // variants
-    first, last = recording.ends()
-    released = recording.offsets[1:] > recording.offsets[:-1]
-    began = np.full(recording.count, np.nan)
-    began[released] = first["t"]
-    ended = np.full(recording.count, np.nan)
-    ended[released] = last["t"]
-
-    landings = recording.first(recording.select(Kind.LANDING, surface="outgoing"))
-    who = landings["particle"]
-    values = {
-        "landing.x": landings["position"][:, 0],
-        "landing.y": landings["position"][:, 1],
-        "landing.vx": landings["velocity_before"][:, 0],
-        "landing.vy": landings["velocity_before"][:, 1],
-        "landing.t": landings["t"] - began[who],
-    }
-    landed = np.zeros(recording.count, dtype=bool)
-    landed[who] = True
+    released, began = recording.released, np.full(recording.count, np.nan)
+    began[released] = recording.ends()[0]["t"]
+    landings = first(recording, "landing")
+    landed = np.isfinite(landings["t"])
+    values = {f"landing.{name}": column(landings, name) for name in ("x", "y", "vx", "vy")}
+    values["landing.t"] = landings["t"] - began
     for name, value in values.items():
-        of_all = np.zeros(recording.count)
-        of_all[who] = value
-        found[name], spread = _mean_and_spread(of_all.reshape(shape), landed.reshape(shape))
+        found[name], spread = _mean_and_spread(value.reshape(shape), landed.reshape(shape))
         if f"{name}_spread" in found:
             found[f"{name}_spread"] = spread
     found["time"], _ = _mean_and_spread(
-        np.where(released, ended - began, 0.0).reshape(shape), released.reshape(shape)
+        (end_times(recording) - began).reshape(shape), released.reshape(shape)
     )
     _balance(found, recording, scene, shape)
     if scene.outgoing is not None:
@@ -224,15 +218,13 @@ def _mean_and_spread(values: Floats, counted: Bools) -> tuple[Floats, Floats]:
 
 def _balance(found: Columns, recording: Recording, scene: Scene, shape: tuple[int, int]) -> None:
     """Fill in the energies."""
-    first, last = recording.ends()
-    (kinetic_first, potential_first), (kinetic_last, potential_last) = (
-        recording.energies(knots) for knots in (first, last)
-    )
+    ends = recording.ends()
+    (kinetic_first, potential_first), (kinetic_last, potential_last) = map(recording.energies, ends)
     change = (kinetic_last - kinetic_first) + (potential_last - potential_first)
     whole = np.zeros((2, recording.count))
-    released = recording.offsets[1:] > recording.offsets[:-1]
-    whole[0, released] = change - balance(last["entries"])
-    whole[1, released] = last["entries"][:, ENTRIES.index("restitution_loss")]
+    released, entries = recording.released, ends[1]["entries"]
+    whole[0, released] = change - balance(entries)
+    whole[1, released] = entries[:, ENTRIES.index("restitution_loss")]
     found["residual"], found["restitution_loss"] = whole.reshape(2, *shape).sum(axis=2)
     if scene.outgoing is not None:
         entries = recording.by_surface.reshape(shape[0], -1, len(ENTRIES))

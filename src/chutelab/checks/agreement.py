@@ -14,17 +14,15 @@ from typing import Final
 
 import numpy as np
 
-from chutelab.engines import reference
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
-from chutelab.results import Kind, Recording
+from chutelab.results import Recording
 from chutelab.results.comparison import compare, relative_error, scales
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import measure
-from chutelab.results.recorder import StalledError
 from chutelab.scene import Expect, Scene, SceneError
 from chutelab.scene.rules import SYMBOLS, unit_of
-from chutelab.studies.accuracy import apart, each, sizes, stirred
+from chutelab.studies.accuracy import UNABLE, answer, because, distance, stirred
 from chutelab.theory import Transfer, predict
 
 ANSWERS: Final = {
@@ -105,15 +103,16 @@ def agreement(scene: Scene) -> tuple[Agreement, ...]:
     rows: list[Agreement] = []
     for name in ("exact", "dop853", "contact", "pymunk"):
         try:
-            found[name] = _run(alone, name)
-        except (SceneError, StalledError, reference.UnableError) as error:
-            why = error.faults[0].allowed if isinstance(error, SceneError) else str(error)
-            rows.append(Agreement(name, f"left out: {why}", None, None))
+            found[name] = answer(alone, name)
+        except UNABLE as error:
+            rows.append(Agreement(name, f"left out: {because(error)}", None, None))
     if not found:
         return tuple(rows)
     base = next(iter(found))
-    growth = _growth(alone, base, found[base])
-    blows = not _lasts(alone, found[base])
+    # By how much the scene magnifies a change of its inputs; inf if it does something else then.
+    moved = answer(stirred(alone, STIR), base)
+    growth = max(1.0, distance(moved, found[base])[0] / STIR)
+    blows = not _lasts(found[base])
     for name, recording in found.items():
         even = name not in ORDERS or (blows and (alone.run.align or name == "contact"))
         allowed = BLOWS[name] * growth if even and isfinite(growth) else None
@@ -132,25 +131,11 @@ def agreement(scene: Scene) -> tuple[Agreement, ...]:
     return tuple(rows)
 
 
-def _run(scene: Scene, name: str) -> Recording:
-    return reference.run(build(scene)) if name == "dop853" else simulate(scene, name)
-
-
-def _distance(one: Recording, other: Recording) -> tuple[float, str]:
-    return apart(list(each(one)), list(each(other)), sizes(other), "relative")
-
-
-def _growth(scene: Scene, name: str, found: Recording) -> float:
-    """Return by how much a scene magnifies a change of its inputs, at least 1; inf if it breaks."""
-    return max(1.0, _distance(_run(stirred(scene, STIR), name), found)[0] / STIR)
-
-
-def _lasts(scene: Scene, found: Recording) -> bool:
+def _lasts(found: Recording) -> bool:
     """Tell whether anything but gravity acts between blows, apart from the ride by adhesion."""
     track = found.track(0)
-    if build(scene).releases.carried[0]:
-        left = found.select(Kind.SEPARATION, surface="incoming")
-        track = track[track["t"] >= (left["t"][0] if len(left) else inf)]
+    if found.machine.releases.carried[0]:
+        track = track[track["t"] >= measure(found, "separation.t")]  # none if it never leaves
     time, velocity = np.diff(track["t"]), np.diff(track["velocity"], axis=0)
     velocity[:, 1] += found.gravity * time
     speed = float(np.hypot(*track["velocity"].T).max(initial=0.0))
@@ -161,7 +146,7 @@ def _with_base(
     scene: Scene, name: str, recording: Recording, base: Recording, allowed: float | None
 ) -> Agreement:
     pair = f"{name}, {base.engine}"
-    error, which = _distance(recording, base)
+    error, which = distance(recording, base)
     if allowed is None and error <= BLOWS.get(name, 0.0):
         allowed = BLOWS[name]  # no worse than where there is no step to go wrong by
     if allowed is not None or name not in ORDERS:
@@ -170,7 +155,7 @@ def _with_base(
     errors = [error]
     for n in (1, 2):
         finer = scene.with_values({"run.dt": scene.run.dt / REFINED**n, "expect": None})
-        errors.append(_distance(_run(finer, name), base)[0])
+        errors.append(distance(answer(finer, name), base)[0])
     seen = ", ".join(f"{error:.0e}" for error in errors)
     least = ORDERS[name] - CHANCE[name]
     return Agreement(pair, f"order ({seen})", order(errors, REFINED, BLOWS[name]), least, True)
@@ -281,15 +266,19 @@ def verify(scene: Scene, progress: Callable[[float], None] | None = None) -> Ver
             except SceneError as error:
                 if error.faults[0].key != "run.engine":
                     raise
-                skipped[engine] = error.faults[0].allowed
+                skipped[engine] = because(error)
     prediction = predict(scene)
     findings: list[Finding] = []
     for expect in scene.expect:
-        findings += [
-            _found(scene, expect, engine, recording, prediction)
-            for engine, recording in recordings.items()
-        ]
-        findings += _by_theory(scene, expect, prediction)
+        for engine, recording in recordings.items():
+            value = measure(recording, expect.quantity)
+            turned_over = ledger(recording).turned_over
+            findings.append(_finding(scene, expect, engine, value, prediction, turned_over))
+        # What the theory has to say of an expectation that is not its own.
+        if expect.value != "theory" and expect.quantity in SYMBOLS:
+            value = _predicted(prediction, expect.quantity)
+            if isfinite(value):
+                findings.append(_finding(scene, expect, "theory", value, prediction, nan))
     return Verification(tuple(findings), agreement(scene), skipped)
 
 
@@ -305,32 +294,9 @@ def _skipped(scene: Scene) -> dict[str, str]:
     return {}
 
 
-def _found(
-    scene: Scene, expect: Expect, engine: str, recording: Recording, prediction: Transfer
-) -> Finding:
-    simulated = measure(recording, expect.quantity)
-    scale = None
-    if expect.quantity.startswith("ledger."):
-        # Each entry is measured by itself, but what should be nothing by what was turned over.
-        residual = expect.quantity == "ledger.residual"
-        scale = ledger(recording).turned_over if residual else 0.0
-    return _finding(scene, expect, engine, simulated, prediction, scale)
-
-
-def _by_theory(scene: Scene, expect: Expect, prediction: Transfer) -> list[Finding]:
-    """Return what the theory has to say of an expectation that is not its own."""
-    if expect.value == "theory" or expect.quantity not in SYMBOLS:
-        return []
-    answer = _predicted(prediction, expect.quantity)
-    if not isfinite(answer):
-        return []
-    return [_finding(scene, expect, "theory", answer, prediction, None)]
-
-
 def _predicted(prediction: Transfer, symbol: str) -> float:
-    if symbol.endswith("_deg"):
-        return degrees(float(getattr(prediction, symbol.removesuffix("_deg"))))
-    return float(getattr(prediction, symbol))
+    value = float(getattr(prediction, symbol.removesuffix("_deg")))
+    return degrees(value) if symbol.endswith("_deg") else value
 
 
 def _finding(
@@ -339,7 +305,7 @@ def _finding(
     engine: str,
     simulated: float,
     prediction: Transfer,
-    scale: float | None,
+    turned_over: float,
 ) -> Finding:
     unit = unit_of(expect.quantity, scene.surfaces)
     assert unit is not None
@@ -350,16 +316,16 @@ def _finding(
     )
     allowed = expect.allowed(engine)
     relative = allowed is None or allowed[1] == "%"
-    if scale is None:
-        scale = scales(scene, prediction)[KINDS[unit]] if unit else 0.0
-    if not isfinite(expected) or not isfinite(simulated):
-        error = nan
-    elif not relative:
+    # An entry is measured by itself, but what should be nothing by what was turned over.
+    scale = turned_over if expect.quantity == "ledger.residual" else 0.0
+    if unit and not expect.quantity.startswith("ledger."):
+        scale = scales(scene, prediction)[KINDS[unit]]
+    if not relative:
         error = abs(simulated - expected)
     elif unit == "degrees":
-        error = relative_error(radians(simulated), radians(expected), scale)
+        error = float(relative_error(radians(simulated), radians(expected), scale))
     else:
-        error = relative_error(simulated, expected, scale)
+        error = float(relative_error(simulated, expected, scale))
     return Finding(
         quantity=expect.quantity,
         unit=unit,

@@ -18,9 +18,8 @@ from time import perf_counter
 from typing import TypeVar
 
 from chutelab.engines.simulation import simulate
-from chutelab.results.recorder import StalledError
-from chutelab.scene import Scene, SceneError
-from chutelab.studies.accuracy import SMALLEST, STIR, Search, Wanted
+from chutelab.scene import Scene
+from chutelab.studies.accuracy import SMALLEST, STIR, UNABLE, Search, Wanted, because
 from chutelab.util.arrays import Progress
 
 T = TypeVar("T")
@@ -201,10 +200,8 @@ def _judged(
     try:
         first, found = clocked(run)
         known = search.judged(found)
-    except SceneError as error:
-        return replace(blank, failed=error.faults[0].allowed), None
-    except StalledError as error:
-        return replace(blank, failed=str(error)), None
+    except UNABLE as error:
+        return replace(blank, failed=because(error)), None
     if known.reached is None:
         return replace(blank, failed=known.method.removeprefix("none: ")), None
     row = replace(

@@ -110,7 +110,7 @@ def compare(recording: Recording) -> Comparison:
         simulated=found,
         theory=theory,
         errors={
-            name: relative_error(found[name], theory[name], sizes[kind])
+            name: float(relative_error(found[name], theory[name], sizes[kind]))
             for name, kind in QUANTITIES.items()
             if isfinite(theory[name]) and isfinite(found[name])
         },
@@ -118,16 +118,11 @@ def compare(recording: Recording) -> Comparison:
     )
 
 
-def relative_error(simulated: float, theory: float, scale: float) -> float:
-    """Return |simulated - theory| / max(|theory|, scale).
+def relative_error(simulated: ArrayLike, theory: ArrayLike, scale: ArrayLike) -> Floats:
+    """Return |simulated - theory| / max(|theory|, scale), of numbers or arrays.
 
     A scale of NaN counts as 0; where the theory is 0 as well, the difference itself is returned.
     """
-    return float(relative_errors(simulated, theory, scale))
-
-
-def relative_errors(simulated: ArrayLike, theory: ArrayLike, scale: ArrayLike) -> Floats:
-    """Return what `relative_error` does, of arrays."""
     off = np.abs(np.subtract(simulated, theory))
     size = np.fmax(np.abs(theory), np.where(np.isfinite(scale), scale, 0.0))
     return np.asarray(off / np.where(size > 0.0, size, 1.0))

@@ -182,7 +182,8 @@ class Recorder:
         events = _joined(self._events, EVENT)
         t = events["t"]
         if count > 1 or np.count_nonzero(t[1:] < t[:-1]):
-            events = events.take(_in_time(events))
+            # At one time by particle, then as they came.
+            events = events.take(np.lexsort((events["particle"].copy(), t.copy())))
         if any(origin):
             knots = knots.copy()
             for rows in (knots, events):
@@ -199,11 +200,6 @@ class Recorder:
             contacts=self.contacts,
             seconds=seconds,
         )
-
-
-def _in_time(events: NDArray[Any]) -> Ints:
-    """Return the order of time; of events at one time that of the particles, then as they came."""
-    return np.lexsort((events["particle"].copy(), events["t"].copy()))
 
 
 def _joined(chunks: list[NDArray[Any]], dtype: np.dtype[Any]) -> NDArray[Any]:

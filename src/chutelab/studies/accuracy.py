@@ -23,9 +23,10 @@ from chutelab.machine import build
 from chutelab.results import ENTRIES, REASONS, Kind, Recording
 from chutelab.results.comparison import compare, scales
 from chutelab.results.ledger import ledger
-from chutelab.results.quantities import QUANTITIES
+from chutelab.results.quantities import QUANTITIES, first
 from chutelab.results.recorder import StalledError
 from chutelab.scene import Scene, SceneError
+from chutelab.scene.rules import NEEDED
 from chutelab.scene.units import read_size, write_size
 from chutelab.util.arrays import Floats, Progress
 from chutelab.util.errors import InputError
@@ -118,26 +119,19 @@ class Answer:
 
 def each(recording: Recording) -> Iterator[Answer]:
     """Yield what happens to each particle, and the ledger."""
-    kinds = ((Kind.SEPARATION, "separation"), (Kind.IMPACT, "impact"), (Kind.LANDING, "landing"))
-    for kind, what in kinds:
+    for event in NEEDED:
         for surface in recording.surfaces[:-1]:
-            events = recording.first(recording.select(kind, surface=surface))
-            if not len(events):
+            found = first(recording, event, surface)
+            if np.isnan(found["t"]).all():
                 continue
-            where = f"{what} on {surface}" if kind == Kind.IMPACT else what
-            for name, quantity, column in (
-                (f"place of the {where}", "place", "position"),
-                (f"time of the {where}", "time", "t"),
-                (f"velocity at the {where}", "speed", "velocity_before"),
-            ):
-                values = np.full((recording.count, *events[column].shape[1:]), np.nan)
-                values[events["particle"]] = events[column]
-                yield Answer(name, quantity, values)
-            if kind != Kind.SEPARATION:
-                values = np.full((recording.count, 2), np.nan)
-                pushed = [events["normal_impulse"], events["tangential_impulse"]]
-                values[events["particle"]] = np.transpose(pushed) / recording.particle.mass
-                yield Answer(f"impulse per mass of the {where}", "speed", values)
+            where = f"{event} on {surface}" if event == "impact" else event
+            yield Answer(f"place of the {where}", "place", found["position"])
+            yield Answer(f"time of the {where}", "time", found["t"])
+            yield Answer(f"velocity at the {where}", "speed", found["velocity_before"])
+            if event != "separation":
+                pushed = np.stack([found["normal_impulse"], found["tangential_impulse"]], axis=1)
+                what = f"impulse per mass of the {where}"
+                yield Answer(what, "speed", pushed / recording.particle.mass)
     yield Answer("place of the end", "place", _ends(recording))
     yield Answer("number of particles that end so", "number", recording.ended.astype(np.float64))
     yield from _booked(recording)
@@ -149,14 +143,14 @@ def _ends(recording: Recording) -> Floats:
     Others end where they do because a run has to stop somewhere.
     """
     scene = recording.scene
-    driven = {free.name for free in scene.surface if free.speed != 0.0}
-    driven |= {name for name in ("incoming", "outgoing") if getattr(scene, name) is not None
-               and getattr(scene, name).speed != 0.0}  # fmt: skip
+    tables = {"incoming": scene.incoming, "outgoing": scene.outgoing}
+    parts = tables | {free.name: free for free in scene.surface}
+    driven = {name for name, part in parts.items() if part is not None and part.speed != 0.0}
     still = [k for k, name in enumerate(recording.surfaces[:-1]) if name not in driven]
     settled = recording.select(Kind.SETTLE)
     told = recording.ended == REASONS.index("time")
     told[settled["particle"][np.isin(settled["surface"], still)]] = True
-    told &= np.diff(recording.offsets) > 0
+    told &= recording.released
     out = np.full((recording.count, 2), np.nan)
     out[told] = recording.knots["position"][recording.offsets[1:][told] - 1]
     return out
@@ -185,12 +179,12 @@ def sizes(recording: Recording) -> dict[str, float]:
     Otherwise by the extent of the way, its duration and the highest speed; energies always by the
     energy that was turned over.
     """
-    known = scales(recording.scene, recording.prediction)
-    knots = recording.knots
-    place = knots["position"]
-    extent = float(np.hypot(*np.ptp(place, axis=0))) if len(place) else 0.0
-    lasted = float(np.ptp(knots["t"])) if len(place) else 0.0
-    fastest = float(np.hypot(*knots["velocity"].T).max()) if len(place) else 0.0
+    known, knots = scales(recording.scene, recording.prediction), recording.knots
+    extent = lasted = fastest = 0.0
+    if len(knots):
+        extent = float(np.hypot(*np.ptp(knots["position"], axis=0)))
+        lasted = float(np.ptp(knots["t"]))
+        fastest = float(np.hypot(*knots["velocity"].T).max())
     return {
         "place": known["length"] if isfinite(known["length"]) else extent,
         "time": known["time"] if isfinite(known["time"]) else lasted,
@@ -245,6 +239,27 @@ def apart(
         if largest > worst:
             worst, which = largest, mine.name
     return worst, which
+
+
+def distance(one: Recording, other: Recording, unit: str = "relative") -> tuple[float, str]:
+    """Return what `apart` does, of `each` answer of two runs."""
+    return apart(list(each(one)), list(each(other)), sizes(other), unit)
+
+
+UNABLE = (SceneError, StalledError, reference.UnableError)
+"""What an engine, or SciPy, raises that cannot run a scene."""
+
+
+def answer(scene: Scene, engine: str | None, progress: Progress | None = None) -> Recording:
+    """Run a scene with an engine, or with "dop853"; one of `UNABLE` if it cannot."""
+    if engine == "dop853":
+        return reference.run(build(scene))
+    return simulate(scene, engine, progress)
+
+
+def because(error: Exception) -> str:
+    """Return why a scene was not run, from one of `UNABLE`."""
+    return error.faults[0].allowed if isinstance(error, SceneError) else str(error)
 
 
 WITNESSES = {
@@ -312,6 +327,11 @@ class Accuracy:
     runs: int
     against: str | None
 
+    @property
+    def size(self) -> float:
+        """What was reached; inf if there is none to tell."""
+        return inf if self.reached is None else self.reached
+
 
 def reach(
     scene: Scene, wanted: Wanted | str | float, progress: Progress | None = None
@@ -363,46 +383,43 @@ class Search:
     def result(self) -> tuple[Recording, Accuracy]:
         """Return what `reach` does."""
         found = self.run(self.scene)
-        known = self.by_theory(found, found.engine)
+        known = self.by_theory(found)
         if known is not None and (known.met or found.engine == "exact"):
             return found, known
-        if self.scene.stream.interact and self.scene.stream.count > 1:
+        if self.crowded:
             return found, self.crowd(found)
         return self.refine(found, known)
+
+    @property
+    def crowded(self) -> bool:
+        """Whether particles meet each other."""
+        return self.scene.stream.interact and self.scene.stream.count > 1
 
     def judged(self, found: Recording) -> Accuracy:
         """Say how wrong a run is, one of the scene with any engine and step.
 
         A witness runs once for each engine, with the step of `scene`.
         """
-        known = self.by_theory(found, found.engine)
+        known = self.by_theory(found)
         if known is not None:
             return known
-        if self.scene.stream.interact and self.scene.stream.count > 1:
+        if self.crowded:
             return self.crowd(found)
         if found.engine not in self.witnesses:
             self.witnesses[found.engine] = self.witness(found)
-        other, none = self.witnesses[found.engine]
-        if other is None:
-            return self.said(found, inf, "every answer", none, None)
-        return self.held(found, other)
+        return self.held(found, *self.witnesses[found.engine])
 
     def run(self, scene: Scene, engine: str | None = None) -> Recording:
         """Run a scene once more."""
-        if engine == "dop853":
-            found = reference.run(build(scene))
-        else:
-            found = simulate(scene, engine, None if self.progress is None else self.share)
+
+        def share(share: float) -> None:
+            # Half of what is left goes to each run: nobody knows how many there will be.
+            if self.progress is not None:
+                self.progress(1.0 - 0.5**self.runs * (1.0 - 0.5 * share))
+
+        found = answer(scene, engine, None if self.progress is None else share)
         self.runs += 1
         return found
-
-    def share(self, share: float) -> None:
-        """Pass on the share of this run that is done.
-
-        Half of what is left goes to each run, because nobody knows how many there will be.
-        """
-        if self.progress is not None:
-            self.progress(1.0 - 0.5**self.runs * (1.0 - 0.5 * share))
 
     def said(self, found: Recording, error: float, which: str, how: str, against: str | None,
              *, chaotic: bool = False) -> Accuracy:  # fmt: skip
@@ -422,12 +439,14 @@ class Search:
             against=against,
         )
 
-    def by_theory(self, found: Recording, engine: str) -> Accuracy | None:
+    def by_theory(self, found: Recording) -> Accuracy | None:
         """Hold a run against the closed form; None where that does not speak of all of it."""
         compared = compare(found)
         if compared.reason or found.count > 1 or self.scene.run.until != "landed":
             return None
         errors = dict(compared.errors)
+        # All but belt_work and slip_heat happen up to the landing.
+        missing = len(errors) < sum(map(isfinite, compared.theory.values())) - 2
         if self.wanted.unit == "m":
             errors = {
                 name: abs(compared.simulated[name] - compared.theory[name])
@@ -436,11 +455,9 @@ class Search:
             }
         else:
             errors["energy ledger"] = ledger(found).relative_residual
-        missing = len(compared.errors) < sum(map(isfinite, compared.theory.values())) - 2
         if missing or not errors:
-            # All but belt_work and slip_heat happen up to the landing.
-            return self.said(found, inf, "what happens at all", f"none: {engine} and the theory"
-                             " differ in what happens", "theory")  # fmt: skip
+            how = f"none: {found.engine} and the theory differ in what happens"
+            return self.said(found, inf, "what happens at all", how, "theory")
         worst = max(errors, key=lambda name: errors[name])
         return self.said(found, errors[worst], worst, "difference from the closed form", "theory")
 
@@ -450,30 +467,24 @@ class Search:
         for engine in WITNESSES[found.engine]:
             try:
                 return self.run(self.scene, engine), ""
-            except (SceneError, StalledError, reference.UnableError) as error:
-                why = error.faults[0].allowed if isinstance(error, SceneError) else str(error)
-                passed.append(f"{engine} ({why})")
+            except UNABLE as error:
+                passed.append(f"{engine} ({because(error)})")
         return None, f"none: no other answer; not {', nor '.join(passed)}"
 
     def refine(self, found: Recording, known: Accuracy | None) -> tuple[Recording, Accuracy]:
         """Shorten the steps of the run, or else of its witness, until the two are near enough."""
-        other = None
-        if known is None:
-            other, none = self.witness(found)
-            if other is None:
-                return found, self.said(found, inf, "every answer", none, None)
+        other, none = self.witness(found) if known is None else (None, "")
         dt, least, stale = self.scene.run.dt, inf, 0
         best: tuple[Recording, Accuracy] | None = None
         while True:
-            now = self.by_theory(found, found.engine) if other is None else self.held(found, other)
+            now = self.held(found, other, none) if known is None else self.by_theory(found)
             assert now is not None
-            if best is None or _size(now) <= _size(best[1]):
-                best = found, now
-            if now.met:
+            if now.met or none:
                 return found, now
-            size = _size(now)
-            stale = 0 if size < STALE * least else stale + 1
-            least = min(least, size)
+            if best is None or now.size <= best[1].size:
+                best = found, now
+            stale = 0 if now.size < STALE * least else stale + 1
+            least = min(least, now.size)
             moving = [one for one in (found, other) if one is not None and one.engine in STEPPED]
             reason = _hopeless(moving, dt, stale)
             if reason:
@@ -486,9 +497,11 @@ class Search:
             if other is not None and other.engine in STEPPED:
                 other = self.run(finer, other.engine)
 
-    def held(self, found: Recording, other: Recording) -> Accuracy:
-        """Hold a run against its witness."""
-        error, which = apart(list(each(found)), list(each(other)), sizes(other), self.wanted.unit)
+    def held(self, found: Recording, other: Recording | None, none: str) -> Accuracy:
+        """Hold a run against its witness; without one, say why there is `none`."""
+        if other is None:
+            return self.said(found, inf, "every answer", none, None)
+        error, which = distance(found, other, self.wanted.unit)
         at = f" at dt = {other.scene.run.dt:.3g} s" if other.engine in STEPPED else ""
         name = "SciPy's DOP853" if other.engine == "dop853" else f"the {other.engine} engine"
         how = f"difference from {name}{at}"
@@ -505,12 +518,8 @@ class Search:
         engine = "pymunk" if found.engine == "contact" else "contact"
         scene = found.scene
         moved = stirred(scene, STIR)
-        runs = [
-            found,
-            self.run(moved, found.engine),
-            self.run(scene, engine),
-            self.run(moved, engine),
-        ]
+        others = ((moved, found.engine), (scene, engine), (moved, engine))
+        runs = [found, *(self.run(*one) for one in others)]
         tables = [list(together(one)) for one in runs]
         error, which = max(
             apart(one, two, sizes(found), self.wanted.unit) for one, two in combinations(tables, 2)
@@ -534,10 +543,6 @@ def _hopeless(moving: list[Recording], dt: float, stale: int) -> str:
     if 2.0 * max(one.steps for one in moving) > MOST_STEPS:
         return f"half the step would take more than {MOST_STEPS:,} steps"
     return ""
-
-
-def _size(found: Accuracy) -> float:
-    return inf if found.reached is None else found.reached
 
 
 def stirred(scene: Scene, share: float) -> Scene:

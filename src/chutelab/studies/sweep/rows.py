@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.results import ENTRIES, REASONS, Kind, Recording, balance
-from chutelab.results.comparison import relative_errors, scales
+from chutelab.results.comparison import relative_error, scales
 from chutelab.results.quantities import (
     QUANTITIES,
     column,
@@ -98,7 +98,7 @@ def deviation(recording: Recording, scene: Scene, shape: tuple[int, int]) -> Flo
     worst = np.full(count, np.nan)
     for name, found in simulated.items():
         expected = getattr(theory, name)
-        errors = relative_errors(found, expected, sizes[QUANTITIES[name]])
+        errors = relative_error(found, expected, sizes[QUANTITIES[name]])
         worst = np.fmax(worst, np.where(np.isfinite(errors), errors, np.nan))
     return worst
 

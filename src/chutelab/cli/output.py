@@ -10,7 +10,7 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
-from functools import reduce, wraps
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -283,7 +283,10 @@ def output_options(command: Callable[..., None]) -> Callable[..., None]:
         json_option("Print one JSON object instead of tables."),
         click.option("--quiet", "-q", is_flag=True, help="Print no summary and no progress bar."),
     )
-    return reduce(lambda made, option: option(made), reversed(options), told)
+    made: Callable[..., None] = told
+    for option in reversed(options):
+        made = option(made)
+    return made
 
 
 def write_json(value: Any, path: Path) -> None:

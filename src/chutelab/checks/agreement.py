@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import groupby
 from math import degrees, inf, isfinite, log, nan, radians
 from typing import Final
 
@@ -22,8 +23,10 @@ from chutelab.results.ledger import ledger
 from chutelab.results.quantities import measure
 from chutelab.scene import Expect, Scene, SceneError
 from chutelab.scene.rules import SYMBOLS, unit_of
+from chutelab.scene.units import with_unit, write_size
 from chutelab.studies.accuracy import UNABLE, answer, because, distance, stirred
 from chutelab.theory import Transfer, predict
+from chutelab.util.tables import Sheet
 
 ANSWERS: Final = {
     "theory": ("closed form, NumPy", "nothing, not even the machine"),
@@ -247,6 +250,47 @@ class Verification:
         """How many promises are broken."""
         rows: tuple[Finding | Agreement, ...] = (*self.findings, *self.agreements)
         return sum(not row.holds for row in rows)
+
+    def sheets(self, title: str) -> tuple[Sheet, Sheet]:
+        """Return what the scene is to show, and its particle 0 in one answer against another."""
+        rows: list[tuple[str, ...]] = []
+        for (quantity, source, unit), findings in groupby(
+            self.findings, lambda row: (row.quantity, row.source, row.unit)
+        ):
+            rows.append((f"{with_unit(quantity, unit)}: {source}",))
+            for row in findings:
+                size = "%" if row.relative else unit
+                rows.append((
+                    row.engine,
+                    *(f"{x:.8g}" if isfinite(x) else "-" for x in (row.expected, row.simulated)),
+                    write_size(row.error, size, 2) if isfinite(row.error) else "-",
+                    "-" if row.tolerance is None else write_size(row.tolerance, size),
+                    _verdict(row),
+                ))  # fmt: skip
+        heads = ("", "expected", "simulated", "error", "tolerance", "") if rows else ("",) * 6
+        left_out = tuple(f"{engine} is left out: {why}" for engine, why in self.skipped.items())
+        pairs, notes = [], []
+        for one in self.agreements:
+            said = f"{one.pair.replace(', ', ' - ')}: {one.quantity}"
+            form = ".1f" if one.least else ".1e"
+            difference, tolerance = (
+                "-" if x is None else f"{x:{form}}" for x in (one.difference, one.tolerance)
+            )
+            if difference == tolerance == "-":
+                notes.append(said)
+            else:
+                pairs.append((said, difference, ">= " * one.least + tolerance, _verdict(one)))
+        alone = "Particle 0 alone, one answer against another"
+        return (
+            Sheet(title, heads, tuple(rows), tail=1, notes=left_out),
+            Sheet(
+                alone, ("", "difference", "tolerance", ""), tuple(pairs), tail=1, notes=tuple(notes)
+            ),
+        )
+
+
+def _verdict(row: Finding | Agreement) -> str:
+    return "" if row.tolerance is None else "ok" if row.holds else "FAILED"
 
 
 def verify(scene: Scene, progress: Callable[[float], None] | None = None) -> Verification:

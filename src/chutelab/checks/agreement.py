@@ -21,11 +21,11 @@ from chutelab.results import Recording
 from chutelab.results.comparison import compare, relative_error, scales
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import measure
-from chutelab.scene import Expect, Scene, SceneError
+from chutelab.scene import Scene, SceneError
 from chutelab.scene.rules import SYMBOLS, unit_of
 from chutelab.scene.units import with_unit, write_size
 from chutelab.studies.accuracy import UNABLE, answer, because, distance, stirred
-from chutelab.theory import Transfer, predict
+from chutelab.theory import predict
 from chutelab.util.tables import Sheet
 
 ANSWERS: Final = {
@@ -314,70 +314,49 @@ def verify(scene: Scene, progress: Callable[[float], None] | None = None) -> Ver
     prediction = predict(scene)
     findings: list[Finding] = []
     for expect in scene.expect:
-        for engine, recording in recordings.items():
-            value = measure(recording, expect.quantity)
-            turned_over = ledger(recording).turned_over
-            findings.append(_finding(scene, expect, engine, value, prediction, turned_over))
-        # What the theory has to say of an expectation that is not its own.
-        if expect.value != "theory" and expect.quantity in SYMBOLS:
-            value = _predicted(prediction, expect.quantity)
-            if isfinite(value):
-                findings.append(_finding(scene, expect, "theory", value, prediction, nan))
+        quantity, unit = expect.quantity, unit_of(expect.quantity, scene.surfaces)
+        assert unit is not None
+        predicted = nan
+        if quantity in SYMBOLS:
+            predicted = float(getattr(prediction, quantity.removesuffix("_deg")))
+            predicted = degrees(predicted) if quantity.endswith("_deg") else predicted
+        values = {engine: measure(recordings[engine], quantity) for engine in recordings}
+        expected = predicted
+        if not isinstance(expect.value, str):
+            expected = float(expect.value)
+            # What the theory has to say of an expectation that is not its own.
+            if isfinite(predicted):
+                values["theory"] = predicted
+        for engine, simulated in values.items():
+            tolerance, size = expect.allowed(engine) or (None, "%")
+            # An entry is measured by itself, but what should be nothing by what was turned over.
+            scale = 0.0
+            if quantity == "ledger.residual":
+                scale = ledger(recordings[engine]).turned_over
+            elif unit and not quantity.startswith("ledger."):
+                scale = scales(scene, prediction)[KINDS[unit]]
+            off = abs(simulated - expected)
+            if size == "%":
+                one, other = simulated, expected
+                if unit == "degrees":
+                    one, other = radians(one), radians(other)
+                off = float(relative_error(one, other, scale))
+            findings.append(
+                Finding(
+                    quantity, unit, expect.source, engine, expected, simulated, off,
+                    tolerance, relative=size == "%",
+                )
+            )  # fmt: skip
     return Verification(tuple(findings), agreement(scene), skipped)
 
 
 def _skipped(scene: Scene) -> dict[str, str]:
     """Return the engines that a scene is not for, with the reason."""
     stream = scene.stream
-    if stream.interact and stream.count > 1:
+    if stream.crowded:
         return {"exact": "particles meet each other"}
     if scene.particle.radius == 0.0:
         return dict.fromkeys(("contact", "pymunk"), "it has no mass points")
     if stream.count > MOST_ALONE:
         return {"pymunk": f"{stream.count} particles that do not meet would take it minutes"}
     return {}
-
-
-def _predicted(prediction: Transfer, symbol: str) -> float:
-    value = float(getattr(prediction, symbol.removesuffix("_deg")))
-    return degrees(value) if symbol.endswith("_deg") else value
-
-
-def _finding(
-    scene: Scene,
-    expect: Expect,
-    engine: str,
-    simulated: float,
-    prediction: Transfer,
-    turned_over: float,
-) -> Finding:
-    unit = unit_of(expect.quantity, scene.surfaces)
-    assert unit is not None
-    expected = (
-        _predicted(prediction, expect.quantity)
-        if isinstance(expect.value, str)
-        else float(expect.value)
-    )
-    allowed = expect.allowed(engine)
-    relative = allowed is None or allowed[1] == "%"
-    # An entry is measured by itself, but what should be nothing by what was turned over.
-    scale = turned_over if expect.quantity == "ledger.residual" else 0.0
-    if unit and not expect.quantity.startswith("ledger."):
-        scale = scales(scene, prediction)[KINDS[unit]]
-    if not relative:
-        error = abs(simulated - expected)
-    elif unit == "degrees":
-        error = float(relative_error(radians(simulated), radians(expected), scale))
-    else:
-        error = float(relative_error(simulated, expected, scale))
-    return Finding(
-        quantity=expect.quantity,
-        unit=unit,
-        source=expect.source,
-        engine=engine,
-        expected=expected,
-        simulated=simulated,
-        error=error,
-        tolerance=None if allowed is None else allowed[0],
-        relative=relative,
-    )

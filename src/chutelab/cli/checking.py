@@ -140,18 +140,14 @@ def stress(
     broken = sum(one.broken for one in found)
     if as_json:
         about = {"scene": scene, "title": recording.title, "engine": run.engine, "dt": run.dt}
-        laws = [
-            {"law": one.law, **plain(one.verdict), "holds": one.verdict.holds,
-             "unpromised": one.unpromised}
-            for one in found
-        ]  # fmt: skip
+        laws = [{"law": one.law, **plain(one), "holds": one.holds} for one in found]
         show_json({"format": 1, **about, "broken": broken, "laws": laws})
     else:
         rows = []
         for one in found:
-            kept = "ok" if one.verdict.holds else "FAILED" if one.broken else "-"
-            said = "; not promised: ".join(filter(None, [one.verdict.detail, one.unpromised]))
-            figures = (f"{one.verdict.figure:.2g}", f"{one.verdict.bound:.2g}")
+            kept = "ok" if one.holds else "FAILED" if one.broken else "-"
+            said = "; not promised: ".join(filter(None, [one.detail, one.unpromised]))
+            figures = (f"{one.figure:.2g}", f"{one.bound:.2g}")
             rows.append((kept, one.law, *figures, said))
         steps = "" if run.dt is None else f", steps of {run.dt:.4g} s"
         title = f"{recording.title}\nengine {run.engine}{steps}"

@@ -7,7 +7,7 @@ recommended.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import acos, ceil, cos, degrees, floor, isnan, log10, radians, sqrt
+from math import ceil, cos, floor, isnan, log10, radians, sqrt
 from typing import Any
 
 import numpy as np
@@ -81,7 +81,7 @@ def advice(
     if steps is not None and scene.particle.radius < SMALL:
         small = write_size(SMALL, "m")
         warning = f"particles of less than {small} radius are beyond what pymunk resolves"
-        if scene.stream.interact and scene.stream.count > 1:
+        if scene.stream.crowded:
             yield _advised(warning, {"particle.radius": SMALL})
         else:
             yield _advised(warning, {"run.engine": "auto"}, after=", for the exact engine")
@@ -95,8 +95,7 @@ def advice(
         # Each waits for all that waited before it.
         period = 1.0 / scene.stream.rate + waited.longest / max(1, tried.count - 1)
         yield _advised(
-            f"of {tried.count} particles tried, {waited.particles} wait for a free place to"
-            f" be released, up to {waited.longest:.3g} s",
+            f"of {tried.count} particles tried, {waited}",
             {"stream.rate": _down((1.0 - MARGIN) / period)},
             after=", or a larger stream.bed_height",
         )
@@ -105,10 +104,7 @@ def advice(
         bed = scene.stream.bed_height
         highest = scene.incoming.pulley_radius + scene.particle.radius + bed
         yield _advised(
-            f"of {machine.count} particles, {pressed.particles} ride into others round the pulley,"
-            f" up to {write_size(pressed.deepest, 'm')} deep: all layers run at"
-            f" {scene.incoming.speed:g} m/s, the lower ones on smaller circles, and v²/(g rho) ="
-            f" {pressed.grip:.3g} keeps the highest there for {degrees(acos(pressed.grip)):.3g}°",
+            f"of {machine.count} particles, {pressed}",
             {"incoming.speed": _up(sqrt(scene.gravity * highest))},
             after=f", to leave at the top{', or stream.bed_height = 0' if bed > 0.0 else ''}",
         )

@@ -101,7 +101,7 @@ def _thrown(scene: Scene, belt: Incoming) -> tuple[Arc, ...]:
     if out is None or scene.surface or not g:
         return ()
     carried = on_belt(scene) and release_velocity(scene) == (belt.speed, 0.0) and belt.speed > 0.0
-    if not carried or (scene.stream.interact and scene.stream.count > 1):
+    if not carried or scene.stream.crowded:
         return ()
     riding = belt.pulley_radius + r
     left = separation(

@@ -255,8 +255,7 @@ class _Run:
                 self.tell(Kind.SETTLE, thing.owner)
                 self.reason = "settled"
                 return None
-        face = n if thing.flat else None
-        found = _Lasting(index, face, sign, belt)
+        found = _Lasting(index, n if thing.flat else None, sign, belt)
         push = self.rates(found, self.state)[V]
         for k, m in touched.items():
             if k != index and v @ m < REST and push @ m < -1e-9:
@@ -491,12 +490,12 @@ class _Run:
     def next(self, on: _Lasting | None, what: tuple[str, int]) -> _Lasting | None:
         """Resolve what ended a phase; return the contact that lasts now, if one does."""
         name, k = what
-        if name == "time":
-            self.reason = "time"
-        elif name == "exit":
-            self.tell(Kind.EXIT, -1)
-            self.reason = "exit"
-        elif name in ("left", "right", "meets"):
+        if name in ("time", "exit"):
+            if name == "exit":
+                self.tell(Kind.EXIT, -1)
+            self.reason = name
+            return None
+        if name in ("left", "right", "meets"):
             if on is not None and on.carried:
                 raise UnableError("something is in the way of the ride")
             self.sides[k] = name != "right"
@@ -505,25 +504,19 @@ class _Run:
             if on is not None and (lasting is None or lasting.index != on.index):
                 self.tell(Kind.SEPARATION, self.things[on.index].owner)
             return lasting
-        elif name == "lifts":
-            assert on is not None
-            self.tell(Kind.SEPARATION, self.things[on.index].owner)
-        elif name == "grips":
-            assert on is not None
-            normal = self.forces(on, self.state[:, None])[0][:, 0]
-            return self.law(k, {**self.touching(), k: normal}, begins=True)
-        elif name == "slips":
-            assert on is not None
-            self.tell(Kind.SLIP, self.things[k].owner)
-            need = float(self.forces(on, self.state[:, None])[4][0])
-            return _Lasting(on.index, on.normal, -1 if need > 0.0 else 1, on.belt)
-        elif name == "ends":
-            assert on is not None
+        assert on is not None
+        if name == "lifts":
+            self.tell(Kind.SEPARATION, self.things[k].owner)
+            return None
+        if name == "ends":
             return self.round_the_end(on, k)
-        else:
-            assert on is not None
+        if name in ("joins", "lasts"):
             return self.law(k, {k: self.normal(k)})
-        return None
+        normal, _, _, _, need = self.forces(on, self.state[:, None])
+        if name == "slips":
+            self.tell(Kind.SLIP, self.things[k].owner)
+            return _Lasting(k, on.normal, -1 if need[0] > 0.0 else 1, on.belt)
+        return self.law(k, {**self.touching(), k: normal[:, 0]}, begins=True)
 
     def round_the_end(self, on: _Lasting, end: int) -> _Lasting | None:
         """Go on at the end of a face: round the pulley, round the end, or in flight."""

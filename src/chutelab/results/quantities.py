@@ -37,6 +37,9 @@ ALONG = 1e-14
 CARRIED = 1e-3
 """m/s from the belt's speed, up to which a particle rides with it: the slip that counts as none."""
 
+_NEVER = np.array(tuple(np.full(EVENT[name].shape, nan) if EVENT[name].base.kind == "f" else 0
+                        for name in EVENT.names or ()), dtype=EVENT)  # fmt: skip
+
 _STATISTICS: dict[str, Callable[[Floats], Any]] = {
     "mean": np.mean, "spread": np.std, "min": np.min, "max": np.max,
 }  # fmt: skip
@@ -67,11 +70,7 @@ def first(recording: Recording, event: str, surface: str | None = None) -> NDArr
 
 def never(count: int) -> NDArray[Any]:
     """Return events (count,) that did not happen: NaN throughout."""
-    events = np.zeros(count, dtype=EVENT)
-    for name in EVENT.names or ():
-        if EVENT[name].base.kind == "f":
-            events[name] = nan
-    return events
+    return np.full(count, _NEVER, dtype=EVENT)
 
 
 def column(events: NDArray[Any], name: str) -> Floats:

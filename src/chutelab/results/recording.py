@@ -378,7 +378,8 @@ class Recording(Shown):
         """
         keep = np.ones(len(self.events), dtype=bool)
         if kinds:
-            keep &= np.isin(self.events["kind"], [int(kind) for kind in kinds])
+            # Several times as fast as `np.isin` where events are few, as those of one particle.
+            keep &= np.logical_or.reduce([self.events["kind"] == kind for kind in kinds])
         if surface is not None:
             # Events on no surface have index -1, as unknown names do.
             keep &= (self.events["surface"] == self.surface_index(surface)) & (

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field
@@ -60,43 +61,28 @@ def unit_of(name: str, surfaces: Iterable[str]) -> str | None:
     >>> unit_of("landing.x.mean", ["incoming", "outgoing"]), unit_of("impact.t", [])
     ('m', None)
     """
-    known = list(surfaces)
-    match name.split("."):
-        case [symbol] if symbol in SYMBOLS:
-            return SYMBOLS[symbol] if {"incoming", "plate"} <= set(known) else None
-        case ["contacts"]:
-            return ""
-        case ["ended", "t", *statistic]:
-            return _column("t", statistic)
-        case ["ended", ending] if ending in ENDINGS:
-            return ""
-        case ["ledger", total] if total in TOTALS:
-            return "J"
-        case ["ledger", stored, "start" | "end"] if stored in STORED:
-            return "J"
-        case ["ledger", "by_surface", surface, entry] if entry in ENTRIES:
-            return "J" if surface in (*known, "particles") else None
-        case [event, *column] if event in NEEDED:
-            return _event(event, column, known)
-    return None
+    return _units(tuple(surfaces)).get(name)
 
 
-def _event(event: str, column: list[str], surfaces: list[str]) -> str | None:
-    home = NEEDED[event]
-    if event == "impact" and column and column[0] in surfaces and column[0] not in NEEDED.values():
-        home, column = column[0], column[1:]
-    if home not in surfaces or not column:
-        return None
-    if column == ["count"]:
-        return ""
-    if event == "separation" and column[0].endswith("_after"):
-        return None
-    return _column(column[0], column[1:])
-
-
-def _column(column: str, statistic: list[str]) -> str | None:
-    fits = not statistic or (len(statistic) == 1 and statistic[0] in STATISTICS)
-    return _UNITS.get(column) if fits else None
+@lru_cache(maxsize=8)
+def _units(surfaces: tuple[str, ...]) -> dict[str, str]:
+    """Return the units of all quantities of a scene with these surfaces, by name."""
+    events = {event: _UNITS for event, home in NEEDED.items() if home in surfaces}
+    if "separation" in events:
+        events["separation"] = {k: u for k, u in _UNITS.items() if not k.endswith("_after")}
+    events |= {f"impact.{name}": _UNITS for name in surfaces if name not in NEEDED.values()}
+    units = dict(SYMBOLS) if {"incoming", "plate"} <= set(surfaces) else {}
+    units |= {"contacts": "", **{f"ended.{ending}": "" for ending in ENDINGS}}
+    units |= {f"{event}.count": "" for event in events}
+    for event, columns in {**events, "ended": {"t": "s"}}.items():
+        for column, unit in columns.items():
+            units[f"{event}.{column}"] = unit
+            units |= {f"{event}.{column}.{statistic}": unit for statistic in STATISTICS}
+    units |= {f"ledger.{total}": "J" for total in TOTALS}
+    units |= {f"ledger.{stored}.{end}": "J" for stored in STORED for end in ("start", "end")}
+    for name in (*surfaces, "particles"):
+        units |= {f"ledger.by_surface.{name}.{entry}": "J" for entry in ENTRIES}
+    return units
 
 
 def suggestion(name: str, surfaces: Iterable[str]) -> str:
@@ -106,23 +92,10 @@ def suggestion(name: str, surfaces: Iterable[str]) -> str:
     for tables in (*([table] for table in absent), absent):
         if tables and unit_of(name, [*known, *tables]) is not None:
             return f"it needs {' and '.join(f'[{table}]' for table in tables)}"
-    return did_you_mean(name, _names(known), f"there are {_families(known)}", cutoff=_NEAR)
-
-
-def _names(surfaces: list[str]) -> Iterator[str]:
-    """Yield all quantities of a scene, those of at most 50 surfaces."""
-    some = surfaces[:50]
-    events = [*NEEDED, "ended", *(f"impact.{name}" for name in some)]
-    candidates = [*SYMBOLS, *NEEDED, "contacts", *(f"ended.{ending}" for ending in ENDINGS)]
-    for event in events:
-        columns = [f"{event}.{column}" for column in (*_UNITS, "count")]
-        candidates += columns
-        candidates += [f"{column}.{statistic}" for column in columns for statistic in STATISTICS]
-    candidates += [f"ledger.{name}" for name in TOTALS]
-    candidates += [f"ledger.{name}.{end}" for name in STORED for end in ("start", "end")]
-    for name in (*some, "particles"):
-        candidates += [f"ledger.by_surface.{name}.{entry}" for entry in ENTRIES]
-    return (name for name in candidates if unit_of(name, surfaces) is not None)
+    # Of a thousand surfaces some will do: looking for likeness takes long.
+    return did_you_mean(
+        name, _units(tuple(known[:50])), f"there are {_families(known)}", cutoff=_NEAR
+    )
 
 
 def _families(surfaces: list[str]) -> str:

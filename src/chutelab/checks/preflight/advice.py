@@ -29,6 +29,7 @@ from chutelab.machine.releases import squeeze
 from chutelab.results import REASONS, Recording
 from chutelab.results.quantities import waits
 from chutelab.scene import Scene, SceneError, shown
+from chutelab.scene.units import write_size
 from chutelab.util.arrays import Floats, Ints
 
 Settings = dict[str, Any]
@@ -72,15 +73,14 @@ def advice(
         yield _advised(str(caution), mended, otherwise=LEAVE if caution.crosses else LOOK)
     if steps is not None and not steps.safe and steps.way is not None and steps.longest is not None:
         yield _advised(
-            f"a particle covers {1e3 * steps.way:.3g} mm in a step, but a surface catches it only"
-            f" within {1e3 * steps.bound:.3g} mm: it may pass through",
+            f"a particle covers {write_size(steps.way, 'm')} in a step, but a surface catches it"
+            f" only within {write_size(steps.bound, 'm')}: it may pass through",
             {"run.align": True},
             after=f", or run.dt = {_down(0.9 * steps.longest):g}",
         )
     if steps is not None and scene.particle.radius < SMALL:
-        warning = (
-            f"particles of less than {1e3 * SMALL:g} mm radius are beyond what pymunk resolves"
-        )
+        small = write_size(SMALL, "m")
+        warning = f"particles of less than {small} radius are beyond what pymunk resolves"
         if scene.stream.interact and scene.stream.count > 1:
             yield _advised(warning, {"particle.radius": SMALL})
         else:
@@ -106,7 +106,7 @@ def advice(
         highest = scene.incoming.pulley_radius + scene.particle.radius + bed
         yield _advised(
             f"of {machine.count} particles, {pressed.particles} ride into others round the pulley,"
-            f" up to {1e3 * pressed.deepest:.3g} mm deep: all layers run at"
+            f" up to {write_size(pressed.deepest, 'm')} deep: all layers run at"
             f" {scene.incoming.speed:g} m/s, the lower ones on smaller circles, and v²/(g rho) ="
             f" {pressed.grip:.3g} keeps the highest there for {degrees(acos(pressed.grip)):.3g}°",
             {"incoming.speed": _up(sqrt(scene.gravity * highest))},

@@ -164,8 +164,7 @@ class Preflight(Shown):
         about = "at least" if self.effort.at_least else "about"
         # Two digits of contacts and one of the time are known.
         contacts = int(float(f"{self.effort.contacts:.2g}"))
-        lasting = float(f"{self.effort.seconds:.1g}")
-        lasts = f"{lasting:g} s" if lasting >= 0.1 else f"{1e3 * lasting:g} ms"
+        lasts = write_size(float(f"{self.effort.seconds:.1g}"), "s", digits=6)
         rows.append(("contacts", f"{about} {contacts:,}"))
         rows.append(("run time", f"{about} {lasts}; {self.effort.how}"))
         rows.append(("closed form",))

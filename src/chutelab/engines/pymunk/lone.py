@@ -139,12 +139,17 @@ class Lone:
         if released:
             self._carry()
         while not self.ended:
-            found = ((face, *face.gap(self.x)) for face in self.world.faces)
-            touching = {face: n for face, gap, n in found if gap <= 0.5 * self.world.hair}
+            touching, room = {}, inf
+            for face in self.world.faces:
+                gap, normal = face.gap(self.x)
+                if gap <= 0.5 * self.world.hair:
+                    touching[face] = normal
+                else:
+                    room = min(room, gap)
             slow = max(self.world.tiny, SEAM if self.on >= 0 else 0.0) * (1.0 + self.v.length)
             if any(self.v.dot(normal) < -slow for normal in touching.values()):
                 self._blow(touching)
-            elif released or not self._ride(touching):
+            elif released or not self._ride(touching, room):
                 self._fly(touching)
             released = False
         self.world.space.remove(self.body, self.circle)
@@ -259,18 +264,18 @@ class Lone:
 
     # Lasting contact
 
-    def _ride(self, touching: dict[Face, Vec2d]) -> bool:
-        """Step on in contact; False if no surface pushes."""
+    def _ride(self, touching: dict[Face, Vec2d], room: float) -> bool:
+        """Step on in contact, `room` (m) from all else; False if no surface pushes."""
         slow = SEAM * (1.0 + self.v.length)
         if all(self.v.dot(normal) > slow for normal in touching.values()):
             return False
         # The step meets every end and every other surface, rather than pass them.
         rims = {face for face in touching if self.world.curved(face, self.x)}
-        room = STRIDE * self.r
-        if not rims:
-            ends = [(self.x - end).length - self.r for face in touching for end in face.ends]
-            others = [face.gap(self.x)[0] for face in self.world.faces if face not in touching]
-            room = max(room, min(ends + others))
+        if rims:
+            room = 0.0
+        for face in touching:
+            room = min([room, *((self.x - end).length - self.r for end in face.ends)])
+        room = max(room, STRIDE * self.r)
         h = min(self.dt, self.machine.end_time - self.t)
         if (speed := self.v.length + self.g * self.dt) > 0.0:
             h = min(h, room / speed)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from math import acos, ceil, cos, inf, sin, sqrt
 from typing import NamedTuple
 
@@ -72,7 +73,7 @@ class Face:
     restitution: float
     friction: float
 
-    @property
+    @cached_property
     def ends(self) -> tuple[Vec2d, ...]:
         """Both ends of a segment (m)."""
         return (self.shape.a, self.shape.b) if isinstance(self.shape, pymunk.Segment) else ()
@@ -193,8 +194,10 @@ class World:
 
     def curved(self, face: Face, x: Vec2d) -> bool:
         """Tell whether what is nearest of a surface is the pulley or the end of a segment."""
+        if face.tangent is None:
+            return True
         point = face.shape.point_query(x).point
-        return not face.ends or min((point - e).length for e in face.ends) <= self.hair
+        return min((point - end).length for end in face.ends) <= self.hair
 
     def meets(
         self, path: Flight | Carriage, face: Face, span: float, leaving: bool = False

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -200,10 +201,10 @@ class Evaluator:
         for column, ending in enumerate(wanted):
             endings.setdefault(common if ending == "any" else ending, []).append(column)
 
-        def read(recording: Recording, rows: Ints, columns: list[int]) -> None:
+        def read(rows: Ints, columns: list[int], recording: Recording, some: Ints) -> None:
             for column in columns:
-                values[rows, column] = self.quantities[column].of(recording)
-            courses[rows] = courses_of(recording, len(rows))
+                values[rows[some], column] = self.quantities[column].of(recording)
+            courses[rows[some]] = courses_of(recording, len(some))
 
         def ran(runs: float) -> None:
             self._done += runs
@@ -217,17 +218,7 @@ class Evaluator:
                 for ending, columns in endings.items():
                     base, keys = self.scene.with_values(_until(ending)), tuple(self.keys)
                     block = Block(to_dict(base), base.source, keys, keys, table[rows], None)
-
-                    def read_some(
-                        recording: Recording,
-                        _: Scene,
-                        some: Ints,
-                        rows: Ints = rows,
-                        columns: list[int] = columns,
-                    ) -> None:
-                        read(recording, rows[some], columns)
-
-                    refused, alone = together(block, read_some)
+                    refused, alone = together(block, partial(read, rows, columns))
                     for row, fault in refused.items():
                         faults[rows[row]] = one_line(fault)
                     left |= set(rows[alone].tolist())
@@ -237,7 +228,7 @@ class Evaluator:
             try:
                 for ending, columns in endings.items():
                     recording = simulate(self.scene.with_values(given | _until(ending)))
-                    read(recording, np.array([row]), columns)
+                    read(np.array([row]), columns, recording, np.array([0]))
             except (SceneError, StalledError) as error:
                 faults[row] = reason(error) if isinstance(error, SceneError) else str(error)
             ran(1)

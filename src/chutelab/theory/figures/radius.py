@@ -42,7 +42,7 @@ def energy_figure(number: int) -> PaperFigure:
     speed = SPEEDS[number]
     near, far = float(DISTANCES[0]), float(DISTANCES[-1])
     found = {(form, d): _paper(speed, d, form) for form in FORMS for d in (near, far)}
-    panels = tuple(
+    left, right = (
         Panel(
             form, "", "pulley radius R, m", "energy ΔE_k of Eq. (14), mJ",
             tuple(
@@ -55,12 +55,11 @@ def energy_figure(number: int) -> PaperFigure:
     columns = {"R, m": GRID}
     for (form, d), one in found.items():
         columns[f"ΔE_k, mJ, {form}, d_okr = {d:g} m"] = 1000.0 * one.dEk
-    printed, right = found["as-printed", near].dEk, found["corrected", near].dEk
     return PaperFigure(
         number,
         f"energy of a particle after the impact on the outgoing belt, v0 = {speed:g} m/s",
-        (_pair(panels),),
-        (_energy_meaning(speed, printed, right),),
+        ((left, right),),
+        (_energy_meaning(speed, *(found[form, near].dEk for form in FORMS)),),
         (
             "which distance d_okr the curve is for (the paper varies it from 0.5 to 1 m): both ends"
             " are drawn.",
@@ -104,7 +103,7 @@ def velocity_figure(number: int) -> PaperFigure:
         "v3": "at the belt",
     }  # fmt: skip
     symbols = {"v2r": "v2'"}
-    panels = tuple(
+    left, right = (
         Panel(
             form, "", "pulley radius R, m", "speed, m/s",
             tuple(
@@ -121,7 +120,7 @@ def velocity_figure(number: int) -> PaperFigure:
     return PaperFigure(
         number,
         f"velocities of the particle in the three phases, v1 = {speed:g} m/s",
-        (_pair(panels),),
+        ((left, right),),
         _velocity_meaning(speed, found["as-printed"], found["corrected"]),
         (
             "which velocities are drawn, and against what: here v1, v2, v2' and v3, the speeds that"
@@ -165,10 +164,6 @@ def _paper(speed: float, distance: float, form: Form) -> Transfer:
 def _line(label: str, y: Floats, role: str) -> Line:
     rows = list(SHOWN)
     return Line(label, GRID, y, role, np.column_stack([GRID[rows], y[rows]]))
-
-
-def _pair(panels: tuple[Panel, ...]) -> tuple[Panel, Panel]:
-    return panels[0], panels[1]
 
 
 def _scene(number: int, speed: float) -> Scene:

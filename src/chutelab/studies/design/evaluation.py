@@ -23,6 +23,7 @@ from chutelab.scene.overrides import value_at
 from chutelab.scene.variants import is_plain, parse_range, quantity, reason
 from chutelab.studies.design.quantities import (
     DesignError,
+    Ending,
     Quantity,
     courses_of,
     each_once,
@@ -196,8 +197,8 @@ class Evaluator:
         values = np.full((len(table), len(self.quantities)), np.nan)
         courses, faults = np.full((2, len(table)), "", dtype=object)
         wanted = [quantity.ending for quantity in self.quantities]
-        common = "scene" if "scene" in wanted or "settled" not in wanted else "settled"
-        endings: dict[str, list[int]] = {}
+        common: Ending = "scene" if "scene" in wanted or "settled" not in wanted else "settled"
+        endings: dict[Ending, list[int]] = {}
         for column, ending in enumerate(wanted):
             endings.setdefault(common if ending == "any" else ending, []).append(column)
 

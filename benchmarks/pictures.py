@@ -38,7 +38,7 @@ def timed(make, path):
 
 def slowed(recording):
     """Return the slowness at which the film has `FRAMES` frames."""
-    layout = lay_out(recording, recording.machine, width=800, height=450)
+    layout = lay_out(recording, width=800, height=450)
     begin, end = span(recording, layout.window)
     low, high = 0.1, 100.0
     while True:
@@ -53,8 +53,7 @@ def usual(recording, slow, layout, moments):
     """Return a function that writes the film by FuncAnimation, every frame drawn as a figure."""
 
     def make(path):
-        machine, prediction = recording.machine, recording.prediction
-        stage = Stage(recording, machine, prediction, layout, moments, slow=slow)
+        stage = Stage(recording, layout, moments, slow=slow)
         figure, high = stage.figure, stage.figure.bbox.height
         bars = []
         for x in (-0.4, 0.6):

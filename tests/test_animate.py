@@ -35,7 +35,7 @@ from chutelab.pictures.animation.moments import (
     slowness,
     span,
 )
-from chutelab.pictures.animation.stage import Layout, lay_out
+from chutelab.pictures.animation.stage import TRAIL, Layout, lay_out
 from chutelab.pictures.colours import tint
 from chutelab.pictures.plots import style, window_of
 from chutelab.pictures.plots.scenery import energies
@@ -68,20 +68,13 @@ def moments_at(times: Sequence[float]) -> tuple[Moment, ...]:
 
 
 def laid_out(recording: Recording, width: int = WIDTH, height: int = HEIGHT, **more: Any) -> Layout:
-    return lay_out(recording, recording.machine, width=width, height=height, **more)
+    return lay_out(recording, width=width, height=height, **more)
 
 
 def stage_of(
     recording: Recording, at: tuple[Moment, ...], slow: float = 5.0, layout: Layout | None = None
 ) -> Stage:
-    return Stage(
-        recording,
-        recording.machine,
-        recording.prediction,
-        layout or laid_out(recording),
-        at,
-        slow=slow,
-    )
+    return Stage(recording, layout or laid_out(recording), at, slow=slow)
 
 
 @pytest.fixture(scope="module")
@@ -371,7 +364,7 @@ def test_actors_stand_where_the_particle_is() -> None:
         assert np.asarray(stage.nominal.dot.get_xydata())[0] == pytest.approx(known, abs=1e-14)
         trail = np.asarray(stage.nominal.trail.get_xydata())
         assert trail[-1] == pytest.approx(known, abs=1e-14)
-        begun = expected(np.array([t - BELT_TIME - layout.trail]))[0][0]
+        begun = expected(np.array([t - BELT_TIME - layout.reach(TRAIL, "trails")]))[0][0]
         assert trail[0] == pytest.approx(begun, abs=0.02)
         strobe = np.asarray(stage.nominal.strobe.get_xydata())
         passed = 0.05 * np.arange(int(t / 0.05) + 1)

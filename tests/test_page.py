@@ -17,6 +17,7 @@ from chutelab.cli import main
 from chutelab.pictures.live import page, runs
 from chutelab.results import Kind
 from chutelab.scene.variants import Vary, VaryError
+from chutelab.util.errors import InputError
 
 ANGLES = "plate.angle_deg=-20:70:46"
 FEW = "plate.angle_deg=0,20,40"
@@ -204,14 +205,14 @@ def test_titles_cannot_break_out():
     ],
 )
 def test_too_much_for_a_page_is_refused(name, changes, varies, said):
-    with pytest.raises(runs.PageError, match=re.escape(said)):
+    with pytest.raises(InputError, match=re.escape(said)):
         page.html(scenes.load(name, changes), varies)
 
 
 def test_too_many_knots_are_refused_before_all_is_run(inclined, monkeypatch):
     monkeypatch.setattr(runs, "MOST_KNOTS", 15)
     done = []
-    with pytest.raises(runs.PageError, match=r"3 of 46 variants have .* at most 15 fit"):
+    with pytest.raises(InputError, match=r"3 of 46 variants have .* at most 15 fit"):
         runs.study(inclined, ["plate.angle_deg=20:65:46"], done.append)
     assert done == [1 / 46, 2 / 46]
 

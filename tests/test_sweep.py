@@ -37,13 +37,13 @@ from chutelab.studies.sweep import (
     MOST_VARIANTS,
     NUMBERS,
     REASON,
-    SampleError,
     batch,
     planned,
     sweep,
 )
 from chutelab.studies.sweep.batch import Block, alone
 from chutelab.studies.sweep.rows import joined
+from chutelab.util.errors import InputError
 
 JOINED = """
 [incoming]
@@ -525,9 +525,9 @@ def test_samples_need_ranges_and_grids_need_counts():
         planned(scene, ["plate.angle_deg=1,2,3"], sample=4)
     with pytest.raises(VaryError, match="from ranges"):
         planned(scene, [Vary("plate.angle_deg", (1.0, 2.0))], sample=4)
-    with pytest.raises(SampleError, match="lhs, sobol"):
+    with pytest.raises(InputError, match="lhs, sobol"):
         planned(scene, ["plate.angle_deg=1:2"], sample=4, design="grid")
-    with pytest.raises(SampleError, match=str(MOST_VARIANTS)):
+    with pytest.raises(InputError, match=str(MOST_VARIANTS)):
         planned(scene, ["plate.angle_deg=1:2"], sample=MOST_VARIANTS + 1)
 
 

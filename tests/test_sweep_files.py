@@ -20,8 +20,6 @@ from chutelab.scene import load
 from chutelab.studies.sweep import (
     NUMBERS,
     REASON,
-    PartError,
-    TableError,
     crew,
     planned,
     sweep,
@@ -30,6 +28,7 @@ from chutelab.studies.sweep import (
 from chutelab.studies.sweep.batch import alone
 from chutelab.studies.sweep.result import columns_of, part_of, text_of
 from chutelab.studies.sweep.rows import joined
+from chutelab.util.errors import InputError
 
 
 @pytest.fixture(autouse=True)
@@ -167,13 +166,13 @@ def test_rows_of_another_sweep_are_refused(interrupted):
     }
     with crew() as team:
         for difference, other in others.items():
-            with pytest.raises(PartError, match=difference):
+            with pytest.raises(InputError, match=difference):
                 sweep_to(other, "rows.csv", team, resume=True)
-        with pytest.raises(PartError, match="--resume"):
+        with pytest.raises(InputError, match="--resume"):
             sweep_to(plan, "rows.csv", team)
         assert part_of(Path("rows.csv")).read_bytes() == kept
         part_of(Path("rows.csv")).write_bytes(b"my notes\n")
-        with pytest.raises(PartError, match="no rows of a sweep"):
+        with pytest.raises(InputError, match="no rows of a sweep"):
             sweep_to(plan, "rows.csv", team, resume=True)
 
 
@@ -206,5 +205,5 @@ def test_ctrl_c_keeps_the_finished_rows_and_says_so():
 
 
 def test_a_table_has_a_known_ending():
-    with pytest.raises(TableError, match="parquet"), crew() as team:
+    with pytest.raises(InputError, match="parquet"), crew() as team:
         sweep_to(planned(load("perpendicular"), SMALL), "rows.xlsx", team)

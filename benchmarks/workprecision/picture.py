@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 
 from chutelab.pictures import colours
 from chutelab.pictures.plots import style
-from chutelab.pictures.plots.style import DPI, Picture
+from chutelab.pictures.plots.style import Picture
 from chutelab.pictures.plots.workprecision import LOOKS as ENGINES
 from chutelab.pictures.plots.workprecision import decades
 from workprecision import METHODS, Record, Size, cases
@@ -212,7 +212,7 @@ def _page(
     below = [max(lines[k : k + columns]) for k in range(0, len(lines), columns)]
     heights = [TITLE + PANEL + LABEL + LINE * count for count in below]
     height = sum(heights) + FOOT
-    figure = Picture(figsize=(WIDTH, height), dpi=DPI)
+    figure = Picture((WIDTH, height))
     width = _width(columns)
     cells = []
     for k in range(len(lines)):

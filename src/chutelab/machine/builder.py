@@ -99,7 +99,7 @@ def cleared(
     near &= (np.maximum(y0, y1) > low - r) & (np.minimum(y0, y1) < high + r)
     carried = bool(releases.carried[0])
     for n, surface in enumerate(owner):
-        if near[n].any() and not (carried and surface == 0):
+        if np.count_nonzero(near[n]) and not (carried and surface == 0):
             releases = _out(scene, releases, ends[:, n], r, names[surface])
     if scene.incoming is not None and not carried:
         # A point may start anywhere.
@@ -249,7 +249,7 @@ class _Builder:
         # Upwards, so that the struck face (-cos α, -sin α) lies to the left of the tangent.
         low, high = ((x - reach * sine, y + reach * cosine) for reach in (-below, plate.above))
         self.add("plate", [low, high], 0.0, plate.restitution, plate.friction)
-        if np.any(missed):
+        if np.count_nonzero(missed):
             self.warnings.append(Caution("plate"))
         self._check_hit((y - hit[1]) * -cosine + (x - hit[0]) * sine, below)
         return height
@@ -260,7 +260,10 @@ class _Builder:
         assert scene.plate is not None
         above = scene.plate.above
         too_low, too_high = np.less(along, -below), np.greater(along, above)
-        off = np.flatnonzero(too_low | too_high)
+        off = too_low | too_high
+        # Several times as fast as `any` where there is one number.
+        if not np.count_nonzero(off):
+            return
 
         def allowed(place: int) -> str:
             hit = self._at(along, place)
@@ -273,14 +276,14 @@ class _Builder:
         if scene.outgoing is not None and scene.outgoing.drop_from == "impact":
             self._refuse(too_high, "plate.above", above, allowed)
             self._refuse(too_low, "plate.below", below, allowed)
-        elif len(off):
-            self.warnings.append(Caution("plate", hit=self._at(along, int(off[0]))))
+        else:
+            self.warnings.append(Caution("plate", hit=self._at(along, int(np.argmax(off)))))
 
     def _refuse(
         self, bad: ArrayLike, key: str, value: ArrayLike, allowed: Callable[[int], str]
     ) -> None:
         """Raise if something is wrong with a key of some scenes."""
-        if np.any(bad):
+        if np.count_nonzero(bad):
             places = np.flatnonzero(np.broadcast_to(bad, self.scene.shape)).tolist()
             faults = {n: Fault(key, self._at(value, n), allowed(n)) for n in places}
             raise RefusedError(self.scene.source, faults)

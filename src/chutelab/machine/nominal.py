@@ -11,7 +11,7 @@ from math import inf, nan
 import numpy as np
 
 from chutelab.machine.releases import on_belt, release_point, release_velocity
-from chutelab.mechanics.ballistics import closing_time, descent
+from chutelab.mechanics.ballistics import descent
 from chutelab.mechanics.ride import Circle, Outcome, advance, grip_slip, normal_force
 from chutelab.scene import Scene
 from chutelab.util.arrays import Bools, Floats, Ints, Numbers
@@ -86,7 +86,8 @@ def _along_belt(
     pull = np.where(slip > 0.0, -drag, drag)
     lever = np.where(turns, 3.0, 1.0)
     until_grip = np.where(slips, np.abs(slip) / np.where(slips, drag * lever, 1.0), 0.0)
-    reach = closing_time(distance, -w, -pull)
+    reach = descent(distance, -w, -pull)
+    reach = np.where(np.isfinite(reach), reach, inf)
     t = np.minimum(until_grip, reach)
     pace = np.where(slips, w + pull * t, w)
     z = np.where(slips & turns, 2.0 * pull * t, 0.0)

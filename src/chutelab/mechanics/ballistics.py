@@ -6,7 +6,7 @@ to negative is a contact; the other one is a departure.
 
 from __future__ import annotations
 
-import itertools
+from itertools import pairwise
 from math import comb
 
 import numpy as np
@@ -24,12 +24,17 @@ BERNSTEIN = np.array(
 """Takes the coefficients of a quartic on [0, 1] to its Bernstein form, which bounds it."""
 
 
-def closing_time(gap: ArrayLike, rate: ArrayLike, acceleration: ArrayLike) -> Floats:
-    """Return when gap + rate t + acceleration t²/2 crosses zero downwards; inf if never.
+def descent(gap: Numbers, rate: Numbers, acceleration: Numbers) -> Floats:
+    """Return when gap + rate t + acceleration t²/2 crosses zero downwards; NaN or ∓inf if never.
+
+    A parabola crosses any level downwards at most once, with derivative -S, where
+    S² = rate² - 2 acceleration gap. Of the two forms of that root the one without cancellation
+    is taken: 2 gap / (S - rate) while closing, -(rate + S) / acceleration while opening. Without
+    a crossing S is not a number or a denominator is missing, for which NumPy warns, unless told.
 
     Parameters
     ----------
-    gap, rate, acceleration : array_like
+    gap, rate, acceleration : float, or ndarray
         m, m/s, m/s²; broadcast together.
 
     Returns
@@ -39,23 +44,8 @@ def closing_time(gap: ArrayLike, rate: ArrayLike, acceleration: ArrayLike) -> Fl
 
     Examples
     --------
-    >>> float(closing_time(0.5, 0.0, -9.81)) == (2 * 0.5 / 9.81) ** 0.5
+    >>> float(descent(0.5, 0.0, -9.81)) == (2 * 0.5 / 9.81) ** 0.5
     True
-    >>> float(closing_time(1.0, 2.0, 0.0))
-    inf
-    """
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        t = descent(*(np.asarray(a, dtype=np.float64) for a in (gap, rate, acceleration)))
-    return np.where(np.isfinite(t), t, np.inf)
-
-
-def descent(gap: Numbers, rate: Numbers, acceleration: Numbers) -> Floats:
-    """Return when gaps close, as `closing_time`, but NaN or ∓inf where they never do.
-
-    A parabola crosses any level downwards at most once, with derivative -S, where
-    S² = rate² - 2 acceleration gap. Of the two forms of that root the one without cancellation
-    is taken: 2 gap / (S - rate) while closing, -(rate + S) / acceleration while opening. Without
-    a crossing S is not a number or a denominator is missing, for which NumPy warns, unless told.
     """
     span = np.abs(rate) + np.sqrt(rate * rate - (acceleration + acceleration) * gap)
     opening = rate > 0.0
@@ -109,9 +99,9 @@ def _isolate(coefficients: Floats, until: Floats) -> Floats:
     zero = np.zeros(coefficients.shape[1])
     knots = [zero, until]
     for derivative in reversed(derivatives[1:]):
-        knots = [zero, *(_crossing(derivative, a, b) for a, b in _pairs(knots)), until]
+        knots = [zero, *(_crossing(derivative, a, b) for a, b in pairwise(knots)), until]
     first = np.full(coefficients.shape[1], np.inf)
-    for a, b in reversed(_pairs(knots)):
+    for a, b in reversed(list(pairwise(knots))):
         falls = polynomial(coefficients, b) < 0.0
         if falls.any():
             first = np.where(falls, _crossing(coefficients, a, b), first)
@@ -125,10 +115,6 @@ def polynomial(coefficients: Floats, t: ArrayLike) -> Floats:
     for c in coefficients[::-1]:
         value = value * t + c
     return value
-
-
-def _pairs(knots: list[Floats]) -> list[tuple[Floats, Floats]]:
-    return list(itertools.pairwise(knots))
 
 
 def _crossing(coefficients: Floats, low: Floats, high: Floats) -> Floats:

@@ -537,8 +537,8 @@ def _lines(number: int, case: Case, found: Path) -> tuple[Line, ...]:
         Line("plate", case.ahead - along * np.sin(alpha), top + along * np.cos(alpha), "plate"),
         Line("belts", np.array([-0.2, 0.0]), np.full(2, top), "belt"),
         Line("", reach, np.full(2, y), "belt"),
-        Line("to the plate", *first.T, "first"),
-        Line("after it", *second.T, "second", second[[0, -1]]),
+        Line("to the plate", first[:, 0], first[:, 1], "first"),
+        Line("after it", second[:, 0], second[:, 1], "second", second[[0, -1]]),
     )
 
 

@@ -19,7 +19,8 @@ from chutelab.theory.transfer import Rebound, transfer
 from chutelab.util.arrays import Floats
 
 if TYPE_CHECKING:
-    from chutelab.scene import Incoming, Plate, Scene
+    # The paper's tables are there without the model of a scene.
+    from chutelab.scene import Scene
 
 LEAST_CLEARANCE = 0.05
 """m of the default plate's lower end above the outgoing belt, for particles below 17 mm."""
@@ -39,8 +40,8 @@ class Course:
         assert scene.plate is not None
         self.scene = scene
         self.rebound = rebound
-        self.belt: Incoming = scene.incoming
-        self.plate: Plate = scene.plate
+        self.belt = scene.incoming
+        self.plate = scene.plate
         self.radius = scene.particle.radius
         self.ride_radius = self.belt.pulley_radius + self.radius
         self.angle = np.radians(self.plate.angle_deg)

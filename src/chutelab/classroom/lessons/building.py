@@ -288,7 +288,7 @@ def bundle(
 
     Raises
     ------
-    SceneError, VaryError, PageError
+    InputError
         If a lesson's scene cannot be run or varied.
     OSError
         If it cannot be written.

@@ -8,7 +8,7 @@ import numpy as np
 
 from chutelab.engines.exact.detect import bounds
 from chutelab.engines.exact.obstacles import NONE, bare, dot, length_of, pick
-from chutelab.engines.exact.particle_state import COLLAPSE, Contact, Mode, Swarm, below
+from chutelab.engines.exact.particle_state import COLLAPSE, Contact, Mode, State, below
 from chutelab.mechanics.impact import impulses, limited
 from chutelab.results import Kind
 from chutelab.util.arrays import Bools, Floats, Ints
@@ -21,7 +21,7 @@ class CornerError(RuntimeError):
     """A spinning disk held between moving surfaces: beyond the exact engine."""
 
 
-def hold(s: Swarm, who: Ints, on: tuple[Ints, Floats], other: tuple[Ints, Floats]) -> Bools:
+def hold(s: State, index: Ints, on: tuple[Ints, Floats], other: tuple[Ints, Floats]) -> Bools:
     """Bring particles to rest in the corner of two obstacles, each given with its side.
 
     A moving surface under them goes on doing work, all of it heat. Where a surface is at rest its
@@ -35,38 +35,38 @@ def hold(s: Swarm, who: Ints, on: tuple[Ints, Floats], other: tuple[Ints, Floats
     ndarray of bool, (k,)
         Which of them gravity pulls away from the one, and onto the other: they are to rest there.
     """
-    if not len(who):
+    if not len(index):
         return np.zeros(0, dtype=bool)
-    a, b = s.contact(who, *on), s.contact(who, *other)
+    a, b = s.contact(index, *on), s.contact(index, *other)
     moving = (a.belt != 0.0) | (b.belt != 0.0)
     if s.spins and moving.any():
         raise CornerError(
             "a spinning disk is held between two surfaces of which one moves; the exact engine"
             ' cannot follow that: run it with engine = "contact"'
         )
-    v, mass = s.v.take(who, axis=1), s.mass[who]
-    kinetic = 0.5 * mass * (dot(v, v) + 0.5 * s.z[who] ** 2)
-    s.v[:, who], s.z[who] = 0.0, 0.0
-    s.book(who, b.surface, 0.0, kinetic, 0.0)
-    s.knots(who)
-    loads, locked = _corner_loads(s.gravity[who], a, b)
-    stays = locked | np.all(loads >= -WEIGHTLESS * s.gravity[who], axis=0)
-    onto = ~stays & (loads[0] < 0.0) & (s.weight_on(who, b.normal) > 0.0)
+    v, mass = s.v.take(index, axis=1), s.mass[index]
+    kinetic = 0.5 * mass * (dot(v, v) + 0.5 * s.z[index] ** 2)
+    s.v[:, index], s.z[index] = 0.0, 0.0
+    s.book(index, b.surface, 0.0, kinetic, 0.0)
+    s.knots(index)
+    loads, locked = _corner_loads(s.gravity[index], a, b)
+    stays = locked | np.all(loads >= -WEIGHTLESS * s.gravity[index], axis=0)
+    onto = ~stays & (loads[0] < 0.0) & (s.weight_on(index, b.normal) > 0.0)
     falls = ~stays & ~onto
-    s.fly(who[falls], other[0][falls], other[1][falls], 2)
+    s.fly(index[falls], other[0][falls], other[1][falls], 2)
     rest = stays & ~moving & (s.machine.until == "settled")
-    s.event(int(Kind.SETTLE), who[rest], a.surface[rest])
-    s.finish(who[rest], "settled")
+    s.event(int(Kind.SETTLE), index[rest], a.surface[rest])
+    s.finish(index[rest], "settled")
     waits = stays & ~rest
-    time = s.stop[who] - s.age[who]
+    time = s.stop[index] - s.age[index]
     for c, load in zip((a, b), loads, strict=True):
         heat = np.where(
             waits & ~locked, mass * _grip(c) * np.abs(c.belt) * np.maximum(load, 0.0) * time, 0.0
         )
-        s.book(who, c.surface, heat, 0.0, heat)
-    s.age[who[waits]] = s.stop[who[waits]]
-    s.knots(who[waits])
-    s.finish(who[waits], "time")
+        s.book(index, c.surface, heat, 0.0, heat)
+    s.age[index[waits]] = s.stop[index[waits]]
+    s.knots(index[waits])
+    s.finish(index[waits], "time")
     return np.asarray(onto)
 
 
@@ -90,63 +90,63 @@ def _corner_loads(gravity: Floats, a: Contact, b: Contact) -> tuple[Floats, Bool
     return loads, inwards
 
 
-def load_on(s: Swarm, who: Ints, obstacle: Ints, c: Contact) -> Floats:
+def load_on(s: State, index: Ints, obstacle: Ints, c: Contact) -> Floats:
     """Return the normal force per mass that would keep a particle on an obstacle, m/s²."""
-    load = s.weight_on(who, c.normal)
+    load = s.weight_on(index, c.normal)
     curved = (obstacle >= s.obstacles.segments).nonzero()[0]
     if len(curved):
-        rho = pick(s.obstacles.rho, who[curved], obstacle[curved] - s.obstacles.segments)
-        load[curved] -= dot(s.v[:, who[curved]], c.tangent[:, curved]) ** 2 / rho
+        rho = pick(s.obstacles.rho, index[curved], obstacle[curved] - s.obstacles.segments)
+        load[curved] -= dot(s.v[:, index[curved]], c.tangent[:, curved]) ** 2 / rho
     return load
 
 
-def settle_law(s: Swarm, who: Ints) -> None:
+def settle_law(s: State, index: Ints) -> None:
     """Choose between gripping and slipping, and end tracks that have settled.
 
     Without slip, friction must hold against gravity: m*/m |g_t| <= µ N. Where it cannot, slip
     starts the way gravity pulls.
     """
-    if not len(who):
+    if not len(index):
         return
-    c = s.contact(who, s.on[who], s.side[who])
-    arc = s.mode[who] == Mode.ARC
-    w = dot(s.v.take(who, axis=1), c.tangent)
-    slip = s.slip_of(who, c, w)
+    c = s.contact(index, s.on[index], s.side[index])
+    arc = s.mode[index] == Mode.ARC
+    w = dot(s.v.take(index, axis=1), c.tangent)
+    slip = s.slip_of(index, c, w)
     still = slip == 0.0
     if s.spins:
-        s.z[who] = np.where(still, c.belt - w, s.z[who])
+        s.z[index] = np.where(still, c.belt - w, s.z[index])
     else:
         w = np.where(still, c.belt, w)
-    s.v[:, who] = w * c.tangent
-    pull, load = s.weight_along(who, c.normal), load_on(s, who, s.on[who], c)
+    s.v[:, index] = w * c.tangent
+    pull, load = s.weight_along(index, c.normal), load_on(s, index, s.on[index], c)
     grips = still & below(s.share * np.abs(pull), c.friction, load)
-    begins = grips & (s.slip[who] != 0.0)
-    s.slip[who] = np.where(grips, 0.0, np.where(still, np.sign(pull), np.sign(slip)))
-    s.event(int(Kind.STICK), who[begins], c.surface[begins])
+    begins = grips & (s.slip[index] != 0.0)
+    s.slip[index] = np.where(grips, 0.0, np.where(still, np.sign(pull), np.sign(slip)))
+    s.event(int(Kind.STICK), index[begins], c.surface[begins])
     if s.machine.until == "settled":
         # Rolling down a slope is not lying on it.
         steady = grips & ((pull == 0.0) | (not s.spins)) & ~(arc & (w != 0.0))
         lies = steady & ((c.belt == 0.0) | (c.surface == s.machine.landing))
-        s.event(int(Kind.SETTLE), who[lies], c.surface[lies])
-        s.finish(who[lies], "settled")
+        s.event(int(Kind.SETTLE), index[lies], c.surface[lies])
+        s.finish(index[lies], "settled")
 
 
-def end_slip(s: Swarm, who: Ints) -> None:
+def end_slip(s: State, index: Ints) -> None:
     """Make a slip that is used up exactly zero, then see whether friction holds."""
-    if not len(who):
+    if not len(index):
         return
-    c = s.contact(who, s.on[who], s.side[who])
+    c = s.contact(index, s.on[index], s.side[index])
     if s.spins:
-        s.z[who] = c.belt - dot(s.v.take(who, axis=1), c.tangent)
+        s.z[index] = c.belt - dot(s.v.take(index, axis=1), c.tangent)
     else:
-        s.v[:, who] = c.belt * c.tangent
-    settle_law(s, who)
+        s.v[:, index] = c.belt * c.tangent
+    settle_law(s, index)
 
 
-def face_force(s: Swarm, who: Ints, c: Contact) -> tuple[Floats, Floats]:
+def face_force(s: State, index: Ints, c: Contact) -> tuple[Floats, Floats]:
     """Return acceleration (2, k) and friction force per mass along the tangent (k,) on a face."""
-    pull, load = s.weight_along(who, c.normal), s.weight_on(who, c.normal)
-    slip = s.slip[who]
+    pull, load = s.weight_along(index, c.normal), s.weight_on(index, c.normal)
+    slip = s.slip[index]
     gripping = slip == 0.0
     finite = np.where(np.isinf(c.friction) | gripping, 0.0, c.friction)
     force = np.where(gripping, -s.share * pull, -slip * finite * load)
@@ -169,129 +169,133 @@ OPPOSED = 1e-9
 """Sine of the angle at which two surfaces must meet to hold a particle between them."""
 
 
-def strike(s: Swarm, who: Ints, obstacle: Ints, side: Floats) -> None:
+def strike(s: State, index: Ints, obstacle: Ints, side: Floats) -> None:
     """Resolve the contacts of particles that have just reached an obstacle."""
-    carried = s.mode[who] == Mode.CARRIED
+    carried = s.mode[index] == Mode.CARRIED
     if np.count_nonzero(carried):
-        s.part(who[carried], 0)
-    place, normal = s.obstacles.snapped(who, obstacle, side, s.p, s.radius[who])
-    s.p[:, s.at(who)] = place
-    c = s.contact(who, obstacle, side, normal)
-    before = s.v.take(who, axis=1)
+        s.part(index[carried], 0)
+    place, normal = s.obstacles.snapped(index, obstacle, side, s.p, s.radius[index])
+    s.p[:, s.at(index)] = place
+    c = s.contact(index, obstacle, side, normal)
+    before = s.v.take(index, axis=1)
     approach = np.maximum(-dot(before, c.normal), 0.0)
     soft = approach <= NEGLIGIBLE
     if np.count_nonzero(soft):
         c = c._replace(restitution=np.where(soft, 0.0, c.restitution))
     rebound = c.restitution * approach
-    landing = (c.surface == s.machine.landing) & ~s.landed[who]
+    landing = (c.surface == s.machine.landing) & ~s.landed[index]
     lands = np.count_nonzero(landing) > 0
-    _blow(s, who, c, before, approach, rebound, landing if lands else None)
+    _blow(s, index, c, before, approach, rebound, landing if lands else None)
     if lands:
-        s.landed[who] |= landing
+        s.landed[index] |= landing
         if s.machine.until == "landed":
-            s.finish(who[landing], "landed")
-            if np.count_nonzero(landing) == len(who):
+            s.finish(index[landing], "landed")
+            if np.count_nonzero(landing) == len(index):
                 return
-    _after(s, who, obstacle, side, c, rebound)
+    _after(s, index, obstacle, side, c, rebound)
 
 
-def _after(s: Swarm, who: Ints, obstacle: Ints, side: Floats, c: Contact, rebound: Floats) -> None:
+def _after(
+    s: State, index: Ints, obstacle: Ints, side: Floats, c: Contact, rebound: Floats
+) -> None:
     """Decide whether particles fly on, slide on or come to rest after a blow."""
     if s.past is not None:
-        before, before_side = _touched_before(s, who)
+        before, before_side = _touched_before(s, index)
         other = before != obstacle
-        s.past.obstacle[who[other]], s.past.side[who[other]] = before[other], before_side[other]
-    jammed = _stop_jammed(s, who, obstacle, side, rebound)
-    mode = s.mode[who]
+        s.past.obstacle[index[other]], s.past.side[index[other]] = before[other], before_side[other]
+    jammed = _stop_jammed(s, index, obstacle, side, rebound)
+    mode = s.mode[index]
     live = mode != Mode.DONE
     if jammed is not None:
         live &= ~jammed
     held = mode >= Mode.FACE
     on_surface = np.count_nonzero(held) > 0
     if on_surface:
-        held[held] = _still_on(s, who[held])
+        held[held] = _still_on(s, index[held])
         slides = held & live
-        _slide_past(s, who[slides], obstacle[slides], side[slides], rebound[slides])
+        _slide_past(s, index[slides], obstacle[slides], side[slides], rebound[slides])
         live &= ~held
     rests = live & (rebound <= REST)
     if np.count_nonzero(rests):
-        rests &= load_on(s, who, obstacle, c) > 0.0
-        rest_on(s, who[rests], obstacle[rests], side[rests], rebound[rests])
+        rests &= load_on(s, index, obstacle, c) > 0.0
+        rest_on(s, index[rests], obstacle[rests], side[rests], rebound[rests])
         live &= ~rests
     if np.count_nonzero(live) < len(live):
-        who, obstacle, side, rebound = who[live], obstacle[live], side[live], rebound[live]
+        index, obstacle, side, rebound = index[live], obstacle[live], side[live], rebound[live]
     if on_surface:
-        on = s.on[who]
+        on = s.on[index]
         leaves = on != NONE
-        s.part(who[leaves], s.obstacles.surface[on[leaves]])
-    s.fly(who, obstacle, side, 2 - (rebound > 0.0))
+        s.part(index[leaves], s.obstacles.surface[on[leaves]])
+    s.fly(index, obstacle, side, 2 - (rebound > 0.0))
 
 
 def _stop_jammed(
-    s: Swarm, who: Ints, obstacle: Ints, side: Floats, rebound: Floats
+    s: State, index: Ints, obstacle: Ints, side: Floats, rebound: Floats
 ) -> Bools | None:
     """Bring to rest, and tell, who goes to and fro between two obstacles without getting on."""
     if not (s.idling or s.crawling or np.count_nonzero(rebound <= 2.0 * CRAWL)):
         return None
-    slow = length_of(s.v.take(who, axis=1)) <= CRAWL
+    slow = length_of(s.v.take(index, axis=1)) <= CRAWL
     if not (s.idling or s.crawling or np.count_nonzero(slow)):
         return None
-    before, before_side = _touched_before(s, who)
-    between = (before != NONE) & (before != obstacle) & (s.mode[who] != Mode.DONE)
-    s.crawls[who] = np.where(slow, s.crawls[who] + between, 0)
+    before, before_side = _touched_before(s, index)
+    between = (before != NONE) & (before != obstacle) & (s.mode[index] != Mode.DONE)
+    s.crawls[index] = np.where(slow, s.crawls[index] + between, 0)
     s.crawling = bool(s.crawls.any())
-    jammed = between & ((s.idle[who] > COLLAPSE) | (s.crawls[who] > COLLAPSE))
+    jammed = between & ((s.idle[index] > COLLAPSE) | (s.crawls[index] > COLLAPSE))
     if not np.count_nonzero(jammed):
         return None
     # Faces that lie on each other make no corner.
-    one = s.contact(who[jammed], before[jammed], before_side[jammed]).normal
-    two = s.contact(who[jammed], obstacle[jammed], side[jammed]).normal
+    one = s.contact(index[jammed], before[jammed], before_side[jammed]).normal
+    two = s.contact(index[jammed], obstacle[jammed], side[jammed]).normal
     jammed[jammed] = np.abs(one[0] * two[1] - one[1] * two[0]) > OPPOSED
     _into_corner(
-        s, who[jammed], (before[jammed], before_side[jammed]), (obstacle[jammed], side[jammed])
+        s, index[jammed], (before[jammed], before_side[jammed]), (obstacle[jammed], side[jammed])
     )
     return np.asarray(jammed)
 
 
-def _into_corner(s: Swarm, who: Ints, on: tuple[Ints, Floats], other: tuple[Ints, Floats]) -> None:
+def _into_corner(
+    s: State, index: Ints, on: tuple[Ints, Floats], other: tuple[Ints, Floats]
+) -> None:
     """Bring particles to rest between two obstacles, or onto the other one, if it alone holds."""
-    onto = hold(s, who, on, other)
-    rest_on(s, who[onto], other[0][onto], other[1][onto], np.zeros(np.count_nonzero(onto)))
+    onto = hold(s, index, on, other)
+    rest_on(s, index[onto], other[0][onto], other[1][onto], np.zeros(np.count_nonzero(onto)))
 
 
-def _touched_before(s: Swarm, who: Ints) -> tuple[Ints, Floats]:
+def _touched_before(s: State, index: Ints) -> tuple[Ints, Floats]:
     """Return obstacle and face that particles are on, or came from at the stretch's beginning."""
-    on = s.on[who]
+    on = s.on[index]
     free = on == NONE
-    return np.where(free, s.left[who], on), np.where(free, s.left_side[who], s.side[who])
+    return np.where(free, s.left[index], on), np.where(free, s.left_side[index], s.side[index])
 
 
 def _blow(
-    s: Swarm, who: Ints, c: Contact, before: Floats, approach: Floats, rebound: Floats,
+    s: State, index: Ints, c: Contact, before: Floats, approach: Floats, rebound: Floats,
     landing: Bools | None,
 ) -> None:  # fmt: skip
     """Change the velocities (`before` so far), book the energies, write events and knots.
 
     `landing` tells who lands with it; None for nobody.
     """
-    omega_before = s.omega(who)
+    omega_before = s.omega(index)
     along = dot(before, c.tangent)
-    slip = s.slip_of(who, c, along)
+    slip = s.slip_of(index, c, along)
     normal, tangential = impulses(approach, slip, c.restitution, c.friction, s.share)
     # The normal speed is set, not added to: ε |v_n| to the last bit.
-    s.v[:, s.at(who)] = bare(rebound) * c.normal + bare(along + tangential) * c.tangent
+    s.v[:, s.at(index)] = bare(rebound) * c.normal + bare(along + tangential) * c.tangent
     if s.spins:
-        s.z[who] += 2.0 * tangential
-    after, mass = slip + tangential / s.share, s.mass[who]
+        s.z[index] += 2.0 * tangential
+    after, mass = slip + tangential / s.share, s.mass[index]
     s.book(
-        who,
+        index,
         c.surface,
         mass * tangential * c.belt,
         0.5 * mass * (approach - rebound) * (approach + rebound),
         -0.5 * mass * tangential * (slip + after),
     )
-    state = s.now(who)
-    s.journal.knots(who, state)
+    state = s.now(index)
+    s.log.knots(index, state)
     told = approach > NEGLIGIBLE
     if landing is not None:
         told |= landing
@@ -300,16 +304,16 @@ def _blow(
     if count < len(told):
         told |= tangential != 0.0
         count = int(np.count_nonzero(told))
-    s.journal.contacts += count
+    s.log.contacts += count
     if count < len(told):
-        who, surface, state = who[told], surface[told], state[:, told]
+        index, surface, state = index[told], surface[told], state[:, told]
         landing = None if landing is None else landing[told]
         before, omega_before = before[:, told], omega_before[told]
         push, rub = push[told], rub[told]
     hit = int(Kind.IMPACT)
-    s.journal.events(
+    s.log.events(
         hit if landing is None else np.where(landing, int(Kind.LANDING), hit),
-        who,
+        index,
         surface,
         state,
         velocity=before,
@@ -319,87 +323,87 @@ def _blow(
     )
 
 
-def _still_on(s: Swarm, who: Ints) -> Bools:
+def _still_on(s: State, index: Ints) -> Bools:
     """Tell which sliding or riding particles a blow from elsewhere leaves where they are."""
-    c = s.contact(who, s.on[who], s.side[who])
-    leaving = np.abs(dot(s.v.take(who, axis=1), c.normal)) > NEGLIGIBLE
-    return ~leaving & (load_on(s, who, s.on[who], c) > 0.0)
+    c = s.contact(index, s.on[index], s.side[index])
+    leaving = np.abs(dot(s.v.take(index, axis=1), c.normal)) > NEGLIGIBLE
+    return ~leaving & (load_on(s, index, s.on[index], c) > 0.0)
 
 
-def _slide_past(s: Swarm, who: Ints, obstacle: Ints, side: Floats, rebound: Floats) -> None:
+def _slide_past(s: State, index: Ints, obstacle: Ints, side: Floats, rebound: Floats) -> None:
     """Go on sliding after a blow from another obstacle, or stay in the corner of the two."""
-    if not len(who):
+    if not len(index):
         return
-    s.left[who], s.left_side[who] = obstacle, side
-    s.order[who] = np.where(rebound > 0.0, 1, 2)
-    settle_law(s, who)
-    kept = s.mode[who] == Mode.FACE
-    who, other, other_side = who[kept], obstacle[kept], side[kept]
-    pull, _ = face_force(s, who, s.contact(who, s.on[who], s.side[who]))
-    against = s.contact(who, other, other_side)
+    s.left[index], s.left_side[index] = obstacle, side
+    s.order[index] = np.where(rebound > 0.0, 1, 2)
+    settle_law(s, index)
+    kept = s.mode[index] == Mode.FACE
+    index, other, other_side = index[kept], obstacle[kept], side[kept]
+    pull, _ = face_force(s, index, s.contact(index, s.on[index], s.side[index]))
+    against = s.contact(index, other, other_side)
     pressed = dot(pull, against.normal) < -OPPOSED * length_of(pull)
     stuck = (rebound[kept] <= REST) & pressed
-    on = (s.on[who[stuck]], s.side[who[stuck]])
-    _into_corner(s, who[stuck], on, (other[stuck], other_side[stuck]))
+    on = (s.on[index[stuck]], s.side[index[stuck]])
+    _into_corner(s, index[stuck], on, (other[stuck], other_side[stuck]))
 
 
-def rest_on(s: Swarm, who: Ints, obstacle: Ints, side: Floats, rebound: Floats) -> None:
+def rest_on(s: State, index: Ints, obstacle: Ints, side: Floats, rebound: Floats) -> None:
     """Begin sliding, gripping or riding on an obstacle."""
-    if not len(who):
+    if not len(index):
         return
-    _last_bounces(s, who, obstacle, side, rebound)
+    _last_bounces(s, index, obstacle, side, rebound)
     flat = obstacle < s.obstacles.segments
-    s.mode[who] = np.where(flat, Mode.FACE, Mode.ARC)
-    s.on[who], s.side[who] = obstacle, side
-    s.left[who], s.left_side[who], s.order[who] = NONE, 0.0, 0
-    _ride(s, who[~flat])
-    settle_law(s, who)
+    s.mode[index] = np.where(flat, Mode.FACE, Mode.ARC)
+    s.on[index], s.side[index] = obstacle, side
+    s.left[index], s.left_side[index], s.order[index] = NONE, 0.0, 0
+    _ride(s, index[~flat])
+    settle_law(s, index)
 
 
-def _last_bounces(s: Swarm, who: Ints, obstacle: Ints, side: Floats, rebound: Floats) -> None:
+def _last_bounces(s: State, index: Ints, obstacle: Ints, side: Floats, rebound: Floats) -> None:
     """Sum the bounces after a rebound slower than `REST`, geometric in time and impulse."""
     hops = (rebound > 0.0) & (obstacle < s.obstacles.segments)
-    who, u, obstacle = who[hops], rebound[hops], obstacle[hops]
-    if not len(who):
+    index, u, obstacle = index[hops], rebound[hops], obstacle[hops]
+    if not len(index):
         return
-    c = s.contact(who, obstacle, side[hops])
-    weight, pull = s.weight_on(who, c.normal), s.weight_along(who, c.normal)
+    c = s.contact(index, obstacle, side[hops])
+    weight, pull = s.weight_on(index, c.normal), s.weight_along(index, c.normal)
     # Without loss the series never ends; its motion is below what is resolved, so it is dropped.
     lost = np.where(c.restitution < 1.0, 1.0 - c.restitution, np.inf)
-    time = np.minimum(2.0 * u / (weight * lost), s.stop[who] - s.age[who])
+    time = np.minimum(2.0 * u / (weight * lost), s.stop[index] - s.age[index])
     # Straight from another obstacle: it is in the way.
-    before, _ = _touched_before(s, who)
+    before, _ = _touched_before(s, index)
     time[(before != NONE) & (before != obstacle)] = 0.0
-    w = dot(s.v.take(who, axis=1), c.tangent)
-    s.age[who] += time
-    s.p[:, who] += (time * (w + 0.5 * pull * time)) * c.tangent
+    w = dot(s.v.take(index, axis=1), c.tangent)
+    s.age[index] += time
+    s.p[:, index] += (time * (w + 0.5 * pull * time)) * c.tangent
     w = w + pull * time
-    slip = s.slip_of(who, c, w)
+    slip = s.slip_of(index, c, w)
     tangential = limited(slip, np.maximum(weight * time - u, 0.0), c.friction, s.share)
-    s.v[:, who] = (w + tangential) * c.tangent
+    s.v[:, index] = (w + tangential) * c.tangent
     if s.spins:
-        s.z[who] += 2.0 * tangential
-    mass = s.mass[who]
+        s.z[index] += 2.0 * tangential
+    mass = s.mass[index]
     s.book(
-        who,
+        index,
         c.surface,
         mass * tangential * c.belt,
         0.5 * mass * u * u,
         -0.5 * mass * tangential * (2.0 * slip + tangential / s.share),
     )
-    s.knots(who)
+    s.knots(index)
 
 
-def _ride(s: Swarm, who: Ints) -> None:
+def _ride(s: State, index: Ints) -> None:
     """Begin a ride round a circle, or round its other half: find where that ends."""
-    if not len(who):
+    if not len(index):
         return
-    o, on, side = s.obstacles, s.on[who], s.side[who]
-    normal = o.normal_at(who, on, side, s.p)
-    side = np.where(side == 0.0, o.rim_side(who, on, normal), side)
-    s.side[who] = side
+    o, on, side = s.obstacles, s.on[index], s.side[index]
+    normal = o.normal_at(index, on, side, s.p)
+    side = np.where(side == 0.0, o.rim_side(index, on, normal), side)
+    s.side[index] = side
     phi = np.arctan2(normal[0], normal[1])
-    rho = pick(o.rho, who, on - o.segments)
-    found = bounds(o, who, on - o.segments, side, rho, phi, s.radius[who])
+    rho = pick(o.rho, index, on - o.segments)
+    found = bounds(o, index, on - o.segments, side, rho, phi, s.radius[index])
     for field in fields(found):
-        getattr(s.bounds, field.name)[who] = getattr(found, field.name)
+        getattr(s.bounds, field.name)[:, index] = getattr(found, field.name)

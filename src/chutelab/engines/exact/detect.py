@@ -35,9 +35,9 @@ class Past:
     side: Floats
     place: Floats
 
-    def of(self, who: Ints) -> Past:
+    def of(self, index: Ints) -> Past:
         """Return that of some particles."""
-        return Past(self.obstacle[who], self.side[who], self.place.take(who, axis=1))
+        return Past(self.obstacle[index], self.side[index], self.place.take(index, axis=1))
 
 
 @dataclass(slots=True, eq=False)
@@ -114,29 +114,29 @@ def first_circle(
     """
     time = np.full(len(motion.rows), np.inf)
     nearest = np.zeros(len(motion.rows), dtype=np.int64)
-    which, who = pairs.nonzero()
+    which, index = pairs.nonzero()
     circle = circles[which]
-    rows = motion.rows[who]
-    v = motion.velocity[:, who]
-    a = np.broadcast_to(motion.acceleration, motion.velocity.shape)[:, who]
-    d = motion.position[:, who] - pick(obstacles.center, rows, circle)
+    rows = motion.rows[index]
+    v = motion.velocity[:, index]
+    a = np.broadcast_to(motion.acceleration, motion.velocity.shape)[:, index]
+    d = motion.position[:, index] - pick(obstacles.center, rows, circle)
     rho = pick(obstacles.rho, rows, circle)
     distance = np.hypot(d[0], d[1])
     # |d + v t + a t²/2|² - ρ², as a polynomial of t.
-    gap = np.empty((5, len(who)))
+    gap = np.empty((5, len(index)))
     gap[0] = (distance - rho) * (distance + rho)
     gap[1] = 2.0 * dot(d, v)
     gap[2] = dot(v, v) + dot(d, a)
     gap[3] = dot(v, a)
     gap[4] = 0.25 * dot(a, a)
-    leaving = motion.left[who] == circle + obstacles.segments
+    leaving = motion.left[index] == circle + obstacles.segments
     touch = rows_of(obstacles.touch, rows)
     touching = np.abs(distance - rho) <= touch
     # The direction from the centre is as uncertain as the places are, over ρ.
     uncertain = 2.0 * (PARALLEL * rho + touch) * length_of(v)
     grazing = touching & (np.abs(gap[1]) <= uncertain)
     gap[1] = np.where(grazing & ~leaving, 0.0, gap[1])
-    order = np.where(leaving, motion.order[who], np.where(touching & (gap[1] >= 0.0), 1, 0))
+    order = np.where(leaving, motion.order[index], np.where(touching & (gap[1] >= 0.0), 1, 0))
     now = touching & ~leaving & (gap[1] < 0.0)
     for n in range(1, 4):
         shift = order >= n
@@ -146,13 +146,13 @@ def first_circle(
     open_ = (~now & (gap[0] >= 0.0) & (gap < 0.0).any(axis=0)).nonzero()[0]
     t = np.where(now, 0.0, np.inf)
     if len(open_):
-        found = first_descent(gap[:, open_], until[who[open_]])
+        found = first_descent(gap[:, open_], until[index[open_]])
         t[open_] = _polished(
             found, d[:, open_], v[:, open_], a[:, open_], rho[open_], order[open_] == 0
         )
     # The soonest is written last; of those met at once, the one with the lowest number.
     best = np.argsort(t, kind="stable")[::-1]
-    time[who[best]], nearest[who[best]] = t[best], circle[best]
+    time[index[best]], nearest[index[best]] = t[best], circle[best]
     return time, nearest
 
 
@@ -369,56 +369,50 @@ GRAZING = 1e-9
 """Sine of the angle between path and surface below which a ride only touches, and goes on."""
 
 
+WAYS = np.array([[-1.0], [1.0]])
+"""Backwards and forwards, as rows of `Bounds`."""
+
+
 @dataclass(eq=False)
 class Bounds:
-    """Nearest angles (rad) below and above where a ride ends, and what is there; arrays (k,).
+    """Nearest angles (rad) backwards and forwards where a ride ends, and what is there; (2, k).
 
     ∓inf and obstacle -1 where the way is free. `handover` marks where something takes over without
     a blow: at an end of the circle a face of its segment, at the tip of a moving one, where the rim
     changes its direction, the other half of the circle.
     """
 
-    low: Floats
-    low_obstacle: Ints
-    low_side: Floats
-    low_handover: Bools
-    high: Floats
-    high_obstacle: Ints
-    high_side: Floats
-    high_handover: Bools
+    angle: Floats
+    obstacle: Ints
+    side: Floats
+    handover: Bools
 
     @classmethod
     def free(cls, count: int) -> Self:
         """No obstacle in any direction."""
-
-        def nothing(limit: float) -> tuple[Floats, Ints, Floats, Bools]:
-            return (
-                np.full(count, limit),
-                np.full(count, NONE, dtype=np.int64),
-                np.zeros(count),
-                np.zeros(count, dtype=bool),
-            )
-
-        return cls(*nothing(-np.inf), *nothing(np.inf))
+        shape = (2, count)
+        return cls(
+            np.broadcast_to(WAYS * np.inf, shape).copy(),
+            np.full(shape, NONE),
+            np.zeros(shape),
+            np.zeros(shape, dtype=bool),
+        )
 
     def narrow(
         self, phi: Floats, angle: Floats, closing: Floats, met: Bools,
         obstacle: Ints | int, side: Floats | int, handover: bool = False,
     ) -> None:  # fmt: skip
         """Take in one more obstacle, whose gap falls with φ at the rate `closing` at `angle`."""
-        turn = 2.0 * np.pi
-        ahead = phi + np.maximum(np.mod(angle - phi + NOW, turn) - NOW, 0.0)
-        behind = phi - np.maximum(np.mod(phi - angle + NOW, turn) - NOW, 0.0)
-        nearer = met & (closing > GRAZING) & (ahead < self.high)
-        self.high = np.where(nearer, ahead, self.high)
-        self.high_obstacle = np.where(nearer, obstacle, self.high_obstacle)
-        self.high_side = np.where(nearer, side, self.high_side)
-        self.high_handover = np.where(nearer, handover, self.high_handover)
-        nearer = met & (closing < -GRAZING) & (behind > self.low)
-        self.low = np.where(nearer, behind, self.low)
-        self.low_obstacle = np.where(nearer, obstacle, self.low_obstacle)
-        self.low_side = np.where(nearer, side, self.low_side)
-        self.low_handover = np.where(nearer, handover, self.low_handover)
+        ahead = np.maximum(np.mod(WAYS * (angle - phi) + NOW, 2.0 * np.pi) - NOW, 0.0)
+        there = phi + WAYS * ahead
+        nearer = met & (WAYS * closing > GRAZING) & (WAYS * (there - self.angle) < 0.0)
+        for array, value in (
+            (self.angle, there),
+            (self.obstacle, obstacle),
+            (self.side, side),
+            (self.handover, handover),
+        ):
+            np.copyto(array, value, where=nearer)
 
 
 def bounds(

@@ -19,7 +19,7 @@ from chutelab.engines.exact.obstacles import (
     size_of,
     touch_of,
 )
-from chutelab.engines.exact.particle_state import Mode, Swarm, World
+from chutelab.engines.exact.particle_state import Mode, State, World
 from chutelab.machine import Machine
 from chutelab.results import Kind, Recording
 from chutelab.results.recorder import Recorder, StalledError
@@ -137,12 +137,13 @@ def run(
     def recording() -> Recording:
         return recorder.finish(engine="exact", steps=rounds, seconds=perf_counter() - begin)
 
-    world = World.of(machine)
-    size = _block(len(world.obstacles.surface))
+    world = World(machine)
+    # What particles do does not depend on how many run together.
+    size = max(FEWEST, min(MOST, CELLS // max(1, len(world.obstacles.surface))))
     # Roots that do not exist come out as inf or NaN, and are looked for as such.
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for first in range(0, machine.count, size):
-            s = Swarm(world, first, min(first + size, machine.count))
+            s = State(world, first, min(first + size, machine.count))
             try:
                 _to_the_end(s, progress)
             except StalledError as stalled:
@@ -155,12 +156,7 @@ def run(
     return recording()
 
 
-def _block(obstacles: int) -> int:
-    """Return how many particles run together; what they do does not depend on it."""
-    return max(FEWEST, min(MOST, CELLS // max(1, obstacles)))
-
-
-def _to_the_end(s: Swarm, progress: Progress | None) -> None:
+def _to_the_end(s: State, progress: Progress | None) -> None:
     """Run a block of particles until all have ended."""
     _release(s)
     then = s.age.copy()
@@ -172,14 +168,14 @@ def _to_the_end(s: Swarm, progress: Progress | None) -> None:
             _look_for_rattling(s, s.age - then)
             then = s.age.copy()
         s.rounds += 1
-        for mode, who in parties:
-            MOVE[mode](s, who)
+        for mode, index in parties:
+            MOVE[mode](s, index)
         if progress is not None:
             ended = s.first + len(s.mode) - int(np.count_nonzero(s.mode))
             progress(ended / s.machine.count)
 
 
-def _look_for_rattling(s: Swarm, passed: Floats) -> None:
+def _look_for_rattling(s: State, passed: Floats) -> None:
     """Raise if a particle hardly got on in the time (k,), s, that a window of rounds took it."""
     stuck = ((s.mode != Mode.DONE) & (passed < WINDOW * TICK)).nonzero()[0]
     if len(stuck):
@@ -190,19 +186,19 @@ def _look_for_rattling(s: Swarm, passed: Floats) -> None:
         raise s.stalled(int(stuck[0]), reason)
 
 
-def _release(s: Swarm) -> None:
+def _release(s: State) -> None:
     """Start every particle whose time comes before the end of the run."""
-    who = (s.stop > 0.0).nonzero()[0]
-    if len(who) < len(s.stop):
+    index = (s.stop > 0.0).nonzero()[0]
+    if len(index) < len(s.stop):
         s.finish((s.stop <= 0.0).nonzero()[0], "time")
-    state = s.now(who)
-    s.journal.knots(who, state)
-    s.journal.events(int(Kind.RELEASE), who, NONE, state)
+    state = s.now(index)
+    s.log.knots(index, state)
+    s.log.events(int(Kind.RELEASE), index, NONE, state)
     if (
         s.machine.until == "settled"
         and s.machine.pulley
         and np.ravel(s.machine.pulley.speed)[0] == 0.0
     ):
-        rests = who[s.mode[who] == Mode.CARRIED]
+        rests = index[s.mode[index] == Mode.CARRIED]
         s.event(int(Kind.SETTLE), rests, s.machine.pulley.surface)
         s.finish(rests, "settled")

@@ -30,7 +30,7 @@ MANY = 1000
 """Chunks that are joined into one: a long run of one particle consists of small ones."""
 
 
-class Journal:
+class EventLog:
     """Grows by chunks, whose last axis is the particles.
 
     Parameters
@@ -50,9 +50,9 @@ class Journal:
         self._old_events: list[NDArray[Any]] = []
         self._old_books: list[tuple[Ints, Floats, Ints]] = []
 
-    def knots(self, who: Ints, state: Floats) -> None:
+    def knots(self, index: Ints, state: Floats) -> None:
         """Add a knot for each of the particles; `state` (9, k) is kept, not copied."""
-        self._knots.append((who, state))
+        self._knots.append((index, state))
         if len(self._knots) >= MANY:
             self._old_knots.append((_joined(self._knots, 0), _joined(self._knots, 1)))
             self._knots.clear()
@@ -60,7 +60,7 @@ class Journal:
     def events(
         self,
         kind: int | Ints,
-        who: Ints,
+        index: Ints,
         surface: int | Ints,
         state: Floats,
         *,
@@ -73,23 +73,23 @@ class Journal:
 
         Where they are left out nothing changes.
         """
-        if not len(who):
+        if not len(index):
             return
         numbers = state.take(OF_STATE, axis=0)
         if velocity is not None:
             numbers[2:4], numbers[6] = velocity, omega
         numbers[8], numbers[9] = normal, tangential
-        self._events.append((who, kind, surface, state[0], numbers))
+        self._events.append((index, kind, surface, state[0], numbers))
         if len(self._events) >= MANY:
             self._old_events.append(self._laid_out())
             self._events.clear()
 
-    def book(self, who: Ints, surface: Ints, entries: Floats) -> None:
+    def book(self, index: Ints, surface: Ints, entries: Floats) -> None:
         """Note ledger entries (3, k), J, on surfaces."""
-        self._books.append((who, entries, surface))
+        self._books.append((index, entries, surface))
         if len(self._books) >= MANY:
-            who, entries, surface = (_joined(self._books, n) for n in range(3))
-            self._old_books.append((who, entries, surface))
+            index, entries, surface = (_joined(self._books, n) for n in range(3))
+            self._old_books.append((index, entries, surface))
             self._books.clear()
 
     def close(self, recorder: Recorder) -> None:
@@ -120,35 +120,24 @@ class Journal:
         names = ("particle", "kind", "surface", "t")
         particles, kinds, surfaces, times = (events[name] for name in names)
         rows = events.view(NUMBERS)["numbers"]
-        for who, kind, surface, t, numbers in self._events:
-            chunk = slice(begin, begin + len(who))
-            particles[chunk], kinds[chunk], surfaces[chunk] = who, kind, surface
+        for index, kind, surface, t, numbers in self._events:
+            chunk = slice(begin, begin + len(index))
+            particles[chunk], kinds[chunk], surfaces[chunk] = index, kind, surface
             times[chunk], rows[chunk] = t, numbers.T
-            begin += len(who)
+            begin += len(index)
         particles += self.first
         return events
 
     def _tracks(self, knots: list[tuple[Ints, Floats]]) -> tuple[Floats, Ints]:
         """Return knots, particle by particle, (K, 9), and how many each has, (count,)."""
-        each, count = len(knots), self.count
-        if count == 1:
-            rows = np.concatenate([state for _, state in knots], axis=1).T.copy()
-            return rows, np.array([len(rows)])
-        if not self._old_knots and all(len(who) == count for who, _ in knots):
-            # Everybody in every chunk.
-            rows = np.empty((count, each, STATE))
-            for n, (_, state) in enumerate(knots):
-                rows[:, n] = state.T
-            return rows.reshape(-1, STATE), np.full(count, each)
         owner = _joined(knots, 0)
-        order = _by_particle(owner)
-        place = np.empty_like(order)
-        place[order] = np.arange(len(order))
+        place = np.empty(len(owner), dtype=np.int64)
+        place[_by_particle(owner)] = np.arange(len(owner))
         rows, begin = np.empty((len(owner), STATE)), 0
-        for who, state in knots:
-            rows[place[begin : begin + len(who)]] = state.T
-            begin += len(who)
-        return rows, np.bincount(owner, minlength=count)
+        for index, state in knots:
+            rows[place[begin : begin + len(index)]] = state.T
+            begin += len(index)
+        return rows, np.bincount(owner, minlength=self.count)
 
 
 def _joined(chunks: Sequence[tuple[Any, ...]], part: int) -> NDArray[Any]:

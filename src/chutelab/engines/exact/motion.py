@@ -11,71 +11,71 @@ import numpy as np
 from chutelab.engines.exact.contacts import end_slip, face_force, rest_on, settle_law, strike
 from chutelab.engines.exact.detect import FEW, Motion, bounds, first_contact
 from chutelab.engines.exact.obstacles import NONE, bare, dot, pick, rows_of
-from chutelab.engines.exact.particle_state import Mode, Swarm
+from chutelab.engines.exact.particle_state import Mode, State
 from chutelab.mechanics.ballistics import descent
 from chutelab.mechanics.ride import STEP_ANGLE, Circle, Outcome, advance, normal_force
 from chutelab.results import Kind
 from chutelab.util.arrays import Bools, Floats, Ints
 
 
-def ride_on(s: Swarm, who: Ints, circle: Ints) -> None:
+def ride_on(s: State, index: Ints, circle: Ints) -> None:
     """Go on from the end of a face round a circle, or fly if it curves away too fast."""
-    if not len(who):
+    if not len(index):
         return
-    left, side, surface = s.on[who].copy(), s.side[who].copy(), s.obstacles.surface[s.on[who]]
-    c = s.contact(who, circle, np.zeros_like(side))
-    rho = pick(s.obstacles.rho, who, circle - s.obstacles.segments)
-    w = dot(s.v.take(who, axis=1), c.tangent)
-    stays = s.weight_on(who, c.normal) - w**2 / rho > 0.0
-    rest_on(s, who[stays], circle[stays], np.zeros_like(side[stays]), np.zeros(int(stays.sum())))
+    left, side, surface = s.on[index].copy(), s.side[index].copy(), s.obstacles.surface[s.on[index]]
+    c = s.contact(index, circle, np.zeros_like(side))
+    rho = pick(s.obstacles.rho, index, circle - s.obstacles.segments)
+    w = dot(s.v.take(index, axis=1), c.tangent)
+    stays = s.weight_on(index, c.normal) - w**2 / rho > 0.0
+    rest_on(s, index[stays], circle[stays], np.zeros_like(side[stays]), np.zeros(int(stays.sum())))
     off = ~stays
-    s.part(who[off], surface[off])
+    s.part(index[off], surface[off])
     # From the pulley it flies tangentially, above it for good; from an end it leaves the face.
     from_pulley = circle[off] == s.obstacles.pulley
     s.fly(
-        who[off],
+        index[off],
         np.where(from_pulley, circle[off], left[off]),
         np.where(from_pulley, 0, side[off]),
         2,
     )
 
 
-def carry_round(s: Swarm, who: Ints) -> None:
+def carry_round(s: State, index: Ints) -> None:
     """Carry particles by adhesion from the top of the pulley until cos φ1 = v²/(g ρ)."""
-    if not len(who):
+    if not len(index):
         return
     o = s.obstacles
-    s.p[0, who] = 0.0
-    rho, v = s.p[1, who], s.v[0, who]
-    left = s.stop[who] - s.age[who]
-    cosine = np.minimum(v**2 / (s.gravity[who] * rho), 1.0)
-    end, struck, found = np.zeros(len(who)), np.zeros(len(who), dtype=bool), None
+    s.p[0, index] = 0.0
+    rho, v = s.p[1, index], s.v[0, index]
+    left = s.stop[index] - s.age[index]
+    cosine = np.minimum(v**2 / (s.gravity[index] * rho), 1.0)
+    end, struck, found = np.zeros(len(index)), np.zeros(len(index), dtype=bool), None
     if np.count_nonzero(cosine < 1.0):
         end = np.arctan2(np.sqrt((1.0 - cosine) * (1.0 + cosine)), cosine)
-        pulley = np.full(len(who), o.pulley - o.segments)
-        top, clockwise = np.zeros(len(who)), np.ones(len(who))
-        found = bounds(o, who, pulley, clockwise, rho, top, s.radius[who])
-        struck = ~found.high_handover & (found.high < end)
-        end = np.where(struck, found.high, end)
+        pulley = np.full(len(index), o.pulley - o.segments)
+        top, clockwise = np.zeros(len(index)), np.ones(len(index))
+        found = bounds(o, index, pulley, clockwise, rho, top, s.radius[index])
+        struck = ~found.handover[1] & (found.angle[1] < end)
+        end = np.where(struck, found.angle[1], end)
         end = np.where(end * rho / v > left, left * v / rho, end)
-        _ease_round(s, who, rho, v, end)
-    over = s.age[who] >= s.stop[who]
+        _ease_round(s, index, rho, v, end)
+    over = s.age[index] >= s.stop[index]
     hit, free = struck & ~over, ~struck & ~over
-    s.finish(who[over], "time")
-    s.part(who[free], 0)
-    s.fly(who[free], o.pulley, 0, 2 + (end[free] > 0.0))
+    s.finish(index[over], "time")
+    s.part(index[free], 0)
+    s.fly(index[free], o.pulley, 0, 2 + (end[free] > 0.0))
     if found is not None and np.count_nonzero(hit):
-        strike(s, who[hit], found.high_obstacle[hit], found.high_side[hit])
+        strike(s, index[hit], found.obstacle[1, hit], found.side[1, hit])
 
 
-def _ease_round(s: Swarm, who: Ints, rho: Floats, v: Floats, end: Floats) -> None:
+def _ease_round(s: State, index: Ints, rho: Floats, v: Floats, end: Floats) -> None:
     """Carry particles from the top of the pulley to an angle, knot by knot."""
     surface = s.obstacles.surface[s.obstacles.pulley]
-    start, above = s.age[who], rho.copy()
+    start, above = s.age[index], rho.copy()
     pieces = np.ceil(end / STEP_ANGLE)
     for n in range(1, int(pieces.max()) + 1):
         on = (pieces >= n).nonzero()[0]
-        riders, part = who[on], end[on] * (n / pieces[on])
+        riders, part = index[on], end[on] * (n / pieces[on])
         _place(s, riders, rho[on], part, v[on])
         s.age[riders] = start[on] + rho[on] * part / v[on]
         # The belt lets the particle down: F v = -m g v sin φ, summed from the last knot.
@@ -86,71 +86,70 @@ def _ease_round(s: Swarm, who: Ints, rho: Floats, v: Floats, end: Floats) -> Non
         s.knots(riders)
 
 
-def ride(s: Swarm, who: Ints) -> None:
+def ride(s: State, index: Ints) -> None:
     """Move riders on by one knot, or to the next event, and resolve it."""
-    circle = s.on[who]
-    c = s.contact(who, circle, s.side[who])
-    rho = pick(s.obstacles.rho, who, circle - s.obstacles.segments)
+    circle = s.on[index]
+    c = s.contact(index, circle, s.side[index])
+    rho = pick(s.obstacles.rho, index, circle - s.obstacles.segments)
     state = Circle(
         phi=np.arctan2(c.normal[0], c.normal[1]),
-        w=dot(s.v.take(who, axis=1), c.tangent),
-        z=s.z[who],
+        w=dot(s.v.take(index, axis=1), c.tangent),
+        z=s.z[index],
         rho=rho,
-        gravity=s.gravity[who],
+        gravity=s.gravity[index],
         friction=c.friction,
         belt=c.belt,
-        slip=s.slip[who],
-        turns=np.full(len(who), s.spins),
-        low=s.bounds.low[who],
-        high=s.bounds.high[who],
+        slip=s.slip[index],
+        turns=np.full(len(index), s.spins),
+        low=s.bounds.angle[0, index],
+        high=s.bounds.angle[1, index],
     )
     lifted = normal_force(state) <= 0.0
-    step = advance(state, s.stop[who] - s.age[who])
+    step = advance(state, s.stop[index] - s.age[index])
     outcome = np.where(lifted, Outcome.LIFT, step.outcome)
     go = np.flatnonzero(~lifted)
-    s.count_idle(who, np.where(lifted, 0.0, step.dt))
-    s.age[who[go]] += step.dt[go]
-    center = s.p.take(who, axis=1) - rho * c.normal
-    _place(s, who[go], rho[go], step.phi[go], step.w[go], center[:, go])
-    s.z[who[go]] = step.z[go]
-    mass = s.mass[who]
+    s.count_idle(index, np.where(lifted, 0.0, step.dt))
+    s.age[index[go]] += step.dt[go]
+    center = s.p.take(index, axis=1) - rho * c.normal
+    _place(s, index[go], rho[go], step.phi[go], step.w[go], center[:, go])
+    s.z[index[go]] = step.z[go]
+    mass = s.mass[index]
     s.book(
-        who[go],
+        index[go],
         c.surface[go],
         (mass * step.work * c.belt)[go],
         0.0,
         (mass * step.heat)[go],
     )
-    s.knots(who[go])
+    s.knots(index[go])
 
-    over = (outcome == Outcome.NOTHING) & (s.age[who] >= s.stop[who])
-    s.finish(who[over], "time")
+    over = (outcome == Outcome.NOTHING) & (s.age[index] >= s.stop[index])
+    s.finish(index[over], "time")
     lift = outcome == Outcome.LIFT
-    s.part(who[lift], c.surface[lift])
-    s.fly(who[lift], circle[lift], 0, np.where(lifted[lift], 2, 3))
+    s.part(index[lift], c.surface[lift])
+    s.fly(index[lift], circle[lift], 0, np.where(lifted[lift], 2, 3))
     onset = outcome == Outcome.ONSET
-    s.slip[who[onset]] = np.sign(np.sin(step.phi[onset]))
-    s.event(int(Kind.SLIP), who[onset], c.surface[onset])
+    s.slip[index[onset]] = np.sign(np.sin(step.phi[onset]))
+    s.event(int(Kind.SLIP), index[onset], c.surface[onset])
     grip = outcome == Outcome.GRIP
-    end_slip(s, who[grip])
-    for name, code in (("low", Outcome.LOW), ("high", Outcome.HIGH)):
+    end_slip(s, index[grip])
+    for way, code in enumerate((Outcome.LOW, Outcome.HIGH)):
         at = outcome == code
-        obstacle = getattr(s.bounds, f"{name}_obstacle")[who]
-        side = getattr(s.bounds, f"{name}_side")[who]
-        joins = at & getattr(s.bounds, f"{name}_handover")[who]
-        rest_on(s, who[joins], obstacle[joins], side[joins], np.zeros(np.count_nonzero(joins)))
+        obstacle, side = s.bounds.obstacle[way, index], s.bounds.side[way, index]
+        joins = at & s.bounds.handover[way, index]
+        rest_on(s, index[joins], obstacle[joins], side[joins], np.zeros(np.count_nonzero(joins)))
         hit = at & ~joins
         if hit.any():
-            strike(s, who[hit], obstacle[hit], side[hit])
+            strike(s, index[hit], obstacle[hit], side[hit])
 
 
 def _place(
-    s: Swarm, who: Ints, rho: Floats, phi: Floats, w: Floats, center: Floats | float = 0.0
+    s: State, index: Ints, rho: Floats, phi: Floats, w: Floats, center: Floats | float = 0.0
 ) -> None:
     """Put particles at an angle of a circle, moving along it."""
     sine, cosine = np.sin(phi), np.cos(phi)
-    s.p[:, who] = center + rho * np.stack([sine, cosine])
-    s.v[:, who] = w * np.stack([cosine, -sine])
+    s.p[:, index] = center + rho * np.stack([sine, cosine])
+    s.v[:, index] = w * np.stack([cosine, -sine])
 
 
 COLLINEAR = 1e-12
@@ -163,10 +162,10 @@ AT_REST = np.zeros((2, 1))
 """No acceleration."""
 
 
-def fly(s: Swarm, who: Ints) -> None:
+def fly(s: State, index: Ints) -> None:
     """Move particles in flight on to their next event and resolve it."""
-    motion = _motion(s, who, rows_of(s.fall, who))
-    stops, leaves = s.stop[who] - s.age[who], None
+    motion = _motion(s, index, rows_of(s.fall, index))
+    stops, leaves = s.stop[index] - s.age[index], None
     # What falls meets surfaces before it leaves the scene: when that is matters to few.
     if not s.falls or s.obstacles.segments > FEW:
         leaves = _exit(s, motion)
@@ -177,75 +176,75 @@ def fly(s: Swarm, who: Ints) -> None:
         leaves = _exit(s, motion)
         dt = np.where(hits, dt, np.minimum(leaves, stops))
     _move(s, motion, dt)
-    s.knots(who)
+    s.knots(index)
     if goes_on:
-        out = who[free & (leaves <= stops)]
+        out = index[free & (leaves <= stops)]
         s.event(int(Kind.EXIT), out)
         s.finish(out, "exit")
-        _stop(s, who[free & (s.mode[who] != Mode.DONE)])
-    _strike(s, who, hits, meeting)
+        _stop(s, index[free & (s.mode[index] != Mode.DONE)])
+    _strike(s, index, hits, *meeting)
 
 
-def carry(s: Swarm, who: Ints) -> None:
+def carry(s: State, index: Ints) -> None:
     """Move particles that the belt carries on to the pulley, or to what is in the way."""
-    motion = _motion(s, who, AT_REST)
+    motion = _motion(s, index, AT_REST)
     motion.never = s.obstacles.under_belt
     v = motion.velocity[0]
-    ends, stops = -motion.position[0] / v, s.stop[who] - s.age[who]
+    ends, stops = -motion.position[0] / v, s.stop[index] - s.age[index]
     ends[~(v > 0.0)] = np.inf
     dt, hits, meeting = _next(s, motion, np.minimum(ends, stops))
     _move(s, motion, dt)
-    s.knots(who)
+    s.knots(index)
     free = ~hits
-    _stop(s, who[free & (stops < ends)])
-    carry_round(s, who[free & (ends <= stops)])
-    _strike(s, who, hits, meeting)
+    _stop(s, index[free & (stops < ends)])
+    carry_round(s, index[free & (ends <= stops)])
+    _strike(s, index, hits, *meeting)
 
 
-def slide(s: Swarm, who: Ints) -> None:
+def slide(s: State, index: Ints) -> None:
     """Move particles on a face on to their next event and resolve it."""
-    on, side = s.on[who], s.side[who]
-    c = s.contact(who, on, side)
-    pull, force = face_force(s, who, c)
-    motion = _motion(s, who, pull)
+    on, side = s.on[index], s.side[index]
+    c = s.contact(index, on, side)
+    pull, force = face_force(s, index, c)
+    motion = _motion(s, index, pull)
     motion.on = on
     # The slip is linear in time, while there is one.
-    slip = dot(motion.velocity, c.tangent) + s.z[who] - c.belt
+    slip = dot(motion.velocity, c.tangent) + s.z[index] - c.belt
     rate = dot(pull, c.tangent) + (2.0 * force if s.spins else 0.0)
-    grips, ends = _grip(s.slip[who], slip, rate), _end(s, motion)
-    stops = s.stop[who] - s.age[who]
+    grips, ends = _grip(s.slip[index], slip, rate), _end(s, motion)
+    stops = s.stop[index] - s.age[index]
     dt, hits, meeting = _next(s, motion, np.minimum(np.minimum(grips, ends), stops))
-    mean = np.where(s.slip[who] == 0.0, 0.0, slip + 0.5 * rate * dt)
-    mass = s.mass[who]
-    s.book(who, c.surface, mass * force * c.belt * dt, 0.0, -mass * force * mean * dt)
+    mean = np.where(s.slip[index] == 0.0, 0.0, slip + 0.5 * rate * dt)
+    mass = s.mass[index]
+    s.book(index, c.surface, mass * force * c.belt * dt, 0.0, -mass * force * mean * dt)
     _move(s, motion, dt)
-    s.p[:, who], _ = s.obstacles.snapped(who, on, side, s.p, s.radius[who])
+    s.p[:, index], _ = s.obstacles.snapped(index, on, side, s.p, s.radius[index])
     if s.spins:
-        s.z[who] += 2.0 * force * dt
+        s.z[index] += 2.0 * force * dt
     # What was left at the beginning is some way off now.
-    s.left[who[dt > 0.0]] = NONE
-    s.knots(who)
+    s.left[index[dt > 0.0]] = NONE
+    s.knots(index)
     free = ~hits
-    _stop(s, who[free & (stops < grips) & (stops < ends)])
-    _leave_face(s, who[free & (ends < grips) & (ends <= stops)])
-    end_slip(s, who[free & (grips <= ends) & (grips <= stops)])
-    _strike(s, who, hits, meeting)
+    _stop(s, index[free & (stops < grips) & (stops < ends)])
+    _leave_face(s, index[free & (ends < grips) & (ends <= stops)])
+    end_slip(s, index[free & (grips <= ends) & (grips <= stops)])
+    _strike(s, index, hits, *meeting)
 
 
-def _motion(s: Swarm, who: Ints, acceleration: Floats) -> Motion:
+def _motion(s: State, index: Ints, acceleration: Floats) -> Motion:
     return Motion(
-        who,
-        s.p.take(who, axis=1),
-        s.v.take(who, axis=1),
+        index,
+        s.p.take(index, axis=1),
+        s.v.take(index, axis=1),
         acceleration,
-        s.left[who],
-        s.left_side[who],
-        s.order[who],
-        past=None if s.past is None else s.past.of(who),
+        s.left[index],
+        s.left_side[index],
+        s.order[index],
+        past=None if s.past is None else s.past.of(index),
     )
 
 
-def _next(s: Swarm, motion: Motion, until: Floats) -> tuple[Floats, Bools, tuple[Ints, Floats]]:
+def _next(s: State, motion: Motion, until: Floats) -> tuple[Floats, Bools, tuple[Ints, Floats]]:
     """Return how long the particles go on, who meets something then, and what (and its side).
 
     Not longer than `until`; a contact at that very time comes first.
@@ -256,7 +255,7 @@ def _next(s: Swarm, motion: Motion, until: Floats) -> tuple[Floats, Bools, tuple
     return dt, hits, (obstacle, side)
 
 
-def _move(s: Swarm, motion: Motion, dt: Floats) -> None:
+def _move(s: State, motion: Motion, dt: Floats) -> None:
     """Carry the state over a stretch."""
     at = s.at(motion.rows)
     s.age[at] += dt
@@ -269,20 +268,19 @@ def _move(s: Swarm, motion: Motion, dt: Floats) -> None:
     s.v[:, at] = motion.velocity + bare(dt) * motion.acceleration
 
 
-def _strike(s: Swarm, who: Ints, hits: Bools, meeting: tuple[Ints, Floats]) -> None:
-    obstacle, side = meeting
+def _strike(s: State, index: Ints, hits: Bools, obstacle: Ints, side: Floats) -> None:
     count = np.count_nonzero(hits)
-    if count == len(who):
-        strike(s, who, obstacle, side)
+    if count == len(index):
+        strike(s, index, obstacle, side)
     elif count:
-        strike(s, who[hits], obstacle[hits], side[hits])
+        strike(s, index[hits], obstacle[hits], side[hits])
 
 
-def _stop(s: Swarm, who: Ints) -> None:
+def _stop(s: State, index: Ints) -> None:
     """End the tracks of particles whose time is over."""
-    if len(who):
-        s.age[who] = s.stop[who]
-        s.finish(who, "time")
+    if len(index):
+        s.age[index] = s.stop[index]
+        s.finish(index, "time")
 
 
 def _grip(sign: Floats, slip: Floats, rate: Floats) -> Floats:
@@ -291,17 +289,17 @@ def _grip(sign: Floats, slip: Floats, rate: Floats) -> Floats:
     return np.where(fading, np.maximum(-slip / np.where(fading, rate, 1.0), 0.0), np.inf)
 
 
-def _end(s: Swarm, motion: Motion) -> Floats:
+def _end(s: State, motion: Motion) -> Floats:
     """Return the times until the face ends."""
-    who, on, o = motion.rows, s.on[motion.rows], s.obstacles
-    tangent, length = pick(o.tangent, who, on), pick(o.length, who, on)
-    foot = dot(motion.position - pick(o.start, who, on), tangent)
+    index, on, o = motion.rows, s.on[motion.rows], s.obstacles
+    tangent, length = pick(o.tangent, index, on), pick(o.length, index, on)
+    foot = dot(motion.position - pick(o.start, index, on), tangent)
     pace, pull = dot(motion.velocity, tangent), dot(motion.acceleration, tangent)
     back, forth = _when(foot, pace, pull), _when(length - foot, -pace, -pull)
     return np.minimum(back, forth)
 
 
-def _exit(s: Swarm, motion: Motion) -> Floats:
+def _exit(s: State, motion: Motion) -> Floats:
     """Time until a flight leaves the scene; never in a run that lasts a number of seconds."""
     if s.machine.until == "time":
         return np.full(len(motion.rows), np.inf)
@@ -321,25 +319,27 @@ def _when(gap: Floats, rate: Floats, acceleration: Floats) -> Floats:
     return np.where(time >= 0.0, time, np.inf)
 
 
-def _leave_face(s: Swarm, who: Ints) -> None:
+def _leave_face(s: State, index: Ints) -> None:
     """Go on at the end of a face: onto the next segment, round the end, or into flight."""
-    if not len(who):
+    if not len(index):
         return
     o = s.obstacles
-    segment, side = s.on[who], s.side[who]
-    foot = dot(s.p.take(who, axis=1) - pick(o.start, who, segment), pick(o.tangent, who, segment))
-    end = (foot > 0.5 * pick(o.length, who, segment)).astype(np.int64)
+    segment, side = s.on[index], s.side[index]
+    foot = dot(
+        s.p.take(index, axis=1) - pick(o.start, index, segment), pick(o.tangent, index, segment)
+    )
+    end = (foot > 0.5 * pick(o.length, index, segment)).astype(np.int64)
     following, circle = o.follow[segment, end], o.end_circle[segment, end]
-    normal = side * pick(o.normal, who, segment)
-    next_normal = pick(o.normal, who, np.maximum(following, 0))
+    normal = side * pick(o.normal, index, segment)
+    next_normal = pick(o.normal, index, np.maximum(following, 0))
     sine = normal[0] * next_normal[1] - normal[1] * next_normal[0]
     smooth = (following != NONE) & (np.abs(sine) <= COLLINEAR)
-    onto = who[smooth]
+    onto = index[smooth]
     s.on[onto] = following[smooth]
     s.side[onto] = np.where(dot(normal[:, smooth], next_normal[:, smooth]) > 0.0, 1.0, -1.0)
     settle_law(s, onto)
     round_ = ~smooth & (circle != NONE)
-    ride_on(s, who[round_], circle[round_])
+    ride_on(s, index[round_], circle[round_])
     off = ~smooth & (circle == NONE)
-    s.part(who[off], o.surface[segment[off]])
-    s.fly(who[off], segment[off], side[off], 2)
+    s.part(index[off], o.surface[segment[off]])
+    s.fly(index[off], segment[off], side[off], 2)

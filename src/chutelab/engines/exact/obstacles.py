@@ -16,7 +16,7 @@ from sys import float_info
 
 import numpy as np
 
-from chutelab.machine import Machine, Segments
+from chutelab.machine import Machine
 from chutelab.util.arrays import Bools, Floats, Ints
 
 NONE = -1
@@ -295,26 +295,41 @@ def obstacles(machine: Machine, origin: tuple[float, float] = (0.0, 0.0)) -> Obs
     size = size_of(corners, places)
     touch = touch_of(size, far)
     spots = spots_of(corners[..., 0], JOINT * size[0].item())
-    kept = _distinct(spots)
+    seen: dict[frozenset[int], int] = {}
+    for s, pair in enumerate(spots):
+        seen.setdefault(frozenset(pair), s)
+    kept = list(seen.values())
     if len(kept) < len(spots):
         corners = corners[:, [*kept, *(s + len(spots) for s in kept)]]
         spots, tangent, length = [spots[s] for s in kept], tangent[:, kept], length[kept]
 
     # Segments, then their ends, then the pulley.
     flat = len(length)
-    disks = np.ravel(r)[0] > 0.0
-    ends, end_circle = _ends(spots, wheel is not None) if disks else _points(flat)
+    # Each place where segments of disks end is a circle; a point meets it with probability zero.
+    known: dict[int, int] = {}
+    ends: list[tuple[int, int]] = []
+    end_circle = np.full((flat, 2), NONE)
+    for s, pair in enumerate(spots if np.ravel(r)[0] > 0.0 else ()):
+        for e, spot in enumerate(pair):
+            if wheel is not None and (s, e) == (0, 1):
+                continue
+            if spot not in known:
+                known[spot] = flat + len(ends)
+                ends.append((s, e))
+            end_circle[s, e] = known[spot]
     where = [s + e * flat for s, e in ends]
     owner = kept + [kept[s] for s, _ in ends]
     if wheel is not None:
-        end_circle[0][1] = flat + len(ends)
+        end_circle[0, 1] = flat + len(ends)
         # It stands in for an end of the first segment until its own values are put in.
         where.append(0)
         owner.append(0)
     center = corners.take(np.array(where, dtype=np.int64), axis=1)
     rho = np.empty(center.shape[1:])
     rho[:] = r
-    material, surface = _material(seg, owner)
+    which = np.array(owner, dtype=np.int64)
+    values = (_scalars(column) for column in (seg.speed, seg.restitution, seg.friction))
+    material, surface = np.stack([*values]).take(which, axis=1), seg.surface.take(which)
     pulley = NONE
     if wheel is not None:
         pulley = flat + len(ends)
@@ -322,10 +337,15 @@ def obstacles(machine: Machine, origin: tuple[float, float] = (0.0, 0.0)) -> Obs
         for row, value in enumerate((wheel.speed, wheel.restitution, wheel.friction)):
             material[row, -1] = value
     first, second = corners[:, :flat], corners[:, flat:]
+    faces = np.empty((2, 4, flat, 1, length.shape[1]))
+    faces[0, 0], faces[1, 0] = -tangent[1][:, None], tangent[0][:, None]
+    faces[:, 1, :, 0], faces[:, 2, :, 0] = tangent, first
+    over = FOOT * length[:, None]
+    faces[0, 3], faces[1, 3] = -over, over + length[:, None]
     # A circle's box is smaller: what only touches it does not meet it.
     reach, inner = r + BOX_TOUCHES * touch, rho - touch
     return Obstacles(
-        faces=_faces(first, tangent, length),
+        faces=faces,
         length=length,
         center=center,
         rho=rho,
@@ -334,7 +354,7 @@ def obstacles(machine: Machine, origin: tuple[float, float] = (0.0, 0.0)) -> Obs
         high=np.concatenate([np.maximum(first, second) + reach, center + inner], axis=1),
         surface=surface,
         spots=tuple(spots),
-        end_circle=np.array(end_circle, dtype=np.int64).reshape(-1, 2),
+        end_circle=end_circle,
         pulley=pulley,
         touch=touch,
     )
@@ -362,32 +382,14 @@ def size_of(corners: Floats, places: Floats) -> Floats:
     return np.asarray(np.maximum(size, farthest))
 
 
-def _faces(start: Floats, tangent: Floats, length: Floats) -> Floats:
-    """Return `Obstacles.faces`."""
-    faces = np.empty((2, 4, len(length), 1, length.shape[1]))
-    normal, along, first, feet = faces[:, :, :, 0].swapaxes(0, 1)
-    normal[0], normal[1], along[:], first[:] = -tangent[1], tangent[0], tangent, start
-    over = FOOT * length
-    feet[0], feet[1] = -over, over + length
-    return faces
-
-
-def _material(segments: Segments, owner: list[int]) -> tuple[Floats, Ints]:
-    """Return `Obstacles.material` and `Obstacles.surface` of obstacles that belong to segments."""
-    each = (segments.speed, segments.restitution, segments.friction)
-    material = np.stack([_scalars(values) for values in each])
-    which = np.array(owner, dtype=np.int64)
-    return material.take(which, axis=1), segments.surface.take(which)
-
-
 def _vectors(array: Floats) -> Floats:
     """(S, 2) or (N, S, 2) to (2, S, n)."""
-    return np.array(np.array(array, ndmin=3, copy=None).T, order="C")
+    return np.array(array, ndmin=3).T.copy()
 
 
 def _scalars(array: Floats) -> Floats:
     """(S,) or (N, S) to (S, n)."""
-    return np.array(np.array(array, ndmin=2, copy=None).T, order="C")
+    return np.array(array, ndmin=2).T.copy()
 
 
 def spots_of(ends: Floats, tolerance: float) -> list[tuple[int, int]]:
@@ -408,41 +410,3 @@ def spots_of(ends: Floats, tolerance: float) -> list[tuple[int, int]]:
                 break
         window.append(n)
     return list(zip(number[:count], number[count:], strict=True))
-
-
-def _distinct(spots: list[tuple[int, int]]) -> list[int]:
-    """Return the segments that do not lie on an earlier one."""
-    seen: dict[frozenset[int], int] = {}
-    for s, pair in enumerate(spots):
-        seen.setdefault(frozenset(pair), s)
-    return list(seen.values())
-
-
-def _points(count: int) -> tuple[list[tuple[int, int]], list[list[int]]]:
-    """No circles: a point meets the end of a segment with probability zero."""
-    return [], [[NONE, NONE] for _ in range(count)]
-
-
-def _ends(
-    spots: list[tuple[int, int]], pulley: bool
-) -> tuple[list[tuple[int, int]], list[list[int]]]:
-    """Give each distinct end of the segments a circle; the pulley stands for the first one's end.
-
-    Returns
-    -------
-    ends : list of (segment, end)
-        Where each of them is, first come.
-    circles : list of (int, int), (S,)
-        Obstacle number of the circle at each end of each segment, -1 for the one left out.
-    """
-    known: dict[int, int] = {}
-    ends, circles = _points(len(spots))
-    for s, pair in enumerate(spots):
-        for e, spot in enumerate(pair):
-            if pulley and s == 0 and e == 1:
-                continue
-            if spot not in known:
-                known[spot] = len(spots) + len(ends)
-                ends.append((s, e))
-            circles[s][e] = known[spot]
-    return ends, circles

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from sys import float_info
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from chutelab.engines.exact.detect import Bounds, Past
-from chutelab.engines.exact.event_log import STATE, Journal
+from chutelab.engines.exact.event_log import STATE, EventLog
 from chutelab.engines.exact.obstacles import NONE, Obstacles, along, obstacles, pick
 from chutelab.machine import Machine, origin
 from chutelab.mechanics.impact import DISK_SHARE
@@ -22,27 +22,19 @@ from chutelab.util.arrays import Bools, Floats, Ints, Numbers
 
 @dataclass(eq=False)
 class World:
-    """What all blocks share.
-
-    Attributes
-    ----------
-    machine : Machine
-        What is run.
-    origin : tuple of float
-        World point from which the engine counts positions, m.
-    obstacles : Obstacles
-        Its surfaces, from there.
-    """
+    """A machine as all blocks share it."""
 
     machine: Machine
-    origin: tuple[float, float]
-    obstacles: Obstacles
 
-    @classmethod
-    def of(cls, machine: Machine) -> Self:
-        """Resolve a machine."""
-        place = origin(machine)
-        return cls(machine, place, obstacles(machine, place))
+    @cached_property
+    def origin(self) -> tuple[float, float]:
+        """World point from which the engine counts positions, m."""
+        return origin(self.machine)
+
+    @cached_property
+    def obstacles(self) -> Obstacles:
+        """Its surfaces, from there."""
+        return obstacles(self.machine, self.origin)
 
     @cached_property
     def exit_box(self) -> tuple[Floats, Floats, Floats, Floats]:
@@ -87,7 +79,7 @@ class Contact(NamedTuple):
     surface: Ints
 
 
-class Swarm:
+class State:
     """State arrays of the particles from `first` up to `last`; age counts from their release.
 
     Attributes
@@ -128,7 +120,7 @@ class Swarm:
         self.world, self.machine = world, machine
         self.obstacles = world.obstacles.of(first, last)
         self.origin = np.reshape(world.origin, (2, 1)) if any(world.origin) else None
-        self.journal = Journal(first, count)
+        self.log = EventLog(first, count)
         mine, particle = slice(first, last), machine.particle
         self.radius, self.mass, self.gravity, inertia, end = (
             world.of_each(value)[mine]
@@ -180,22 +172,22 @@ class Swarm:
     def hand_over(self, recorder: Recorder) -> None:
         """Give all that was written down to the recorder."""
         recorder.ended[self.first : self.first + len(self.ended)] = self.ended
-        self.journal.close(recorder)
+        self.log.close(recorder)
 
-    def count_idle(self, who: Ints, dt: Floats) -> None:
+    def count_idle(self, index: Ints, dt: Floats) -> None:
         """Count events in a row that take no time, and raise rather than hang if they never end."""
-        moved = dt > ROUNDING * self.age[who]
-        still = int(np.count_nonzero(moved)) < len(who)
+        moved = dt > ROUNDING * self.age[index]
+        still = int(np.count_nonzero(moved)) < len(index)
         self.idling = still or (self.idling and bool(self.idle.any()))
         if not self.idling:
             return
-        self.idle[who] = np.where(moved, 0, self.idle[who] + 1)
-        if self.idle[who].max() > 2 * COLLAPSE:
+        self.idle[index] = np.where(moved, 0, self.idle[index] + 1)
+        if self.idle[index].max() > 2 * COLLAPSE:
             reason = (
                 f"{2 * COLLAPSE} events in a row took no time; look for surfaces that nearly"
                 " touch where it is, and join their ends or move them apart"
             )
-            raise self.stalled(int(who[np.argmax(self.idle[who])]), reason)
+            raise self.stalled(int(index[np.argmax(self.idle[index])]), reason)
 
     def stalled(self, particle: int, reason: str) -> StalledError:
         """Say that a particle, numbered within the block, does not get on."""
@@ -214,12 +206,12 @@ class Swarm:
             if count and mode != Mode.DONE
         ]
 
-    def omega(self, who: Ints) -> Floats:
+    def omega(self, index: Ints) -> Floats:
         """Angular velocities, rad/s."""
-        return self.z[who] / self.radius[who] if self.spins else np.zeros(len(who))
+        return self.z[index] / self.radius[index] if self.spins else np.zeros(len(index))
 
     def contact(
-        self, who: Ints, obstacle: Ints, side: Floats, normal: Floats | None = None
+        self, index: Ints, obstacle: Ints, side: Floats, normal: Floats | None = None
     ) -> Contact:
         """Return what a contact with an obstacle is like where the particles are now.
 
@@ -227,92 +219,92 @@ class Swarm:
         """
         o = self.obstacles
         if normal is None:
-            normal = o.normal_at(who, obstacle, side, self.p)
-        tangent, material = along(normal), pick(o.material, who, obstacle)
+            normal = o.normal_at(index, obstacle, side, self.p)
+        tangent, material = along(normal), pick(o.material, index, obstacle)
         open_ = (side == 0.0).nonzero()[0]
         if len(open_):
             side = side.copy()
-            side[open_] = o.rim_side(who[open_], obstacle[open_], normal[:, open_])
+            side[open_] = o.rim_side(index[open_], obstacle[open_], normal[:, open_])
         speed, restitution, friction = material
         return Contact(normal, tangent, side * speed, friction, restitution, o.surface[obstacle])
 
-    def at(self, who: Ints) -> Ints | slice:
+    def at(self, index: Ints) -> Ints | slice:
         """Return what to assign by: a slice is several times as fast where it is everyone."""
-        return slice(None) if len(who) == len(self.mode) else who
+        return slice(None) if len(index) == len(self.mode) else index
 
-    def now(self, who: Ints) -> Floats:
+    def now(self, index: Ints) -> Floats:
         """Return the particles as rows of a knot, (9, k)."""
-        everyone = len(who) == len(self.mode)
-        state = self.state.copy() if everyone else self.state.take(who, axis=1)
+        everyone = len(index) == len(self.mode)
+        state = self.state.copy() if everyone else self.state.take(index, axis=1)
         if self.staggered:
-            state[0] += self.released if everyone else self.released[who]
+            state[0] += self.released if everyone else self.released[index]
         if self.origin is not None:
             state[1:3] += self.origin
         if self.spins:
-            state[5] /= self.radius if everyone else self.radius[who]
+            state[5] /= self.radius if everyone else self.radius[index]
         return state
 
-    def knots(self, who: Ints) -> None:
+    def knots(self, index: Ints) -> None:
         """Write a knot for each of the particles as they are now."""
-        if len(who):
-            self.journal.knots(who, self.now(who))
+        if len(index):
+            self.log.knots(index, self.now(index))
 
-    def event(self, kind: int | Ints, who: Ints, surface: int | Ints = NONE) -> None:
+    def event(self, kind: int | Ints, index: Ints, surface: int | Ints = NONE) -> None:
         """Write an event for each of the particles as they are now, without an impulse."""
-        if len(who):
-            state = self.now(who)
-            self.journal.events(kind, who, surface, state)
+        if len(index):
+            state = self.now(index)
+            self.log.events(kind, index, surface, state)
 
     def book(
         self,
-        who: Ints,
+        index: Ints,
         surface: Ints,
         belt_work: ArrayLike = 0.0,
         restitution_loss: ArrayLike = 0.0,
         friction_loss: ArrayLike = 0.0,
     ) -> None:
         """Book ledger entries (J) on particles (k,), each once, and on the surfaces they met."""
-        if not len(who):
+        if not len(index):
             return
-        rows = np.empty((3, len(who)))
+        rows = np.empty((3, len(index)))
         rows[0], rows[1], rows[2] = belt_work, restitution_loss, friction_loss
-        self.entries[:, self.at(who)] += rows
-        self.journal.book(who, surface, rows)
+        self.entries[:, self.at(index)] += rows
+        self.log.book(index, surface, rows)
 
-    def finish(self, who: Ints, reason: str) -> None:
+    def finish(self, index: Ints, reason: str) -> None:
         """End the tracks of the particles."""
-        if not len(who):
+        if not len(index):
             return
-        self.mode[who] = Mode.DONE
-        self.ended[who] = REASONS.index(reason)
+        self.mode[index] = Mode.DONE
+        self.ended[index] = REASONS.index(reason)
 
-    def fly(self, who: Ints, left: ArrayLike, side: ArrayLike, order: ArrayLike) -> None:
+    def fly(self, index: Ints, left: ArrayLike, side: ArrayLike, order: ArrayLike) -> None:
         """Let the particles go, away from the obstacle they touched."""
-        at = self.at(who)
+        at = self.at(index)
         self.mode[at] = Mode.FLIGHT
         self.on[at], self.side[at], self.slip[at] = NONE, 0.0, 1.0
         self.left[at], self.left_side[at], self.order[at] = left, side, order
 
-    def part(self, who: Ints, surface: int | Ints) -> None:
+    def part(self, index: Ints, surface: int | Ints) -> None:
         """Tell that particles leave a surface."""
-        self.event(int(Kind.SEPARATION), who, surface)
+        self.event(int(Kind.SEPARATION), index, surface)
 
-    def weight_on(self, who: Ints, normal: Floats) -> Floats:
+    def weight_on(self, index: Ints, normal: Floats) -> Floats:
         """Component of gravity into a surface of that normal, m/s²."""
-        return np.asarray(self.gravity[who] * normal[1])
+        return np.asarray(self.gravity[index] * normal[1])
 
-    def weight_along(self, who: Ints, normal: Floats) -> Floats:
+    def weight_along(self, index: Ints, normal: Floats) -> Floats:
         """Component of gravity along (n_y, -n_x), m/s²."""
-        return np.asarray(self.gravity[who] * normal[0])
+        return np.asarray(self.gravity[index] * normal[0])
 
-    def slip_of(self, who: Ints, contact: Contact, w: Floats) -> Floats:
+    def slip_of(self, index: Ints, contact: Contact, w: Floats) -> Floats:
         """Slip of the contact point against the surface at a pace w, (k,), m/s.
 
         Exactly 0 below rounding.
         """
         slip, scale = w - contact.belt, np.abs(w) + np.abs(contact.belt)
         if self.spins:
-            z = self.z[who]
+            z = self.z[index]
             slip, scale = w + z - contact.belt, scale + np.abs(z)
         slip[np.abs(slip) <= NO_SLIP * scale] = 0.0
         return slip

@@ -2,10 +2,9 @@
 
 ===============  ==================================================================================
 `moments`        which moments are shown, for how long each, and what happened, in words
-`palette`        the colours of every film; numbers that change with every frame
 `actors`         what moves: particles, arrows, belts, pulley, and the energy bars
 `stage`          where everything is: a background drawn once, and what moves on it
-`files`          `animate`: all of it as a GIF, or as mp4 or webm
+`files`          `animate`: all of it as a GIF in a few fixed colours, or as mp4 or webm
 ===============  ==================================================================================
 """
 

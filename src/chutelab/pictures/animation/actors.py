@@ -17,7 +17,14 @@ from PIL import ImageDraw, ImageFont
 from chutelab.machine import Machine
 from chutelab.pictures.colours import tint
 from chutelab.pictures.plots import style
-from chutelab.pictures.plots.scenery import round_times, strobe_step, subset, track_times
+from chutelab.pictures.plots.scenery import (
+    nominal,
+    spread,
+    strobe_step,
+    strobe_times,
+    subset,
+    track_times,
+)
 from chutelab.results import Recording
 from chutelab.util.arrays import Floats
 
@@ -72,19 +79,18 @@ class Nominal:
         arrow: float,
         strobe: bool,
     ) -> None:
-        begin, end = (float(recording.track(0)["t"][k]) for k in (0, -1))
-        lone = subset(recording, [0])
         self.times = times
-        self.position, self.velocity = (values[:, 0] for values in lone.at(times))
-        filmed = times[(times >= begin) & (times <= end)]
-        self.passed = np.union1d(filmed, track_times(recording, begin, end))
-        self.path = lone.at(self.passed)[0][:, 0]
+        self.position, self.velocity = nominal(recording, times)
+        clock = recording.track(0)["t"]
+        filmed = times[(times >= clock[0]) & (times <= clock[-1])]
+        self.passed = np.union1d(filmed, track_times(recording))
+        self.path, _ = nominal(recording, self.passed)
         self.step = strobe_step(recording)
-        self.round = round_times(begin, end, self.step)
-        self.stops = lone.at(self.round)[0][:, 0]
+        self.round = strobe_times(recording)
+        self.stops, _ = nominal(recording, self.round)
         self.reach = trail
         (self.trail,) = ax.plot([], [], color=style.TRACK, linewidth=2.0, animated=True)
-        self.strobe = _rings(ax, animated=True)
+        (self.strobe,) = ax.plot([], [], **style.RINGS, ms=4.5, animated=True)
         self.arrow = arrow
         # In m/s, `arrow` m long for each: two components and the whole, over them. Heads of short
         # arrows shrink with them.
@@ -133,8 +139,7 @@ class Nominal:
         (dot,) = ax.plot([], [], "o", color=style.STRIKE, markersize=6.0, label="particle 0")
         handles = [dot]
         if self._strobes:
-            handles.append(_rings(ax, animated=False))
-            handles[-1].set_label(f"every {self.step:g} s")
+            handles += ax.plot([], [], **style.RINGS, ms=4.5, label=f"every {self.step:g} s")
         if self.arrow:
             handles += ax.plot([], [], color=style.INK, linewidth=2.0, label="velocity")
         return handles
@@ -151,13 +156,11 @@ class Crowd:
 
     def __init__(self, ax: Axes, recording: Recording, times: Floats, *, trail: float) -> None:
         self.count = recording.count
-        sizes = np.diff(recording.offsets)
-        released = np.flatnonzero(sizes > 0)
+        released = np.diff(recording.offsets) > 0
         first, last = recording.ends()
-        during = released[(first["t"] <= times[-1]) & (last["t"] >= times[0])]
+        during = released.nonzero()[0][(first["t"] <= times[-1]) & (last["t"] >= times[0])]
         others = during[during != 0]
-        keep = np.linspace(0, max(len(others) - 1, 0), min(len(others), DRAWN - 1))
-        self.particles = others[np.unique(keep.astype(np.int64))]
+        self.particles = others[spread(len(others), DRAWN - 1)]
         self.thinned = len(others) > len(self.particles)
         self.positions = subset(recording, self.particles).at(times)[0]
         # A trail reaches back to the picture before at least.
@@ -201,10 +204,8 @@ class Drives:
         self.spacing = float(np.ptp(ax.get_xlim())) / MARKS
         pulley = machine.pulley
         size = 0.0 if pulley is None else min(_points(ax, 0.3 * pulley.radius), SMALLEST)
-        (self.marks,) = ax.plot([], [], "o", markersize=3.2, color="white", animated=True)
-        (self.holes,) = ax.plot([], [], "o", markersize=size, color=style.STEEL, animated=True)
-        self.holes.set_markeredgewidth(0.0)
-        self.marks.set_markeredgewidth(0.0)
+        (self.marks,) = ax.plot([], [], "o", ms=3.2, mew=0.0, color="white", animated=True)
+        (self.holes,) = ax.plot([], [], "o", ms=size, mew=0.0, color=style.STEEL, animated=True)
 
     @property
     def artists(self) -> list[Artist]:
@@ -234,30 +235,9 @@ def _points(ax: Axes, length: float) -> float:
 
 def _dots(ax: Axes, radius: float, color: str) -> Line2D:
     """Return disks to scale (m), or of `SMALLEST` size."""
-    (dots,) = ax.plot(
-        [],
-        [],
-        "o",
-        markersize=max(_points(ax, 2.0 * radius), SMALLEST),
-        markeredgewidth=0.4,
-        markeredgecolor="white",
-        markerfacecolor=color,
-        animated=True,
-    )
+    size = max(_points(ax, 2.0 * radius), SMALLEST)
+    (dots,) = ax.plot([], [], "o", color=color, ms=size, mew=0.4, mec="white", animated=True)
     return dots
-
-
-def _rings(ax: Axes, *, animated: bool) -> Line2D:
-    (rings,) = ax.plot(
-        [],
-        [],
-        "o",
-        markersize=4.5,
-        markerfacecolor="white",
-        markeredgecolor=style.TRACK,
-        animated=animated,
-    )
-    return rings
 
 
 SIGNS = {

@@ -204,20 +204,13 @@ def animate(
         raise ValueError(f"{width} x {height} pixels: allowed in a video are even numbers")
     frame_delay(fps)
     shows = frozenset([show] if isinstance(show, str) else show)
-    machine = recording.machine
     layout = lay_out(
-        recording,
-        machine,
-        width=width,
-        height=height,
-        title=title,
-        question=question,
-        shows=shows,
+        recording, width=width, height=height, title=title, question=question, shows=shows
     )
     begin, end = span(recording, layout.window)
     pace = slowness(end - begin) if slow is None else slow
     moments = film(recording, begin, end, fps=fps, slow=pace)
-    stage = Stage(recording, machine, recording.prediction, layout, moments, slow=pace)
+    stage = Stage(recording, layout, moments, slow=pace)
     pictures = map(stage.frame, range(len(moments)))
     delays = [moment.delay for moment in moments]
     with whole(path) as unfinished:

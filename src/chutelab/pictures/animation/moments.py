@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from chutelab.machine import Machine
 from chutelab.pictures.plots import Window
-from chutelab.pictures.plots.scenery import STRUCK, action, subset
+from chutelab.pictures.plots.scenery import STRUCK, action, nominal
 from chutelab.pictures.plots.style import quantity
 from chutelab.results import PARTICLES, Kind, Recording
 from chutelab.util.arrays import Bools, Floats, Ints
@@ -127,7 +127,7 @@ def in_flight(recording: Recording, times: Floats, near: float) -> Bools:
     Just before a time or just after it, within `near` seconds: an impact is in flight too.
     """
     moments = times[:, None] + np.array([-near, 0.0, near])
-    velocity = subset(recording, [0]).at(moments.ravel())[1].reshape(*moments.shape, 2)
+    velocity = nominal(recording, moments.ravel())[1].reshape(*moments.shape, 2)
     pulled = np.diff(velocity, axis=1) / near + np.array([0.0, recording.gravity])
     least = 1e-6 * max(recording.gravity, float(np.abs(pulled[np.isfinite(pulled)]).max(initial=0)))
     return np.asarray((np.hypot(*np.moveaxis(pulled, 2, 0)) <= least).any(axis=1))
@@ -200,7 +200,9 @@ def film(
     if not 0.0 < slow < float("inf"):
         raise ValueError(f"slow = {slow!r}: allowed is a positive number")
     step = 0.01 * delay / slow
-    mine = _events_of_nominal(recording, begin, end)
+    events = recording.events
+    mine = events[(events["particle"] == 0) | (events["other"] == 0)]
+    mine = mine[(mine["t"] >= begin) & (mine["t"] <= end)]
     held = _held(mine)
     stops = mine["t"][held]
     times = np.linspace(begin, end, max(2, round((end - begin) / step) + 1))
@@ -242,7 +244,7 @@ def span(recording: Recording, shown: Window) -> tuple[float, float]:
     times = np.linspace(first, max(action(recording)[0], first), 400)
     inset = max(EDGE, recording.particle.radius / max(shown.width, shown.height))
     all_of_it = shown.padded(*[-inset] * 4)
-    inside = all_of_it.holds(subset(recording, [0]).at(times)[0][:, 0])
+    inside = all_of_it.holds(nominal(recording, times)[0])
     begin = float(times[np.argmax(inside)]) if inside.any() else first
     end = float(recording.knots["t"].max())
     return begin, min(end, begin + LIVES * (last - begin)) if last > begin else end
@@ -260,12 +262,6 @@ def slowness(length: float) -> float:
     power = floor(log10(exact))
     mantissa = exact / 10.0**power
     return float(f"{max(m for m in (1, 1.5, 2, 3, 4, 5, 6, 8) if m <= mantissa)}e{power}")
-
-
-def _events_of_nominal(recording: Recording, begin: float, end: float) -> NDArray[Any]:
-    events = recording.events
-    mine = (events["particle"] == 0) | (events["other"] == 0)
-    return np.asarray(events[mine & (events["t"] >= begin) & (events["t"] <= end)])
 
 
 def _held(mine: NDArray[Any]) -> Ints:
@@ -300,18 +296,22 @@ def _words(
     told[held] = True
     stories = np.flatnonzero(told)
     lines = [f"t = {mine['t'][i]:.3f} s: {sentence(recording, mine[i])}" for i in stories]
-    carried = "rides the incoming belt" if _is_carried(recording, mine) else ""
+    # Particle 0 comes on the incoming belt if that is the first thing it leaves.
+    struck = np.isin(mine["kind"], [int(kind) for kind in STRUCK])
+    first = mine[struck | (mine["kind"] == Kind.SEPARATION)][:1]
+    incoming = recording.surface_index("incoming")
+    carried = any((first["kind"] == Kind.SEPARATION) & (first["surface"] == incoming))
     gone = float(recording.track(0)["t"][-1])
     near = 0.25 * float(np.diff(times).min(initial=np.inf))
     flying = in_flight(recording, times, near)
-    still: Bools = ~np.any(subset(recording, [0]).at(times)[1], axis=(1, 2))
+    still = ~np.any(nominal(recording, times)[1], axis=1)
     captions = []
-    for t, flies, lies in zip(times, flying.tolist(), np.asarray(still).tolist(), strict=True):
+    for t, flies, lies in zip(times, flying.tolist(), still.tolist(), strict=True):
         story = int(np.searchsorted(mine["t"][stories], t, side="right")) - 1
         if story >= 0 and _still_told(mine[stories[story]], t, slow, flying=flies):
             captions.append(lines[story])
         elif story < 0 and carried:
-            captions.append(carried)
+            captions.append("rides the incoming belt")
         else:
             latest = int(np.searchsorted(mine["t"], t, side="right")) - 1
             known = latest >= 0 and t <= gone
@@ -322,14 +322,6 @@ def _words(
         at = int(np.searchsorted(times, mine["t"][i]))
         captions[at] = lines[int(np.searchsorted(stories, i))]
     return captions
-
-
-def _is_carried(recording: Recording, mine: NDArray[Any]) -> bool:
-    """Tell whether particle 0 comes on the incoming belt: that is the first it leaves."""
-    struck = np.isin(mine["kind"], [int(kind) for kind in STRUCK])
-    leaves = np.flatnonzero(struck | (mine["kind"] == Kind.SEPARATION))
-    incoming = recording.surface_index("incoming")
-    return bool(len(leaves)) and not struck[leaves[0]] and mine["surface"][leaves[0]] == incoming
 
 
 def _still_told(event: Any, t: float, slow: float, *, flying: bool) -> bool:

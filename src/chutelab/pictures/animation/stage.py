@@ -14,14 +14,11 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from PIL import Image, ImageDraw
 
-from chutelab.machine import Machine
 from chutelab.pictures.animation.actors import LONGEST, Bars, Crowd, Drives, Nominal, Writing
 from chutelab.pictures.animation.moments import Moment, span
 from chutelab.pictures.plots import Window, analytic_of, draw_analytic, draw_scene, style, window_of
-from chutelab.pictures.plots.scenery import around, energies, round_step, subset, track_times
+from chutelab.pictures.plots.scenery import around, energies, nominal, round_step, track_times
 from chutelab.results import Recording
-from chutelab.theory import Transfer
-from chutelab.util.arrays import Floats
 
 Box = tuple[float, float, float, float]
 
@@ -46,7 +43,7 @@ LETTER_ROOM = 0.015
 
 @dataclass(frozen=True)
 class Layout:
-    """Where everything is; boxes are left, bottom, width and height as shares of the picture.
+    """Where everything is; a box is left, bottom, width and height as shares of the picture.
 
     Attributes
     ----------
@@ -56,6 +53,8 @@ class Layout:
         What stands above the scene; the question may be empty.
     shows : frozenset of str
         Some of `SHOWS`.
+    view : tuple of float
+        Where the scene is.
     window : Window
         What of the world is shown, of the shape of `view`.
     fastest : float
@@ -67,51 +66,31 @@ class Layout:
     title: str
     question: str
     shows: frozenset[str]
+    view: Box
     window: Window
     fastest: float
+
+    def reach(self, share: float, what: str) -> float:
+        """Return the time (s) in which particle 0's highest speed covers a share of the window.
+
+        As much as arrows (in m for 1 m/s) and trails are long; 0 if `what` is not shown.
+        """
+        shown = what in self.shows and self.fastest > 0.0
+        return share * self.window.width / self.fastest if shown else 0.0
 
     @property
     def arrow(self) -> float:
         """Length of the arrow of the velocity for 1 m/s, m; 0: there is none."""
-        return self._reach(LONGEST) if "velocity" in self.shows else 0.0
-
-    @property
-    def trail(self) -> float:
-        """Time that trails reach back, s; 0: there are none."""
-        return self._reach(TRAIL) if "trails" in self.shows else 0.0
-
-    def _reach(self, share: float) -> float:
-        return share * self.window.width / self.fastest if self.fastest > 0.0 else 0.0
+        return self.reach(LONGEST, "velocity")
 
     @property
     def dpi(self) -> float:
         """Pixels to the inch."""
         return min(self.width / INCHES[0], self.height / INCHES[1])
 
-    @property
-    def view(self) -> Box:
-        """The scene."""
-        return _view(self.shows, self.question)
-
-    @property
-    def bars(self) -> Box:
-        """The energy bars; above them is room for their title, and the clock."""
-        _, bottom, _, height = self.view
-        return (0.765, 0.43, 0.225, bottom + height - 0.06 - 0.43)
-
-    @property
-    def table(self) -> Box:
-        """The names and figures of the bars."""
-        return (0.73, 0.125, 0.26, 0.245)
-
-
-def _view(shows: frozenset[str], question: str) -> Box:
-    return (0.015, 0.135, 0.675 if "energy" in shows else 0.97, 0.65 if question else 0.71)
-
 
 def lay_out(
     recording: Recording,
-    machine: Machine,
     *,
     width: int,
     height: int,
@@ -130,32 +109,26 @@ def lay_out(
         raise ValueError(f"{width} x {height} pixels: allowed are at least {LEAST[0]} x {LEAST[1]}")
     if unknown := sorted(shows - set(SHOWS)):
         raise ValueError(f"show = {unknown[0]!r}: allowed are {', '.join(SHOWS)}")
-    view = _view(shows, question)
+    view = (0.015, 0.135, 0.675 if "energy" in shows else 0.97, 0.65 if question else 0.71)
     aspect = view[2] * width / (view[3] * height)
-    window = window_of(recording, machine).fitted(aspect)
-    position, velocity = _seen(recording, window)
+    pulley = recording.machine.pulley
+    window = window_of(recording, recording.machine).fitted(aspect)
+    begin, end = span(recording, window)
+    times = track_times(recording, begin, min(end, float(recording.track(0)["t"][-1])))
+    position, velocity = nominal(recording, times)
+    # What has left it for good shall not make all else small.
+    inside = window.holds(position)
+    position, velocity = position[inside], velocity[inside]
     fastest = float(np.hypot(*velocity.T).max(initial=0.0))
     said = recording.title if title is None else title
-    tight = Layout(width, height, said, question, shows, window, fastest)
+    tight = Layout(width, height, said, question, shows, view, window, fastest)
     corners = [(window.left, window.bottom), (window.right, window.top)]
-    if machine.pulley is not None:
-        corners.append((-machine.pulley.radius - NAME * window.width, 0.0))
+    if pulley is not None:
+        corners.append((-pulley.radius - NAME * window.width, 0.0))
     room = LETTER_ROOM * window.width
     tips = position + tight.arrow * velocity
     grown = around(np.concatenate([corners, tips - room, tips + room]))
     return replace(tight, window=grown.fitted(aspect))
-
-
-def _seen(recording: Recording, window: Window) -> tuple[Floats, Floats]:
-    """Return positions and velocities of particle 0, (P, 2), while it is filmed in the window.
-
-    What has left it for good shall not make all else small.
-    """
-    begin, end = span(recording, window)
-    times = track_times(recording, begin, min(end, float(recording.track(0)["t"][-1])))
-    position, velocity = (values[:, 0] for values in subset(recording, [0]).at(times))
-    inside = window.holds(position)
-    return position[inside], velocity[inside]
 
 
 TITLE = 0.942
@@ -181,10 +154,6 @@ class Stage:
     ----------
     recording : Recording
         From either engine.
-    machine : Machine
-        The one it was made on.
-    prediction : Transfer
-        For the analytic parabola.
     layout : Layout
         Where everything is, and which part of the world is shown.
     moments : tuple of Moment
@@ -196,8 +165,6 @@ class Stage:
     def __init__(
         self,
         recording: Recording,
-        machine: Machine,
-        prediction: Transfer,
         layout: Layout,
         moments: tuple[Moment, ...],
         *,
@@ -211,22 +178,30 @@ class Stage:
         self.canvas = cast(Any, FigureCanvasAgg(self.figure))  # its methods are not annotated
         self.view = self.figure.add_axes(layout.view)
         shows = layout.shows
-        _draw_background(self.view, machine, layout.window)
+        draw_scene(self.view, recording.machine, layout.window)
+        self.view.set(xticks=[], yticks=[])
+        for spine in self.view.spines.values():
+            spine.set_color(style.STEEL_LIGHT)
+        _draw_scale(self.view)
         if "parabola" in shows:
-            draw_analytic(self.view, analytic_of(recording, prediction)[0])
-        self.drives = Drives(self.view, machine)
-        self.crowd = Crowd(self.view, recording, times, trail=layout.trail)
+            draw_analytic(self.view, analytic_of(recording, recording.prediction)[0])
+        trail = layout.reach(TRAIL, "trails")
+        self.drives = Drives(self.view, recording.machine)
+        self.crowd = Crowd(self.view, recording, times, trail=trail)
         self.nominal = Nominal(
             self.view,
             recording,
             times,
-            trail=layout.trail,
+            trail=trail,
             arrow=layout.arrow,
             strobe="strobe" in shows,
         )
         self.bars = None
         if "energy" in shows:
-            axes, table = (self.figure.add_axes(box) for box in (layout.bars, layout.table))
+            # Above the bars is room for their title, and the clock.
+            top = layout.view[1] + layout.view[3] - 0.06
+            axes = self.figure.add_axes((0.765, 0.43, 0.225, top - 0.43))
+            table = self.figure.add_axes((0.73, 0.125, 0.26, 0.245))
             self.bars = Bars(axes, table, energies(recording, times))
         self._add_legend()
         self._add_text(layout, pace_words(slow))
@@ -340,27 +315,12 @@ def pace_words(slow: float) -> str:
     return f"{slow:.3g}× slower" if slow > 1.0 else f"{1.0 / slow:.3g}× faster"
 
 
-def _draw_background(ax: Axes, machine: Machine, window: Window) -> None:
-    draw_scene(ax, machine, window)
-    ax.set_xticks([])
-    ax.set_yticks([])
-    for spine in ax.spines.values():
-        spine.set_color(style.STEEL_LIGHT)
-    _draw_scale(ax)
-
-
 def _draw_scale(ax: Axes) -> None:
     """Draw a bar of round length in the upper left corner: the picture has no ticks."""
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
     length = round_step(right - left, 6)
     x, y = left + 0.015 * (right - left), top - 0.08 * (top - bottom)
     ax.plot([x, x + length], [y, y], color=style.MUTED, linewidth=2.0, solid_capstyle="butt")
-    ax.text(
-        x + 0.5 * length,
-        y + 0.012 * (top - bottom),
-        f"{length:g} m",
-        fontsize=style.SMALL,
-        color=style.MUTED,
-        ha="center",
-        va="bottom",
-    )
+    middle = x + 0.5 * length, y + 0.012 * (top - bottom)
+    said = ax.text(*middle, f"{length:g} m", ha="center", va="bottom")
+    said.set(fontsize=style.SMALL, color=style.MUTED)

@@ -81,7 +81,7 @@ def write(
     ------
     VaryError
         If what is to be varied cannot be.
-    PageError
+    InputError
         If there is too much for a page, or no variant runs.
 
     Notes

@@ -43,10 +43,6 @@ MOST_KNOTS: Final = 100_000
 """Knots of all variants together: a page of about 10 MB."""
 
 
-class PageError(InputError):
-    """What cannot be made a page of; the text says why, and what can."""
-
-
 @dataclass(frozen=True, eq=False)
 class Outcome:
     """A variant: what became of it, or why nothing did.
@@ -112,7 +108,7 @@ def study(
     ------
     VaryError
         If what is to be varied cannot be.
-    PageError
+    InputError
         If there is too much for a page, or no variant runs.
     """
     varied = tuple(parse(vary) if isinstance(vary, str) else vary for vary in varies)
@@ -125,7 +121,7 @@ def study(
         recording = outcomes[-1].recording
         knots += 0 if recording is None else len(recording.knots)
         if knots > MOST_KNOTS:
-            raise PageError(
+            raise InputError(
                 f"{number + 1} of {len(found)} variants have {knots} knots already, at most"
                 f" {MOST_KNOTS} fit on a page: vary in fewer steps, or take fewer particles with"
                 " --set stream.count=..."
@@ -134,7 +130,7 @@ def study(
             progress((number + 1) / len(found))
     result = Study(scene, varied, quantities(scene, varied), tuple(outcomes))
     if not result.sound:
-        raise PageError(f"{scene.source}: no variant can be run; the first: {outcomes[0].fault}")
+        raise InputError(f"{scene.source}: no variant can be run; the first: {outcomes[0].fault}")
     return result
 
 
@@ -143,7 +139,7 @@ def _check(found: Sequence[Variant]) -> None:
     scenes = [variant.scene for variant in found if variant.scene is not None]
     most = max((scene.stream.count for scene in scenes), default=0)
     if most > MOST_PARTICLES:
-        raise PageError(
+        raise InputError(
             f"stream.count = {most}: a page shows at most {MOST_PARTICLES} particles; add"
             f" --set stream.count={MOST_PARTICLES}"
         )
@@ -152,7 +148,7 @@ def _check(found: Sequence[Variant]) -> None:
         for scene in scenes
     )
     if stepped > MOST_STEPPED:
-        raise PageError(
+        raise InputError(
             f"{stepped} variants are stepped, at most {MOST_STEPPED} are allowed,"
             " because each may take seconds: vary in fewer steps, or add"
             " --set stream.interact=false --set run.engine=exact"

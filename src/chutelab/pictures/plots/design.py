@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from chutelab.pictures.plots import style
-from chutelab.pictures.plots.style import DPI, Picture
+from chutelab.pictures.plots.style import Picture
 from chutelab.scene.units import symbol, with_unit
 from chutelab.studies.design import Solution, Uncertainty
 from chutelab.studies.sweep import NUMBERS, REASON, Sweep
@@ -43,7 +43,7 @@ def scan(solution: Solution, *, path: str | Path | None = None) -> Figure:
     OSError
         If the file cannot be written.
     """
-    figure = _figure(SIZE)
+    figure = Picture(SIZE)
     ax = figure.add_axes((0.105, 0.115, 0.865, 0.66))
     draw_scan(ax, solution)
     _titles(figure, solution.base.title, solution.asked)
@@ -58,8 +58,7 @@ def draw_scan(ax: Axes, solution: Solution) -> Axes:
     if found is None:
         raise ValueError("several keys were varied: there is no line to draw")
     key, (name, *_), (unit, *_) = solution.ranges[0], solution.quantities, solution.units
-    finite = np.abs(found.values[np.isfinite(found.values)])
-    factor, said = _scaled(float(finite.max()) if len(finite) else 0.0, unit)
+    factor, said = _scaled(found.values, unit)
     style.dress(ax, with_unit(key.key, key.unit), with_unit(name, said))
     label = name
     for piece in found.pieces:
@@ -130,8 +129,8 @@ def spread(found: Uncertainty, *, path: str | Path | None = None) -> Figure:
         If the file cannot be written.
     """
     rows = len(found.quantities)
-    figure = _figure((13.0, 1.4 + 3.1 * rows))
     height = 1.4 + 3.1 * rows
+    figure = Picture((13.0, height))
     grid = figure.add_gridspec(
         rows, 3, left=0.06, right=0.985, top=1.0 - 1.15 / height, bottom=0.55 / height,
         hspace=0.42, wspace=0.36, width_ratios=(1.0, 1.0, 1.0),
@@ -155,7 +154,7 @@ def draw_distribution(ax: Axes, found: Uncertainty, row: int) -> Axes:
     """Draw the distribution of a quantity, its mean and its 95 % interval."""
     values = found.outputs[:, row]
     values = values[np.isfinite(values)]
-    factor, unit = _scaled(float(np.abs(values).max()) if len(values) else 0.0, found.units[row])
+    factor, unit = _scaled(values, found.units[row])
     name = found.quantities[row]
     style.dress(ax, with_unit(name, unit), "samples", name)
     if not len(values):
@@ -166,9 +165,7 @@ def draw_distribution(ax: Axes, found: Uncertainty, row: int) -> Axes:
     )
     ax.axvspan(low, high, color=style.STEEL_LIGHT, zorder=0.5)
     ax.axvline(factor * found.mean[row], color=style.INK, linewidth=1.4, zorder=4.0)
-    ax.set_title(
-        f"95 %: {low:.4g} to {high:.4g}", fontsize=style.SMALL, loc="right", color=style.MUTED
-    )
+    style.note(ax, f"95 %: {low:.4g} to {high:.4g}")
     return ax
 
 
@@ -178,14 +175,9 @@ def draw_strongest(ax: Axes, found: Uncertainty, row: int) -> Axes:
     k = int(np.argmax(first))
     one = found.spreads[k]
     values = found.outputs[:, row]
-    finite = np.abs(values[np.isfinite(values)])
-    factor, unit = _scaled(float(finite.max()) if len(finite) else 0.0, found.units[row])
-    style.dress(
-        ax,
-        with_unit(one.key, one.unit),
-        with_unit(found.quantities[row], unit),
-        f"against {one.key}",
-    )
+    factor, unit = _scaled(values, found.units[row])
+    quantity = with_unit(found.quantities[row], unit)
+    style.dress(ax, with_unit(one.key, one.unit), quantity, f"against {one.key}")
     ax.plot(
         found.inputs[:, k], factor * values,
         linestyle="none", marker=".", markersize=3.0, color=style.TRACK, alpha=0.5, zorder=3.0,
@@ -221,10 +213,6 @@ def draw_shares(ax: Axes, found: Uncertainty, row: int) -> Axes:
     return ax
 
 
-def _figure(size: tuple[float, float]) -> Picture:
-    return Picture(figsize=size, dpi=DPI)
-
-
 def _titles(figure: Picture, title: str, text: str, wide: int = 95) -> None:
     """Write a title, and a line below it."""
     height = float(figure.get_figheight())
@@ -235,11 +223,9 @@ def _titles(figure: Picture, title: str, text: str, wide: int = 95) -> None:
     )  # fmt: skip
 
 
-def _scaled(largest: float, unit: str) -> tuple[float, str]:
+def _scaled(values: Floats, unit: str) -> tuple[float, str]:
     """Return a factor and the prefixed unit, for units that take prefixes."""
-    if unit in ("J", "W", "m") and largest:
-        return style.scaled(largest, unit)
-    return 1.0, unit
+    return style.scaled(values, unit) if unit in ("J", "W", "m") else (1.0, unit)
 
 
 SWEEP_SIZE = (8.6, 5.4)
@@ -277,7 +263,7 @@ def sweep_figure(swept: Sweep, column: str, *, path: str | Path | None = None) -
     """
     if column not in NUMBERS:
         raise ValueError(f"{column}: one of {', '.join(NUMBERS)}")
-    figure = Picture(figsize=SWEEP_SIZE, dpi=DPI)
+    figure = Picture(SWEEP_SIZE)
     ax = figure.add_subplot()
     axes = varied(swept)
     if swept.shape is None:
@@ -403,11 +389,9 @@ def _axis(swept: Sweep, column: str) -> tuple[float, str]:
     what = what if what.startswith(("x ", "y ")) else what[0].upper() + what[1:]
     if column.endswith("_spread"):
         what = f"Standard deviation of {column.removesuffix('_spread')}"
-    values = swept.columns[column]
-    known = np.abs(values[np.isfinite(values)])
-    if not unit or not len(known):
+    if not unit:
         return 1.0, what
-    factor, name = style.scaled(float(known.max()), unit)
+    factor, name = style.scaled(swept.columns[column], unit)
     return factor, f"{what}, {name}"
 
 

@@ -24,10 +24,10 @@ from chutelab.pictures.plots.panels import (
     draw_velocity,
 )
 from chutelab.pictures.plots.scenery import draw_scene, window_of
-from chutelab.pictures.plots.style import DPI, Picture
+from chutelab.pictures.plots.style import Picture
 from chutelab.results import Recording
 from chutelab.theory import Transfer
-from chutelab.theory.figures import Line, Panel, PaperFigure
+from chutelab.theory.figures import Panel, PaperFigure
 
 SIZE = (13.0, 7.6)
 """Width and height of the figure, inches."""
@@ -59,7 +59,7 @@ def overlay(
     """
     if prediction is None:
         prediction = recording.prediction
-    figure = Picture(figsize=SIZE, dpi=DPI)
+    figure = Picture(SIZE)
     grid = figure.add_gridspec(
         2, 1, height_ratios=(4.2, 1.0), left=0.06, right=0.56, top=0.88, bottom=0.08, hspace=0.28
     )
@@ -81,8 +81,13 @@ def overlay(
         columnspacing=1.0,
     )
     figure.headline(0.06, 0.965, recording.title)
-    engine = figure.text(0.985, 0.965, _said(recording), fontsize=style.NORMAL, color=style.MUTED)
-    engine.set(horizontalalignment="right", verticalalignment="center")
+    said = "one particle" if recording.count == 1 else f"{recording.count:,} particles"
+    if recording.count > STREAM_TRACKS:
+        said += f", {STREAM_TRACKS} tracks drawn"
+    engine = figure.text(
+        0.985, 0.965, f"engine {recording.engine}, {said}", ha="right", va="center"
+    )
+    engine.set(fontsize=style.NORMAL, color=style.MUTED)
     figure.write(path)
     return figure
 
@@ -95,15 +100,6 @@ def draw_view(ax: Axes, recording: Recording, parts: tuple[Arc, ...]) -> Axes:
     draw_tracks(draw_analytic(ax, parts), recording)
     style.legend_above(ax, 4)
     return ax
-
-
-def _said(recording: Recording) -> str:
-    if recording.count == 1:
-        return f"engine {recording.engine}, one particle"
-    said = f"engine {recording.engine}, {recording.count:,} particles"
-    if recording.count > STREAM_TRACKS:
-        said += f", {STREAM_TRACKS} tracks drawn"
-    return said
 
 
 WIDE = 185
@@ -144,7 +140,7 @@ def paper_figure(found: PaperFigure, *, path: str | Path | None = None) -> Figur
     panels = [panel for pair in found.panels for panel in pair]
     below = TEXT * lines + 0.85
     height = 1.0 + 4.1 + below
-    figure = Picture(figsize=(13.0, height), dpi=DPI)
+    figure = Picture((13.0, height))
     grid = figure.add_gridspec(
         1, len(panels), left=0.06, right=0.985, top=1.0 - 1.0 / height, bottom=below / height,
         wspace=0.16 if len(panels) == 2 else 0.3,
@@ -175,28 +171,17 @@ def draw_panel(ax: Axes, panel: Panel) -> Axes:
     """Draw one panel."""
     style.dress(ax, panel.x_label, panel.y_label, panel.title)
     for line in panel.lines:
-        _draw(ax, line)
+        color, solid = COLOURS[line.role], line.role in ("plate", "belt")
+        (drawn,) = ax.plot(line.x, line.y, color=color, label=line.label, gid=line.role)
+        drawn.set(linewidth=3.0 if solid else 1.8, zorder=3.0 if solid else 4.0)
+        drawn.set_linestyle(DASHES.get(line.role, "-"))
+        if line.marks is not None:
+            ax.plot(*line.marks.T, "o", color=color, ms=4.5, mfc="white", zorder=5.0)
     if panel.to_scale:
         ax.set_aspect("equal", adjustable="box")
     else:
         ax.legend(loc="best", fontsize=style.SMALL, framealpha=0.85, edgecolor="none")
     return ax
-
-
-def _draw(ax: Axes, line: Line) -> None:
-    solid = line.role in ("plate", "belt")
-    ax.plot(
-        line.x, line.y,
-        color=COLOURS[line.role], linewidth=3.0 if solid else 1.8,
-        linestyle=DASHES.get(line.role, "-"), label=line.label, zorder=3.0 if solid else 4.0,
-        gid=line.role,
-    )  # fmt: skip
-    if line.marks is not None:
-        ax.plot(
-            line.marks[:, 0], line.marks[:, 1],
-            linestyle="none", marker="o", markersize=4.5, color=COLOURS[line.role],
-            markerfacecolor="white", zorder=5.0,
-        )  # fmt: skip
 
 
 def _alike(left: Axes, right: Axes) -> None:
@@ -208,4 +193,4 @@ def _alike(left: Axes, right: Axes) -> None:
         ax.set_xlim(low[0] - margin[0], high[0] + margin[0])
         ax.set_ylim(low[1] - margin[1], high[1] + margin[1])
         if low[1] > 2.0 * margin[1]:
-            ax.set_title("axis not from 0", fontsize=style.SMALL, loc="right", color=style.MUTED)
+            style.note(ax, "axis not from 0")

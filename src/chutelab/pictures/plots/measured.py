@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,12 +16,12 @@ from chutelab.pictures.plots.scenery import (
     FAR,
     around,
     draw_scene,
+    nominal,
     struck_by_nominal,
-    subset,
     track_times,
     window_of,
 )
-from chutelab.pictures.plots.style import DPI, Picture
+from chutelab.pictures.plots.style import Picture
 from chutelab.results import Kind, Recording
 from chutelab.scene.units import write_size
 from chutelab.studies.measured import Fit, Residuals
@@ -31,6 +32,9 @@ PARAMETERS = 6
 """Fitted parameters that are written into the figure."""
 
 AXES = ("x", "y")
+
+POINTS: dict[str, Any] = {"ls": "none", "marker": "+", "ms": 7.0, "mew": 1.3}
+"""How measured points are drawn."""
 
 
 def measured(found: Residuals, fit: Fit | None = None, *, path: str | Path | None = None) -> Figure:
@@ -50,7 +54,7 @@ def measured(found: Residuals, fit: Fit | None = None, *, path: str | Path | Non
     OSError
         If the file cannot be written.
     """
-    figure = Picture(figsize=SIZE, dpi=DPI)
+    figure = Picture(SIZE)
     lines = 0 if fit is None else min(len(fit.parameters), PARAMETERS)
     top = 0.88 - 0.032 * max(0, lines - 1)
     view = figure.add_subplot(
@@ -91,26 +95,20 @@ def draw_measured(ax: Axes, found: Residuals, before: Recording | None = None) -
     draw_scene(ax, machine, around(np.concatenate([corners, position[shown]])))
     parts, _ = analytic_of(recording, recording.prediction)
     draw_analytic(ax, parts)
-    if before is not None:
-        ax.plot(
-            *_path(before).T,
-            color=style.MUTED, linewidth=1.4, linestyle=":", zorder=4.8, gid="before",
-            label="before the fit",
-        )  # fmt: skip
-    ax.plot(
-        *_path(recording).T,
-        color=style.TRACK, linewidth=1.6, zorder=5.0, gid="track", label="simulation",
-    )  # fmt: skip
+    for run, gid, colour, line, label in (
+        (before, "before", style.MUTED, ":", "before the fit"),
+        (recording, "track", style.TRACK, "-", "simulation"),
+    ):
+        if run is not None:
+            path, _ = nominal(run, track_times(run))
+            ax.plot(*path.T, line, color=colour, lw=1.6, zorder=5.0, gid=gid, label=label)
     for chosen, colour, label in (
         (found.used, style.STRIKE, "measured"),
         (~found.used, style.STEEL, "measured, left out"),
     ):
         if chosen.any():
-            ax.plot(
-                *position[chosen].T,
-                linestyle="none", marker="+", markersize=7.0, markeredgewidth=1.3, color=colour,
-                zorder=8.0, gid=label, label=label,
-            )  # fmt: skip
+            points = {**POINTS, "color": colour, "gid": label, "label": label}
+            ax.plot(*position[chosen].T, **points, zorder=8.0)
     if not shown.all():
         ax.text(
             0.5, 0.97, f"{counted(int((~shown).sum()), 'point')} outside the picture",
@@ -125,7 +123,7 @@ def draw_residuals(ax: Axes, found: Residuals, axis: int) -> Axes:
     """Draw measured minus simulated x (axis 0) or y (axis 1) over time, with the impacts."""
     used = found.used
     times, values = found.track.t[used], found.values[used, axis]
-    factor, unit = style.scaled(float(np.abs(values).max()), "m")
+    factor, unit = style.scaled(values, "m")
     name, rms = AXES[axis], found.rms[axis]
     style.dress(
         ax,
@@ -135,14 +133,11 @@ def draw_residuals(ax: Axes, found: Residuals, axis: int) -> Axes:
     )
     ax.axhspan(-factor * rms, factor * rms, color=style.STEEL_LIGHT, zorder=0.5, gid="rms")
     ax.axhline(0.0, color=style.TRACK, linewidth=1.6, zorder=2.0)
-    ax.plot(
-        times, factor * values,
-        linestyle="none", marker="+", markersize=7.0, markeredgewidth=1.3, color=style.STRIKE,
-        zorder=3.0, gid=f"residual {name}",
-    )  # fmt: skip
+    points = {**POINTS, "color": style.STRIKE, "gid": f"residual {name}"}
+    ax.plot(times, factor * values, **points, zorder=3.0)
     bottom, top = ax.get_ylim()
     ax.set_ylim(bottom, top + 0.12 * (top - bottom))
-    ax.set_title("grey: ± RMS", fontsize=style.SMALL, loc="right", color=style.MUTED)
+    style.note(ax, "grey: ± RMS")
     low, high = float(times[0]), float(times[-1])
     margin = 0.03 * (high - low)
     ax.set_xlim(low - margin, high + margin)
@@ -156,13 +151,6 @@ def draw_residuals(ax: Axes, found: Residuals, axis: int) -> Axes:
                 horizontalalignment="right", verticalalignment="top",
             )  # fmt: skip
     return ax
-
-
-def _path(recording: Recording) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    """Return the track of particle 0 as points (T, 2), m."""
-    clock = recording.track(0)["t"]
-    times = track_times(recording, float(clock[0]), float(clock[-1]))
-    return subset(recording, [0]).at(times)[0][:, 0]
 
 
 def _said(fit: Fit) -> list[str]:

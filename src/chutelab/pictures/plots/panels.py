@@ -19,9 +19,10 @@ from chutelab.pictures.plots import style
 from chutelab.pictures.plots.scenery import (
     action,
     energies,
-    round_times,
-    shown_particles,
+    nominal,
+    spread,
     strobe_step,
+    strobe_times,
     struck_by_nominal,
     subset,
     track_times,
@@ -157,77 +158,39 @@ def draw_tracks(ax: Axes, recording: Recording) -> Axes:
     """
     if recording.count > 1:
         _draw_stream(ax, recording)
-    nominal = subset(recording, [0])
-    track = recording.track(0)
-    begin, end = float(track["t"][0]), float(track["t"][-1])
-    position, _ = nominal.at(track_times(recording, begin, end))
-    ax.plot(
-        *position[:, 0].T, color=style.TRACK, linewidth=1.6, zorder=5.0, gid="track", label="track"
-    )
-    step = strobe_step(recording)
-    dots, _ = nominal.at(round_times(begin, end, step))
-    ax.plot(
-        *dots[:, 0].T,
-        linestyle="none",
-        marker="o",
-        markersize=5.0,
-        markerfacecolor="white",
-        markeredgecolor=style.TRACK,
-        zorder=6.0,
-        gid="strobe",
-        label=f"every {step:g} s",
-    )
-    struck = struck_by_nominal(recording)
+    position, _ = nominal(recording, track_times(recording))
+    ax.plot(*position.T, color=style.TRACK, lw=1.6, zorder=5.0, gid="track", label="track")
+    dots, _ = nominal(recording, strobe_times(recording))
+    said = f"every {strobe_step(recording):g} s"
+    ax.plot(*dots.T, **style.RINGS, ms=5.0, zorder=6.0, gid="strobe", label=said)
+    struck = struck_by_nominal(recording)["t"]
     if len(struck):
-        where, _ = nominal.at(np.clip(struck["t"], begin, end))
-        ax.plot(
-            *where[:, 0].T,
-            linestyle="none",
-            marker="x",
-            markersize=8.0,
-            markeredgewidth=2.0,
-            color=style.STRIKE,
-            zorder=7.0,
-            gid="impacts",
-            label="impact",
-        )
+        track = recording.track(0)["t"]
+        where, _ = nominal(recording, np.clip(struck, track[0], track[-1]))
+        (cross,) = ax.plot(*where.T, "x", color=style.STRIKE, ms=8.0, mew=2.0, zorder=7.0)
+        cross.set(gid="impacts", label="impact")
     return ax
 
 
 def _draw_stream(ax: Axes, recording: Recording) -> None:
-    chosen = shown_particles(recording, STREAM_TRACKS)
-    chosen = chosen[chosen != 0]
-    if not len(chosen):
-        return
-    some = subset(recording, chosen)
+    chosen = spread(recording.count, STREAM_TRACKS)[1:]
     lines = []
-    for i in range(len(chosen)):
-        one = subset(some, [i])
+    for i in chosen[np.diff(recording.offsets)[chosen] > 0]:
+        one = subset(recording, [i])
         knots = np.unique(one.knots["t"])
         times = np.union1d(np.linspace(knots[0], knots[-1], 200), knots[:: len(knots) // 200 + 1])
         lines.append(one.at(times)[0][:, 0])
-    ax.add_collection(
-        LineCollection(
-            lines, colors=style.STREAM, linewidths=0.8, alpha=0.35, zorder=3.0, gid="stream"
-        ),
-        autolim=False,
-    )
+    tracks = LineCollection(lines, colors=style.STREAM, linewidths=0.8, alpha=0.35, zorder=3.0)
+    tracks.set_gid("stream")
+    ax.add_collection(tracks, autolim=False)
 
 
 def draw_analytic(ax: Axes, parts: tuple[Arc, ...]) -> Axes:
     """Draw the analytic parabola, dashed; draw the track over it."""
-    if not parts:
-        return ax
-    position, _ = flight(parts, _times_of(parts))
-    ax.plot(
-        *position.T,
-        color=style.ANALYTIC,
-        linewidth=4.0,
-        linestyle=(0, (2.2, 1.1)),
-        zorder=4.5,
-        gid="analytic",
-        label="analytic parabola",
-    )
+    if parts:
+        position, _ = flight(parts, _times_of(parts))
+        dashed = {**style.DASHED, "gid": "analytic", "label": "analytic parabola"}
+        ax.plot(*position.T, **dashed, zorder=4.5)
     return ax
 
 
@@ -252,53 +215,30 @@ def draw_residual(
     if not parts:
         ax.set_axis_off()
         why = reason or "particle 0 does not separate from a pulley"
-        ax.text(
-            0.5,
-            0.5,
-            fill(f"no analytic parabola; {why}", 60),
-            transform=ax.transAxes,
-            fontsize=style.NORMAL,
-            color=style.MUTED,
-            horizontalalignment="center",
-            verticalalignment="center",
-        )
+        text = ax.text(0.5, 0.5, fill(f"no analytic parabola; {why}", 60), ha="center", va="center")
+        text.set(transform=ax.transAxes, fontsize=style.NORMAL, color=style.MUTED)
         return ax
     times = _times_of(parts)
     known, _ = flight(parts, times)
     clock, end = start + times, float(recording.track(0)["t"][-1])
     # A sum may pass the end by rounding, where there is no position any more.
     clock = np.where(np.isclose(clock, end, rtol=1e-12, atol=0.0), end, clock)
-    position, _ = subset(recording, [0]).at(clock)
-    distance = np.hypot(*(position[:, 0] - known).T)
+    distance = np.hypot(*(nominal(recording, clock)[0] - known).T)
     flying = np.isfinite(distance)
     times, distance = times[flying], distance[flying]
     largest = float(distance.max(initial=0.0))
     ax.set_yscale("log")
-    ax.axhline(ROUNDING, color=style.MUTED, linewidth=1.0, linestyle=":")
-    ax.plot(
-        times,
-        np.maximum(distance, FLOOR),
-        color=style.TRACK,
-        linestyle="none",
-        marker=".",
-        markersize=4.0,
-        gid="residual",
-    )
+    ax.axhline(ROUNDING, color=style.MUTED, lw=1.0, ls=":")
+    ax.plot(times, np.maximum(distance, FLOOR), ".", color=style.TRACK, ms=4.0, gid="residual")
     top = max(-14, ceil(log10(30.0 * largest))) if largest > 0.0 else -14
     bottom = round(log10(FLOOR))
     ax.set_ylim(FLOOR, 10.0**top)
     ax.set_yticks([10.0**k for k in range(bottom, top + 1, (top - bottom + 3) // 4)])
     ax.minorticks_off()
     ax.set_xlim(0.0, parts[-1].end)
-    ax.set_title(
-        f"Simulated − analytic: at most {style.scientific(largest, 'm')}",
-        fontsize=style.NORMAL,
-        loc="left",
-        fontweight="bold",
-    )
-    ax.set_title(
-        "dotted: spacing of doubles at 1 m", fontsize=style.SMALL, loc="right", color=style.MUTED
-    )
+    title = f"Simulated − analytic: at most {style.scientific(largest, 'm')}"
+    ax.set_title(title, fontsize=style.NORMAL, loc="left", fontweight="bold")
+    style.note(ax, "dotted: spacing of doubles at 1 m")
     return ax
 
 
@@ -307,31 +247,16 @@ def draw_velocity(
 ) -> Axes:
     """Draw both velocity components of particle 0 over time, over the analytic ones, dashed."""
     style.dress(ax, "time, s", "velocity, m/s", "Velocity of particle 0")
-    track = recording.track(0)
-    times = track_times(recording, float(track["t"][0]), float(track["t"][-1]))
-    _, velocity = subset(recording, [0]).at(times)
-    clock = _times_of(parts) if parts else np.empty(0)
+    times = track_times(recording)
+    _, velocity = nominal(recording, times)
     if parts:
-        clock = np.unique(np.concatenate([clock, np.nextafter([arc.end for arc in parts], 0.0)]))
-    _, known = flight(parts, clock)
+        clock = np.union1d(_times_of(parts), np.nextafter([arc.end for arc in parts], 0.0))
+        _, known = flight(parts, clock)
     for axis, (name, label) in enumerate((("vx", "forward"), ("vy", "up"))):
         if parts:
-            ax.plot(
-                start + clock,
-                known[:, axis],
-                color=style.ANALYTIC,
-                linewidth=4.0,
-                linestyle=(0, (2.2, 1.1)),
-                gid=f"analytic {name}",
-            )
-        ax.plot(
-            times,
-            velocity[:, 0, axis],
-            color=style.VELOCITY[name],
-            linewidth=1.6,
-            label=f"$v_{name[1]}$, {label}",
-            gid=name,
-        )
+            ax.plot(start + clock, known[:, axis], **style.DASHED, gid=f"analytic {name}")
+        (line,) = ax.plot(times, velocity[:, axis], color=style.VELOCITY[name], lw=1.6, gid=name)
+        line.set_label(f"$v_{name[1]}$, {label}")
     ax.set_xlim(times[0], _beyond(times))
     ax.legend(fontsize=style.SMALL, loc="best", framealpha=0.85)
     return ax
@@ -355,7 +280,7 @@ def draw_ledger(ax: Axes, recording: Recording, count: int = 240) -> Axes:
     times = np.append(times, _beyond(times))
     books = energies(recording, times)
     supplied = books["start"] + books["belt_work"]
-    factor, unit = style.scaled(float(np.abs(supplied).max()), "J")
+    factor, unit = style.scaled(supplied, "J")
     names = ("kinetic", "potential", "restitution_loss", "friction_loss")
     ax.stackplot(
         times,
@@ -364,22 +289,10 @@ def draw_ledger(ax: Axes, recording: Recording, count: int = 240) -> Axes:
         labels=[style.ENERGY_LABEL[name] for name in names],
         linewidth=0.0,
     )
-    ax.plot(
-        times,
-        factor * supplied,
-        color=style.INK,
-        linewidth=1.6,
-        linestyle=(0, (4, 1.5)),
-        label="at release + belt work",
-        gid="supplied",
-    )
-    residual = float(books["residual"][-1])
-    style.dress(
-        ax,
-        "time, s",
-        f"energy, {unit}",
-        f"Energy ledger: residual {style.scientific(residual, 'J')}",
-    )
+    (line,) = ax.plot(times, factor * supplied, color=style.INK, lw=1.6, gid="supplied")
+    line.set(linestyle=(0, (4, 1.5)), label="at release + belt work")
+    residual = style.scientific(float(books["residual"][-1]), "J")
+    style.dress(ax, "time, s", f"energy, {unit}", f"Energy ledger: residual {residual}")
     ax.set_xlim(times[0], times[-1])
     ax.set_ylim(bottom=min(0.0, factor * float(supplied.min())))
     return ax

@@ -15,7 +15,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
-from matplotlib.text import Annotation
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.machine import Machine
@@ -42,6 +41,12 @@ def subset(recording: Recording, particles: Sequence[int] | Ints) -> Recording:
         ended=recording.ended[np.asarray(particles, dtype=np.int64)],
         events=recording.events[:0],
     )
+
+
+def nominal(recording: Recording, times: ArrayLike) -> tuple[Floats, Floats]:
+    """Return positions and velocities of particle 0, (T, 2) each, as `Recording.at` does."""
+    position, velocity = subset(recording, [0]).at(times)
+    return position[:, 0], velocity[:, 0]
 
 
 def spread(count: int, at_most: int) -> Ints:
@@ -95,12 +100,21 @@ def strobe_step(recording: Recording) -> float:
     return round_step(max(last - begin, 1e-3), STROBES)
 
 
-def track_times(recording: Recording, begin: float, end: float, count: int = 400) -> Floats:
+def strobe_times(recording: Recording) -> Floats:
+    """Return the round times at which particle 0 has a strobe dot, s."""
+    clock = recording.track(0)["t"]
+    return round_times(float(clock[0]), float(clock[-1]), strobe_step(recording))
+
+
+def track_times(
+    recording: Recording, begin: float | None = None, end: float | None = None, count: int = 400
+) -> Floats:
     """Return even times, joined by the knots of particle 0 and the moments just before them.
 
-    So a jump at an impact is drawn upright, not slanted.
+    So a jump at an impact is drawn upright, not slanted. By default all of its track.
     """
     knots = recording.track(0)["t"]
+    begin, end = knots[0] if begin is None else begin, knots[-1] if end is None else end
     if len(knots) > count:
         knots = recording.events["t"][recording.events["particle"] == 0][:count]
     return upright(np.linspace(begin, end, count), knots)
@@ -130,22 +144,17 @@ def energies(recording: Recording, times: ArrayLike) -> dict[str, Floats]:
     at_release = np.concatenate([[0.0], np.cumsum(sum(recording.energies(first[order])))])
     released = np.searchsorted(first["t"][order], times, side="right")
     weight = released * recording.particle.mass * recording.gravity
-    for zero in _lowest(recording):
+    heights = recording.knots["position"][:, 1]
+    stays = recording.ended != REASONS.index("exit")
+    staying = heights[np.repeat(stays, np.diff(recording.offsets))]
+    lowest = float(heights.min(initial=np.inf))
+    for zero in (float(staying.min()) if len(staying) else lowest, lowest):
         lifted = books["potential"] - weight * zero
         if (lifted >= 0.0).all():
             break
     books["potential"] = np.maximum(lifted, 0.0)
     books["start"] = at_release[released] - weight * zero
     return books
-
-
-def _lowest(recording: Recording) -> tuple[float, float]:
-    """Return the lowest knots (m) of the particles that stay in the scene, and of all."""
-    heights = recording.knots["position"][:, 1]
-    stays = recording.ended != REASONS.index("exit")
-    staying = heights[np.repeat(stays, np.diff(recording.offsets))]
-    lowest = float(heights.min(initial=np.inf))
-    return float(staying.min()) if len(staying) else lowest, lowest
 
 
 MANY = 60
@@ -257,7 +266,7 @@ def _path(recording: Recording) -> tuple[Floats, Floats]:
     landed = struck["t"][struck["kind"] == Kind.LANDING]
     last = landed[0] if len(landed) else struck["t"][-1] if len(struck) else end
     times = track_times(recording, begin, end)
-    position = subset(recording, [0]).at(times)[0][:, 0]
+    position, _ = nominal(recording, times)
     return position[times <= last], position[times > last]
 
 
@@ -291,16 +300,6 @@ TWO_LINES = 32.0
 """pt; height of two lines of small text."""
 
 
-def show_window(ax: Axes, window: Window) -> Window:
-    """Set limits that hold a window at equal scales and fill the axes; return what is shown."""
-    box = ax.get_window_extent()
-    shown = window.fitted(box.width / box.height)
-    ax.set_xlim(shown.left, shown.right)
-    ax.set_ylim(shown.bottom, shown.top)
-    ax.set_aspect("equal", adjustable="box")
-    return shown
-
-
 def draw_scene(ax: Axes, machine: Machine, window: Window | None = None) -> Axes:
     """Draw the machine's surfaces to scale, with their names.
 
@@ -318,35 +317,28 @@ def draw_scene(ax: Axes, machine: Machine, window: Window | None = None) -> Axes
         if machine.pulley is not None:
             ends = np.concatenate([ends, [[machine.pulley.radius, -machine.pulley.radius]]])
         window = around(ends).padded(0.1, 0.22, 0.1, 0.12)
-    shown = show_window(ax, window)
+    box = ax.get_window_extent()
+    shown = window.fitted(box.width / box.height)
+    ax.set(xlim=(shown.left, shown.right), ylim=(shown.bottom, shown.top))
+    ax.set_aspect("equal", adjustable="box")
     if machine.pulley is not None:
-        _draw_pulley(ax, machine.pulley.radius)
+        face = {"facecolor": style.STEEL_LIGHT, "edgecolor": style.BELT, "linewidth": 2.0}
+        ax.add_patch(Circle((0.0, 0.0), machine.pulley.radius, **face))
+        ax.plot(0.0, 0.0, "+", color=style.STEEL, ms=7.0, zorder=1.5)
     labelled: set[int] = set()
     for i, surface in enumerate(machine.segments.surface):
         start, end = machine.segments.start[i], machine.segments.end[i]
         name = machine.surfaces[surface]
         speed = float(machine.segments.speed[i])
         belt = name in ("incoming", "outgoing") or speed != 0.0
-        ax.plot(
-            *np.array([start, end]).T,
-            color=style.BELT if belt else style.INK,
-            linewidth=2.6,
-            solid_capstyle="butt",
-            zorder=2.0,
-            gid=f"surface {name}",
-        )
+        color = style.BELT if belt else style.INK
+        (drawn,) = ax.plot(*np.array([start, end]).T, color=color, lw=2.6, zorder=2.0)
+        drawn.set(solid_capstyle="butt", gid=f"surface {name}")
         part = shown.clip(start, end)
         if part is not None and surface not in labelled:
             labelled.add(int(surface))
-            _label(ax, machine, i, part, shown)
+            _label(ax, machine, i, part, shown, color)
     return ax
-
-
-def _draw_pulley(ax: Axes, radius: float) -> None:
-    ax.add_patch(
-        Circle((0.0, 0.0), radius, facecolor=style.STEEL_LIGHT, edgecolor=style.BELT, linewidth=2.0)
-    )
-    ax.plot([0.0], [0.0], marker="+", color=style.STEEL, markersize=7.0, zorder=1.5)
 
 
 def _label(
@@ -355,7 +347,8 @@ def _label(
     segment: int,
     part: tuple[Floats, Floats],
     shown: Window,
-) -> Annotation:
+    color: str,
+) -> None:
     """Name a surface at its part that is shown, on the side where no particle is expected."""
     name = machine.surfaces[machine.segments.surface[segment]]
     speed = float(machine.segments.speed[segment])
@@ -392,34 +385,20 @@ def _label(
         xytext=offset,
         textcoords="offset points",
         fontsize=style.SMALL,
-        color=style.BELT if name in ("incoming", "outgoing") or speed != 0.0 else style.INK,
-        horizontalalignment=across,
-        verticalalignment=along,
+        color=color,
+        ha=across,
+        va=along,
         path_effects=HALO,
         zorder=4.0,
     )
-    _keep_inside(ax, label)
-    return label
-
-
-def _keep_inside(ax: Axes, label: Annotation) -> None:
-    """Shift a name back over the edges of the axes."""
-    box, frame = label.get_window_extent(), ax.get_window_extent()
-    margin = 3.0
-    right = max(frame.x0 + margin - box.x0, 0.0) + min(frame.x1 - margin - box.x1, 0.0)
-    up = max(frame.y0 + margin - box.y0, 0.0) + min(frame.y1 - margin - box.y1, 0.0)
-    x, y = label.xyann
+    # Shifted back over the edges of the axes.
+    box, frame = label.get_window_extent(), ax.get_window_extent().padded(-3.0)
+    right = max(frame.x0 - box.x0, 0.0) + min(frame.x1 - box.x1, 0.0)
+    up = max(frame.y0 - box.y0, 0.0) + min(frame.y1 - box.y1, 0.0)
     points = 72.0 / ax.figure.dpi
-    label.xyann = (x + right * points, y + up * points)
+    label.xyann = (offset[0] + right * points, offset[1] + up * points)
 
 
 def _motion(speed: float) -> str:
     arrow = "→" if speed > 0.0 else "←"
     return f"{abs(speed):.3g} m/s {arrow}" if speed != 0.0 else "at rest"
-
-
-def shown_particles(recording: Recording, at_most: int) -> Ints:
-    """Return the particles to draw: up to `at_most` released ones, particle 0 among them."""
-    chosen = spread(recording.count, at_most)
-    released = recording.offsets[1:] > recording.offsets[:-1]
-    return chosen[released[chosen]]

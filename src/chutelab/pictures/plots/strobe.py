@@ -15,7 +15,7 @@ from matplotlib.transforms import Bbox
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.figure import draw_view
 from chutelab.pictures.plots.panels import analytic_of
-from chutelab.pictures.plots.scenery import HALO, round_times, strobe_step, subset
+from chutelab.pictures.plots.scenery import HALO, nominal, strobe_step, strobe_times
 from chutelab.pictures.plots.style import Picture
 from chutelab.results import Recording
 from chutelab.theory import Transfer
@@ -32,16 +32,7 @@ AWAY = 9.0
 GAP = 1.5
 """pt that stay free around such a text."""
 
-SIDES = (
-    (0.0, 0.8),
-    (1.0, 0.0),
-    (-1.0, 0.0),
-    (0.7, 0.6),
-    (-0.7, 0.6),
-    (0.7, -0.6),
-    (-0.7, -0.6),
-    (0.0, -0.8),
-)
+SIDES = ((0, 0.8), (1, 0), (-1, 0), (0.7, 0.6), (-0.7, 0.6), (0.7, -0.6), (-0.7, -0.6), (0, -0.8))
 """Directions from a dot in which its text may stand, the best first."""
 
 
@@ -71,7 +62,7 @@ def strobe(
     """
     if prediction is None:
         prediction = recording.prediction
-    figure = Picture(figsize=SIZE, dpi=DPI)
+    figure = Picture(SIZE, DPI)
     ax = figure.add_axes((0.095, 0.09, 0.885, 0.77))
     draw_view(ax, recording, analytic_of(recording, prediction)[0])
     _write_times(ax, recording)
@@ -82,11 +73,9 @@ def strobe(
 
 def _write_times(ax: Axes, recording: Recording) -> None:
     """Write the time beside each strobe dot in the picture, where there is room for it."""
-    track = recording.track(0)
-    step = strobe_step(recording)
-    times = round_times(float(track["t"][0]), float(track["t"][-1]), step)
-    dots = subset(recording, [0]).at(times)[0][:, 0]
-    digits = max(0, -floor(log10(step) + 1e-9))
+    times = strobe_times(recording)
+    dots, _ = nominal(recording, times)
+    digits = max(0, -floor(log10(strobe_step(recording)) + 1e-9))
     half = 0.4 * AWAY * ax.figure.dpi / 72.0
     taken = [text.get_window_extent() for text in ax.texts]
     pixels = ax.transData.transform(dots)
@@ -109,16 +98,8 @@ def _write_times(ax: Axes, recording: Recording) -> None:
         )
         if not _placed(label, n, pixels, inside, taken, lines, gap):
             label.remove()
-    ax.text(
-        1.0,
-        1.01,
-        "beside the dots: time, s",
-        transform=ax.transAxes,
-        fontsize=style.SMALL,
-        color=style.TRACK,
-        horizontalalignment="right",
-        verticalalignment="bottom",
-    )
+    said = ax.text(1.0, 1.01, "beside the dots: time, s", ha="right", va="bottom")
+    said.set(transform=ax.transAxes, fontsize=style.SMALL, color=style.TRACK)
 
 
 def _lines(ax: Axes) -> list[tuple[MplPath, bool]]:
@@ -154,10 +135,8 @@ def _placed(
         label.set_verticalalignment("bottom" if y > 0.0 else "top" if y < 0.0 else "center")
         box = label.get_window_extent().padded(gap)
         if (
-            inside.containsx(box.x0)
-            and inside.containsx(box.x1)
-            and inside.containsy(box.y0)
-            and inside.containsy(box.y1)
+            inside.contains(box.x0, box.y0)
+            and inside.contains(box.x1, box.y1)
             and np.hypot(*(dots - np.mean(box.corners(), axis=0)).T).argmin() == own
             and not box.count_overlaps(taken)
             and not any(path.intersects_bbox(box, filled=filled) for path, filled in lines)

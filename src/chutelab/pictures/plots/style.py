@@ -7,14 +7,16 @@ itself to a file and shows itself in a notebook.
 from __future__ import annotations
 
 from io import BytesIO
-from math import floor, isfinite, log10
+from math import floor, log10
 from pathlib import Path
 from textwrap import shorten
 from typing import Any
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
 from chutelab.pictures import colours
 from chutelab.util.files import whole
@@ -57,15 +59,17 @@ SMALL, NORMAL, LARGE = 9.5, 10.5, 13.0
 _PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
 
 
-def scaled(largest: float, unit: str) -> tuple[float, str]:
-    """Return a factor and the prefixed unit that bring `largest` to between 1 and 1000.
+def scaled(values: ArrayLike, unit: str) -> tuple[float, str]:
+    """Return a factor and the prefixed unit that bring the largest value to between 1 and 1000.
 
-    >>> scaled(0.0202, "J")
+    >>> scaled([0.0202, -0.01, float("nan")], "J")
     (1000.0, 'mJ')
     """
-    if not isfinite(largest) or largest == 0.0:
+    sizes = np.abs(values)
+    largest = float(np.max(sizes, initial=0.0, where=np.isfinite(sizes)))
+    if largest == 0.0:
         return 1.0, unit
-    power = min(max(3 * floor(log10(abs(largest)) / 3), -15), 6)
+    power = min(max(3 * floor(log10(largest) / 3), -15), 6)
     return float(f"1e{-power}"), _PREFIXES[power] + unit
 
 
@@ -98,6 +102,11 @@ def dress(ax: Axes, x: str = "", y: str = "", title: str = "") -> Axes:
     return ax
 
 
+def note(ax: Axes, text: str) -> None:
+    """Write a remark above axes, at the right."""
+    ax.set_title(text, fontsize=SMALL, loc="right", color=MUTED)
+
+
 def legend_above(ax: Axes, columns: int) -> None:
     """Add a legend right above axes, in one line if it fits."""
     ax.legend(
@@ -109,6 +118,13 @@ def legend_above(ax: Axes, columns: int) -> None:
         borderaxespad=0.3,
         handlelength=2.2,
     )
+
+
+DASHED: dict[str, Any] = {"color": ANALYTIC, "lw": 4.0, "ls": (0, (2.2, 1.1))}
+"""How lines known analytically are drawn, under those that are simulated."""
+
+RINGS: dict[str, Any] = {"ls": "none", "marker": "o", "mfc": "white", "mec": TRACK}
+"""How strobe dots are drawn."""
 
 
 def scientific(value: float, unit: str) -> str:
@@ -128,10 +144,18 @@ ON_SCREEN = 80
 
 
 class Picture(Figure):
-    """A matplotlib figure with its canvas, made without pyplot; arguments as of `Figure`."""
+    """A matplotlib figure with its canvas, made without pyplot.
 
-    def __init__(self, *args: Any, **kwargs: Any) -> None:
-        super().__init__(*args, **kwargs)
+    Parameters
+    ----------
+    size : tuple of float
+        Width and height, inches.
+    dpi : float
+        Dots to the inch.
+    """
+
+    def __init__(self, size: tuple[float, float], dpi: float = DPI) -> None:
+        super().__init__(figsize=size, dpi=dpi)
         FigureCanvasAgg(self)
 
     def headline(self, x: float, y: float, title: str, longest: int = 80) -> None:

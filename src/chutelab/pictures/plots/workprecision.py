@@ -16,7 +16,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from chutelab.checks.workprecision import METHODS, Timing
 from chutelab.pictures import colours
 from chutelab.pictures.plots import style
-from chutelab.pictures.plots.style import DPI, Picture
+from chutelab.pictures.plots.style import Picture
 from chutelab.util.versions import PACKAGES
 
 WIDTH, PANEL = 8.5, 3.6
@@ -63,7 +63,7 @@ def workprecision(
     said = [f"{key} {value}" if key in PACKAGES else value for key, value in about.items()]
     below += wrap(" · ".join(said), CHARACTERS)
     height = HEAD + PANEL + FOOT + LINE * len(below)
-    figure = Picture(figsize=(WIDTH, height), dpi=DPI)
+    figure = Picture((WIDTH, height))
     width = WIDTH - LEFT - RIGHT
     box = (LEFT / WIDTH, 1.0 - (HEAD + PANEL) / height, width / WIDTH, PANEL / height)
     ax = style.dress(figure.add_axes(box), "relative error", "run time, s", title)

@@ -234,9 +234,7 @@ class Evaluator:
         left: set[int] = set()
         for ending, columns in self._endings().items():
 
-            def read(
-                recording: Recording, _: Scene, rows: Ints, columns: list[int] = columns
-            ) -> None:
+            def read(recording: Recording, rows: Ints, columns: list[int] = columns) -> None:
                 for column in columns:
                     values[rows, column] = self.quantities[column].of(recording)
                 courses[rows] = courses_of(recording)

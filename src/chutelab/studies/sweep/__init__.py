@@ -16,13 +16,12 @@ SciPy, pyarrow, Dask and pandas are imported when they are needed.
 """
 
 from chutelab.studies.sweep.batch import row_of
-from chutelab.studies.sweep.plan import DESIGNS, MOST_VARIANTS, Plan, SampleError, planned
-from chutelab.studies.sweep.result import PartError, Sweep, TableError
+from chutelab.studies.sweep.plan import DESIGNS, MOST_VARIANTS, Plan, planned
+from chutelab.studies.sweep.result import Sweep
 from chutelab.studies.sweep.rows import NUMBERS, REASON
 from chutelab.studies.sweep.sweeping import (
     Crew,
     LostWorkersError,
-    WorkersError,
     crew,
     sweep,
     sweep_to,
@@ -36,12 +35,8 @@ __all__ = [
     "REASON",
     "Crew",
     "LostWorkersError",
-    "PartError",
     "Plan",
-    "SampleError",
     "Sweep",
-    "TableError",
-    "WorkersError",
     "crew",
     "planned",
     "row_of",

@@ -57,7 +57,7 @@ class Block:
     engine: str | None
 
 
-Reader = Callable[[Recording, Scene, Ints], None]
+Reader = Callable[[Recording, Ints], None]
 
 
 def screened(block: Block) -> tuple[Scene | None, Ints, dict[int, str]]:
@@ -114,7 +114,7 @@ def row_of(scene: Scene, engine: str | None = None) -> Columns:
         return because(reason(error))
     except StalledError as error:
         return because(f"the run got stuck: {error}")
-    return rows(recording, scene)
+    return rows(recording)
 
 
 def because(why: str) -> Columns:
@@ -137,8 +137,8 @@ def together(block: Block, read: Reader) -> tuple[dict[int, str], list[int]]:
     block : Block
         See `chutelab.scene.variants.is_plain`.
     read : callable
-        Takes a recording with a particle for each of N variants, their scenes as a family, and
-        their rows in the block, (N,); called for each group of variants that went through.
+        Takes a recording with a particle for each of N variants, whose scene is a family, and their
+        rows in the block, (N,); called for each group of variants that went through.
 
     Returns
     -------
@@ -148,12 +148,11 @@ def together(block: Block, read: Reader) -> tuple[dict[int, str], list[int]]:
     template, which, faults = screened(block)
     if template is None or not _fits(template, block.paths, block.engine):
         return faults, which.tolist()
-    scene = template
 
     def scenes(some: Ints) -> Scene:
-        return family(scene, dict(zip(block.paths, block.values[some].T.copy(), strict=True)))
+        return family(template, dict(zip(block.paths, block.values[some].T.copy(), strict=True)))
 
-    groups: list[tuple[Machine, Ints]] = []
+    groups: list[tuple[Machine, Ints, Ints]] = []
     while len(which) and not groups:
         try:
             machine = build(scenes(which))
@@ -161,20 +160,21 @@ def together(block: Block, read: Reader) -> tuple[dict[int, str], list[int]]:
             faults |= {int(which[n]): str(fault) for n, fault in refused.members.items()}
             which = np.delete(which, list(refused.members))
         else:
-            groups = [(members(machine, alike), which[alike]) for alike in kinds(machine)]
+            groups = [(machine, which, alike) for alike in kinds(machine)]
     left: list[int] = []
     while groups:
-        machine, some = groups.pop()
-        machine = replace(machine, scene=scenes(some))
+        machine, which, part = groups.pop()
+        which = which[part]
+        machine = replace(members(machine, part), scene=scenes(which))
         try:
             recording = run(machine, apart=True)
         except (CornerError, StalledError):
             # Whoever does not get through is found by halving.
-            halves = np.array_split(np.arange(len(some)), 2) if len(some) > 1 else []
-            groups += [(members(machine, half), some[half]) for half in halves]
-            left += [] if halves else some.tolist()
+            halves = np.array_split(np.arange(len(which)), 2) if len(which) > 1 else []
+            groups += [(machine, which, half) for half in halves]
+            left += [] if halves else which.tolist()
         else:
-            read(recording, machine.scene, some)
+            read(recording, which)
     return faults, left
 
 
@@ -196,8 +196,8 @@ def swept(block: Block) -> Columns:
         for name, values in columns.items():
             found[name][which] = values
 
-    def read(recording: Recording, scenes: Scene, which: Ints) -> None:
-        put(which, rows(recording, scenes, len(which)))
+    def read(recording: Recording, which: Ints) -> None:
+        put(which, rows(recording, len(which)))
 
     left = list(range(len(block.values)))
     if all(is_plain(path) for path in block.paths):

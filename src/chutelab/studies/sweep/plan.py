@@ -30,10 +30,6 @@ DESIGNS: Final = {"lhs": "LatinHypercube", "sobol": "Sobol"}
 """Names of the designs, and of the classes of `scipy.stats.qmc` that draw them."""
 
 
-class SampleError(InputError):
-    """Samples that cannot be drawn; the text says what is allowed."""
-
-
 def drawn(
     varies: Sequence[Vary],
     about: Sequence[Quantity],
@@ -49,19 +45,19 @@ def drawn(
 
     Raises
     ------
-    SampleError
+    InputError
         If the design is unknown, there are too many samples, or SciPy is not installed.
     """
     if design not in DESIGNS:
-        raise SampleError(f"--design {design}: one of {', '.join(DESIGNS)}")
+        raise InputError(f"--design {design}: one of {', '.join(DESIGNS)}")
     if not 1 <= count <= most:
-        raise SampleError(f"--sample {count}: a whole number from 1 to {most}")
+        raise InputError(f"--sample {count}: a whole number from 1 to {most}")
     if seed < 0:
-        raise SampleError(f"--seed {seed}: a whole number from 0")
+        raise InputError(f"--seed {seed}: a whole number from 0")
     try:
         from scipy.stats import qmc
     except ImportError:
-        raise SampleError('--sample needs SciPy: pip install "chutelab[design]"') from None
+        raise InputError('--sample needs SciPy: pip install "chutelab[design]"') from None
     sampler = getattr(qmc, DESIGNS[design])(d=len(varies), seed=np.random.default_rng(seed))
     if design == "sobol":
         # Of a power of two points the first ones: SciPy warns of all other numbers.
@@ -154,7 +150,7 @@ def planned(
     ------
     VaryError
         If a key cannot be varied so, or there is too much.
-    SampleError
+    InputError
         If samples cannot be drawn so.
     ValueError
         If there is no engine of that name.
@@ -167,7 +163,9 @@ def planned(
     if len(varied) > MOST_KEYS:
         raise VaryError(varied[MOST_KEYS].typed, f"at most {MOST_KEYS} keys can be varied")
     about = quantities(scene, varied)
-    _check_whole(varied, about)
+    for vary, one in zip(varied, about, strict=True):
+        if one.whole and not all(value.is_integer() for value in vary.values):
+            raise VaryError(vary.typed, f"{one.path} takes whole numbers only")
     samples = None
     if sample is not None:
         samples = drawn(varied, about, sample, design, seed, MOST_VARIANTS)
@@ -197,9 +195,3 @@ def _varies(varies: Sequence[Vary | str] | Mapping[str, Any], *, ranges: bool) -
         kind(key, tuple((np.asarray(values, dtype=np.float64).ravel() + 0.0).tolist()))
         for key, values in varies.items()
     ]
-
-
-def _check_whole(varies: Sequence[Vary], about: Sequence[Quantity]) -> None:
-    for vary, one in zip(varies, about, strict=True):
-        if one.whole and not all(value.is_integer() for value in vary.values):
-            raise VaryError(vary.typed, f"{one.path} takes whole numbers only")

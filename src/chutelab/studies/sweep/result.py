@@ -37,26 +37,22 @@ SUFFIXES: Final = {".csv": "csv", ".parquet": "parquet"}
 """Endings of files, and the formats they stand for."""
 
 
-class TableError(InputError):
-    """A file that cannot be written; the text says what is allowed."""
-
-
 def format_of(path: str | Path) -> str:
     """Return the format of a file by its ending.
 
     Raises
     ------
-    TableError
+    InputError
         If it is none that is known, or what it needs is not installed; or it is a folder, or in one
         that is not there.
     """
     if Path(path).is_dir():
-        raise TableError(f"{path} is a folder, not a file")
+        raise InputError(f"{path} is a folder, not a file")
     if not (folder := Path(path).parent).is_dir():
-        raise TableError(f"{path}: there is no folder {folder}")
+        raise InputError(f"{path}: there is no folder {folder}")
     found = SUFFIXES.get(Path(path).suffix.lower())
     if found is None:
-        raise TableError(f"{path}: the name of a table ends with {' or '.join(SUFFIXES)}")
+        raise InputError(f"{path}: the name of a table ends with {' or '.join(SUFFIXES)}")
     if found == "parquet":
         _pyarrow()
     return found
@@ -107,7 +103,7 @@ def _pyarrow() -> tuple[Any, Any]:
         import pyarrow as pa
         from pyarrow import parquet
     except ImportError:
-        raise TableError('Parquet needs pyarrow: pip install "chutelab[parquet]"') from None
+        raise InputError('Parquet needs pyarrow: pip install "chutelab[parquet]"') from None
     return pa, parquet
 
 
@@ -212,10 +208,6 @@ WORDS: Final = {
 """What a sweep can differ in, for people."""
 
 
-class PartError(InputError):
-    """A file of finished rows that cannot be used; the text says what to do."""
-
-
 def head_of(plan: Plan) -> dict[str, Any]:
     """Return what decides the rows of a sweep."""
     samples = None
@@ -250,7 +242,7 @@ class Part:
 
     Raises
     ------
-    PartError
+    InputError
         If the file is of another sweep, there although it should not be, or cannot be written.
     """
 
@@ -269,7 +261,7 @@ class Part:
                 self._sync()
                 return
             if not resume:
-                raise PartError(
+                raise InputError(
                     f"{self.path} holds the finished rows of a sweep that was interrupted: go on"
                     " with --resume, or remove the file"
                 )
@@ -278,7 +270,7 @@ class Part:
             self._file.truncate(length)
             self._file.seek(length)
         except OSError as error:
-            raise PartError(f"{self.path}: {error.strerror or error}") from error
+            raise InputError(f"{self.path}: {error.strerror or error}") from error
 
     def _read(self, head: Mapping[str, Any]) -> int:
         """Read the file that is there, and return the length of what is whole."""
@@ -289,10 +281,10 @@ class Part:
         except ValueError:
             found = None
         if not isinstance(found, dict):
-            raise PartError(f"{self.path} holds no rows of a sweep: remove it, or choose --out")
+            raise InputError(f"{self.path} holds no rows of a sweep: remove it, or choose --out")
         other = [words for key, words in WORDS.items() if found.get(key) != head[key]]
         if other:
-            raise PartError(
+            raise InputError(
                 f"{self.path} is of another sweep, with a difference in {', '.join(other)}: repeat"
                 " that command, or remove the file and begin anew"
             )

@@ -23,7 +23,6 @@ from chutelab.results.quantities import (
     from_events,
     never,
 )
-from chutelab.scene import Scene
 from chutelab.theory import unbounded
 from chutelab.util.arrays import Bools, Floats
 
@@ -72,28 +71,35 @@ OTHER = (Kind.COLLISION, Kind.STICK, Kind.SETTLE)
 """Kinds of events that they do not know of, on the way or on another surface."""
 
 
-def deviation(recording: Recording, scene: Scene, shape: tuple[int, int]) -> Floats:
+def deviation(recording: Recording, shape: tuple[int, int]) -> Floats:
     """Return the largest relative error, (V,), as `results.comparison` measures it; NaN for none.
 
     Parameters
     ----------
-    recording, scene : Recording, Scene
+    recording : Recording
         Of one variant, or a family of them.
     shape : tuple of int
         Variants V, and the particles M of each.
     """
-    count = shape[0]
-    if scene.incoming is None or scene.plate is None or (scene.stream.interact and shape[1] > 1):
+    (count, every), scene = shape, recording.scene
+    if scene.incoming is None or scene.plate is None or (scene.stream.interact and every > 1):
         return np.full(count, np.nan)
-    events = _way(recording, shape[1], count)
-    begins = _begins(recording, scene, shape)
+    # Particle 0 has to be released on the belt, as fast as the belt is.
+    belt, start = scene.incoming, recording.offsets[:-1:every]
+    released = recording.offsets[1::every] > start
+    release = recording.knots[np.where(released, start, 0)]
+    (x, y), (vx, vy) = release["position"].T, release["velocity"].T
+    begins = released & (y == belt.pulley_radius + scene.particle.radius) & (x <= 0.0)
+    begins &= (-belt.length <= x) & (vx == belt.speed) & (vy == 0.0)
+    events = _way(recording, every, count)
     for one in events:
         one[~begins] = never(1)
-    simulated = from_events(scene, *events)
-    theory = unbounded(scene)
-    settled = _settled(recording, shape)
-    if settled is not None:
-        simulated |= settled
+    simulated, theory = from_events(scene, *events), unbounded(scene)
+    if every == 1 and "outgoing" in recording.surfaces:
+        # What the outgoing belt paid is comparable where nothing slips on it any more.
+        paid, over = _paid(recording, count), recording.ended == REASONS.index("settled")
+        simulated["belt_work"] = np.where(over, paid["belt_work"], np.nan)
+        simulated["slip_heat"] = np.where(over, paid["friction_loss"], np.nan)
     sizes = scales(scene, theory)
     worst = np.full(count, np.nan)
     for name, found in simulated.items():
@@ -101,18 +107,6 @@ def deviation(recording: Recording, scene: Scene, shape: tuple[int, int]) -> Flo
         errors = relative_error(found, expected, sizes[QUANTITIES[name]])
         worst = np.fmax(worst, np.where(np.isfinite(errors), errors, np.nan))
     return worst
-
-
-def _begins(recording: Recording, scene: Scene, shape: tuple[int, int]) -> Bools:
-    """Tell whether particle 0 was released on the belt, as fast as the belt is, (V,)."""
-    assert scene.incoming is not None
-    belt, start = scene.incoming, recording.offsets[: -1 : shape[1]]
-    released = recording.offsets[1 :: shape[1]] > start
-    first = recording.knots[np.where(released, start, 0)]
-    (x, y), (vx, vy) = first["position"].T, first["velocity"].T
-    height = belt.pulley_radius + scene.particle.radius
-    on_belt = (y == height) & (-belt.length <= x) & (x <= 0.0)
-    return np.asarray(released & on_belt & (vx == belt.speed) & (vy == 0.0))
 
 
 def _way(recording: Recording, every: int, count: int) -> list[NDArray[Any]]:
@@ -147,19 +141,6 @@ def _way(recording: Recording, every: int, count: int) -> list[NDArray[Any]]:
     return found
 
 
-def _settled(recording: Recording, shape: tuple[int, int]) -> dict[str, Floats] | None:
-    """Return what the outgoing belt paid for those that no longer slip on it, NaN for others."""
-    if shape[1] > 1 or "outgoing" not in recording.surfaces:
-        return None
-    entries = recording.by_surface.reshape(shape[0], -1, len(ENTRIES))
-    belt = entries[:, recording.surface_index("outgoing")]
-    over = recording.ended == REASONS.index("settled")
-    return {
-        "belt_work": np.where(over, belt[:, ENTRIES.index("belt_work")], np.nan),
-        "slip_heat": np.where(over, belt[:, ENTRIES.index("friction_loss")], np.nan),
-    }
-
-
 FATES = {
     "time": "still under way when the run ended",
     "settled": "came to rest elsewhere",
@@ -168,19 +149,18 @@ FATES = {
 """What became of particles that did not land, by why their tracks ended."""
 
 
-def rows(recording: Recording, scene: Scene, variants: int = 1) -> Columns:
+def rows(recording: Recording, variants: int = 1) -> Columns:
     """Return the rows of the variants of a recording.
 
     Parameters
     ----------
     recording : Recording
-        Of one variant; or of as many as there are particles, each on a machine of its own.
-    scene : Scene
-        What was run: a family in the second case.
+        Of one variant; or of as many as there are particles, each on a machine of its own: its
+        scene is a family then.
     variants : int
         How many.
     """
-    found = empty(variants)
+    found, scene = empty(variants), recording.scene
     shape = variants, recording.count // variants
     released, began = recording.released, np.full(recording.count, np.nan)
     began[released] = recording.ends()[0]["t"]
@@ -195,15 +175,11 @@ def rows(recording: Recording, scene: Scene, variants: int = 1) -> Columns:
     found["time"], _ = _mean_and_spread(
         (end_times(recording) - began).reshape(shape), released.reshape(shape)
     )
-    _balance(found, recording, scene, shape)
+    _balance(found, recording, shape)
     if scene.outgoing is not None:
         found["misses"] = (shape[1] - landed.reshape(shape).sum(axis=1)).astype(np.float64)
-        _tell_misses(found[REASON], recording.ended.reshape(shape), ~landed.reshape(shape))
-        # Where it is varied, it is an array of numbers.
-        if isinstance(scene.run.until, str) and scene.run.until == "settled":
-            restless = landed & (recording.ended != REASONS.index("settled"))
-            _tell_restless(found[REASON], restless.reshape(shape).sum(axis=1), shape[1])
-    found["error"] = deviation(recording, scene, shape)
+        _tell(found[REASON], recording, ~landed.reshape(shape))
+    found["error"] = deviation(recording, shape)
     return found
 
 
@@ -216,7 +192,7 @@ def _mean_and_spread(values: Floats, counted: Bools) -> tuple[Floats, Floats]:
     return np.where(count > 0, mean, np.nan), np.where(count > 0, np.sqrt(square), np.nan)
 
 
-def _balance(found: Columns, recording: Recording, scene: Scene, shape: tuple[int, int]) -> None:
+def _balance(found: Columns, recording: Recording, shape: tuple[int, int]) -> None:
     """Fill in the energies."""
     ends = recording.ends()
     (kinetic_first, potential_first), (kinetic_last, potential_last) = map(recording.energies, ends)
@@ -226,28 +202,37 @@ def _balance(found: Columns, recording: Recording, scene: Scene, shape: tuple[in
     whole[0, released] = change - balance(entries)
     whole[1, released] = entries[:, ENTRIES.index("restitution_loss")]
     found["residual"], found["restitution_loss"] = whole.reshape(2, *shape).sum(axis=2)
-    if scene.outgoing is not None:
-        entries = recording.by_surface.reshape(shape[0], -1, len(ENTRIES))
-        belt = entries[:, recording.surface_index("outgoing")]
-        found["belt_work"] = belt[:, ENTRIES.index("belt_work")].copy()
-        found["slip_heat"] = belt[:, ENTRIES.index("friction_loss")].copy()
-        found["power"] = np.asarray(found["belt_work"] / shape[1] * scene.stream.rate)
+    if "outgoing" in recording.surfaces:
+        paid = _paid(recording, shape[0])
+        found["belt_work"], found["slip_heat"] = paid["belt_work"], paid["friction_loss"]
+        rate = recording.scene.stream.rate
+        found["power"] = np.asarray(found["belt_work"] / shape[1] * rate)
 
 
-def _tell_misses(reason: NDArray[Any], ended: NDArray[np.int8], missed: Bools) -> None:
-    """Say what became of those that did not land."""
-    for row in np.flatnonzero(missed.any(axis=1)).tolist():
-        fates = [REASONS[k] for k in ended[row, missed[row]].tolist()]
-        told = [f"{fates.count(name)} {fate}" for name, fate in FATES.items() if name in fates]
-        of_all = f"{len(fates)} of {missed.shape[1]} particles" if missed.shape[1] > 1 else "it"
-        if missed.shape[1] == 1:
-            told = [FATES[fates[0]]]
-        reason[row] = f"{of_all} missed the outgoing belt: {', '.join(told)}"
+def _paid(recording: Recording, count: int) -> dict[str, Floats]:
+    """Return the ledger's entries of the outgoing belt, (V,) each."""
+    entries = recording.by_surface.reshape(count, -1, len(ENTRIES))
+    belt = entries[:, recording.surface_index("outgoing")].T.copy()
+    return dict(zip(ENTRIES, belt, strict=True))
 
 
-def _tell_restless(reason: NDArray[Any], restless: NDArray[Any], of: int) -> None:
-    """Say that what the belt pays is not all, where a run until settled ended before that."""
-    for row in np.flatnonzero(restless).tolist():
-        who = f"{restless[row]} of {of} particles" if of > 1 else "it"
-        more = f"{who} landed, but never came to rest on a belt: belt_work has only a part"
-        reason[row] = f"{reason[row]}; {more}" if reason[row] else more
+def _tell(reasons: NDArray[Any], recording: Recording, missed: Bools) -> None:
+    """Say what became of those that did not land, (V, M), and whose slip went on after that."""
+    every, ended = missed.shape[1], recording.ended.reshape(missed.shape)
+    restless = ~missed & (ended != REASONS.index("settled"))
+    if recording.machine.until != "settled":
+        restless[:] = False
+    for row in np.flatnonzero((missed | restless).any(axis=1)).tolist():
+        said = []
+        if missed[row].any():
+            fates = [REASONS[k] for k in ended[row, missed[row]].tolist()]
+            told = [f"{fates.count(name)} {fate}" for name, fate in FATES.items() if name in fates]
+            who = f"{len(fates)} of {every} particles" if every > 1 else "it"
+            fate = ", ".join(told) if every > 1 else FATES[fates[0]]
+            said.append(f"{who} missed the outgoing belt: {fate}")
+        if restless[row].any():
+            who = f"{restless[row].sum()} of {every} particles" if every > 1 else "it"
+            said.append(
+                f"{who} landed, but never came to rest on a belt: belt_work has only a part"
+            )
+        reasons[row] = "; ".join(said)

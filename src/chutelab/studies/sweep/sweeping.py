@@ -52,10 +52,6 @@ ADDRESS: Final = re.compile(r"(\w+://)?[^\s:/]+:\d{1,5}")
 """A host and a port."""
 
 
-class WorkersError(InputError):
-    """Nobody is there to do the work; the text says what is wrong with what was asked for."""
-
-
 class LostWorkersError(RuntimeError):
     """Those who did the work are gone; the text says what to do."""
 
@@ -132,7 +128,7 @@ def crew(jobs: int = 1, scheduler: str | None = None) -> Iterator[Crew]:
 
     Raises
     ------
-    WorkersError
+    InputError
         If Dask is not installed, no scheduler answers, or it has no workers.
     """
     if scheduler is not None:
@@ -170,18 +166,18 @@ def _cluster(address: str) -> Iterator[Crew]:
     try:
         from distributed import Client, KilledWorker
     except ImportError:
-        raise WorkersError('--scheduler needs Dask: pip install "chutelab[cluster]"') from None
+        raise InputError('--scheduler needs Dask: pip install "chutelab[cluster]"') from None
     if not ADDRESS.fullmatch(address):
-        raise WorkersError(f"--scheduler {address}: must be like tcp://10.0.0.1:8786")
+        raise InputError(f"--scheduler {address}: must be like tcp://10.0.0.1:8786")
     connect: Any = Client
     try:
         client = connect(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
-        raise WorkersError(f"--scheduler {address}: no Dask scheduler answers: {error}") from error
+        raise InputError(f"--scheduler {address}: no Dask scheduler answers: {error}") from error
     with client:
         threads = sum(client.nthreads().values())
         if not threads:
-            raise WorkersError(f"--scheduler {address}: it has no workers; start some with `dask`")
+            raise InputError(f"--scheduler {address}: it has no workers; start some with `dask`")
         try:
             with client.get_executor(pure=False) as executor:
                 yield Crew(executor, 2 * threads)
@@ -249,7 +245,7 @@ def sweep(
 
     Raises
     ------
-    VaryError, SampleError
+    InputError
         If the variants cannot be made so; before anything runs.
 
     Examples
@@ -299,7 +295,7 @@ def sweep_to(
 
     Raises
     ------
-    TableError, PartError
+    InputError
         If the file is of no known format or a folder, or there are rows of another sweep.
     """
     out, form = Path(out), format_of(out)

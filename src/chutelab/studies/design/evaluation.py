@@ -75,7 +75,7 @@ def ranges(scene: Scene, texts: Sequence[str]) -> tuple[Span, ...]:
 
     Raises
     ------
-    DesignError, VaryError
+    InputError
         If a range cannot be read, is empty, goes beyond what the scene allows, or is of a key that
         is unknown, no continuous number, or given twice.
     """

@@ -25,7 +25,7 @@ from chutelab.results.quantities import each, measure
 from chutelab.scene import MISSING, Scene, rules
 from chutelab.scene.overrides import value_at
 from chutelab.scene.units import read_size
-from chutelab.scene.variants import Vary, VaryError, quantity
+from chutelab.scene.variants import Vary, quantity
 from chutelab.util.errors import InputError, did_you_mean
 from chutelab.util.versions import library
 
@@ -259,8 +259,8 @@ def _right(scene: Scene, text: str, typed: str, left: Quantity) -> Quantity:
         return measured(scene, text, typed)
     try:
         found = quantity(scene, Vary(text, (0.0,), typed))
-    except VaryError as error:
-        allowed = str(error).removeprefix(f"{typed}: ")
+    except InputError as error:
+        allowed = error.allowed
         raise DesignError(
             typed, f"{text} is neither a number, nor a quantity, nor a key of the scene: {allowed}"
         ) from None

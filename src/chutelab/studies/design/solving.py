@@ -137,7 +137,7 @@ def solve(
 
     Raises
     ------
-    DesignError, VaryError
+    InputError
         If the question makes no sense for the scene. Nothing has run then.
     SceneError
         If the scene itself cannot be run.

@@ -97,7 +97,7 @@ def spreads(scene: Scene, texts: Sequence[str]) -> tuple[Spread, ...]:
 
     Raises
     ------
-    DesignError, VaryError
+    InputError
         If one cannot be read, or is of a key that is unknown, no continuous number, or given twice.
     """
 
@@ -318,7 +318,7 @@ def uncertainty(
 
     Raises
     ------
-    DesignError, VaryError
+    InputError
         If the question makes no sense for the scene. Nothing has run then.
     ImportError
         Without SciPy.

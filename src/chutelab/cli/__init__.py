@@ -10,10 +10,10 @@
 `solving`        ``solve``, and ``sweep --uncertainty``
 `lessons`        ``lesson``: list, show, build, new, grade, page
 `benching`       ``bench``
-`parameters`     what several commands take: scenes, overrides, output
-`output`         the files of ``--out``, all of them or none
+`parameters`     what several commands take: scenes, overrides, folders
+`output`         what is left: the files of ``--out``, all of them or none; a run's summary
 `report`         summaries as tables for people
-`console`        text and JSON on standard output, a bar on standard error, runs that get stuck
+`console`        text and JSON on standard output, a bar on standard error
 ===============  ==================================================================================
 
 Modules that take long to import are imported inside the commands that need them, so that

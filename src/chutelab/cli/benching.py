@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from chutelab.cli.parameters import complete_scene, folder, retitled, set_option
+from chutelab.cli import console
+from chutelab.cli.console import progress
+from chutelab.cli.output import destination
+from chutelab.cli.parameters import json_option, out_option, retitled, scene_argument, set_option
 
 if TYPE_CHECKING:
     from chutelab.checks.workprecision import Timing
@@ -19,7 +22,7 @@ REPEATS = 9
 
 
 @click.command(short_help="Measure run time against error of a scene, and draw the diagram.")
-@click.argument("scene", shell_complete=complete_scene)
+@scene_argument
 @click.option(
     "--engine",
     "engines",
@@ -44,14 +47,8 @@ REPEATS = 9
     help="Timed runs after the first, at most; fewer of what takes long.",
 )
 @set_option
-@click.option(
-    "--out",
-    metavar="DIR",
-    type=click.Path(),
-    callback=folder,
-    help="Write work-precision.tsv and work-precision.png into this folder.",
-)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of a table.")
+@out_option("Write work-precision.tsv and work-precision.png into this folder.")
+@json_option("Print one JSON object instead of a table.")
 def bench(
     scene: str,
     engines: tuple[str, ...],
@@ -80,9 +77,6 @@ def bench(
     lower, take that engine for the accuracy you need.
     """
     from chutelab.checks.workprecision import Timing, measure
-    from chutelab.cli import console
-    from chutelab.cli.console import progress
-    from chutelab.cli.output import destination
     from chutelab.scene import load
     from chutelab.util.files import tsv_text
     from chutelab.util.versions import environment, measured_on

@@ -10,13 +10,18 @@ from typing import TYPE_CHECKING
 
 import click
 
+from chutelab.cli import console
+from chutelab.cli.console import progress
 from chutelab.cli.parameters import (
     complete_scene,
     dt_option,
     engine_option,
+    json_option,
     loaded_as_told,
+    scene_argument,
     set_option,
 )
+from chutelab.cli.program import StuckError
 
 if TYPE_CHECKING:
     from chutelab.checks.agreement import Verification
@@ -29,7 +34,7 @@ if TYPE_CHECKING:
     "scenes", metavar="SCENE...", nargs=-1, required=True, shell_complete=complete_scene
 )
 @set_option
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@json_option()
 @click.pass_context
 def check(
     ctx: click.Context, scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool
@@ -40,7 +45,6 @@ def check(
     what the closed form covers, and for each warning what to change.
     """
     from chutelab.checks.preflight import preflight
-    from chutelab.cli import console
     from chutelab.scene import SceneError, load
     from chutelab.util.tables import plain
 
@@ -64,7 +68,7 @@ def check(
 
 @click.command(short_help="Check what scenes promise; compare independent answers.")
 @click.argument("scenes", metavar="[SCENE]...", nargs=-1, shell_complete=complete_scene)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@json_option()
 @click.pass_context
 def verify(ctx: click.Context, scenes: tuple[str, ...], as_json: bool) -> None:
     """Check what each SCENE is expected to show (default: all shipped ones).
@@ -74,8 +78,6 @@ def verify(ctx: click.Context, scenes: tuple[str, ...], as_json: bool) -> None:
     its particle 0, taken alone. Exit code 1 if an error is larger than its tolerance.
     """
     from chutelab.checks import agreement
-    from chutelab.cli import console
-    from chutelab.cli.console import progress
     from chutelab.scene import load, shipped
     from chutelab.util.tables import Sheet, plain
 
@@ -155,11 +157,11 @@ def _sheets(title: str, answer: Verification) -> Iterator[Sheet]:
 
 
 @click.command(short_help="Run a scene and judge it by laws that every run must keep.")
-@click.argument("scene", shell_complete=complete_scene)
+@scene_argument
 @engine_option
 @dt_option
 @set_option
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@json_option()
 @click.pass_context
 def stress(
     ctx: click.Context,
@@ -177,7 +179,6 @@ def stress(
     such a scene is told with the reason. Exit code 1 if a law is broken.
     """
     from chutelab.checks.stress import Evidence, judge
-    from chutelab.cli import console
     from chutelab.engines.simulation import simulate
     from chutelab.machine import build
     from chutelab.results.recorder import StalledError
@@ -188,7 +189,7 @@ def stress(
         with console.progress("simulating") as update:
             recording = simulate(loaded, progress=update)
     except StalledError as stalled:
-        raise console.StuckError(str(stalled)) from stalled
+        raise StuckError(str(stalled)) from stalled
     run = Evidence(build(loaded), recording)
     found = judge(run)
     broken = sum(one.broken for one in found)

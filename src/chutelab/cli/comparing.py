@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from chutelab.cli.parameters import complete_scene, folder, set_option
+from chutelab.cli.console import progress, show, show_json
+from chutelab.cli.output import destination, write_json
+from chutelab.cli.parameters import json_option, out_option, scene_argument, set_option
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -33,7 +35,7 @@ def _keys(
 
 
 @click.command(short_help="Lay measured points over a scene; fit the scene to them.")
-@click.argument("scene", shell_complete=complete_scene)
+@scene_argument
 @click.option(
     "--data",
     metavar="FILE",
@@ -73,14 +75,8 @@ def _keys(
 )
 @click.option("--robust", is_flag=True, help="With --fit: give points far off less weight.")
 @set_option
-@click.option(
-    "--out",
-    metavar="DIR",
-    type=click.Path(),
-    callback=folder,
-    help="Write compare.png, points.csv and, with --fit, fit.json into this folder.",
-)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")
+@out_option("Write compare.png, points.csv and, with --fit, fit.json into this folder.")
+@json_option("Print one JSON object instead of tables.")
 def compare(
     scene: str,
     data: str,
@@ -118,8 +114,6 @@ def compare(
     s² (JᵀJ)⁻¹ from how the points respond to the parameters (J) and how much they scatter (s): they
     hold if errors are independent and the model is right. Needs pip install "chutelab[fit]".
     """  # noqa: D301 - click wants the backspace
-    from chutelab.cli.console import progress, show_json
-    from chutelab.cli.output import destination
     from chutelab.scene import load
     from chutelab.studies import measured
     from chutelab.studies.measured.result import as_dict
@@ -142,7 +136,6 @@ def compare(
 
 
 def _write(found: Residuals, fit: Fit | None, place: Path) -> None:
-    from chutelab.cli.output import write_json
     from chutelab.pictures.plots.measured import measured
     from chutelab.studies.measured.result import as_dict, points_csv
 
@@ -155,7 +148,6 @@ def _write(found: Residuals, fit: Fit | None, place: Path) -> None:
 def _tell(found: Residuals, fit: Fit | None, out: Path | None) -> None:
     from rich.text import Text
 
-    from chutelab.cli.console import show
     from chutelab.studies.measured.result import advice
     from chutelab.util.tables import wrapped
 

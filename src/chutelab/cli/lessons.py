@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING
 import click
 from click.shell_completion import CompletionItem
 
-from chutelab.cli.parameters import folder
+from chutelab.cli import console
+from chutelab.cli.console import progress
+from chutelab.cli.output import check_file, writing
+from chutelab.cli.parameters import json_option, out_option
 from chutelab.cli.program import InOrder, RefusedError
 
 if TYPE_CHECKING:
@@ -43,11 +46,10 @@ def lesson() -> None:
 
 
 @lesson.command("list", short_help="List the lessons.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@json_option()
 def list_lessons(as_json: bool) -> None:
     """List the lessons: number, name, for whom, how long, and the question of each."""
     from chutelab.classroom.lessons.reading import shipped_lessons
-    from chutelab.cli import console
 
     found = shipped_lessons()
     if as_json:
@@ -65,7 +67,7 @@ def list_lessons(as_json: bool) -> None:
 
 @lesson.command(short_help="Show one lesson, with its worksheet.")
 @click.argument("wanted", metavar="LESSON", shell_complete=complete_lesson)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@json_option()
 def show(wanted: str, as_json: bool) -> None:
     """Show one lesson: its question, scenes and quantities, its files, and the worksheet.
 
@@ -80,7 +82,6 @@ def show(wanted: str, as_json: bool) -> None:
     from chutelab.classroom.lessons import find, scene_of
     from chutelab.classroom.lessons.building import plain_of
     from chutelab.classroom.lessons.reading import unit_in
-    from chutelab.cli import console
     from chutelab.util.tables import Sheet
 
     found = find(wanted)
@@ -103,13 +104,9 @@ def show(wanted: str, as_json: bool) -> None:
 
 @lesson.command(short_help="Make the picture of each lesson that changed.")
 @click.argument("wanted", metavar="[LESSON]...", nargs=-1, shell_complete=complete_lesson)
-@click.option(
-    "--out",
-    metavar="DIR",
-    type=click.Path(),
-    callback=folder,
-    help="Write each picture into a folder NN-name in here, not into the lesson's own: for an"
-    " installed chutelab, whose folders cannot be written to.",
+@out_option(
+    "Write each picture into a folder NN-name in here, not into the lesson's own: for an"
+    " installed chutelab, whose folders cannot be written to."
 )
 @click.option("--force", is_flag=True, help="Make them anew, changed or not.")
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing, and show no progress bar.")
@@ -121,8 +118,6 @@ def build(wanted: tuple[str, ...], out: Path | None, force: bool, quiet: bool) -
     the same bytes.
     """
     from chutelab.classroom.lessons.building import build as build_lesson
-    from chutelab.cli.console import progress
-    from chutelab.cli.output import writing
 
     for one in _lessons(wanted):
         with (
@@ -157,7 +152,6 @@ def new(name: Path, model: str | None) -> None:
     """  # noqa: D301 - click wants the backspace
     from chutelab.classroom.lessons import find
     from chutelab.classroom.lessons.building import start
-    from chutelab.cli.output import writing
 
     copied = None if model is None else find(model)
     with writing(instead="another place"):
@@ -169,15 +163,7 @@ def new(name: Path, model: str | None) -> None:
 
 @lesson.command(short_help="Bundle the lessons as web pages that need no server.")
 @click.argument("wanted", metavar="[LESSON]...", nargs=-1, shell_complete=complete_lesson)
-@click.option(
-    "-o",
-    "--out",
-    metavar="DIR",
-    required=True,
-    type=click.Path(),
-    callback=folder,
-    help="The folder; files that are there are replaced.",
-)
+@out_option("The folder; files that are there are replaced.", "-o", required=True)
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing, and show no progress bar.")
 def page(wanted: tuple[str, ...], out: Path, quiet: bool) -> None:
     """Bundle lessons (without LESSON: all that are shipped) into a folder of web pages.
@@ -187,8 +173,6 @@ def page(wanted: tuple[str, ...], out: Path, quiet: bool) -> None:
     phone.
     """
     from chutelab.classroom.lessons.building import bundle
-    from chutelab.cli.console import progress
-    from chutelab.cli.output import writing
 
     with writing(instead="another folder"), progress("making the pages", quiet=quiet) as update:
         made = bundle(_lessons(wanted), out, update)
@@ -254,9 +238,6 @@ def grade(files: tuple[Path, ...], out: Path | None, time_limit: float, quiet: b
     """  # noqa: D301 - click wants the backspace
     from chutelab.classroom.grading import grade as grade_notebooks
     from chutelab.classroom.grading import write_csv
-    from chutelab.cli import console
-    from chutelab.cli.console import progress
-    from chutelab.cli.output import check_file, writing
     from chutelab.util.tables import Sheet
 
     notebooks: list[Path] = []

@@ -1,16 +1,24 @@
-"""The files of ``--out``: made in a folder of their own, then moved in, all of them or none."""
+"""What commands leave: files of ``--out``, all of them or none, and a recording's summary.
+
+A folder's files are made in one of their own, then moved in.
+"""
 
 from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from chutelab.cli.console import progress
-from chutelab.cli.parameters import FILMS, KINDS
+import click
+from click.shell_completion import CompletionItem
+
+from chutelab.cli.console import progress, show, show_json
+from chutelab.cli.parameters import json_option, out_option
 from chutelab.cli.program import RefusedError
 from chutelab.util.tables import plain
 
@@ -18,9 +26,26 @@ if TYPE_CHECKING:
     from chutelab.results import Recording
     from chutelab.studies.accuracy import Accuracy
 
-
 PICTURES = (".png", ".svg", ".pdf")
 """What pictures may be written as, by suffix."""
+
+KINDS = {
+    "png": ("overlay.png",),
+    "gif": ("lesson.gif",),
+    "csv": ("events.csv", "trajectory.csv"),
+    "npz": ("recording.npz",),
+    "json": ("summary.json",),
+    "mp4": ("lesson.mp4",),
+    "webm": ("lesson.webm",),
+    "strobe": ("strobe.png",),
+}
+"""What ``--only`` takes, and the files it stands for."""
+
+FILMS = ("gif", "mp4", "webm")
+"""Those that are the lesson picture; ``--format`` chooses one."""
+
+USUAL = ("png", "gif", "csv", "npz", "json")
+"""Those that are written unless ``--only`` chooses."""
 
 
 @contextmanager
@@ -60,11 +85,6 @@ def destination(folder: Path | None, names: Iterable[str] = ()) -> Iterator[Path
     except OSError as error:
         reason = error.strerror or str(error)
         raise RefusedError(f"--out {folder}: cannot be written to: {reason}") from error
-
-
-def files_of(kinds: Sequence[str]) -> list[str]:
-    """Return the names of the files that some of `KINDS` stand for."""
-    return [name for kind in kinds for name in KINDS[kind]]
 
 
 def check_file(option: str, path: Path | None, suffixes: Sequence[str] = ()) -> None:
@@ -119,35 +139,154 @@ def writing(what: str = "", instead: str = "") -> Iterator[None]:
         raise RefusedError(f"{name}: {said}" if name else said) from error
 
 
-def write(
-    recording: Recording,
-    folder: Path,
-    kinds: Sequence[str],
-    *,
-    quiet: bool,
-    accuracy: Accuracy | None = None,
-) -> None:
-    """Write the files of the given `KINDS` into an existing folder."""
-    for kind in kinds:
-        with progress(f"writing {' and '.join(KINDS[kind])}", quiet=quiet):
-            if kind in FILMS:
-                from chutelab.pictures.animation import animate
+@dataclass(frozen=True)
+class Output:
+    """What ``run`` and ``show`` leave of a recording, see `output_options`.
 
-                animate(recording, folder / KINDS[kind][0])
-            elif kind in ("png", "strobe"):
-                from chutelab.pictures import plots
+    Attributes
+    ----------
+    out : Path or None
+        Folder of the files; None writes nothing.
+    kinds : tuple of str
+        Which of `KINDS`.
+    as_json, quiet : bool
+        Whether the summary is JSON; whether there is none, and no bar.
+    """
 
-                draw = plots.overlay if kind == "png" else plots.strobe
-                draw(recording, path=folder / KINDS[kind][0])
-            elif kind == "csv":
-                recording.to_csv(folder)
-            elif kind == "npz":
-                recording.save(folder / KINDS[kind][0])
-            else:
-                from chutelab.results.summary import summary
+    out: Path | None
+    kinds: tuple[str, ...]
+    as_json: bool
+    quiet: bool
 
-                reached = None if accuracy is None else vars(accuracy)
-                write_json(summary(recording, reached), folder / KINDS[kind][0])
+    @property
+    def files(self) -> list[str]:
+        """Names of the files."""
+        return [name for kind in self.kinds for name in KINDS[kind]]
+
+    def destination(self) -> AbstractContextManager[Path | None]:
+        """Give an empty folder for the files, see `destination`."""
+        return destination(self.out, self.files)
+
+    def write(self, recording: Recording, folder: Path, accuracy: Accuracy | None = None) -> None:
+        """Write the files into an existing folder."""
+        for kind in self.kinds:
+            path = folder / KINDS[kind][0]
+            with progress(f"writing {' and '.join(KINDS[kind])}", quiet=self.quiet):
+                if kind in FILMS:
+                    from chutelab.pictures.animation import animate
+
+                    animate(recording, path)
+                elif kind in ("png", "strobe"):
+                    from chutelab.pictures import plots
+
+                    draw = plots.overlay if kind == "png" else plots.strobe
+                    draw(recording, path=path)
+                elif kind == "csv":
+                    recording.to_csv(folder)
+                elif kind == "npz":
+                    recording.save(path)
+                else:
+                    write_json(_summary(recording, accuracy), path)
+
+    def tell(self, recording: Recording, accuracy: Accuracy | None = None) -> None:
+        """Print the summary and what was written."""
+        if self.as_json:
+            show_json(_summary(recording, accuracy))
+        elif not self.quiet:
+            from chutelab.cli.report import report
+
+            show(*report(recording, accuracy))
+            if self.out is not None:
+                click.echo(f"wrote into {self.out}: {', '.join(self.files)}")
+
+
+def _summary(recording: Recording, accuracy: Accuracy | None) -> dict[str, Any]:
+    from chutelab.results.summary import summary
+
+    return summary(recording, None if accuracy is None else vars(accuracy))
+
+
+def _complete_kinds(
+    _ctx: click.Context, _parameter: click.Parameter, incomplete: str
+) -> list[CompletionItem]:
+    """Offer `KINDS` after the last comma."""
+    before, comma, begun = incomplete.rpartition(",")
+    return [CompletionItem(f"{before}{comma}{kind}") for kind in KINDS if kind.startswith(begun)]
+
+
+def _kinds(
+    _ctx: click.Context, _parameter: click.Parameter, values: tuple[str, ...]
+) -> tuple[str, ...] | None:
+    if not values:
+        return None
+    asked = {kind.strip().lower() for value in values for kind in value.split(",")}
+    if asked - KINDS.keys():
+        raise click.BadParameter(f"{','.join(values)!r}: choose from {','.join(KINDS)}")
+    return tuple(kind for kind in KINDS if kind in asked)
+
+
+def output_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add ``--out``, ``--only``, ``--format``, ``--json`` and ``--quiet``, given as one `Output`.
+
+    Refused are ``--only`` and ``--format`` where nothing is written, ``--format`` where there is no
+    film, and a film that cannot be written here.
+    """
+
+    @wraps(command)
+    def told(
+        out: Path | None,
+        only: tuple[str, ...] | None,
+        film: str | None,
+        as_json: bool,
+        quiet: bool,
+        **others: Any,
+    ) -> None:
+        if out is None:
+            for option, given in (("--only chooses among", only), ("--format is for one of", film)):
+                if given is not None:
+                    raise click.UsageError(f"{option} the files of --out DIR: give --out too.")
+        kinds = USUAL if only is None else only
+        if film is not None:
+            if not set(kinds) & set(FILMS):
+                raise click.UsageError(
+                    f"--format {film} is for the lesson picture, which --only {','.join(kinds)}"
+                    " leaves out: add gif to --only."
+                )
+            kinds = tuple(kind for kind in KINDS if kind == film or kind in set(kinds) - set(FILMS))
+        for kind in {"mp4", "webm"}.intersection(kinds):
+            from chutelab.pictures.animation import VideoError, need_video
+
+            try:
+                need_video(kind)
+            except VideoError as error:
+                raise RefusedError(str(error)) from error
+        command(**others, output=Output(out, kinds, as_json, quiet))
+
+    options = (
+        out_option("Write pictures, tables and the recording into this folder."),
+        click.option(
+            "--only",
+            metavar="KINDS",
+            multiple=True,
+            callback=_kinds,
+            shell_complete=_complete_kinds,
+            help=f"With --out: only some of {','.join(KINDS)}; without, the first"
+            f" {len(USUAL)}. May be repeated.",
+        ),
+        click.option(
+            "--format",
+            "film",
+            type=click.Choice(FILMS),
+            help="With --out: the lesson picture as this instead of a GIF; mp4 and webm need the"
+            " extra chutelab[video].",
+        ),
+        json_option("Print one JSON object instead of tables."),
+        click.option("--quiet", "-q", is_flag=True, help="Print no summary and no progress bar."),
+    )
+    made: Callable[..., None] = told
+    for option in reversed(options):
+        made = option(made)
+    return made
 
 
 def write_json(value: Any, path: Path) -> None:

@@ -25,6 +25,12 @@ class RefusedError(click.ClickException):
     exit_code = 2
 
 
+class StuckError(click.ClickException):
+    """A run got stuck; it is not the user's to mend."""
+
+    exit_code = 1
+
+
 class InOrder(click.Group):
     """A group of commands, listed in the order they were added."""
 

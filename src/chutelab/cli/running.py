@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from chutelab.cli.console import partial_option, salvaged
+from chutelab.cli.console import progress
+from chutelab.cli.output import KINDS, Output, output_options, writing
 from chutelab.cli.parameters import (
-    KINDS,
-    chosen,
-    complete_scene,
     dt_option,
     engine_option,
     loaded_as_told,
-    output_options,
+    scene_argument,
     set_option,
 )
-from chutelab.cli.program import RefusedError
+from chutelab.cli.program import RefusedError, StuckError
 
 if TYPE_CHECKING:
-    from chutelab.results import Recording
     from chutelab.scene.variants import Vary
     from chutelab.studies.accuracy import Accuracy, Wanted
 
@@ -39,7 +35,7 @@ def _accuracy(_ctx: click.Context, _parameter: click.Parameter, text: str | None
 
 
 @click.command(short_help="Simulate a scene and print a summary; write its files.")
-@click.argument("scene", shell_complete=complete_scene)
+@scene_argument
 @engine_option
 @dt_option
 @click.option(
@@ -51,18 +47,18 @@ def _accuracy(_ctx: click.Context, _parameter: click.Parameter, text: str | None
 )
 @set_option
 @output_options
-@partial_option
+@click.option(
+    "--partial",
+    is_flag=True,
+    help="With --out: if the run gets stuck, write what was recorded until then.",
+)
 def run(
     scene: str,
     engine: str | None,
     dt: float | None,
     accuracy: Wanted | None,
     overrides: tuple[str, ...],
-    out: Path | None,
-    only: tuple[str, ...] | None,
-    film: str | None,
-    as_json: bool,
-    quiet: bool,
+    output: Output,
     partial: bool,
 ) -> None:
     """Simulate SCENE, a scene file or the name of a shipped one, and print a summary.
@@ -71,31 +67,36 @@ def run(
     step that is tried; if the accuracy cannot be reached, everything is printed and written all
     the same, and the exit code is 1.
     """
-    from chutelab.cli.console import progress
-    from chutelab.cli.output import destination, files_of, write
     from chutelab.engines.simulation import simulate
+    from chutelab.results.recorder import StalledError
 
-    kinds = chosen(out, only, film)
-    if partial and out is None:
+    if partial and output.out is None:
         raise click.UsageError("--partial keeps files of --out DIR: give --out too.")
     loaded = loaded_as_told(scene, overrides, engine, dt)
     reached: Accuracy | None = None
+    stuck: StuckError | None = None
+    with output.destination() as folder:
+        try:
+            with progress("simulating", quiet=output.quiet) as update:
+                if accuracy is None:
+                    recording = simulate(loaded, progress=update)
+                else:
+                    from chutelab.studies.accuracy import reach
 
-    def simulated() -> Recording:
-        nonlocal reached
-        if accuracy is None:
-            return simulate(loaded, progress=update)
-        from chutelab.studies.accuracy import reach
-
-        found, reached = reach(loaded, accuracy, update)
-        return found
-
-    with destination(out, files_of(kinds)) as folder:
-        with progress("simulating", quiet=quiet) as update:
-            recording, stuck = salvaged(simulated, keep=partial)
+                    recording, reached = reach(loaded, accuracy, update)
+        except StalledError as stalled:
+            if not partial:
+                kept = "; add --out DIR --partial to keep what was recorded until then"
+                raise StuckError(f"{stalled}{kept}") from stalled
+            if stalled.recording is None:
+                raise StuckError(str(stalled)) from stalled
+            recording, stuck = (
+                stalled.recording,
+                StuckError(f"{stalled}; what is written ends there"),
+            )
         if folder is not None:
-            write(recording, folder, kinds, quiet=quiet, accuracy=reached)
-    _tell(recording, out, kinds, as_json=as_json, quiet=quiet, accuracy=reached)
+            output.write(recording, folder, reached)
+    output.tell(recording, reached)
     if stuck is not None:
         raise stuck
     if accuracy is not None and reached is not None and not reached.met:
@@ -108,20 +109,11 @@ def run(
 @click.command(short_help="Print the summary of a recording.npz; make its files again.")
 @click.argument("recording", type=click.Path(path_type=Path))
 @output_options
-def show(
-    recording: Path,
-    out: Path | None,
-    only: tuple[str, ...] | None,
-    film: str | None,
-    as_json: bool,
-    quiet: bool,
-) -> None:
+def show(recording: Path, output: Output) -> None:
     """Print the summary of RECORDING, a recording.npz; with --out make its files again."""
-    from chutelab.cli.output import destination, files_of, write
     from chutelab.results import Recording
     from chutelab.results.storage import RecordingError
 
-    kinds = chosen(out, only, film)
     try:
         loaded = Recording.load(recording)
     except RecordingError as error:
@@ -133,35 +125,10 @@ def show(
         elif recording.suffix == ".toml" or str(recording) in shipped():
             meant = f"; show takes a recording.npz; for a scene: chutelab run {recording}"
         raise RefusedError(f"{error}{meant}") from error
-    with destination(out, files_of(kinds)) as folder:
+    with output.destination() as folder:
         if folder is not None:
-            write(loaded, folder, kinds, quiet=quiet)
-    _tell(loaded, out, kinds, as_json=as_json, quiet=quiet)
-
-
-def _tell(
-    recording: Recording,
-    out: Path | None,
-    kinds: Sequence[str],
-    *,
-    as_json: bool,
-    quiet: bool,
-    accuracy: Accuracy | None = None,
-) -> None:
-    """Print a recording's summary and what was written, as JSON or as tables."""
-    from chutelab.cli import console
-    from chutelab.cli.output import files_of
-
-    if as_json:
-        from chutelab.results.summary import summary
-
-        console.show_json(summary(recording, None if accuracy is None else vars(accuracy)))
-    elif not quiet:
-        from chutelab.cli.report import report
-
-        console.show(*report(recording, accuracy))
-        if out is not None:
-            click.echo(f"wrote into {out}: {', '.join(files_of(kinds))}")
+            output.write(loaded, folder)
+    output.tell(loaded)
 
 
 def _varies(
@@ -173,7 +140,7 @@ def _varies(
 
 
 @click.command(short_help="Write a page with sliders that any browser opens.")
-@click.argument("scene", shell_complete=complete_scene)
+@scene_argument
 @click.option(
     "--vary",
     "varies",
@@ -206,8 +173,6 @@ def page(
     It holds everything: no network, no server. Every variant is simulated now; those that cannot
     be run say so on their positions. A file that is there is replaced.
     """
-    from chutelab.cli.console import progress
-    from chutelab.cli.output import writing
     from chutelab.pictures.live.page import write
     from chutelab.scene import load
 

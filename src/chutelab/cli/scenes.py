@@ -9,25 +9,22 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import click
 
-from chutelab.cli.parameters import folder
+from chutelab.cli import console
+from chutelab.cli.output import destination, writing
+from chutelab.cli.parameters import json_option, out_option
 from chutelab.cli.program import RefusedError
-
-if TYPE_CHECKING:
-    pass
-
 
 STANDARD_OUTPUT = Path("-")
 
 
 @click.command()
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@json_option()
 def scenes(as_json: bool) -> None:
     """List the shipped scenes; `run` takes their names."""
-    from chutelab.cli import console
     from chutelab.scene import about
 
     found = about()
@@ -54,7 +51,6 @@ def schema() -> None:
 @click.option("--force", is_flag=True, help="Overwrite a file that is there.")
 def new(path: Path, force: bool) -> None:
     """Write a complete, commented scene to start from (scene.toml, or PATH; - prints it)."""
-    from chutelab.cli.output import writing
     from chutelab.scene import template
     from chutelab.util.files import whole
 
@@ -87,14 +83,13 @@ NUMBERS = (1, 3, 4, 5)
 @click.option(
     "--corrected", "rebound", flag_value="corrected", help="Compute with Eq. (9) put right."
 )
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@json_option()
 def tables(number: str | None, rebound: Literal["as-printed", "corrected"], as_json: bool) -> None:
     """Compute Table 1, 3, 4 or 5 of the paper anew (all of them without NUMBER).
 
     Each cell holds the printed number, then the computed one, marked with * where it differs in a
     printed digit.
     """
-    from chutelab.cli import console
     from chutelab.theory import table
 
     found = [table(n, rebound) for n in ([int(number)] if number else NUMBERS)]
@@ -107,14 +102,8 @@ def tables(number: str | None, rebound: Literal["as-printed", "corrected"], as_j
 
 @click.command(short_help="Draw the paper's figures anew, printed beside corrected.")
 @click.argument("number", type=int, metavar="NUMBER")
-@click.option(
-    "--out",
-    metavar="DIR",
-    type=click.Path(),
-    callback=folder,
-    help="Write the picture, its numbers and its scenes into this folder.",
-)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@out_option("Write the picture, its numbers and its scenes into this folder.")
+@json_option()
 def figure(number: int, out: Path | None, as_json: bool) -> None:
     """Compute Figure 6, 7, 8, 9, 11, 12 or 13 of the paper anew.
 
@@ -126,8 +115,6 @@ def figure(number: int, out: Path | None, as_json: bool) -> None:
     chutelab figure 6
     chutelab figure 6 --out out
     """  # noqa: D301 - click wants the backspace
-    from chutelab.cli import console
-    from chutelab.cli.output import destination
     from chutelab.scene import to_toml
     from chutelab.theory.figures import figure as compute
 

@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from chutelab.cli.parameters import complete_scene, folder, retitled, set_option
+from chutelab.cli.console import progress, show, show_json
+from chutelab.cli.output import PICTURES, check_file, destination, write_json, writing
+from chutelab.cli.parameters import json_option, out_option, retitled, scene_argument, set_option
 
 if TYPE_CHECKING:
     from chutelab.scene import Scene
@@ -23,7 +25,7 @@ FILES = ("overlay.png", "scan.png", "solution.toml", "nearest.toml", "solve.json
 
 
 @click.command(short_help="Find the angle, speed, distance ... that does what you want.")
-@click.argument("scene", shell_complete=complete_scene)
+@scene_argument
 @click.option(
     "--vary",
     metavar="KEY=FROM:TO",
@@ -59,15 +61,11 @@ FILES = ("overlay.png", "scan.png", "solution.toml", "nearest.toml", "solve.json
     help="With several: of the random draws of the search.",
 )
 @set_option
-@click.option(
-    "--out",
-    metavar="DIR",
-    type=click.Path(),
-    callback=folder,
-    help="Write the overlay at the answer, the scene there, a picture of the search and its"
-    " numbers into this folder.",
+@out_option(
+    "Write the overlay at the answer, the scene there, a picture of the search and its"
+    " numbers into this folder."
 )
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of tables.")
+@json_option("Print one JSON object instead of tables.")
 @click.option("--quiet", "-q", is_flag=True, help="Print no answer and no progress bar.")
 def solve(
     scene: str,
@@ -100,8 +98,6 @@ def solve(
     is 1 if there is no solution; the nearest thing to one is shown then. It needs
     pip install "chutelab[design]".
     """  # noqa: D301 - click wants the backspace
-    from chutelab.cli.console import progress, show, show_json
-    from chutelab.cli.output import destination
     from chutelab.scene import load
     from chutelab.studies import design
     from chutelab.studies.design.answers import as_dict
@@ -137,7 +133,6 @@ def solve(
 
 
 def _write(found: Solution, place: Path) -> None:
-    from chutelab.cli.output import write_json
     from chutelab.engines.simulation import simulate
     from chutelab.pictures.plots import overlay
     from chutelab.pictures.plots.design import scan
@@ -181,8 +176,6 @@ def propagate(
     out, plot : Path or None
         A CSV file for all samples, and a picture.
     """
-    from chutelab.cli.console import progress, show, show_json
-    from chutelab.cli.output import PICTURES, check_file, writing
     from chutelab.studies import design
     from chutelab.studies.design.uncertainty import SAMPLES, as_dict
     from chutelab.util.files import write_lines

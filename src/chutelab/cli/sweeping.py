@@ -8,8 +8,11 @@ from pathlib import Path
 import click
 from click.shell_completion import CompletionItem
 
-from chutelab.cli.parameters import complete_scene, set_option
+from chutelab.cli import console
+from chutelab.cli.output import PICTURES, check_file, writing
+from chutelab.cli.parameters import engine_option, json_option, scene_argument, set_option
 from chutelab.cli.program import RefusedError
+from chutelab.cli.solving import propagate
 
 
 def _complete_column(
@@ -25,7 +28,7 @@ def _complete_column(
 
 
 @click.command(short_help="Simulate many variants of a scene; a row for each.")
-@click.argument("scene", shell_complete=complete_scene)
+@scene_argument
 @click.option(
     "--vary",
     "varies",
@@ -56,11 +59,7 @@ def _complete_column(
     help="How samples are drawn: a Latin hypercube, or Sobol points.",
 )
 @click.option("--seed", type=int, default=0, help="Seed of the samples.", show_default=True)
-@click.option(
-    "--engine",
-    type=click.Choice(["auto", "exact", "contact", "pymunk"]),
-    help="Same as --set run.engine=...",
-)
+@engine_option
 @set_option
 @click.option(
     "--out",
@@ -94,7 +93,7 @@ def _complete_column(
     help="Spread the work over N processes; 0 is one for each processor.",
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Spread it over a Dask cluster instead.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object with all columns.")
+@json_option("Print one JSON object with all columns.")
 @click.option("--quiet", "-q", is_flag=True, help="Print no summary and no progress bar.")
 def sweep(
     scene: str,
@@ -130,8 +129,6 @@ def sweep(
     slip that goes on after it is not in them. With --set run.until=settled it is, as it always is
     in chutelab solve and with --uncertainty.
     """
-    from chutelab.cli import console
-    from chutelab.cli.output import PICTURES, check_file, writing
     from chutelab.scene import load
     from chutelab.scene.overrides import Override
     from chutelab.studies.sweep import (
@@ -150,8 +147,6 @@ def sweep(
     if resume and out is None:
         raise click.UsageError("--resume goes on with the file of --out: give --out too.")
     if uncertain:
-        from chutelab.cli.solving import propagate
-
         if resume or scheduler is not None or jobs != 1:
             raise click.UsageError("--resume, --jobs and --scheduler go with --vary only.")
         engines = [Override("run.engine", engine, f"--engine {engine}")] if engine else []

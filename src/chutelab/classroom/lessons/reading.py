@@ -18,8 +18,8 @@ from chutelab.scene import MISSING, Fault, Scene, SceneError, load, shipped
 from chutelab.scene.overrides import at_path, joined
 from chutelab.scene.rules import suggestion, unit_of
 from chutelab.scene.units import Number, Table, Text, Whole
-from chutelab.scene.variants import VaryError, parse, quantity
-from chutelab.util.errors import did_you_mean
+from chutelab.scene.variants import parse, quantity
+from chutelab.util.errors import InputError, did_you_mean
 
 LEVELS: Final = ("start", "core", "advanced")
 MOST: Final = 20
@@ -247,9 +247,8 @@ def _misfits(lesson: Lesson) -> Iterator[Fault]:
         for i, text in enumerate(part.vary if isinstance(part, Page) else ()):
             try:
                 quantity(scene, parse(text))
-            except VaryError as error:
-                said = str(error).removeprefix(f"--vary {text}: ")
-                yield Fault(f"{table}.vary[{i}]", text, said)
+            except InputError as error:
+                yield Fault(f"{table}.vary[{i}]", text, error.allowed)
 
 
 def unit_in(lesson: Lesson, quantity: str) -> str:

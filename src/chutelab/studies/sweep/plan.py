@@ -17,7 +17,6 @@ from chutelab.scene.variants import (
     Quantity,
     Range,
     Vary,
-    VaryError,
     count_of,
     parse,
     parse_range,
@@ -148,10 +147,8 @@ def planned(
 
     Raises
     ------
-    VaryError
-        If a key cannot be varied so, or there is too much.
     InputError
-        If samples cannot be drawn so.
+        If a key cannot be varied so, there is too much, or samples cannot be drawn so.
     ValueError
         If there is no engine of that name.
     """
@@ -159,13 +156,13 @@ def planned(
         raise ValueError(f"engine = {engine!r}: one of {', '.join(ENGINES)}")
     varied = tuple(_varies(varies, ranges=sample is not None))
     if not varied:
-        raise VaryError("--vary", "at least one key is to be varied, such as plate.angle_deg")
+        raise InputError("at least one key is to be varied, such as plate.angle_deg", "--vary")
     if len(varied) > MOST_KEYS:
-        raise VaryError(varied[MOST_KEYS].typed, f"at most {MOST_KEYS} keys can be varied")
+        raise InputError(f"at most {MOST_KEYS} keys can be varied", varied[MOST_KEYS].typed)
     about = quantities(scene, varied)
     for vary, one in zip(varied, about, strict=True):
         if one.whole and not all(value.is_integer() for value in vary.values):
-            raise VaryError(vary.typed, f"{one.path} takes whole numbers only")
+            raise InputError(f"{one.path} takes whole numbers only", vary.typed)
     samples = None
     if sample is not None:
         samples = drawn(varied, about, sample, design, seed, MOST_VARIANTS)
@@ -188,7 +185,7 @@ def _varies(varies: Sequence[Vary | str] | Mapping[str, Any], *, ranges: bool) -
         given = [(parse_range if ranges else parse)(v) if isinstance(v, str) else v for v in varies]
         for vary in given:
             if ranges and not isinstance(vary, Range):
-                raise VaryError(vary.typed, "samples are drawn from ranges, not from lists")
+                raise InputError("samples are drawn from ranges, not from lists", vary.typed)
         return given
     # + 0.0: there is one zero.
     return [

@@ -126,6 +126,7 @@ typedef struct {
     double swept[3];        /* the impulse two sweeps ago */
     double course[3];       /* where it is heading to; both see `hasten` */
     double mass[3];         /* what the contact feels of masses and inertias, in the same order */
+    double light[3];        /* 1 / mass, 0 where there is none */
     double friction, arm;   /* coefficient; rolling friction as an arm, m */
     double other[3];        /* velocity of a surface or rider there: normal, tangential, spin */
     double rest;            /* coefficient of restitution */

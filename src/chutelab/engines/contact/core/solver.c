@@ -191,7 +191,7 @@ static double press(Contact *c) {
     double change[3] = {normal - c->impulse[0], 0, 0};
     if (change[0] != 0) push(c, change);
     c->impulse[0] = normal;
-    return fabs(change[0]) / c->mass[0];
+    return fabs(change[0]) * c->light[0];
 }
 
 /* How far a change of velocity (x, y) is from keeping all gaps closed, m/s. */
@@ -260,8 +260,7 @@ static double rub(Contact *c) {
     push(c, change);
     J[1] += change[1];
     J[2] += change[2];
-    double roll = c->mass[2] > 0 ? fabs(change[2]) / c->mass[2] * W.disks[c->i].radius : 0;
-    return MAX(fabs(change[1]) / c->mass[1], roll);
+    return MAX(fabs(change[1]) * c->light[1], fabs(change[2]) * c->light[2] * W.disks[c->i].radius);
 }
 
 /* Hasten the sweeps of a crowd: go on where they are heading to, by nonlinear conjugate gradients, of
@@ -272,8 +271,7 @@ static double hasten(Contact *list, int count, double size) {
     double now = 0;
     for (int n = 0; n < count && size >= 0; n++)
         for (int k = 0; k < 3; k++)
-            if (list[n].mass[k] > 0)
-                now += square(list[n].impulse[k] - list[n].swept[k]) / list[n].mass[k];
+            now += square(list[n].impulse[k] - list[n].swept[k]) * list[n].light[k];
     double go = now < size ? now / size : 0;
     for (int n = 0; n < count; n++) {
         Contact *c = list + n;

@@ -15,9 +15,7 @@ import chutelab
 from chutelab.cli import main
 from chutelab.pictures.plots.figure import paper_figure
 from chutelab.results import Kind
-from chutelab.theory.figures import DRAWINGS, NUMBERS, FigureError, figure
-from chutelab.theory.figures.model import path
-from chutelab.theory.figures.paths import CASES
+from chutelab.theory.figures import CASES, DRAWINGS, NUMBERS, FigureError, figure, path
 
 G, EPSILON, FALL, MASS = 9.81, 0.5, 0.5, 0.008
 

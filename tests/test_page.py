@@ -16,7 +16,7 @@ from chutelab import scene as scenes
 from chutelab.cli import main
 from chutelab.pictures.live import page, runs
 from chutelab.results import Kind
-from chutelab.scene.variants import Vary, VaryError
+from chutelab.scene.variants import Vary
 from chutelab.util.errors import InputError
 
 ANGLES = "plate.angle_deg=-20:70:46"
@@ -218,7 +218,7 @@ def test_too_many_knots_are_refused_before_all_is_run(inclined, monkeypatch):
 
 
 def test_too_many_variants_are_refused(inclined):
-    with pytest.raises(VaryError, match="40 × 40 variants, at most 1000 are allowed"):
+    with pytest.raises(InputError, match="40 × 40 variants, at most 1000 are allowed"):
         page.html(inclined, ["gravity=1:2:40", "plate.angle_deg=0:1:40"])
 
 

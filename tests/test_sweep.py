@@ -24,7 +24,6 @@ from chutelab.results.ledger import ledger
 from chutelab.scene import SceneError, load, parse, to_dict
 from chutelab.scene.variants import (
     Vary,
-    VaryError,
     accepted,
     family,
     is_plain,
@@ -473,7 +472,7 @@ def test_units_are_read():
     scene = load("perpendicular")
     for text in ("plate.angle_deg=0:60°:3", "particle.mass=1kg,2kg", "incoming.speed=20cm/s,1m/s"):
         quantity(scene, parse_vary(text))
-    with pytest.raises(VaryError, match="in kg, not in g"):
+    with pytest.raises(InputError, match="in kg, not in g"):
         quantity(scene, parse_vary("particle.mass=1g"))
 
 
@@ -521,9 +520,9 @@ def test_whole_numbers_are_drawn_as_such_with_both_ends():
 
 def test_samples_need_ranges_and_grids_need_counts():
     scene = load("perpendicular")
-    with pytest.raises(VaryError, match="samples are drawn between two ends"):
+    with pytest.raises(InputError, match="samples are drawn between two ends"):
         planned(scene, ["plate.angle_deg=1,2,3"], sample=4)
-    with pytest.raises(VaryError, match="from ranges"):
+    with pytest.raises(InputError, match="from ranges"):
         planned(scene, [Vary("plate.angle_deg", (1.0, 2.0))], sample=4)
     with pytest.raises(InputError, match="lhs, sobol"):
         planned(scene, ["plate.angle_deg=1:2"], sample=4, design="grid")

@@ -214,12 +214,18 @@ class Look:
         The scene's Pydantic model, for the defaults.
     faulty
         Full paths that are already known to be at fault.
+
+    Attributes
+    ----------
+    asked : set of str
+        Keys whose values were asked for: the rules can depend on no others.
     """
 
     def __init__(self, document: Mapping[str, Any], model: Any, faulty: Collection[str] = ()):
         self._document = document
         self._model = model
         self._faulty = faulty
+        self.asked: set[str] = set()
 
     def sound(self, path: str) -> bool:
         """Whether neither the key, nor its table, nor anything inside it is at fault."""
@@ -239,6 +245,7 @@ class Look:
 
     def __call__(self, table: str, key: str) -> Any:
         """Return the value of a key, or its default; NaN if it is at fault or its table absent."""
+        self.asked.add(f"{table}.{key}")
         if not self.sound(f"{table}.{key}"):
             return math.nan
         if self.given(table, key):

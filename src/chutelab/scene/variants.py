@@ -8,13 +8,11 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
 from itertools import product
-from math import isfinite, prod
-from typing import Annotated, Any, Final
+from math import isfinite, nan, prod
+from typing import Any, Final
 
 import numpy as np
-from pydantic import TypeAdapter, ValidationError
 
 from chutelab.scene.loading import SceneError, from_dict, plain, to_dict
 from chutelab.scene.overrides import Override, apply, joined, limits_of, parts_of, rule_at
@@ -30,14 +28,6 @@ MOST_VALUES: Final = 10_000
 FORM: Final = "must be KEY=FROM:TO:COUNT, such as plate.angle_deg=-20:70:46, or KEY=a,b,c"
 
 RANGE_FORM: Final = "must be KEY=FROM:TO, such as plate.angle_deg=-20:70"
-
-
-class VaryError(InputError):
-    """What cannot be varied so; the text says what was given, and what is allowed."""
-
-    def __init__(self, typed: str, allowed: str) -> None:
-        super().__init__(allowed, typed)
-        self.args = typed, allowed
 
 
 @dataclass(frozen=True)
@@ -65,9 +55,9 @@ class Vary:
         if not self.typed:
             object.__setattr__(self, "typed", f"--vary {self.key}=...")
         if not self.values:
-            raise VaryError(self.typed, "at least one value is needed")
+            raise InputError("at least one value is needed", self.typed)
         if not all(isfinite(value) for value in self.values):
-            raise VaryError(self.typed, "only finite numbers are allowed")
+            raise InputError("only finite numbers are allowed", self.typed)
 
 
 @dataclass(frozen=True)
@@ -77,10 +67,10 @@ class Range(Vary):
     def __post_init__(self) -> None:
         super().__post_init__()
         if len(self.values) != 2:
-            raise VaryError(self.typed, RANGE_FORM)
+            raise InputError(RANGE_FORM, self.typed)
         low, high = self.values
         if low >= high:
-            raise VaryError(self.typed, f"the range is empty: from {low:g} to {high:g}")
+            raise InputError(f"the range is empty: from {low:g} to {high:g}", self.typed)
 
 
 def parse(text: str) -> Vary:
@@ -88,24 +78,36 @@ def parse(text: str) -> Vary:
 
     Raises
     ------
-    VaryError
+    InputError
         If it is not of the form, no number, an empty range, or too many values.
     """
     typed, key, given = _parted_key(text, FORM)
     if ":" not in given:
         parts = given.split(",")
         if len(parts) > MOST_VALUES:
-            raise VaryError(typed, f"{len(parts)} values, at most {MOST_VALUES} are allowed")
+            raise InputError(f"{len(parts)} values, at most {MOST_VALUES} are allowed", typed)
         values, unit = _numbers(typed, parts, FORM)
         return Vary(key, values, typed, unit)
     parts = given.split(":")
     if len(parts) != 3:
-        raise VaryError(typed, FORM)
+        raise InputError(FORM, typed)
     (first, last), unit = _numbers(typed, parts[:2], FORM)
-    count = _count(typed, parts[2])
-    if count > 1 and first == last:
-        raise VaryError(typed, f"the range is empty: from {first:g} to {last:g}")
-    return Vary(key, _even(first, last, count), typed, unit)
+    try:
+        count = int(parts[2])
+    except ValueError:
+        count = 0
+    if not 1 <= count <= MOST_VALUES:
+        found = f"COUNT = {parts[2].strip() or 'nothing'}"
+        raise InputError(f"{found}; it must be a whole number from 1 to {MOST_VALUES}", typed)
+    if count == 1:
+        return Vary(key, (first,), typed, unit)
+    if first == last:
+        raise InputError(f"the range is empty: from {first:g} to {last:g}", typed)
+    # Rounded: 0.3 is 0.3, not 0.30000000000000004, and what rounding leaves of a 0 is a 0.
+    nothing = 1e-13 * max(abs(first), abs(last))
+    inside = (first + (last - first) * i / (count - 1) for i in range(1, count - 1))
+    rounded = (0.0 if abs(value) < nothing else float(f"{value:.12g}") for value in inside)
+    return Vary(key, (first, *rounded, last), typed, unit)
 
 
 def parse_range(text: str) -> Range:
@@ -113,13 +115,13 @@ def parse_range(text: str) -> Range:
 
     Raises
     ------
-    VaryError
+    InputError
         If it is not of the form, no number, or an empty range.
     """
     typed, key, given = _parted_key(text, RANGE_FORM)
     parts = given.split(":")
     if len(parts) != 2:
-        raise VaryError(typed, f"samples are drawn between two ends: it {RANGE_FORM}")
+        raise InputError(f"samples are drawn between two ends: it {RANGE_FORM}", typed)
     values, unit = _numbers(typed, parts, RANGE_FORM)
     return Range(key, values, typed, unit)
 
@@ -128,51 +130,28 @@ def _parted_key(text: str, form: str) -> tuple[str, str, str]:
     typed = f"--vary {text}"
     key, equals, given = (part.strip() for part in text.partition("="))
     if not (key and equals and given):
-        raise VaryError(typed, form)
+        raise InputError(form, typed)
     return typed, key, given
 
 
 def _numbers(typed: str, parts: Sequence[str], form: str) -> tuple[tuple[float, ...], str]:
     """Return numbers in the SI unit, and which that is; "" if none was written."""
-    read = [_number(typed, part, form) for part in parts]
-    units = {unit for value, unit in read if unit or value != 0.0}
+    values, units = [], set()
+    for part in parts:
+        try:
+            value, unit = read_size(part)
+        except ValueError:
+            # A unit without prefixes, such as kg, is as good if it is the key's.
+            match = SIZE.fullmatch(part.strip())
+            value, unit = (float(match[1]), match[2]) if match else (nan, "")
+        if not isfinite(value):
+            raise InputError(f"{part.strip() or 'nothing'} is not a number; it {form}", typed)
+        values.append(value)
+        if unit or value != 0.0:
+            units.add(unit)
     if len(units) > 1:
-        raise VaryError(typed, "give all numbers in one kind of unit, or all without")
-    return tuple(value for value, _ in read), units.pop() if units else ""
-
-
-def _number(typed: str, text: str, form: str) -> tuple[float, str]:
-    try:
-        return read_size(text)
-    except ValueError:
-        # A unit without prefixes, such as kg, is as good if it is the key's.
-        match = SIZE.fullmatch(text.strip())
-    value = float(match[1]) if match else float("nan")
-    if match is None or not isfinite(value):
-        raise VaryError(typed, f"{text.strip() or 'nothing'} is not a number; it {form}")
-    return value, match[2]
-
-
-def _count(typed: str, text: str) -> int:
-    try:
-        count = int(text)
-    except ValueError:
-        count = 0
-    if not 1 <= count <= MOST_VALUES:
-        given = f"COUNT = {text.strip() or 'nothing'}"
-        raise VaryError(typed, f"{given}; it must be a whole number from 1 to {MOST_VALUES}")
-    return count
-
-
-def _even(first: float, last: float, count: int) -> tuple[float, ...]:
-    """Return evenly spaced values; 0.3 is 0.3, not 0.30000000000000004."""
-    if count == 1:
-        return (first,)
-    # What is left of a 0 by rounding is a 0.
-    nothing = 1e-13 * max(abs(first), abs(last))
-    inside = (first + (last - first) * i / (count - 1) for i in range(1, count - 1))
-    rounded = (0.0 if abs(value) < nothing else float(f"{value:.12g}") for value in inside)
-    return (first, *rounded, last)
+        raise InputError("give all numbers in one kind of unit, or all without", typed)
+    return tuple(values), units.pop() if units else ""
 
 
 @dataclass(frozen=True)
@@ -202,27 +181,34 @@ def quantity(scene: Scene, vary: Vary) -> Quantity:
 
     Raises
     ------
-    VaryError
+    InputError
         If the scene knows no such key, or it holds no number.
     """
     document = plain(to_dict(scene))
     faults, _ = apply(document, [setting(vary.key, vary.values[0])])
     if faults:
-        raise VaryError(vary.typed, faults[0].allowed)
+        raise InputError(faults[0].allowed, vary.typed)
     parts = parts_of(vary.key, [free.name for free in scene.surface])
     path, indexed = joined(parts), isinstance(parts[-1], int)
     while isinstance(parts[-1], int):
         parts.pop()
     about = rule_at(parts)
     if about is None:
-        raise VaryError(vary.typed, _unknown(document, path))
+        text = "unknown key; `chutelab schema` lists all"
+        try:
+            from_dict(document)
+        except SceneError as error:
+            # What the scene says of it.
+            said = (one for one in error.faults if one.value is not MISSING)
+            text = next((one.allowed for one in said if path.startswith(one.key)), text)
+        raise InputError(text, vary.typed)
     kinds = {kind.get("type") for kind in about.get("anyOf", [about])}
     if not (indexed or kinds & {"number", "integer"}) or parts[0] == "expect":
-        raise VaryError(vary.typed, f"{path} is no number, and only numbers can be varied")
+        raise InputError(f"{path} is no number, and only numbers can be varied", vary.typed)
     unit = str(about.get("x-unit") or "")
     if vary.unit not in ("", unit) and (vary.unit, unit) != ("%", ""):
         own = f"is in {unit}" if unit else "is a pure number"
-        raise VaryError(vary.typed, f"{path} {own}, not in {vary.unit}; plain numbers will do")
+        raise InputError(f"{path} {own}, not in {vary.unit}; plain numbers will do", vary.typed)
     if indexed:
         return Quantity(path, path, unit)
     label = re.split("[;:]", str(about.get("description", path)))[0].removesuffix(".")
@@ -232,30 +218,19 @@ def quantity(scene: Scene, vary: Vary) -> Quantity:
     return Quantity(path, label, unit, whole="number" not in kinds)
 
 
-def _unknown(document: dict[str, Any], path: str) -> str:
-    """Say what the scene says of a key that it does not know."""
-    try:
-        from_dict(document)
-    except SceneError as error:
-        for fault in error.faults:
-            if fault.value is not MISSING and path.startswith(fault.key):
-                return fault.allowed
-    return "unknown key; `chutelab schema` lists all"
-
-
 def quantities(scene: Scene, varies: Sequence[Vary]) -> tuple[Quantity, ...]:
     """Return what each of the varied keys is.
 
     Raises
     ------
-    VaryError
+    InputError
         If a key cannot be varied, or two are the same.
     """
     found: list[Quantity] = []
     for vary in varies:
         one = quantity(scene, vary)
         if any(one.path == other.path for other in found):
-            raise VaryError(vary.typed, f"{one.path} is varied already")
+            raise InputError(f"{one.path} is varied already", vary.typed)
         found.append(one)
     return tuple(found)
 
@@ -307,18 +282,21 @@ def variants(scene: Scene, varies: Sequence[Vary], most: int = 1_000) -> tuple[V
 
     Raises
     ------
-    VaryError
+    InputError
         If there are too many keys or combinations, or a key cannot be varied.
     """
     if len(varies) > MOST_VARIED:
-        raise VaryError(varies[MOST_VARIED].typed, f"at most {MOST_VARIED} keys can be varied")
+        raise InputError(f"at most {MOST_VARIED} keys can be varied", varies[MOST_VARIED].typed)
     quantities(scene, varies)
     count_of(varies, most)
-    document = to_dict(scene)
-    return tuple(
-        variant(document, scene.source, [vary.key for vary in varies], values)
-        for values in product(*(vary.values for vary in varies))
-    )
+    found = []
+    for values in product(*(vary.values for vary in varies)):
+        settings = {vary.key: value for vary, value in zip(varies, values, strict=True)}
+        try:
+            found.append(Variant(values, scene.with_values(settings)))
+        except SceneError as error:
+            found.append(Variant(values, None, reason(error)))
+    return tuple(found)
 
 
 def count_of(varies: Sequence[Vary], most: int) -> int:
@@ -326,36 +304,15 @@ def count_of(varies: Sequence[Vary], most: int) -> int:
 
     Raises
     ------
-    VaryError
+    InputError
         If there are more than `most`.
     """
     total = prod(len(vary.values) for vary in varies)
     if total > most:
         counts = "".join(f"{len(vary.values)} × " for vary in varies[:-1])
-        raise VaryError(
-            varies[-1].typed,
-            f"{counts}{len(varies[-1].values)} variants, at most {most} are allowed",
-        )
+        text = f"{counts}{len(varies[-1].values)} variants, at most {most} are allowed"
+        raise InputError(text, varies[-1].typed)
     return total
-
-
-def variant(
-    document: Mapping[str, Any], source: str, keys: Sequence[str], values: tuple[float, ...]
-) -> Variant:
-    """Lay one combination of values over a scene.
-
-    Parameters
-    ----------
-    document, source : mapping and str
-        The scene, as `chutelab.scene.to_dict` has it, and what messages call it.
-    keys, values : sequence of str, tuple of float
-        What is varied, and what it is.
-    """
-    settings = [setting(key, value) for key, value in zip(keys, values, strict=True)]
-    try:
-        return Variant(values, from_dict(document, source, settings))
-    except SceneError as error:
-        return Variant(values, None, reason(error))
 
 
 def reason(error: SceneError) -> str:
@@ -374,36 +331,9 @@ def is_plain(path: str) -> bool:
 
 
 def accepted(path: str, values: Floats) -> Bools:
-    """Tell which values a key takes, (N,), if nothing else is looked at."""
-    good = np.ones(len(values), dtype=bool)
-    try:
-        _adapter(path).validate_python(values.tolist())
-    except ValidationError as error:
-        good[[int(fault["loc"][0]) for fault in error.errors(include_url=False)]] = False
-    return good
-
-
-@cache
-def _adapter(path: str) -> TypeAdapter[Any]:
-    """Return what validates a list of values of a key as its model does."""
-    *home, key = parts_of(path)
-    field = (Scene.tables()[str(home[0])] if home else Scene).model_fields[str(key)]
-    kind: Any = field.annotation
-    for limit in field.metadata:
-        kind = Annotated[kind, limit]
-    return TypeAdapter(list[kind])
-
-
-class _Noting(Look):
-    """Notes which keys the rules ask for: they cannot depend on another one."""
-
-    def __init__(self, document: Mapping[str, Any], model: Any) -> None:
-        super().__init__(document, model)
-        self.asked: set[str] = set()
-
-    def __call__(self, table: str, key: str) -> Any:
-        self.asked.add(f"{table}.{key}")
-        return super().__call__(table, key)
+    """Tell which values a key that `is_plain` takes, (N,), if nothing else is looked at."""
+    low, high = limits_of(rule_at(parts_of(path)) or {}) or (nan, nan)
+    return np.isfinite(values) & (low <= values) & (values <= high)
 
 
 def judged_by(mapping: Mapping[str, Any], overrides: Sequence[str | Override] = ()) -> set[str]:
@@ -418,9 +348,8 @@ def judged_by(mapping: Mapping[str, Any], overrides: Sequence[str | Override] = 
     """
     document = plain(mapping)
     apply(document, overrides)
-    look = _Noting(document, Scene)
-    for _ in conflicts(look):
-        pass
+    look = Look(document, Scene)
+    list(conflicts(look))
     return look.asked
 
 

@@ -10,7 +10,7 @@ chute with the damping plate", Mech. Sci. 7, 167-177, 2016, doi:10.5194/ms-7-167
 - `prediction`: `predict`, particle 0 of a scene, or the reason why the closed form does not hold
   for it; `unbounded`, the same without looking at the finite machine.
 - `paper`: the paper's tables beside what the equations give.
-- `figures`: the paper's figures.
+- `figures`: its figures.
 
 Only NumPy, `chutelab.scene` and `chutelab.util` are imported.
 """

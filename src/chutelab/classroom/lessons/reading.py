@@ -18,8 +18,8 @@ from chutelab.scene import MISSING, Fault, Scene, SceneError, load, shipped
 from chutelab.scene.overrides import at_path, joined
 from chutelab.scene.rules import suggestion, unit_of
 from chutelab.scene.units import Number, Table, Text, Whole
-from chutelab.scene.variants import VaryError, parse, quantity
-from chutelab.util.errors import did_you_mean
+from chutelab.scene.variants import parse, quantity
+from chutelab.util.errors import InputError, did_you_mean
 
 LEVELS: Final = ("start", "core", "advanced")
 MOST: Final = 20
@@ -61,7 +61,9 @@ class Picture(Chosen):
         ge=0.01,
         le=1000.0,
     )
-    fps: Literal[10, 20, 25, 50] = key(25, "Pictures a second", "10, 20, 25 or 50")
+    fps: Literal[10, 20, 25, 50] | None = key(
+        None, "Pictures a second; default: 25, of a stream 20", "10, 20, 25 or 50"
+    )
     width: Whole = key(800, "Width, pixels", "a whole number from 320 to 3840", ge=320, le=3840)
     height: Whole = key(450, "Height, pixels", "a whole number from 180 to 2160", ge=180, le=2160)
 
@@ -245,9 +247,8 @@ def _misfits(lesson: Lesson) -> Iterator[Fault]:
         for i, text in enumerate(part.vary if isinstance(part, Page) else ()):
             try:
                 quantity(scene, parse(text))
-            except VaryError as error:
-                said = str(error).removeprefix(f"--vary {text}: ")
-                yield Fault(f"{table}.vary[{i}]", text, said)
+            except InputError as error:
+                yield Fault(f"{table}.vary[{i}]", text, error.allowed)
 
 
 def unit_in(lesson: Lesson, quantity: str) -> str:

@@ -79,10 +79,8 @@ def write(
 
     Raises
     ------
-    VaryError
-        If what is to be varied cannot be.
     InputError
-        If there is too much for a page, or no variant runs.
+        If what is to be varied cannot be, there is too much for a page, or no variant runs.
 
     Notes
     -----

@@ -106,10 +106,8 @@ def study(
 
     Raises
     ------
-    VaryError
-        If what is to be varied cannot be.
     InputError
-        If there is too much for a page, or no variant runs.
+        If what is to be varied cannot be, there is too much for a page, or no variant runs.
     """
     varied = tuple(parse(vary) if isinstance(vary, str) else vary for vary in varies)
     found = variants(scene, varied, MOST_VARIANTS)

@@ -18,17 +18,8 @@ from chutelab.engines.simulation import simulate
 from chutelab.machine import Machine, RefusedError, build, members
 from chutelab.results import Recording
 from chutelab.results.recorder import StalledError
-from chutelab.scene import Scene, SceneError
-from chutelab.scene.variants import (
-    Variant,
-    accepted,
-    family,
-    is_plain,
-    judged_by,
-    reason,
-    setting,
-    variant,
-)
+from chutelab.scene import Scene, SceneError, from_dict
+from chutelab.scene.variants import accepted, family, is_plain, judged_by, reason, setting
 from chutelab.studies.sweep.rows import REASON, Columns, empty, rows
 from chutelab.util.arrays import Floats, Ints
 
@@ -89,21 +80,30 @@ def screened(block: Block) -> tuple[Scene | None, Ints, dict[int, str]]:
         if (more == asked).all():
             break
         asked = more
-    judged = [_variant(block, row) for row in first.tolist()]
-    faults = {n: judged[g].fault for n, g in enumerate(group.ravel().tolist()) if judged[g].fault}
-    template = next((one.scene for one in judged if one.scene is not None), None)
+    template, wrong = None, dict[int, str]()
+    for number, row in enumerate(first.tolist()):
+        try:
+            scene = _scene(block, row)
+            template = template or scene
+        except SceneError as error:
+            wrong[number] = reason(error)
+    faults = {n: wrong[g] for n, g in enumerate(group.ravel().tolist()) if g in wrong}
     return template, np.delete(np.arange(len(values)), list(faults)), faults
 
 
-def _variant(block: Block, row: int) -> Variant:
-    values = tuple(block.values[row].tolist())
-    return variant(block.document, block.source, block.keys, values)
+def _scene(block: Block, row: int) -> Scene:
+    """Return one variant of a block; a `SceneError` if its values make no scene."""
+    settings = map(setting, block.keys, block.values[row].tolist())
+    return from_dict(block.document, block.source, [*settings])
 
 
 def alone(block: Block, row: int) -> Columns:
     """Validate and simulate one variant of a block, and return its row."""
-    made = _variant(block, row)
-    return because(made.fault) if made.scene is None else row_of(made.scene, block.engine)
+    try:
+        scene = _scene(block, row)
+    except SceneError as error:
+        return because(reason(error))
+    return row_of(scene, block.engine)
 
 
 def row_of(scene: Scene, engine: str | None = None) -> Columns:

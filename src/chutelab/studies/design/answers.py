@@ -215,36 +215,29 @@ class Solution(Shown):
         return [self.sheet(), self.slopes()] if self.solved else [self.sheet()]
 
 
-TOLD: Final = ("key", "quantity", "derivative", "step", "lower", "upper", "courses")
-"""What JSON has of a `Sensitivity`."""
-
-
 def as_dict(solution: Solution) -> dict[str, Any]:
     """Return a solution as plain lists and floats, for JSON."""
 
+    def some(one: object, *names: str) -> dict[str, Any]:
+        return {name: getattr(one, name) for name in names}
+
     def answer(one: Answer) -> dict[str, Any]:
+        about = "key", "quantity", "derivative", "step", "lower", "upper", "courses"
         return {
             "values": dict(zip((r.key for r in solution.ranges), one.values, strict=True)),
             "found": dict(zip(solution.quantities, one.found, strict=True)),
-            "wanted": one.wanted,
-            "course": one.course,
-            "place": one.place,
-            "sensitivities": [{name: getattr(s, name) for name in TOLD} for s in one.sensitivities],
+            **some(one, "wanted", "course", "place"),
+            "sensitivities": [some(each, *about) for each in one.sensitivities],
         }
 
     def change(one: Change) -> dict[str, Any]:
-        return {name: getattr(one, name) for name in ("at", "before", "after", "courses", "fault")}
+        return some(one, "at", "before", "after", "courses", "fault")
 
     told = {
         "format": 1,
         "scene": solution.base.title,
-        "asked": solution.asked,
-        "goal": solution.goal,
-        "solved": solution.solved,
-        "ranges": [
-            {"key": r.key, "unit": r.unit, "low": r.low, "high": r.high, "start": r.start}
-            for r in solution.ranges
-        ],
+        **some(solution, "asked", "goal", "solved"),
+        "ranges": [some(one, "key", "unit", "low", "high", "start") for one in solution.ranges],
         "quantities": dict(zip(solution.quantities, solution.units, strict=True)),
         "answers": [answer(one) for one in solution.answers],
         "best": solution.best if solution.solved else None,
@@ -252,9 +245,7 @@ def as_dict(solution: Solution) -> dict[str, Any]:
         "everywhere": solution.everywhere,
         "jumps": [change(one) for one in solution.jumps],
         "changes": [change(one) for one in solution.changes],
-        "runs": solution.runs,
-        "seed": solution.seed,
-        "notes": solution.notes,
+        **some(solution, "runs", "seed", "notes"),
     }
     return dict(plain(told))
 
@@ -279,16 +270,8 @@ def asked(goal: str, what: str, ranges: Sequence[Span]) -> str:
     return f"{verb} {what}, {spans}"
 
 
-def remarks(solution: Solution) -> list[str]:
-    """Return sentences to be read below the table of answers."""
-    said = [*_outcome(solution)]
-    if solution.scan is not None:
-        said += _jumps(solution)
-    return [*said, *solution.notes]
-
-
-def _outcome(solution: Solution) -> Iterator[str]:
-    """Yield what was found: how many answers, where they stop, or how near one came."""
+def remarks(solution: Solution) -> Iterator[str]:
+    """Yield sentences below the table: how many answers, how near one came, where it jumps."""
     one, count = solution.ranges[0], len(solution.answers)
     for low, high in solution.everywhere:
         yield (
@@ -319,15 +302,10 @@ def _outcome(solution: Solution) -> Iterator[str]:
             )
         ]
         yield f"No solution in the range. Nearest to one: {', '.join(parts)}."
-
-
-def _jumps(solution: Solution) -> Iterator[str]:
-    """Yield where the quantity jumps or ends."""
     unit, quantity = solution.units[0], solution.quantities[0]
-    key = solution.ranges[0]
     for jump in solution.jumps[:MOST]:
         yield (
-            f"No solution at {key.key} = {_size(jump.at, key.unit)}: there {quantity} jumps over"
+            f"No solution at {one.key} = {_size(jump.at, one.unit)}: there {quantity} jumps over"
             f" the target, from {_size(jump.before, unit)} to {_size(jump.after, unit)}"
             f"{_ways(jump)}."
         )
@@ -339,7 +317,7 @@ def _jumps(solution: Solution) -> Iterator[str]:
         <= KINK * max(abs(change.after), abs(change.before))
     ]
     for change in others[:MOST]:
-        place = f"At {key.key} = {_size(change.at, key.unit)}"
+        place = f"At {one.key} = {_size(change.at, one.unit)}"
         if NO_RUN in change.courses:
             side = "below" if change.courses[0] == NO_RUN else "above"
             yield f"{place} the runs end; {side} it: {change.fault}."
@@ -353,6 +331,7 @@ def _jumps(solution: Solution) -> Iterator[str]:
             yield f"{place} {quantity} ends; {side} it there is none{_ways(change)}."
     if len(others) > MOST:
         yield f"There are {len(others) - MOST} further changes, see solve.json."
+    yield from solution.notes
 
 
 def _ways(change: Change) -> str:

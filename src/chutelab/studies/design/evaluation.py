@@ -7,13 +7,13 @@ numbers are smooth functions of the keys; where it changes, they may jump.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import isfinite
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from chutelab.engines.simulation import simulate
 from chutelab.results import ENTRIES, Recording
@@ -23,14 +23,14 @@ from chutelab.scene.overrides import value_at
 from chutelab.scene.variants import is_plain, parse_range, quantity, reason
 from chutelab.studies.design.quantities import (
     DesignError,
-    Measured,
+    Ending,
     Quantity,
     courses_of,
     each_once,
     measured,
 )
 from chutelab.studies.sweep.batch import Block, one_line, together
-from chutelab.util.arrays import Floats, Ints
+from chutelab.util.arrays import Floats, Ints, Progress
 
 FORM: Final = "must be KEY=FROM:TO, such as plate.angle_deg=0:80"
 
@@ -45,20 +45,16 @@ INSIDE: Final = 0.3819660112501051
 
 @dataclass(frozen=True)
 class Span:
-    """A key of the scene and the values it may take.
+    """A key of the scene and the range that is searched.
 
     Attributes
     ----------
-    key : str
-        Its full path; free surfaces by index.
-    unit : str
-        "" for a pure number.
+    key, unit, label : str
+        Its full path, free surfaces by index; its unit, "" for a pure number; what it is.
     low, high : float
         Ends of the range, low < high.
     start : float or None
         The scene's own value; None if it has none.
-    label : str
-        Its definition in words.
     """
 
     key: str
@@ -83,66 +79,61 @@ def ranges(scene: Scene, texts: Sequence[str]) -> tuple[Span, ...]:
         If a range cannot be read, is empty, goes beyond what the scene allows, or is of a key that
         is unknown, no continuous number, or given twice.
     """
-    return each_once("--vary", texts, lambda text: _read(scene, text), ASK, MOST)
 
+    def read(text: str) -> Span:
+        if text.count(":") != 1:
+            raise DesignError(f"--vary {text}", FORM)
+        given = parse_range(text)
+        home = given.key.partition(".")[0]
+        if home in Scene.tables() and getattr(scene, home) in (None, ()):
+            named = "[[surface]]" if home == "surface" else f"[{home}]"
+            raise DesignError(given.typed, f"the scene has no {named}")
+        about = quantity(scene, given)
+        if about.whole:
+            raise DesignError(given.typed, f"{about.path} is a whole number: it cannot be searched")
+        low, high = given.values
+        refused = []
+        for tried in (low, low + INSIDE * (high - low), high):
+            try:
+                scene.with_values({about.path: tried})
+            except SceneError as error:
+                refused.append(error)
+                # What only does not go with other keys may pass.
+                if own := [fault for fault in error.faults if fault.key == about.path]:
+                    raise DesignError(given.typed, str(own[0])) from None
+        if len(refused) == 3:
+            raise DesignError(given.typed, reason(refused[0]))
+        value = value_at(scene, about.path)
+        start = float(value) if isinstance(value, (int, float)) else None
+        return Span(about.path, about.unit, low, high, start, about.label)
 
-def _read(scene: Scene, text: str) -> Span:
-    if text.count(":") != 1:
-        raise DesignError(f"--vary {text}", FORM)
-    given = parse_range(text)
-    home = given.key.partition(".")[0]
-    if home in Scene.tables() and getattr(scene, home) in (None, ()):
-        named = "[[surface]]" if home == "surface" else f"[{home}]"
-        raise DesignError(given.typed, f"the scene has no {named}")
-    low, high = given.values
-    about = quantity(scene, given)
-    if about.whole:
-        raise DesignError(given.typed, f"{about.path} is a whole number: it cannot be searched")
-    _allowed(scene, about.path, (low, low + INSIDE * (high - low), high), given.typed)
-    value = value_at(scene, about.path)
-    start = float(value) if isinstance(value, (int, float)) else None
-    return Span(about.path, about.unit, low, high, start, about.label)
-
-
-def _allowed(scene: Scene, path: str, values: Sequence[float], typed: str) -> None:
-    """Refuse values that the key cannot have; those that only do not go with others may pass."""
-    refused = []
-    for value in values:
-        try:
-            scene.with_values({path: value})
-        except SceneError as error:
-            refused.append(error)
-            for fault in error.faults:
-                if fault.key == path and isfinite(value):
-                    raise DesignError(typed, str(fault)) from None
-    if len(refused) == len(values):
-        raise DesignError(typed, reason(refused[0]))
+    return each_once("--vary", texts, read, ASK, MOST)
 
 
 def suits(scene: Scene, keys: Sequence[str], quantities: Sequence[Quantity]) -> bool:
     """Tell whether variants of a scene can run at once, and all quantities be read off that."""
+
+    def readable(quantity: Quantity) -> bool:
+        match quantity.key.split("."):
+            case _ if quantity.source != "run":
+                return True
+            case ["separation" | "impact" | "landing", *column]:
+                return column[-1] not in ("count", *rules.STATISTICS)
+            case ["ledger", name]:
+                return name in ENTRIES
+            case ["ledger", "by_surface", *_]:
+                return True
+            case [symbol]:
+                return symbol in rules.SYMBOLS and symbol not in ("belt_work", "slip_heat")
+        return False
+
     return (
         scene.stream.count == 1
         and scene.stream.at is None
         and scene.run.engine not in ("contact", "pymunk")
-        and all(is_plain(key) for key in keys)
-        and all(_readable(quantity) for quantity in quantities)
+        and all(map(is_plain, keys))
+        and all(map(readable, quantities))
     )
-
-
-def _readable(quantity: Quantity) -> bool:
-    if not isinstance(quantity, Measured):
-        return True
-    match quantity.key.split("."):
-        case ["separation" | "impact" | "landing", *column]:
-            return column[-1] not in ("count", *rules.STATISTICS)
-        case ["ledger", name]:
-            return name in ENTRIES
-        case ["ledger", "by_surface", *_]:
-            return True
-        case [symbol]:
-            return symbol in rules.SYMBOLS and symbol not in ("belt_work", "slip_heat")
-    return False
 
 
 MANY: Final = 8
@@ -187,7 +178,7 @@ class Evaluator:
     quantities : sequence of Quantity
         What is looked at.
     progress : callable, optional
-        Called now and then with the share that is done; see `expect`.
+        Called now and then with the share that is done of the `expected` variants.
     runs : int
         Variants run so far.
     """
@@ -195,81 +186,57 @@ class Evaluator:
     scene: Scene
     keys: Sequence[str]
     quantities: Sequence[Quantity]
-    progress: Callable[[float], None] | None = None
+    progress: Progress | None = None
+    expected: int = 0
     runs: int = field(default=0, init=False)
     _done: float = field(default=0.0, init=False)
-    _expected: int = field(default=0, init=False)
-
-    def expect(self, runs: int) -> None:
-        """Say how many variants there will be about, for the progress."""
-        self._expected = runs
 
     def __call__(self, points: ArrayLike) -> Outcomes:
         """Run the variants at points, shape (N, K), K values of the keys each."""
         table = np.asarray(points, dtype=np.float64)
         values = np.full((len(table), len(self.quantities)), np.nan)
         courses, faults = np.full((2, len(table)), "", dtype=object)
-        alone = np.ones(len(table), dtype=bool)
+        wanted = [quantity.ending for quantity in self.quantities]
+        common: Ending = "scene" if "scene" in wanted or "settled" not in wanted else "settled"
+        endings: dict[Ending, list[int]] = {}
+        for column, ending in enumerate(wanted):
+            endings.setdefault(common if ending == "any" else ending, []).append(column)
+
+        def read(rows: Ints, columns: list[int], recording: Recording, some: Ints) -> None:
+            for column in columns:
+                values[rows[some], column] = self.quantities[column].of(recording)
+            courses[rows[some]] = courses_of(recording, len(some))
+
+        def ran(runs: float) -> None:
+            self._done += runs
+            if self.progress is not None and self.expected:
+                self.progress(min(self._done / self.expected, 1.0))
+
+        left = set(range(len(table)))
         if len(table) >= MANY and suits(self.scene, self.keys, self.quantities):
-            alone[:] = False
-            for start in range(0, len(table), BLOCK):
-                rows = slice(start, start + BLOCK)
-                left = self._together(table[rows], values[rows], courses[rows], faults[rows])
-                alone[start + left] = True
-        for row in np.flatnonzero(alone).tolist():
+            left = set()
+            for rows in np.split(np.arange(len(table)), range(BLOCK, len(table), BLOCK)):
+                for ending, columns in endings.items():
+                    base, keys = self.scene.with_values(_until(ending)), tuple(self.keys)
+                    block = Block(to_dict(base), base.source, keys, keys, table[rows], None)
+                    refused, alone = together(block, partial(read, rows, columns))
+                    for row, fault in refused.items():
+                        faults[rows[row]] = one_line(fault)
+                    left |= set(rows[alone].tolist())
+                    ran(len(rows) / len(endings))
+        for row in sorted(left):
+            given = dict(zip(self.keys, table[row].tolist(), strict=True))
             try:
-                courses[row] = self._alone(table[row], values[row])
+                for ending, columns in endings.items():
+                    recording = simulate(self.scene.with_values(given | _until(ending)))
+                    read(np.array([row]), columns, recording, np.array([0]))
             except (SceneError, StalledError) as error:
                 faults[row] = reason(error) if isinstance(error, SceneError) else str(error)
-            self._tell(1)
+            ran(1)
         values[faults != ""] = np.nan
         courses[faults != ""] = NO_RUN
         self.runs += len(table)
         return Outcomes(values, courses.tolist(), faults.tolist())
-
-    def _together(
-        self, table: Floats, values: Floats, courses: NDArray[Any], faults: NDArray[Any]
-    ) -> Ints:
-        """Fill in what can be run at once; return the rows that are left."""
-        left: set[int] = set()
-        for ending, columns in self._endings().items():
-
-            def read(recording: Recording, rows: Ints, columns: list[int] = columns) -> None:
-                for column in columns:
-                    values[rows, column] = self.quantities[column].of(recording)
-                courses[rows] = courses_of(recording)
-
-            base, keys = self.scene.with_values(_until(ending)), tuple(self.keys)
-            refused, alone = together(
-                Block(to_dict(base), base.source, keys, keys, table, None), read
-            )
-            for row, fault in refused.items():
-                faults[row] = one_line(fault)
-            left |= set(alone)
-            self._tell(len(table) / len(self._endings()))
-        return np.array(sorted(left), dtype=np.int64)
-
-    def _alone(self, point: Floats, out: Floats) -> str:
-        """Fill in the quantities of one variant; return its course."""
-        given = dict(zip(self.keys, point.tolist(), strict=True))
-        for ending, columns in self._endings().items():
-            recording = simulate(self.scene.with_values(given | _until(ending)))
-            out[columns] = [self.quantities[column].of(recording) for column in columns]
-        return courses_of(recording, 1)[0]
-
-    def _endings(self) -> dict[str, list[int]]:
-        """Return how the runs must end, and which quantities are read off which."""
-        wanted = [quantity.ending for quantity in self.quantities]
-        first = "scene" if "scene" in wanted or "settled" not in wanted else "settled"
-        endings: dict[str, list[int]] = {}
-        for column, ending in enumerate(wanted):
-            endings.setdefault(first if ending == "any" else ending, []).append(column)
-        return endings
-
-    def _tell(self, runs: float) -> None:
-        self._done += runs
-        if self.progress is not None and self._expected:
-            self.progress(min(self._done / self._expected, 1.0))
 
 
 def _until(ending: str) -> dict[str, Any]:

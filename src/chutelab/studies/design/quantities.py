@@ -12,10 +12,11 @@ and a solved scene as TOML text.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 from itertools import groupby, pairwise
 from math import nan
-from typing import Any, Final, Literal, Protocol, TypeVar
+from typing import Any, Final, Literal, TypeVar
 
 import numpy as np
 
@@ -28,16 +29,7 @@ from chutelab.scene.variants import Vary, quantity
 from chutelab.util.errors import InputError, did_you_mean
 from chutelab.util.versions import library
 
-
-class Keyed(Protocol):
-    """Something said of one key of a scene."""
-
-    @property
-    def key(self) -> str:
-        """Full path of the key."""
-
-
-T = TypeVar("T", bound=Keyed)
+T = TypeVar("T")
 
 
 class DesignError(InputError):
@@ -51,7 +43,7 @@ class DesignError(InputError):
 def each_once(
     option: str, texts: Sequence[str], read: Callable[[str], T], ask: str, most: int
 ) -> tuple[T, ...]:
-    """Read what an option takes, given 1 to `most` times, once for each key.
+    """Read what an option takes, given 1 to `most` times; each result has another `key`.
 
     Raises
     ------
@@ -64,7 +56,7 @@ def each_once(
         raise DesignError(f"{option} {texts[most]}", f"at most {most} keys are allowed")
     found: dict[str, T] = {}
     for text in texts:
-        one = read(text)
+        one: Any = read(text)
         if one.key in found:
             raise DesignError(f"{option} {text}", f"{one.key} is given already")
         found[one.key] = one
@@ -96,28 +88,28 @@ def courses_of(recording: Recording, count: int | None = None) -> list[str]:
     Such as ``plate, outgoing``, or ``plate, never lands (exit)``. Of all particles by default.
     """
     count = recording.count if count is None else count
-    events = recording.events[recording.events["particle"] < count]
-    events = events[np.isin(events["kind"], (Kind.IMPACT, Kind.LANDING))]
+    events = recording.events[np.isin(recording.events["kind"], (Kind.IMPACT, Kind.LANDING))]
     events = events[np.argsort(events["particle"], kind="stable")]
     bounds = np.searchsorted(events["particle"], np.arange(count + 1)).tolist()
     surfaces, landed = events["surface"].tolist(), (events["kind"] == Kind.LANDING).tolist()
-    known: dict[tuple[object, ...], str] = {}
+
+    @cache
+    def course(touched: tuple[int, ...], end: str) -> str:
+        names = []
+        for surface, group in groupby(touched):
+            times = len(list(group))
+            often = {1: "", 2: " twice"}.get(times, f" {times} times")
+            often = often if times < MANY else " many times"
+            names.append(f"{recording.surfaces[surface]}{often}")
+        if len(names) > LONGEST:
+            names[LONGEST - 1 :] = ["and so on"]
+        return ", ".join([*names, *([f"never lands ({end})"] if end else [])])
+
     found = []
     for particle, (start, stop) in enumerate(pairwise(bounds)):
         last = next((i for i in range(start, stop) if landed[i]), None)
         touched = tuple(surfaces[start : stop if last is None else last + 1])
-        end = "" if last is not None else REASONS[recording.ended[particle]]
-        if (touched, end) not in known:
-            names = []
-            for surface, group in groupby(touched):
-                times = len(list(group))
-                often = "" if times == 1 else "twice" if times == 2 else f"{times} times"
-                often = often if times < MANY else "many times"
-                names.append(f"{recording.surfaces[surface]} {often}".rstrip())
-            if len(names) > LONGEST:
-                names[LONGEST - 1 :] = ["and so on"]
-            known[touched, end] = ", ".join([*names, *([f"never lands ({end})"] if end else [])])
-        found.append(known[touched, end])
+        found.append(course(touched, REASONS[recording.ended[particle]] if last is None else ""))
     return found
 
 
@@ -137,86 +129,63 @@ that work per particle times the stream's rate."""
 
 
 @dataclass(frozen=True)
-class Measured:
-    """A number of a run.
+class Quantity:
+    """A number of a run, the value of a key of the scene, or a plain number.
 
     Attributes
     ----------
     name, unit : str
         As it was asked for, and its unit.
     key : str
-        Its full name, see `chutelab.scene.rules`.
+        Of a run: its full name, see `chutelab.scene.rules`. Of the scene: the full path.
+    source : {"run", "scene", "number"}
+        Where it is read.
     ending : {"any", "scene", "settled"}
         How the run must end.
+    number : float
+        A plain number.
     """
 
     name: str
     unit: str
-    key: str
-    ending: Ending
+    key: str = ""
+    source: Literal["run", "scene", "number"] = "run"
+    ending: Ending = "any"
+    number: float = 0.0
 
     def of(self, recording: Recording) -> Any:
         """Return its value, of each scene of a family (N,); NaN where it did not happen."""
-        settled = recording.ended == REASONS.index("settled")
-        rate = recording.scene.stream.rate
-        value: Any
-        if recording.scene.shape:
-            value = each(recording, self.key)
-        else:
-            value = measure(recording, self.key)
-            settled, rate = settled.all(), rate / recording.count
-        if self.ending == "settled":
-            value = np.where(settled, value, nan)
-        return value * rate if self.name == "power" else value
-
-
-@dataclass(frozen=True)
-class Given:
-    """A key of the scene, by its full path."""
-
-    name: str
-    unit: str
-    ending: Ending = "any"
-
-    def of(self, recording: Recording) -> Any:
-        """Return its value in the scene that was run; NaN where it has none."""
-        value = value_at(recording.scene, self.name)
-        return nan if value is None or value is MISSING or isinstance(value, str) else value
-
-
-@dataclass(frozen=True)
-class Fixed:
-    """A plain number."""
-
-    value: float
-    unit: str
-    ending: Ending = "any"
-
-    @property
-    def name(self) -> str:
-        """The number as text."""
-        return f"{self.value:.12g} {self.unit}".strip()
-
-    def of(self, _: Recording) -> float:
-        """Return the number."""
-        return self.value
-
-
-Quantity = Measured | Given | Fixed
+        value: Any = self.number
+        if self.source == "scene":
+            value = value_at(recording.scene, self.key)
+            return nan if value is None or value is MISSING or isinstance(value, str) else value
+        if self.source == "run":
+            settled = recording.ended == REASONS.index("settled")
+            rate = recording.scene.stream.rate
+            if recording.scene.shape:
+                value = each(recording, self.key)
+            else:
+                value = measure(recording, self.key)
+                settled, rate = settled.all(), rate / recording.count
+            if self.ending == "settled":
+                value = np.where(settled, value, nan)
+            if self.name == "power":
+                value = value * rate
+        return value
 
 
 @dataclass(frozen=True)
 class Target:
     """Two quantities that are to be equal."""
 
-    left: Measured
+    left: Quantity
     right: Quantity
 
     def __str__(self) -> str:
         return f"{self.left.name} = {self.right.name}"
 
 
-def measured(scene: Scene, name: str, typed: str = "") -> Measured:
+def measured(scene: Scene, name: str, typed: str = "") -> Quantity:
     """Return the quantity of a scene that has this name, short or full.
 
     Parameters
@@ -242,7 +211,7 @@ def measured(scene: Scene, name: str, typed: str = "") -> Measured:
         if name not in SHORT:
             advice = did_you_mean(name, SHORT, advice, cutoff=0.75)
         raise DesignError(typed or name, f"no such quantity here; {advice}")
-    return Measured(name, "W" if name == "power" else unit, key, ending)
+    return Quantity(name, "W" if name == "power" else unit, key, ending=ending)
 
 
 def target(scene: Scene, text: str) -> Target:
@@ -261,12 +230,12 @@ def target(scene: Scene, text: str) -> Target:
         )
     left = measured(scene, name, typed)
     right = _right(scene, given, typed, left)
+    if right.source == "number" and right.unit == "":
+        right = replace(right, name=f"{right.name} {left.unit}".strip(), unit=left.unit)
     if right.unit != left.unit:
-        if not (isinstance(right, Fixed) and right.unit == ""):
-            raise DesignError(
-                typed, f"{left.name} is {_in(left.unit)}, and {right.name} is {_in(right.unit)}"
-            )
-        right = Fixed(right.value, left.unit)
+        raise DesignError(
+            typed, f"{left.name} is {_in(left.unit)}, and {right.name} is {_in(right.unit)}"
+        )
     if right == left:
         raise DesignError(typed, "both sides are the same")
     return Target(left, right)
@@ -276,7 +245,7 @@ def _in(unit: str) -> str:
     return f"in {unit}" if unit else "a pure number"
 
 
-def _right(scene: Scene, text: str, typed: str, left: Measured) -> Quantity:
+def _right(scene: Scene, text: str, typed: str, left: Quantity) -> Quantity:
     try:
         number, unit = read_size(text)
     except ValueError as error:
@@ -285,7 +254,7 @@ def _right(scene: Scene, text: str, typed: str, left: Measured) -> Quantity:
                 typed, f"{text} is no number of a quantity {_in(left.unit)}; {error}"
             ) from None
     else:
-        return Fixed(number, unit)
+        return Quantity(f"{number:.12g} {unit}".strip(), unit, source="number", number=number)
     if text in SHORT or rules.unit_of(text, scene.surfaces) is not None:
         return measured(scene, text, typed)
     try:
@@ -295,7 +264,6 @@ def _right(scene: Scene, text: str, typed: str, left: Measured) -> Quantity:
         raise DesignError(
             typed, f"{text} is neither a number, nor a quantity, nor a key of the scene: {allowed}"
         ) from None
-    value = value_at(scene, found.path)
-    if value is MISSING or value is None or isinstance(value, (str, bool)):
+    if not isinstance(value_at(scene, found.path), (int, float)):
         raise DesignError(typed, f"{found.path} has no number as its value in this scene")
-    return Given(found.path, found.unit)
+    return Quantity(found.path, found.unit, found.path, "scene")

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import groupby, pairwise
-from typing import Final, Literal
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
@@ -60,12 +60,12 @@ ROUNDS: Final = 60
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """Two neighbouring values of the key between which the course changes.
+    """Two values of the key, as close as numbers get, between which the course changes.
 
     Attributes
     ----------
     low, high : float
-        The values, as close as numbers get.
+        The values.
     values : ndarray, shape (2, M)
         The quantities there; NaN where they have no value.
     courses : tuple of str
@@ -98,17 +98,7 @@ class Change:
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """Values of the key, ascending, with one course, and the quantities there.
-
-    Attributes
-    ----------
-    x : ndarray, shape (P,)
-        The key.
-    values : ndarray, shape (P, M)
-        The quantities.
-    course : str
-        The way of particle 0.
-    """
+    """Ascending values of the key, x (P,), with one course, and the quantities there, (P, M)."""
 
     x: Floats
     values: Floats
@@ -117,13 +107,7 @@ class Piece:
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """The whole range: `pieces` in order, and the `changes` between them.
-
-    Attributes
-    ----------
-    complete : bool
-        Whether all changes were closed in on.
-    """
+    """The whole range: pieces in order, the changes between them, and whether these are all."""
 
     pieces: tuple[Piece, ...]
     changes: tuple[Change, ...]
@@ -145,8 +129,7 @@ class Scan:
         return float(np.abs(self.values[np.isfinite(self.values)]).max(initial=0.0))
 
 
-@dataclass(frozen=True, eq=False)
-class _Point:
+class _Point(NamedTuple):
     x: float
     values: Floats
     course: str
@@ -183,21 +166,14 @@ def scan(evaluate: Evaluator, low: float, high: float, points: int) -> Scan:
     ascending = sorted({point.x: point for point in every}.values(), key=lambda point: point.x)
     parts = [list(part) for _, part in groupby(ascending, lambda point: point.course)]
     wide = [part for part in parts if part[-1].x - part[0].x > SLIVER * (high - low)] or parts[:1]
-    pieces = [
-        Piece(
-            np.array([point.x for point in part]),
-            np.array([point.values for point in part]),
-            part[0].course,
-        )
-        for part in wide
-    ]
-    seams = [
-        Change(
-            a.x, b.x, np.stack([a.values, b.values]), (a.course, b.course),
-            a.fault if a.course == NO_RUN else b.fault,
-        )
-        for a, b in ((before[-1], after[0]) for before, after in pairwise(wide))
-    ]  # fmt: skip
+    pieces = []
+    for part in wide:
+        x, values, courses, _ = zip(*part, strict=True)
+        pieces.append(Piece(np.array(x), np.array(values), courses[0]))
+    seams = []
+    for (*_, a), (b, *_) in pairwise(wide):
+        fault = a.fault if a.course == NO_RUN else b.fault
+        seams.append(Change(a.x, b.x, np.stack([a.values, b.values]), (a.course, b.course), fault))
     return Scan(tuple(pieces), tuple(seams), complete)
 
 
@@ -245,26 +221,20 @@ SAME: Final = 1e-8
 """Share of the range within which two roots, or two minima, are one."""
 
 
-@dataclass(frozen=True, eq=False)
-class Roots:
-    """What a range holds.
-
-    Attributes
-    ----------
-    at : tuple of float
-        Values of the key at which the two sides are equal, ascending.
-    everywhere : tuple of (float, float)
-        Ranges in which they are equal throughout.
-    jumps : tuple of Change
-        Where one side jumps over the other: no solutions.
-    nearest : float
-        The value at which they differ least; NaN if they have none anywhere.
-    """
+class Roots(NamedTuple):
+    """What a range holds."""
 
     at: tuple[float, ...]
+    """Values of the key at which the two sides are equal, ascending."""
+
     everywhere: tuple[tuple[float, float], ...]
+    """Ranges in which they are equal throughout."""
+
     jumps: tuple[Change, ...]
+    """Where one side jumps over the other: no solutions."""
+
     nearest: float
+    """The value at which they differ least; NaN if they have none anywhere."""
 
 
 def roots(found: Scan, function: Function) -> Roots:
@@ -288,18 +258,31 @@ def roots(found: Scan, function: Function) -> Roots:
             jumps.append(change)
     least, nearest = np.inf, np.nan
     for piece in found.pieces:
+        first, last = piece.x[[0, -1]].tolist()
         flat, rest = _flat(piece.x, piece.values[:, 0] - piece.values[:, 1], zero)
         everywhere += flat
         for x, f in (_turning(*part, function) for part in rest):
             size = np.abs(f)
             if np.nanmin(size, initial=np.inf) < least:
                 least, nearest = float(np.nanmin(size)), float(x[np.nanargmin(size)])
-            for root in _in_part(x, f, function, zero, ends):
-                border = root in (piece.x[0], piece.x[-1])
-                if abs(function(root)) <= zero * (LIMIT if border else 1.0):
+            small = np.full(len(x), zero)
+            for border in (0, -1):
+                small[border] *= EXACT if x[border] in ends else LIMIT
+            # What is next to a change of sign is closed in on.
+            signs, lone = np.sign(f), np.ones(len(x), dtype=bool)
+            crossing = np.flatnonzero(signs[:-1] * signs[1:] < 0.0)
+            lone[crossing] = lone[crossing + 1] = False
+            met = x[(f == 0.0) | (size <= small) & lone].tolist()
+            met += [bracketed(function, x[i], x[i + 1]) for i in crossing.tolist()]
+            for root in met:
+                if abs(function(root)) <= zero * (LIMIT if root in (first, last) else 1.0):
                     at.append(root)
-                else:
-                    jumps.append(_inside(root, function, piece))
+                    continue
+                # The bracket closed in on a jump, though the course stays.
+                step = 1e-12 * max(abs(root), last - first)
+                low, high = np.clip([root - step, root + step], first, last).tolist()
+                sides = np.array([[function(low)], [function(high)]])
+                jumps.append(Change(low, high, sides, (piece.course, piece.course)))
     distinct: list[float] = []
     for root in sorted(at):
         if distinct and root - distinct[-1] <= SAME * width:
@@ -340,34 +323,8 @@ def _turning(x: Floats, f: Floats, function: Function) -> tuple[Floats, Floats]:
             low, high = x[near][0], x[near][-1]
             place, value = bounded(function, low, high, sign)
             points.setdefault(place, sign * value)
-    ascending = sorted(points.items())
-    return np.array([at for at, _ in ascending]), np.array([value for _, value in ascending])
-
-
-def _in_part(
-    x: Floats, f: Floats, function: Function, zero: float, ends: tuple[float, float]
-) -> list[float]:
-    """Return where a function that is smooth is 0 or changes sign."""
-    small = np.full(len(x), zero)
-    for border in (0, -1):
-        small[border] *= EXACT if x[border] in ends else LIMIT
-    signs = np.sign(f)
-    # What is next to a change of sign is closed in on.
-    lone = np.ones(len(x), dtype=bool)
-    crossing = np.flatnonzero(signs[:-1] * signs[1:] < 0.0)
-    lone[crossing] = lone[crossing + 1] = False
-    return [
-        *x[(f == 0.0) | (np.abs(f) <= small) & lone].tolist(),
-        *(bracketed(function, x[i], x[i + 1]) for i in crossing.tolist()),
-    ]
-
-
-def _inside(root: float, function: Function, piece: Piece) -> Change:
-    """Return the jump that a bracket closed in on, though the course stays."""
-    step = 1e-12 * max(abs(root), float(np.ptp(piece.x)))
-    low, high = np.clip([root - step, root + step], piece.x[0], piece.x[-1]).tolist()
-    sides = np.array([[function(low)], [function(high)]])
-    return Change(low, high, sides, (piece.course, piece.course))
+    ascending = np.array(sorted(points.items()))
+    return ascending[:, 0], ascending[:, 1]
 
 
 Place = Literal["inside", "end", "change"]
@@ -382,8 +339,7 @@ EVEN: Final = 1e-12
 """Relative change over the whole range that is none."""
 
 
-@dataclass(frozen=True)
-class Least:
+class Least(NamedTuple):
     """A local minimum: where, how much, and of which kind."""
 
     at: float

@@ -164,10 +164,10 @@ def sensitivities(
         Which of the evaluator's quantities.
     """
     found = []
-    for k, one in enumerate(ranges):
-        derivative = _derivatives(evaluate, at, k, one.width)
-        step = PERCENT * (abs(float(at[k])) or one.width)
-        sides = evaluate(np.stack([_moved(at, k, -step), _moved(at, k, step)]))
+    for one, unit in zip(ranges, np.eye(len(at)), strict=True):
+        derivative = _derivatives(evaluate, at, unit * one.width)
+        step = PERCENT * (float(unit @ np.abs(at)) or one.width)
+        sides = evaluate([at - step * unit, at + step * unit])
         for column in columns:
             quantity = evaluate.quantities[column]
             lower, upper = (float(value) for value in sides.values[:, column])
@@ -180,47 +180,40 @@ def sensitivities(
     return tuple(found)
 
 
-def _moved(at: Floats, k: int, step: float) -> Floats:
-    moved = at.copy()
-    moved[k] += step
-    return moved
-
-
-def _derivatives(evaluate: Evaluator, at: Floats, k: int, width: float) -> Floats:
+def _derivatives(evaluate: Evaluator, at: Floats, along: Floats) -> Floats:
     """Return the derivatives of all quantities by one key; one-sided where the course ends.
 
     Differences over a step and half of it are extrapolated; of all steps the one counts at which
-    the two agree best, since next to a jump the function may bend within any step.
+    the two agree best, since next to a jump the function may bend within any step. `along` is the
+    range of the key in its own direction, (K,).
     """
-    here = evaluate(at[np.newaxis])
+    width = float(along.sum())
+    outcome = evaluate(at[np.newaxis])
+    here = outcome.values[0]
     sides: dict[float, dict[float, Floats]] = {1.0: {}, -1.0: {}}
     for share in STEPS:
         for sign, found in sides.items():
-            steps = sign * share * width * np.array([1.0, 0.5])
-            near = evaluate(np.stack([_moved(at, k, step) for step in steps]))
-            if set(near.courses) == set(here.courses):
+            near = evaluate([at + sign * share * part * along for part in (1.0, 0.5)])
+            if set(near.courses) == set(outcome.courses):
                 found[share] = near.values
     slopes = []
     for share in STEPS:
         step = share * width
         if all(share in found for found in sides.values()):
             far, half = (sides[1.0][share] - sides[-1.0][share]) / (step * np.array([[2.0], [1.0]]))
-            rounding = ROUNDING * np.abs(here.values[0]) / step
+            rounding = ROUNDING * np.abs(here) / step
             slopes.append(((4.0 * half - far) / 3.0, np.abs(half - far) + rounding))
-    if not slopes:
-        return _one_sided(here.values[0], sides, width)
-    values, apart = (np.array(part) for part in zip(*slopes, strict=True))
-    best = np.argmin(np.where(np.isfinite(apart), apart, np.inf), axis=0)
-    chosen: Floats = np.take_along_axis(values, best[np.newaxis], axis=0)[0]
-    return chosen
-
-
-def _one_sided(here: Floats, sides: dict[float, dict[float, Floats]], width: float) -> Floats:
+    if slopes:
+        values, apart = (np.array(part) for part in zip(*slopes, strict=True))
+        best = np.argmin(np.where(np.isfinite(apart), apart, np.inf), axis=0)
+        chosen: Floats = np.take_along_axis(values, best[np.newaxis], axis=0)[0]
+        return chosen
     for sign, found in sides.items():
         for share in reversed(STEPS):
             if share in found:
-                step = sign * share * width
-                far, half = (found[share] - here) / (step * np.array([[1.0], [0.5]]))
+                far, half = (found[share] - here) / (
+                    sign * share * width * np.array([[1.0], [0.5]])
+                )
                 # A slope that depends on the step is none: at a grazing blow it is infinite.
                 steady = np.abs(half - far) <= STEADY * np.abs(half)
                 slope: Floats = np.where(steady, 2.0 * half - far, np.nan)

@@ -17,13 +17,8 @@ from numpy.typing import ArrayLike
 from chutelab.scene import Scene
 from chutelab.studies.design.answers import Answer, Goal, Solution, asked
 from chutelab.studies.design.evaluation import Evaluator, ranges
-from chutelab.studies.design.quantities import (
-    DesignError,
-    Quantity,
-    measured,
-    scipy,
-    target,
-)
+from chutelab.studies.design.quantities import DesignError, Quantity, measured, scipy
+from chutelab.studies.design.quantities import target as wish
 from chutelab.studies.design.roots import CLOSE, Scan, level, minima, roots, scan
 from chutelab.studies.design.sensitivity import sensitivities
 from chutelab.util.arrays import Floats, Progress
@@ -156,8 +151,21 @@ def solve(
     >>> round(found.answer.values[0], 6)
     47.254812
     """
-    wishes = [target] if isinstance(target, str) else list(target)
-    return _Search(scene, vary, points, seed, progress).solve(wishes)
+    search = _Search(scene, vary, points, seed, progress)
+    texts = [target] if isinstance(target, str) else list(target)
+    if not texts:
+        raise DesignError("--target", "name at least one, such as landing.vx=outgoing.speed")
+    wishes = [wish(scene, text) for text in texts]
+    keys, count = len(search.ranges), len(wishes)
+    if count > keys:
+        raise DesignError(
+            f"--target {texts[-1]}", f"{count} targets need as many keys to vary, {keys} given"
+        )
+    if len({one.left.key for one in wishes}) < count:
+        raise DesignError(f"--target {texts[-1]}", "this quantity has a target already")
+    search.look_at([side for one in wishes for side in (one.left, one.right)])
+    found = search.roots() if keys == 1 else search.system(count)
+    return search.solution("solve", ", ".join(map(str, wishes)), **found)
 
 
 def minimize(
@@ -174,7 +182,7 @@ def minimize(
     Parameters, result and errors are those of `solve`, with a quantity such as ``belt_work`` or
     ``landing.t`` for the target.
     """
-    return _Search(scene, vary, points, seed, progress).extremum(quantity, "minimize")
+    return _extremum("minimize", quantity, _Search(scene, vary, points, seed, progress))
 
 
 def maximize(
@@ -187,7 +195,14 @@ def maximize(
     progress: Progress | None = None,
 ) -> Solution:
     """Find the values of some keys for which a quantity is largest; see `minimize`."""
-    return _Search(scene, vary, points, seed, progress).extremum(quantity, "maximize")
+    return _extremum("maximize", quantity, _Search(scene, vary, points, seed, progress))
+
+
+def _extremum(goal: Literal["minimize", "maximize"], name: str, search: _Search) -> Solution:
+    search.look_at([measured(search.scene, name, f"--{goal} {name}")])
+    sign = 1.0 if goal == "minimize" else -1.0
+    found = search.minima(name, sign) if len(search.ranges) == 1 else search.minimum(sign)
+    return search.solution(goal, name, **found)
 
 
 class _Search:
@@ -209,41 +224,21 @@ class _Search:
         self.ranges = ranges(scene, [vary] if isinstance(vary, str) else list(vary))
         self.points, self.seed, self.progress = points, seed, progress
 
-    def solve(self, texts: Sequence[str]) -> Solution:
-        """Answer `solve`."""
-        if not texts:
-            raise DesignError("--target", "name at least one, such as landing.vx=outgoing.speed")
-        targets = [target(self.scene, text) for text in texts]
-        if len(targets) > len(self.ranges):
-            raise DesignError(
-                f"--target {texts[-1]}",
-                f"{len(targets)} targets need as many keys to vary, {len(self.ranges)} given",
-            )
-        if len({wish.left.key for wish in targets}) < len(targets):
-            raise DesignError(f"--target {texts[-1]}", "this quantity has a target already")
-        self._look_at([side for wish in targets for side in (wish.left, wish.right)])
-        found = self._roots() if len(self.ranges) == 1 else self._system(len(targets))
-        return self._solution("solve", ", ".join(map(str, targets)), **found)
-
-    def extremum(self, name: str, goal: Literal["minimize", "maximize"]) -> Solution:
-        """Answer `minimize` and `maximize`."""
-        self._look_at([measured(self.scene, name, f"--{goal} {name}")])
-        sign = 1.0 if goal == "minimize" else -1.0
-        found = self._minima(name, sign) if len(self.ranges) == 1 else self._minimum(sign)
-        return self._solution(goal, name, **found)
-
-    def _look_at(self, quantities: Sequence[Quantity]) -> None:
+    def look_at(self, quantities: Sequence[Quantity]) -> None:
+        """Choose the quantities; of targets both sides, one after the other."""
         scipy("optimize")
         keys = [one.key for one in self.ranges]
-        self.evaluate = Evaluator(self.scene, keys, quantities, self.progress)
-        self.evaluate.expect(self.points + MORE if len(keys) == 1 else 800 * len(keys))
+        runs = self.points + MORE if len(keys) == 1 else 800 * len(keys)
+        self.evaluate = Evaluator(self.scene, keys, quantities, self.progress, runs)
 
-    def _scan(self) -> Scan:
+    def scan(self) -> Scan:
+        """Return the whole range of the only key."""
         (one,) = self.ranges
         return scan(self.evaluate, one.low, one.high, self.points)
 
-    def _roots(self) -> dict[str, Any]:
-        (one,), seen = self.ranges, self._scan()
+    def roots(self) -> dict[str, Any]:
+        """Return what a `Solution` holds for one key and one target."""
+        (one,), seen = self.ranges, self.scan()
 
         def function(x: float) -> float:
             left, right = self.evaluate([[x]]).values[0]
@@ -252,87 +247,92 @@ class _Search:
         found = roots(seen, function)
         own = one.start if one.start is not None else one.low
         edges = {x for change in seen.changes for x in (change.low, change.high)}
-        answers = [self._answer([x], "change" if x in edges else "inside") for x in found.at]
+        answers = [self.answer([x], "change" if x in edges else "inside") for x in found.at]
         best = int(np.argmin([abs(x - own) for x in found.at])) if answers else 0
         nearest = None
         if not answers and isfinite(found.nearest):
-            nearest = self._answer([found.nearest], "inside")
+            nearest = self.answer([found.nearest])
         if not answers and found.everywhere:
             low, high = found.everywhere[0]
-            answers = [self._answer([min(max(own, low), high)], "inside")]
+            answers = [self.answer([min(max(own, low), high)])]
         return {
             "answers": answers, "nearest": nearest, "everywhere": found.everywhere,
             "jumps": found.jumps, "best": best, "scan": seen,
         }  # fmt: skip
 
-    def _system(self, targets: int) -> dict[str, Any]:
+    def system(self, targets: int) -> dict[str, Any]:
+        """Return what a `Solution` holds for several keys and some targets."""
+
         def apart(shares: Floats) -> Floats:
-            sides = self.evaluate(self._scaled(shares)).values.reshape(-1, targets, 2)
+            sides = self.evaluate(self.scaled(shares)).values.reshape(-1, targets, 2)
             return sides[:, :, 0] - sides[:, :, 1]
 
-        middle = self.evaluate(self._scaled(np.full((1, len(self.ranges)), 0.5))).values[0]
+        keys = len(self.ranges)
+        middle = self.evaluate(self.scaled(np.full((1, keys), 0.5))).values[0]
         sizes = np.nanmax(np.abs(middle).reshape(targets, 2), axis=1, initial=0.0)
         sizes[sizes == 0.0] = 1.0
         at, value = least(
             lambda shares: np.sum((apart(shares) / sizes) ** 2, axis=1),
-            len(self.ranges),
+            keys,
             self.seed,
             lambda share: apart(share[np.newaxis])[0] / sizes,
         )
-        answer = self._answer(self._scaled(at), "inside") if isfinite(value) else None
+        answer = self.answer(self.scaled(at)) if isfinite(value) else None
         notes = []
-        if targets < len(self.ranges):
+        if targets < keys:
             notes.append(
-                f"{targets} target and {len(self.ranges)} keys: this is one of many solutions,"
+                f"{targets} target and {keys} keys: this is one of many solutions,"
                 " the one that the search came upon."
             )
         if answer and value**0.5 <= CLOSE:
             return {"answers": [answer], "notes": notes}
         return {"answers": [], "nearest": answer, "notes": notes}
 
-    def _minima(self, name: str, sign: float) -> dict[str, Any]:
-        seen = self._scan()
+    def minima(self, name: str, sign: float) -> dict[str, Any]:
+        """Return what a `Solution` holds for one key and the least (sign 1) or largest (-1)."""
+        seen = self.scan()
         lows = minima(seen, lambda x: float(self.evaluate([[x]]).values[0, 0]), sign)
-        answers = [self._answer([low.at], low.place, slopes=low is lows[0]) for low in lows]
+        answers = [self.answer([low.at], low.place, slopes=low is lows[0]) for low in lows]
         notes = []
         if level(seen):
             answers = [replace(answers[0], place="inside")]
             notes.append(f"{name} is the same over the whole range: it does not depend on it.")
         return {"answers": answers, "scan": seen, "notes": notes}
 
-    def _minimum(self, sign: float) -> dict[str, Any]:
+    def minimum(self, sign: float) -> dict[str, Any]:
+        """Return the same for several keys."""
         at, value = least(
-            lambda shares: sign * self.evaluate(self._scaled(shares)).values[:, 0],
+            lambda shares: sign * self.evaluate(self.scaled(shares)).values[:, 0],
             len(self.ranges),
             self.seed,
         )
-        end = bool(np.any((at <= 1e-9) | (at >= 1.0 - 1e-9)))
-        place = "end" if end else "inside"
-        return {"answers": [self._answer(self._scaled(at), place)] if isfinite(value) else []}
+        place = "end" if np.any((at <= 1e-9) | (at >= 1.0 - 1e-9)) else "inside"
+        return {"answers": [self.answer(self.scaled(at), place)] if isfinite(value) else []}
 
-    def _scaled(self, shares: Floats) -> Floats:
-        low = np.array([one.low for one in self.ranges])
-        high = np.array([one.high for one in self.ranges])
+    def scaled(self, shares: Floats) -> Floats:
+        """Return values of the keys, 0 to 1 each from one end of its range to the other."""
+        low, high = np.array([(one.low, one.high) for one in self.ranges]).T
         # low + share * width may pass the end by a rounding, which a scene would refuse.
         scaled: Floats = np.clip(low + shares * (high - low), low, high)
         return scaled
 
-    def _answer(self, at: ArrayLike, place: str, *, slopes: bool = True) -> Answer:
+    def answer(self, at: ArrayLike, place: str = "inside", *, slopes: bool = True) -> Answer:
+        """Return what is found at a point (K,)."""
         point = np.asarray(at, dtype=np.float64)
         outcome = self.evaluate(point[np.newaxis])
         values = outcome.values[0].tolist()
-        two = len(values) > 1
-        columns = range(0, len(values), 2 if two else 1)
+        every = 2 if len(values) > 1 else 1
+        columns = range(0, len(values), every)
         return Answer(
             tuple(point.tolist()),
-            tuple(values[column] for column in columns),
-            tuple(values[1::2]) if two else (),
+            tuple(values[::every]),
+            tuple(values[1::2]),
             outcome.courses[0],
             place,
             sensitivities(self.evaluate, self.ranges, point, columns) if slopes else (),
         )
 
-    def _solution(
+    def solution(
         self,
         goal: Goal,
         what: str,
@@ -342,6 +342,7 @@ class _Search:
         scan: Scan | None = None,
         **found: Any,
     ) -> Solution:
+        """Return the result, with what holds for all questions."""
         said = []
         if any(quantity.ending == "settled" for quantity in self.evaluate.quantities):
             said.append("What the belt pays is counted until nothing slips on it any more.")

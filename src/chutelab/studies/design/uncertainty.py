@@ -9,6 +9,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -17,14 +18,10 @@ from chutelab.scene import Scene, SceneError
 from chutelab.scene.overrides import limits_of, parts_of, rule_at, value_at
 from chutelab.scene.units import read_size, with_unit
 from chutelab.scene.variants import Vary, quantity, reason
-from chutelab.studies.design.evaluation import (
-    INSIDE,
-    Evaluator,
-    Outcomes,
-)
+from chutelab.studies.design.evaluation import INSIDE, Evaluator
 from chutelab.studies.design.quantities import DesignError, each_once, measured, scipy
 from chutelab.studies.design.sensitivity import Indices, crossed, design, indices
-from chutelab.util.arrays import Floats
+from chutelab.util.arrays import Floats, Progress
 from chutelab.util.files import csv_text
 from chutelab.util.tables import Sheet, Shown, frame, plain
 
@@ -103,61 +100,56 @@ def spreads(scene: Scene, texts: Sequence[str]) -> tuple[Spread, ...]:
     InputError
         If one cannot be read, or is of a key that is unknown, no continuous number, or given twice.
     """
-    return each_once("--uncertainty", texts, lambda text: _read(scene, text), ASK, MOST)
 
+    def read(text: str) -> Spread:
+        typed = f"--uncertainty {text}"
+        key, equals, given = (part.strip() for part in text.partition("="))
+        given, _, law = (part.strip() for part in given.partition(":"))
+        parts = [part.strip() for part in _SIGN.split(given)]
+        if not (key and equals) or len(parts) != 2 or not parts[1]:
+            raise DesignError(typed, FORM)
+        if law not in ("", *LAWS):
+            known = " and ".join(LAWS)
+            raise DesignError(typed, f"{law} is no distribution here; there are {known}")
+        if "." not in key and "[" not in key and key not in Scene.model_fields:
+            homes = (home for home in HOMES if getattr(scene, home) is not None)
+            known_in = (home for home in homes if key in Scene.tables()[home].model_fields)
+            key = ".".join([*islice(known_in, 1), key])
+        about = quantity(scene, Vary(key, (0.0,), typed))
 
-def _read(scene: Scene, text: str) -> Spread:
-    typed = f"--uncertainty {text}"
-    key, equals, given = (part.strip() for part in text.partition("="))
-    given, _, law = (part.strip() for part in given.partition(":"))
-    parts = [part.strip() for part in _SIGN.split(given)]
-    if not (key and equals) or len(parts) != 2 or not parts[1]:
-        raise DesignError(typed, FORM)
-    if law not in ("", *LAWS):
-        raise DesignError(typed, f"{law} is no distribution here; there are {' and '.join(LAWS)}")
-    about = quantity(scene, Vary(_full(scene, key), (0.0,), typed))
-    own = value_at(scene, about.path)
-    if not isinstance(own, (int, float)):
-        own = None
-    if own is None and not parts[0]:
-        raise DesignError(typed, f"{about.path} has no value in this scene: give the mean, too")
-    mean = float(own) if own is not None and not parts[0] else _number(parts[0], about.unit, typed)
-    if parts[1].endswith("%"):
-        spread = abs(mean) * _number(parts[1].removesuffix("%"), "", typed) / 100.0
-    else:
-        spread = _number(parts[1], about.unit, typed)
-    if not spread > 0.0:
-        raise DesignError(typed, f"the spread {parts[1]} must be more than 0; it {FORM}")
-    low, high = limits_of(rule_at(parts_of(about.path)) or {}) or (-np.inf, np.inf)
-    for value in (mean, float(np.clip(mean + INSIDE * spread, low, high))):
-        try:
-            scene.with_values({about.path: value})
-        except SceneError as error:
-            raise DesignError(typed, reason(error)) from None
-    return Spread(
-        about.path, about.unit, mean, spread, "uniform" if law == "uniform" else "normal", low, high
-    )
+        def number(text: str, unit: str) -> float:
+            try:
+                value, found = read_size(text)
+            except ValueError as error:
+                raise DesignError(typed, f"{text or 'nothing'}: {error}; it {FORM}") from None
+            if found not in ("", unit):
+                allowed = f"it is in {unit}" if unit else "it is a pure number"
+                raise DesignError(typed, f"wrong unit in {text}: {allowed}")
+            return value
 
+        own = value_at(scene, about.path)
+        if parts[0]:
+            mean = number(parts[0], about.unit)
+        elif isinstance(own, (int, float)):
+            mean = float(own)
+        else:
+            raise DesignError(typed, f"{about.path} has no value in this scene: give the mean, too")
+        if parts[1].endswith("%"):
+            spread = abs(mean) * number(parts[1].removesuffix("%"), "") / 100.0
+        else:
+            spread = number(parts[1], about.unit)
+        if not spread > 0.0:
+            raise DesignError(typed, f"the spread {parts[1]} must be more than 0; it {FORM}")
+        low, high = limits_of(rule_at(parts_of(about.path)) or {}) or (-np.inf, np.inf)
+        for value in (mean, float(np.clip(mean + INSIDE * spread, low, high))):
+            try:
+                scene.with_values({about.path: value})
+            except SceneError as error:
+                raise DesignError(typed, reason(error)) from None
+        kind: Literal["normal", "uniform"] = "uniform" if law == "uniform" else "normal"
+        return Spread(about.path, about.unit, mean, spread, kind, low, high)
 
-def _full(scene: Scene, key: str) -> str:
-    """Add the table to a name that has none."""
-    if "." in key or "[" in key or key in Scene.model_fields:
-        return key
-    for home in HOMES:
-        if getattr(scene, home) is not None and key in Scene.tables()[home].model_fields:
-            return f"{home}.{key}"
-    return key
-
-
-def _number(text: str, unit: str, typed: str) -> float:
-    try:
-        value, found = read_size(text)
-    except ValueError as error:
-        raise DesignError(typed, f"{text or 'nothing'}: {error}; it {FORM}") from None
-    if found not in ("", unit):
-        allowed = f"it is in {unit}" if unit else "it is a pure number"
-        raise DesignError(typed, f"wrong unit in {text}: {allowed}")
-    return value
+    return each_once("--uncertainty", texts, read, ASK, MOST)
 
 
 QUANTITIES: Final = ("landing.x", "belt_work")
@@ -215,25 +207,25 @@ class Uncertainty(Shown):
     samples: int
     seed: int
 
+    def _of_each(self, statistic: Callable[[Floats], Any], shape: tuple[int, ...] = ()) -> Floats:
+        """Return a statistic of the known values of each quantity, (M, ...); NaN without any."""
+        known = (column[np.isfinite(column)] for column in self.outputs.T)
+        return np.array([statistic(one) if len(one) else np.full(shape, np.nan) for one in known])
+
     @property
     def mean(self) -> Floats:
         """Means of the quantities, (M,); NaN without a single value."""
-        return np.array([np.mean(one) if len(one) else np.nan for one in self._kept()])
+        return self._of_each(np.mean)
 
     @property
     def deviation(self) -> Floats:
         """Their standard deviations, (M,)."""
-        return np.array([np.std(one) if len(one) else np.nan for one in self._kept()])
+        return self._of_each(np.std)
 
     @property
     def interval(self) -> Floats:
         """Their 95 % intervals, (M, 2)."""
-        return np.array(
-            [np.quantile(one, INTERVAL) if len(one) else [np.nan] * 2 for one in self._kept()]
-        )
-
-    def _kept(self) -> list[Floats]:
-        return [column[np.isfinite(column)] for column in self.outputs.T]
+        return self._of_each(lambda one: np.quantile(one, INTERVAL), (2,))
 
     @property
     def columns(self) -> dict[str, Floats]:
@@ -304,7 +296,7 @@ def uncertainty(
     *,
     samples: int = SAMPLES,
     seed: int = 0,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Uncertainty:
     """Propagate uncertain inputs through a scene.
 
@@ -351,8 +343,8 @@ def uncertainty(
     if seed < 0:
         raise DesignError(f"seed {seed}", "must be a whole number from 0")
     samples = 1 << (int(samples) - 1).bit_length()
-    evaluate = Evaluator(scene, [one.key for one in inputs], wanted, progress)
-    evaluate.expect(samples * (len(inputs) + 2) + 1)
+    runs = samples * (len(inputs) + 2) + 1
+    evaluate = Evaluator(scene, [one.key for one in inputs], wanted, progress, runs)
     nominal = evaluate(np.array([[one.mean for one in inputs]])).values[0]
     a, b = design(len(inputs), samples, seed)
     shares = np.concatenate([a, b, crossed(a, b).reshape(-1, len(inputs))])
@@ -362,7 +354,11 @@ def uncertainty(
     outcomes = evaluate(points)
     used = 2 * samples
     missing = np.flatnonzero(~np.isfinite(outcomes.values[:used]).all(axis=1))
-    lost = Counter(_why(outcomes, i, names) for i in missing.tolist())
+    lost: Counter[str] = Counter()
+    for i in missing.tolist():
+        absent = [name for name, x in zip(names, outcomes.values[i], strict=True) if np.isnan(x)]
+        why = f"no {' and no '.join(absent)} (touches {outcomes.courses[i]})"
+        lost[outcomes.faults[i] or why] += 1
     return Uncertainty(
         scene.title, inputs, tuple(names), tuple(one.unit for one in wanted), nominal,
         points[:used], outcomes.values[:used],
@@ -372,14 +368,6 @@ def uncertainty(
         ),
         dict(lost), evaluate.runs, samples, seed,
     )  # fmt: skip
-
-
-def _why(outcomes: Outcomes, row: int, names: Sequence[str]) -> str:
-    """Return why a sample lacks some of the quantities, or all."""
-    if outcomes.faults[row]:
-        return outcomes.faults[row]
-    lacking = [n for n, value in zip(names, outcomes.values[row], strict=True) if np.isnan(value)]
-    return f"no {' and no '.join(lacking)} (touches {outcomes.courses[row]})"
 
 
 def as_dict(found: Uncertainty) -> dict[str, Any]:

@@ -7,6 +7,7 @@ recommended.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from math import ceil, cos, floor, isnan, log10, radians, sqrt
 from typing import Any
 
@@ -54,22 +55,15 @@ LANDING_ROOM = 0.5
 def advice(
     scene: Scene, machine: Machine, tried: Trial, steps: Stepping | None, cost: Effort
 ) -> Iterator[Advice]:
-    """Yield what may surprise about a scene that works.
-
-    Parameters
-    ----------
-    scene, machine : Scene, Machine
-        The scene, and the same resolved.
-    tried : Trial
-        A run of its first particles.
-    steps : Stepping or None
-        None for the exact engine.
-    cost : Effort
-        What the run is estimated to cost.
-    """
+    """Yield what may surprise about a scene that works; `steps` is None for the exact engine."""
     for caution in machine.warnings:
-        candidates = _candidates(scene, machine, caution)
-        mended = next((one for one in candidates if _helps(scene, machine, one)), {})
+        mended: Settings = {}
+        for settings in _candidates(scene, machine, caution):
+            with suppress(SceneError):
+                changed = build(scene.with_values({**settings, "expect": None}))
+                if len(changed.warnings) < len(machine.warnings):
+                    mended = settings
+                    break
         yield _advised(str(caution), mended, otherwise=LEAVE if caution.crosses else LOOK)
     if steps is not None and not steps.safe and steps.way is not None and steps.longest is not None:
         yield _advised(
@@ -126,15 +120,6 @@ def _advised(
         for key, value in (settings or {}).items()
     ]
     return Advice(warning, " and ".join(written) + after if written else otherwise, settings or {})
-
-
-def _helps(scene: Scene, machine: Machine, settings: Settings) -> bool:
-    """Tell whether the machine has fewer warnings with some settings."""
-    try:
-        changed = build(scene.with_values({**settings, "expect": None}))
-    except SceneError:
-        return False
-    return len(changed.warnings) < len(machine.warnings)
 
 
 def _candidates(scene: Scene, machine: Machine, caution: Caution) -> Iterator[Settings]:

@@ -75,8 +75,8 @@ class Agreement:
 
     pair: str
     quantity: str
-    difference: float | None
-    tolerance: float | None
+    difference: float | None = None
+    tolerance: float | None = None
     least: bool = False
 
     @property
@@ -108,7 +108,7 @@ def agreement(scene: Scene) -> tuple[Agreement, ...]:
         try:
             found[name] = answer(alone, name)
         except UNABLE as error:
-            rows.append(Agreement(name, f"left out: {because(error)}", None, None))
+            rows.append(Agreement(name, f"left out: {because(error)}"))
     if not found:
         return tuple(rows)
     base = next(iter(found))
@@ -124,13 +124,11 @@ def agreement(scene: Scene) -> tuple[Agreement, ...]:
             what = "largest relative error"
             rows.append(Agreement(f"{name}, theory", what, compared.max, allowed))
         elif name == base:
-            rows.append(Agreement(f"{name}, theory", compared.reason, None, None))
+            rows.append(Agreement(f"{name}, theory", compared.reason))
         if name != base:
             rows.append(_with_base(alone, name, recording, found[base], allowed))
     if not isfinite(growth):
-        rows.append(
-            Agreement(base, f"a change of the inputs by {STIR:g} changes what happens", None, None)
-        )
+        rows.append(Agreement(base, f"a change of the inputs by {STIR:g} changes what happens"))
     return tuple(rows)
 
 

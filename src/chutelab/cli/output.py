@@ -222,12 +222,9 @@ def output_options(command: Callable[..., None]) -> Callable[..., None]:
                 )
             kinds = tuple(kind for kind in KINDS if kind == film or kind in set(kinds) - set(FILMS))
         for kind in {"mp4", "webm"}.intersection(kinds):
-            from chutelab.pictures.animation import VideoError, need_video
+            from chutelab.pictures.animation import need_video
 
-            try:
-                need_video(kind)
-            except VideoError as error:
-                raise RefusedError(str(error)) from error
+            need_video(kind)
         command(**others, output=Output(out, kinds, as_json, quiet))
 
     options = (

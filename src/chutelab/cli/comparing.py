@@ -139,7 +139,7 @@ def _write(found: Residuals, fit: Fit | None, place: Path) -> None:
     from chutelab.pictures.plots.measured import measured
     from chutelab.studies.measured.result import as_dict, points_csv
 
-    measured(found, fit, path=place / "compare.png")
+    measured(found, fit).write(place / "compare.png")
     (place / "points.csv").write_text(points_csv(found), encoding="utf-8")
     if fit is not None:
         write_json(as_dict(found, fit), place / "fit.json")

@@ -22,8 +22,6 @@ from chutelab.scene.rules import ConflictError, Look, conflicts
 from chutelab.scene.schema import Scene
 from chutelab.util.errors import MISSING, Fault, InputError, did_you_mean
 
-_TITLE: Final = re.compile(r"""^title\s*=\s*["'](.*?)["']\s*(?:#.*)?$""", re.MULTILINE)
-
 
 class SceneError(InputError):
     """A scene that cannot be used; its text lists every fault.
@@ -73,10 +71,9 @@ def about() -> list[About]:
     found = []
     for name, path in shipped().items():
         text = path.read_text(encoding="utf-8")
-        title = _TITLE.search(text)
         comment = takewhile(lambda line: line.startswith("#"), text.splitlines())
         look = tuple(line.lstrip("# ") for line in comment if not line.startswith("#:"))
-        found.append(About(name, title[1] if title else name, look, path))
+        found.append(About(name, tomllib.loads(text).get("title", name), look, path))
     return found
 
 

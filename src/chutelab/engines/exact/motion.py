@@ -303,7 +303,7 @@ def _exit(s: State, motion: Motion) -> Floats:
     """Time until a flight leaves the scene; never in a run that lasts a number of seconds."""
     if s.machine.until == "time":
         return np.full(len(motion.rows), np.inf)
-    left, right, bottom, top = (side[motion.rows] for side in s.exit_box)
+    left, right, bottom, top = s.exit_box[:, motion.rows]
     (x, y), (vx, vy) = motion.position, motion.velocity
     fall = rows_of(s.fall, motion.rows)
     time = _when(y - bottom, vy, fall[1])

@@ -206,7 +206,11 @@ def _after(
     held = mode >= Mode.FACE
     on_surface = np.count_nonzero(held) > 0
     if on_surface:
-        held[held] = _still_on(s, index[held])
+        # A blow from elsewhere may leave those that slide or ride where they are.
+        on = index[held]
+        under = s.contact(on)
+        leaving = np.abs(dot(s.v.take(on, axis=1), under.normal)) > NEGLIGIBLE
+        held[held] = ~leaving & (load_on(s, on, s.on[on], under) > 0.0)
         slides = held & live
         _slide_past(s, index[slides], obstacle[slides], side[slides], rebound[slides])
         live &= ~held
@@ -218,9 +222,8 @@ def _after(
     if np.count_nonzero(live) < len(live):
         index, obstacle, side, rebound = index[live], obstacle[live], side[live], rebound[live]
     if on_surface:
-        on = s.on[index]
-        leaves = on != NONE
-        s.part(index[leaves], s.obstacles.surface[on[leaves]])
+        leaves = index[s.on[index] != NONE]
+        s.part(leaves, s.obstacles.surface[s.on[leaves]])
     s.fly(index, obstacle, side, 2 - (rebound > 0.0))
 
 
@@ -306,13 +309,6 @@ def _blow(
         normal=push,
         tangential=rub,
     )
-
-
-def _still_on(s: State, index: Ints) -> Bools:
-    """Tell which sliding or riding particles a blow from elsewhere leaves where they are."""
-    c = s.contact(index)
-    leaving = np.abs(dot(s.v.take(index, axis=1), c.normal)) > NEGLIGIBLE
-    return ~leaving & (load_on(s, index, s.on[index], c) > 0.0)
 
 
 def _slide_past(s: State, index: Ints, obstacle: Ints, side: Floats, rebound: Floats) -> None:

@@ -211,7 +211,9 @@ def slide(s: State, index: Ints) -> None:
     # The slip is linear in time, while there is one.
     slip = dot(motion.velocity, c.tangent) + s.z[index] - c.belt
     rate = dot(pull, c.tangent) + (2.0 * force if s.spins else 0.0)
-    grips, ends = _grip(s.slip[index], slip, rate), _end(s, motion)
+    fading = s.slip[index] * rate < 0.0
+    grips = np.where(fading, np.maximum(-slip / np.where(fading, rate, 1.0), 0.0), np.inf)
+    ends = _end(s, motion)
     stops = s.stop[index] - s.age[index]
     dt, hits, meeting = _next(s, motion, np.minimum(np.minimum(grips, ends), stops))
     mean = np.where(s.slip[index] == 0.0, 0.0, slip + 0.5 * rate * dt)
@@ -281,12 +283,6 @@ def _stop(s: State, index: Ints) -> None:
     if len(index):
         s.age[index] = s.stop[index]
         s.finish(index, "time")
-
-
-def _grip(sign: Floats, slip: Floats, rate: Floats) -> Floats:
-    """Return the times until the slip is used up; inf where there is none or it grows."""
-    fading = (sign != 0.0) & (sign * rate < 0.0)
-    return np.where(fading, np.maximum(-slip / np.where(fading, rate, 1.0), 0.0), np.inf)
 
 
 def _end(s: State, motion: Motion) -> Floats:

@@ -41,7 +41,7 @@ from chutelab.pictures.plots import style, window_of
 from chutelab.pictures.plots.scenery import energies
 from chutelab.results import Kind, Recording
 from chutelab.results.recorder import Recorder
-from test_plots import (
+from handmade import (
     BELT_TIME,
     DISTANCE,
     EPS,
@@ -764,6 +764,13 @@ def test_what_stands_still_never_changes_its_colour(
     shows = np.zeros(1 << 24, dtype=np.int64)
     shows[drawn] = shown
     assert (shows[drawn] == shown).all()
+
+
+@pytest.mark.parametrize(("name", "delay"), [("perpendicular", 40), ("stream", 50)])
+def test_a_stream_has_fewer_pictures_a_second(name: str, delay: int, tmp_path: Path) -> None:
+    few = scene.load(name, overrides=["stream.count=4"] if name == "stream" else ())
+    with Image.open(animate(simulate(few), tmp_path / "lesson.gif")) as gif:
+        assert gif.info["duration"] == delay
 
 
 @pytest.mark.parametrize("name", [*EXACT, "inclined-20", "perpendicular-fast"])

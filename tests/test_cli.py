@@ -15,12 +15,12 @@ from click.testing import CliRunner
 from PIL import Image
 
 import chutelab
+from broken import BROKEN
 from chutelab import scene as sc
 from chutelab.checks.agreement import BLOWS
 from chutelab.cli import console, main
 from chutelab.machine import build
 from chutelab.theory import predict
-from test_bad_scenes import BROKEN
 
 SOURCES = str(Path(chutelab.__file__).parent.parent)
 FILES = [

@@ -13,7 +13,7 @@ from PIL import Image
 from chutelab import scene
 from chutelab.engines.simulation import simulate
 from chutelab.pictures.plots import strobe
-from test_plots import BELT_TIME, EXACT, by_hand, expected, seen
+from handmade import BELT_TIME, EXACT, by_hand, expected, seen
 
 
 def times_of(figure: Figure) -> list[Annotation]:

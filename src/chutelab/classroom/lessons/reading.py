@@ -61,7 +61,9 @@ class Picture(Chosen):
         ge=0.01,
         le=1000.0,
     )
-    fps: Literal[10, 20, 25, 50] = key(25, "Pictures a second", "10, 20, 25 or 50")
+    fps: Literal[10, 20, 25, 50] | None = key(
+        None, "Pictures a second; default: 25, of a stream 20", "10, 20, 25 or 50"
+    )
     width: Whole = key(800, "Width, pixels", "a whole number from 320 to 3840", ge=320, le=3840)
     height: Whole = key(450, "Height, pixels", "a whole number from 180 to 2160", ge=180, le=2160)
 

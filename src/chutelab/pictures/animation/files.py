@@ -145,7 +145,7 @@ def animate(
     recording: Recording,
     path: str | Path,
     *,
-    fps: int = 25,
+    fps: int | None = None,
     width: int = 800,
     height: int = 450,
     slow: float | None = None,
@@ -163,8 +163,9 @@ def animate(
     path : path
         Where to; written whole or not at all. Its suffix says what: .gif, .mp4 or .webm, the last
         two with the extra ``chutelab[video]``.
-    fps : int
-        Pictures a second: 25 or 50, or another divisor of 100 below.
+    fps : int, optional
+        Pictures a second: 25 or 50, or another divisor of 100 below. By default 25; of a stream 20,
+        since much of each picture changes.
     width, height : int
         Pixels; even numbers for a video.
     slow : float, optional
@@ -202,6 +203,7 @@ def animate(
         raise ValueError(f"{path.name}: allowed are files that end in {allowed}")
     if kind in VIDEOS and (width % 2 or height % 2):
         raise ValueError(f"{width} x {height} pixels: allowed in a video are even numbers")
+    fps = (25 if recording.count == 1 else 20) if fps is None else fps
     frame_delay(fps)
     shows = frozenset([show] if isinstance(show, str) else show)
     layout = lay_out(

@@ -43,7 +43,7 @@ def measured(found: Residuals, fit: Fit | None = None, *, path: str | Path | Non
     Parameters
     ----------
     found : Residuals
-        From `chutelab.studies.measured.residuals`; of a fit, its `after`.
+        From `chutelab.measured.residuals`; of a fit, its `after`.
     fit : Fit, optional
         Also draw the track before the fit, and write the fitted values.
     path : path, optional

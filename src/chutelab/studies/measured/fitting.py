@@ -12,20 +12,35 @@ from numpy.typing import ArrayLike
 from chutelab.results import Recording
 from chutelab.scene import Fault, Scene, SceneError
 from chutelab.studies.measured import result
-from chutelab.studies.measured.parameters import (
-    STEP,
-    Parameter,
-    changed,
-    inseparable,
-    jacobian,
-    resolve,
-    without_effect,
-)
-from chutelab.studies.measured.residuals import LEAST, Residuals, best_t0, follow, inside, over, run
+from chutelab.studies.measured.parameters import Parameter, changed, resolve
 from chutelab.studies.measured.result import Fit
-from chutelab.studies.measured.track import MeasuredError, Track
+from chutelab.studies.measured.track import (
+    LEAST,
+    MeasuredError,
+    Residuals,
+    Track,
+    best_t0,
+    follow,
+    inside,
+    over,
+    run,
+)
 from chutelab.util.arrays import Bools, Floats
 from chutelab.util.versions import library
+
+STEP = 1e-6
+"""Of a parameter's size. Tracks of the exact engine are smooth to rounding, so a difference over
+this step is right to about 1e-9, and next to no point lies within it of an impact."""
+
+SINGULAR = 1e-6
+"""Least singular value, relative to the largest, of a Jacobian with columns of equal length: far
+above what differences leave of zero, far below what noise would let anybody measure."""
+
+UNMOVED = 1e-7
+"""m; a parameter that moves the points by no more when it changes by its own size has no effect."""
+
+PART = 0.1
+"""Share of a combination of parameters from which on a parameter is named as belonging to it."""
 
 
 class Problem:
@@ -78,10 +93,52 @@ class Problem:
     def derivatives(self, values: Floats, steps: ArrayLike = 0.0) -> Floats:
         """Return how the residuals change with the values, (M, p), by differences.
 
-        The steps are small ones, or those given, if they are larger.
+        The steps are small ones, or those given, if they are larger; one-sided at a bound. A column
+        is 0 where the scene refuses a step to either side.
         """
-        wanted = np.maximum(steps, STEP * self.sizes)
-        return jacobian(self.residuals, values, wanted, self.parameters)
+        columns = []
+        steps = np.maximum(steps, STEP * self.sizes)
+        for k, (parameter, step) in enumerate(zip(self.parameters, steps, strict=True)):
+            sides = []
+            for side in (-step, step):
+                moved = values.copy()
+                moved[k] = np.clip(values[k] + side, parameter.low, parameter.high)
+                try:
+                    sides.append((moved[k], self.residuals(moved)))
+                except SceneError:
+                    sides.append((values[k], self.residuals(values)))
+            (low, before), (high, after) = sides
+            columns.append((after - before) / ((high - low) or 1.0))
+        return np.stack(columns, axis=1)
+
+
+def without_effect(derivatives: Floats, parameters: Sequence[Parameter]) -> list[str]:
+    """Say which parameters do not move the points at all; see `Problem.derivatives`."""
+    moves = np.linalg.norm(derivatives, axis=0) / np.sqrt(len(derivatives))
+    return [
+        f"{parameter.key} does not move the particle where it was measured: leave it out"
+        for parameter, move in zip(parameters, moves, strict=True)
+        if move * parameter.size < UNMOVED
+    ]
+
+
+def inseparable(derivatives: Floats, parameters: Sequence[Parameter]) -> list[str]:
+    """Say which combinations of parameters the points cannot tell, though each moves them."""
+    directions = derivatives / np.linalg.norm(derivatives, axis=0)
+    _, values, vectors = np.linalg.svd(directions, full_matrices=False)
+    said = []
+    for value, vector in zip(values, vectors, strict=True):
+        if value < SINGULAR * values[0]:
+            *first, last = (
+                parameter.key
+                for parameter, share in zip(parameters, vector, strict=True)
+                if abs(share) > PART
+            )
+            said.append(
+                f"{', '.join(first)} and {last} cannot be told apart: a change of one moves these"
+                " points as a change of the others does; fit fewer of them"
+            )
+    return said
 
 
 ROUNDS = 5

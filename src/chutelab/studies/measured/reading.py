@@ -5,8 +5,6 @@ Tracker (https://opensourcephysics.github.io/tracker-website) writes a line with
 line per frame; a frame without a mark has empty cells. Several tracks stand side by side under
 ``#multi:``, with the names over the first column of each. Separator and decimal mark are the
 user's choice. Any other table with columns t, x and y does as well.
-
-`filmed` makes a track without a film: a simulation with noise.
 """
 
 from __future__ import annotations
@@ -21,9 +19,8 @@ from typing import Final
 
 import numpy as np
 
-from chutelab.scene import Fault, Scene, load, shipped
-from chutelab.studies.measured.residuals import LEAST, ends, follow, run
-from chutelab.studies.measured.track import MeasuredError, Placement, Track
+from chutelab.scene import Fault, shipped
+from chutelab.studies.measured.track import LEAST, MeasuredError, Placement, Track
 from chutelab.util.errors import did_you_mean
 
 LARGEST_FILE: Final = 20_000_000
@@ -329,69 +326,3 @@ def _scale(source: Path, columns: _Columns, header: int, given: float | None) ->
     if len(units) > 1:
         raise refused(source, place, f"x and y have different units: {', '.join(sorted(units))}")
     return LENGTHS[units.pop()]
-
-
-SCENE: Final = "perpendicular"
-TRUTH: Final = {"plate.restitution": 0.62, "incoming.speed": 1.9}
-"""What the shipped track was made with; the scene itself says 0.5 and 2 m/s."""
-
-NAME: Final = "simulated_with_noise"
-FRAMES: Final = 120.0
-"""1/s: slow motion of a common telephone."""
-
-NOISE: Final = 0.001
-"""m; how well a ball of 8 mm is marked by hand."""
-
-SEED: Final = 4
-BEGIN: Final = 0.4
-"""s; the film begins when the particle comes into the picture, a little before the pulley."""
-
-
-def filmed(
-    scene: Scene,
-    *,
-    frames: float = FRAMES,
-    noise: float = NOISE,
-    seed: int = SEED,
-    begin: float = 0.0,
-) -> Track:
-    """Return what a camera would see of particle 0, to a tenth of a millimetre.
-
-    Parameters
-    ----------
-    scene : Scene
-        What is filmed, until particle 0 ends.
-    frames : float
-        Frames per second.
-    noise : float
-        Standard deviation of each coordinate, m; independent and normal.
-    seed : int
-        Of the noise.
-    begin : float
-        s, on the clock of the simulation, which is that of the film.
-    """
-    recording = run(scene)
-    first, last = np.ceil(begin * frames), np.floor(ends(recording)[1] * frames)
-    seconds = np.arange(first, last + 1.0) / frames
-    errors = noise * np.random.default_rng(seed).standard_normal((len(seconds), 2))
-    return Track(
-        name=NAME,
-        source="<simulated>",
-        seconds=seconds,
-        points=np.round(follow(recording, seconds) + errors, 4),
-        lines=np.arange(len(seconds)) + 3,
-    )
-
-
-def tracker_text(track: Track) -> str:
-    """Return a track as Tracker would export it: its name, the columns' names, the points."""
-    rows = [
-        f"{t:.6f},{x:.4f},{y:.4f}" for t, (x, y) in zip(track.seconds, track.points, strict=True)
-    ]
-    return "\n".join([track.name, "t,x,y", *rows]) + "\n"
-
-
-def shipped_text() -> str:
-    """Return the content of the shipped track."""
-    scene = load(SCENE, [f"{key}={value}" for key, value in TRUTH.items()])
-    return tracker_text(filmed(scene, begin=BEGIN))

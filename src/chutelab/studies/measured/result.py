@@ -13,8 +13,7 @@ import numpy as np
 from chutelab.scene import Scene
 from chutelab.scene.units import write_size
 from chutelab.studies.measured.parameters import Parameter
-from chutelab.studies.measured.residuals import Residuals, best_t0, over
-from chutelab.studies.measured.track import MeasuredError
+from chutelab.studies.measured.track import MeasuredError, Residuals, best_t0, over
 from chutelab.util.arrays import Floats
 from chutelab.util.files import csv_lines
 from chutelab.util.tables import Sheet, Shown, plain
@@ -234,6 +233,32 @@ COLUMNS = (
 
 def as_dict(found: Residuals, fit: Fit | None = None) -> dict[str, Any]:
     """Return what is known of a comparison, SI units, ready for JSON."""
+
+    def sizes(found: Residuals) -> dict[str, Any]:
+        (rms_x, rms_y), (mean_x, mean_y) = found.rms, found.mean
+        i = found.worst
+        x, y = found.values[i]
+        worst = {"line": found.track.lines[i], "t": found.track.t[i], "x": x, "y": y}
+        return {"rms_x": rms_x, "rms_y": rms_y, "mean_x": mean_x, "mean_y": mean_y, "worst": worst}
+
+    fitted = None
+    if fit is not None:
+        columns = zip(fit.parameters, fit.values, fit.errors, fit.low, fit.high, strict=True)
+        fitted = {
+            "parameters": {
+                one.key: {
+                    "value": value, "error": error, "low": low, "high": high,
+                    "start": one.start, "unit": one.unit,
+                }
+                for one, value, error, low, high in columns
+            },
+            "correlation": fit.correlation,
+            "scatter": fit.scatter,
+            "freedom": fit.freedom,
+            "robust": fit.robust,
+            "notes": fit.notes,
+            "before": sizes(fit.before),
+        }  # fmt: skip
     track = found.track
     told = {
         "format": 1,
@@ -245,9 +270,9 @@ def as_dict(found: Residuals, fit: Fit | None = None) -> dict[str, Any]:
         "left_out": found.left_out(),
         "skipped": track.skipped,
         "placement": track.placement,
-        "residuals": _residuals(found),
+        "residuals": sizes(found),
         "advice": advice(found),
-        "fit": None if fit is None else _fit(fit),
+        "fit": fitted,
     }
     return dict(plain(told))
 
@@ -265,27 +290,3 @@ def points_csv(found: Residuals) -> str:
         numbers = (t, *measured, *simulated, *off)
         rows.append([line, *(f"{value:.9g}" if isfinite(value) else "" for value in numbers)])
     return "".join(csv_lines(rows))
-
-
-def _residuals(found: Residuals) -> dict[str, Any]:
-    i = found.worst
-    (rms_x, rms_y), (mean_x, mean_y), (x, y) = found.rms, found.mean, found.values[i]
-    worst = {"line": found.track.lines[i], "t": found.track.t[i], "x": x, "y": y}
-    return {"rms_x": rms_x, "rms_y": rms_y, "mean_x": mean_x, "mean_y": mean_y, "worst": worst}
-
-
-def _fit(fit: Fit) -> dict[str, Any]:
-    names = ("value", "error", "low", "high", "start", "unit")
-    columns = zip(fit.values, fit.errors, fit.low, fit.high, strict=True)
-    return {
-        "parameters": {
-            one.key: dict(zip(names, (*numbers, one.start, one.unit), strict=True))
-            for one, numbers in zip(fit.parameters, columns, strict=True)
-        },
-        "correlation": fit.correlation,
-        "scatter": fit.scatter,
-        "freedom": fit.freedom,
-        "robust": fit.robust,
-        "notes": fit.notes,
-        "before": _residuals(fit.before),
-    }

@@ -1,4 +1,4 @@
-"""`Track`: the points that somebody measured, and how they lie in the world."""
+"""`Track`: the points that somebody measured, in the world, and beside the simulation."""
 
 from __future__ import annotations
 
@@ -8,8 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from chutelab.scene import Fault, SceneError
-from chutelab.util.arrays import Floats, Ints
+from chutelab.engines.simulation import simulate
+from chutelab.results import Recording
+from chutelab.scene import Fault, Scene, SceneError
+from chutelab.scene.units import write_size
+from chutelab.util.arrays import Bools, Floats, Ints
 from chutelab.util.tables import Sheet, Shown
 
 
@@ -142,3 +145,189 @@ def counted(number: int, thing: str) -> str:
     ('1 line', '3 lines')
     """
     return f"{number} {thing}{'' if number == 1 else 's'}"
+
+
+ROUNDING = 1e-9
+"""s; a time this little before release or after the end is meant to be on it."""
+
+LEAST = 3
+"""Points without which there is nothing to compare."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Residuals(Shown):
+    """Measured minus simulated positions of particle 0, SI units.
+
+    Attributes
+    ----------
+    track : Track
+        The measured points, P of them.
+    recording : Recording
+        The simulation.
+    simulated : ndarray, shape (P, 2)
+        Where particle 0 is at the times of the points, m; NaN before its release and after its end.
+    """
+
+    track: Track
+    recording: Recording
+    simulated: Floats
+
+    @property
+    def used(self) -> Bools:
+        """Which points lie within the simulated time, shape (P,)."""
+        return np.asarray(np.isfinite(self.simulated[:, 0]))
+
+    @property
+    def values(self) -> Floats:
+        """Measured minus simulated position, m, shape (P, 2); NaN where there is no simulation."""
+        return self.track.position - self.simulated
+
+    @property
+    def rms(self) -> tuple[float, float]:
+        """Root mean square of the residuals in x and in y, m."""
+        x, y = np.sqrt(np.mean(self.values[self.used] ** 2, axis=0)).tolist()
+        return x, y
+
+    @property
+    def mean(self) -> tuple[float, float]:
+        """Mean residuals in x and in y, m: how far the points lie off as a whole."""
+        x, y = np.mean(self.values[self.used], axis=0).tolist()
+        return x, y
+
+    @property
+    def worst(self) -> int:
+        """Index of the point that lies farthest from where it should be."""
+        return int(np.nanargmax(np.hypot(*self.values.T)))
+
+    def left_out(self) -> str:
+        """Say which points lie outside the simulated time, "" if none does."""
+        begin, end = ends(self.recording)
+        parts = []
+        for outside, where in (
+            (self.track.t < begin - ROUNDING, f"before the release at {begin:.4g} s"),
+            (self.track.t > end + ROUNDING, f"after the end at {end:.4g} s"),
+        ):
+            lines = self.track.lines[outside]
+            if len(lines):
+                span = f"line {lines[0]}" if len(lines) == 1 else f"lines {lines[0]} to {lines[-1]}"
+                parts.append(f"{counted(len(lines), 'point')} {where} ({span})")
+        return " and ".join(parts)
+
+    def sheet(self) -> Sheet:
+        """Return root mean squares, means and the worst point, and what was left out."""
+        i = self.worst
+        where = self.track.position[i]
+        rows = [
+            (name, *(write_size(float(value), "m") for value in (x, y, np.hypot(x, y))))
+            for name, (x, y) in (
+                ("RMS", self.rms),
+                ("mean", self.mean),
+                ("worst point", self.values[i]),
+            )
+        ]
+        notes = [
+            f"{int(self.used.sum())} of {len(self.track)} points compared; the worst one is line"
+            f" {self.track.lines[i]}: {self.track.t[i]:.4g} s, x = {where[0]:.4g} m, y ="
+            f" {where[1]:.4g} m"
+        ]
+        if left_out := self.left_out():
+            notes.append(f"left out: {left_out}")
+        title = "Measured - simulated, particle 0"
+        return Sheet(title, ("", "x", "y", "together"), tuple(rows), notes=tuple(notes))
+
+
+def residuals(scene: Scene, track: Track) -> Residuals:
+    """Simulate a scene and lay a measured track over its particle 0.
+
+    Raises
+    ------
+    SceneError
+        If the scene cannot be run.
+    MeasuredError
+        If fewer than three points lie within the simulated time.
+    """
+    return over(run(scene), track)
+
+
+def over(recording: Recording, track: Track) -> Residuals:
+    """Lay a measured track over particle 0 of a finished run; raises as `residuals` does."""
+    begin, end = ends(recording)
+    clock, within = track.t, inside(recording, track)
+    if within.sum() < LEAST:
+        text = (
+            f"{int(within.sum())} of {len(track)} points lie within the simulated time,"
+            f" {begin:.4g} to {end:.4g} s; they were measured at {clock[0]:.4g} to"
+            f" {clock[-1]:.4g} s. t0 moves their clock, and can be fitted"
+        )
+        raise MeasuredError(track.source, [Fault("column t", None, text)])
+    simulated = np.where(within[:, None], follow(recording, clock), np.nan)
+    return Residuals(track, recording, simulated)
+
+
+def inside(recording: Recording, track: Track) -> Bools:
+    """Return which points were measured between release and end of particle 0, shape (P,)."""
+    begin, end = ends(recording)
+    return np.asarray((track.t >= begin - ROUNDING) & (track.t <= end + ROUNDING))
+
+
+def run(scene: Scene) -> Recording:
+    """Simulate what particle 0 does; of a stream that ignores each other, only particle 0."""
+    if scene.stream.count > 1 and not scene.stream.interact:
+        scene = scene.with_values({"stream.count": 1})
+    return simulate(scene)
+
+
+def ends(recording: Recording) -> tuple[float, float]:
+    """Return when particle 0 is released and when it ends, s."""
+    clock = recording.track(0)["t"]
+    return float(clock[0]), float(clock[-1])
+
+
+def follow(recording: Recording, times: Floats) -> Floats:
+    """Return positions (T, 2) of particle 0 at times (T,), straight on before and after its track.
+
+    A fit moves release and end a little; with NaN there, its sum of squares would jump.
+    """
+    within = np.clip(times, *ends(recording))
+    if recording.count > 1:
+        recording = replace(
+            recording,
+            knots=recording.track(0),
+            offsets=recording.offsets[:2],
+            ended=recording.ended[:1],
+        )
+    position, velocity = recording.at(within)
+    onward: Floats = position[:, 0] + velocity[:, 0] * (times - within)[:, None]
+    return onward
+
+
+STEPS = 2000
+"""Moments tried; a fit from the best one finds what is between two."""
+
+POINTS = 200
+"""Points that are looked at, evenly spread; no more are needed for this."""
+
+
+def best_t0(recording: Recording, track: Track) -> float:
+    """Return the t0 (s, in the time of the file) that brings track and simulation closest.
+
+    Each point counts the square of its distance, but no more than the size of the track, and a
+    little more than that where there is no simulation: so points cannot be hidden before the
+    release or after the end. The t0 that the track has is kept if no other is better.
+    """
+    begin, end = ends(recording)
+    some = slice(None, None, 1 + len(track) // POINTS)
+    seconds, position = track.seconds[some], track.position[some]
+    reach = float(np.ptp(position, axis=0).max())
+    now = track.placement.t0
+    tried = np.append(np.linspace(seconds[0] - end, seconds[-1] - begin, STEPS), now)
+    # Linear between so many samples is far closer than the points lie.
+    moments = np.linspace(begin, end, 4 * STEPS)
+    path = follow(recording, moments)
+    clock = seconds - tried[:, None]
+    x, y = (np.interp(clock, moments, path[:, axis]) for axis in (0, 1))
+    squares = np.minimum((x - position[:, 0]) ** 2 + (y - position[:, 1]) ** 2, reach**2)
+    outside = (clock < begin) | (clock > end)
+    costs = np.where(outside, 1.01 * reach**2, squares).sum(axis=1)
+    best = int(np.argmin(costs))
+    return float(tried[best]) if costs[best] < costs[-1] else now

@@ -29,47 +29,6 @@ DESIGNS: Final = {"lhs": "LatinHypercube", "sobol": "Sobol"}
 """Names of the designs, and of the classes of `scipy.stats.qmc` that draw them."""
 
 
-def drawn(
-    varies: Sequence[Vary],
-    about: Sequence[Quantity],
-    count: int,
-    design: str,
-    seed: int,
-    most: int,
-) -> Floats:
-    """Draw samples, (count, K), between the two values of each `Vary`.
-
-    Whole numbers are drawn with both ends, all equally likely. The same seed draws the same
-    samples.
-
-    Raises
-    ------
-    InputError
-        If the design is unknown, there are too many samples, or SciPy is not installed.
-    """
-    if design not in DESIGNS:
-        raise InputError(f"--design {design}: one of {', '.join(DESIGNS)}")
-    if not 1 <= count <= most:
-        raise InputError(f"--sample {count}: a whole number from 1 to {most}")
-    if seed < 0:
-        raise InputError(f"--seed {seed}: a whole number from 0")
-    try:
-        from scipy.stats import qmc
-    except ImportError:
-        raise InputError('--sample needs SciPy: pip install "chutelab[design]"') from None
-    sampler = getattr(qmc, DESIGNS[design])(d=len(varies), seed=np.random.default_rng(seed))
-    if design == "sobol":
-        # Of a power of two points the first ones: SciPy warns of all other numbers.
-        shares = sampler.random_base2((count - 1).bit_length())[:count]
-    else:
-        shares = sampler.random(count)
-    low, high = (np.array([vary.values[end] for vary in varies]) for end in (0, 1))
-    whole = np.array([one.whole for one in about])
-    points = low + shares * (high - low)
-    steps = low + np.floor(shares * (high - low + 1.0))
-    return np.asarray(np.where(whole, np.minimum(steps, high), points))
-
-
 MOST_VARIANTS: Final = 1_000_000
 """Rows of one sweep: some 300 MB while it runs."""
 
@@ -154,7 +113,19 @@ def planned(
     """
     if engine is not None and engine not in ENGINES:
         raise ValueError(f"engine = {engine!r}: one of {', '.join(ENGINES)}")
-    varied = tuple(_varies(varies, ranges=sample is not None))
+    kind, read = (Vary, parse) if sample is None else (Range, parse_range)
+    varied: tuple[Vary, ...]
+    if hasattr(varies, "items"):
+        # + 0.0: there is one zero.
+        columns = {
+            key: np.asarray(values, np.float64).ravel() + 0.0 for key, values in varies.items()
+        }
+        varied = tuple(kind(key, tuple(column.tolist())) for key, column in columns.items())
+    else:
+        varied = tuple(read(vary) if isinstance(vary, str) else vary for vary in varies)
+        for vary in varied:
+            if not isinstance(vary, kind):
+                raise InputError("samples are drawn from ranges, not from lists", vary.typed)
     if not varied:
         raise InputError("at least one key is to be varied, such as plate.angle_deg", "--vary")
     if len(varied) > MOST_KEYS:
@@ -165,7 +136,7 @@ def planned(
             raise InputError(f"{one.path} takes whole numbers only", vary.typed)
     samples = None
     if sample is not None:
-        samples = drawn(varied, about, sample, design, seed, MOST_VARIANTS)
+        samples = _drawn(varied, about, sample, design, seed)
     return Plan(
         document=to_dict(scene),
         source=scene.source,
@@ -178,17 +149,28 @@ def planned(
     )
 
 
-def _varies(varies: Sequence[Vary | str] | Mapping[str, Any], *, ranges: bool) -> list[Vary]:
-    """Read what is to be varied; two ends each if samples are drawn."""
-    kind = Range if ranges else Vary
-    if not hasattr(varies, "items"):
-        given = [(parse_range if ranges else parse)(v) if isinstance(v, str) else v for v in varies]
-        for vary in given:
-            if ranges and not isinstance(vary, Range):
-                raise InputError("samples are drawn from ranges, not from lists", vary.typed)
-        return given
-    # + 0.0: there is one zero.
-    return [
-        kind(key, tuple((np.asarray(values, dtype=np.float64).ravel() + 0.0).tolist()))
-        for key, values in varies.items()
-    ]
+def _drawn(
+    varies: Sequence[Vary], about: Sequence[Quantity], count: int, design: str, seed: int
+) -> Floats:
+    """Draw samples, (count, K); whole numbers with both ends, all equally likely."""
+    if design not in DESIGNS:
+        raise InputError(f"--design {design}: one of {', '.join(DESIGNS)}")
+    if not 1 <= count <= MOST_VARIANTS:
+        raise InputError(f"--sample {count}: a whole number from 1 to {MOST_VARIANTS}")
+    if seed < 0:
+        raise InputError(f"--seed {seed}: a whole number from 0")
+    try:
+        from scipy.stats import qmc
+    except ImportError:
+        raise InputError('--sample needs SciPy: pip install "chutelab[design]"') from None
+    sampler = getattr(qmc, DESIGNS[design])(d=len(varies), seed=np.random.default_rng(seed))
+    if design == "sobol":
+        # Of a power of two points the first ones: SciPy warns of all other numbers.
+        shares = sampler.random_base2((count - 1).bit_length())[:count]
+    else:
+        shares = sampler.random(count)
+    low, high = np.array([vary.values for vary in varies]).T
+    whole = np.array([one.whole for one in about])
+    points = low + shares * (high - low)
+    steps = low + np.floor(shares * (high - low + 1.0))
+    return np.asarray(np.where(whole, np.minimum(steps, high), points))

@@ -11,13 +11,13 @@ import hashlib
 import json
 import os
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from time import monotonic
-from types import TracebackType
-from typing import Any, BinaryIO, Final, Self
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -208,23 +208,19 @@ WORDS: Final = {
 """What a sweep can differ in, for people."""
 
 
-def head_of(plan: Plan) -> dict[str, Any]:
-    """Return what decides the rows of a sweep."""
-    samples = None
-    if plan.samples is not None:
-        samples = hashlib.sha256(plan.samples.tobytes()).hexdigest()
-    return {
-        "format": FORMAT,
-        "chutelab": version_of("chutelab"),
-        "scene": json.loads(json.dumps(plan.document)),
-        "vary": [[vary.key, list(vary.values)] for vary in plan.varies],
-        "samples": samples,
-        "engine": plan.engine,
-    }
+def part_of(out: Path) -> Path:
+    """Return where the finished rows are kept while the sweep goes on."""
+    return out.with_name(f"{out.name}.part")
 
 
-class Part:
-    """The file of finished rows; use it in a ``with`` statement.
+@contextmanager
+def unfinished(
+    out: Path, plan: Plan, *, resume: bool
+) -> Iterator[tuple[dict[int, str], Callable[[int, int, str], None]]]:
+    """Keep the rows of a sweep that are finished beside the file it is to write, until all are.
+
+    Gives the rows that are there already, as text, by where their block begins; and what appends a
+    block: its begin, how many rows it has, and their text.
 
     Parameters
     ----------
@@ -235,107 +231,85 @@ class Part:
     resume : bool
         Whether to go on with a file that is there; without, there must be none.
 
-    Attributes
-    ----------
-    done : dict of int to str
-        Rows that are there already, as text, by where their block begins.
-
     Raises
     ------
     InputError
         If the file is of another sweep, there although it should not be, or cannot be written.
     """
+    samples = None if plan.samples is None else hashlib.sha256(plan.samples.tobytes()).hexdigest()
+    head = {
+        "format": FORMAT,
+        "chutelab": version_of("chutelab"),
+        "scene": json.loads(json.dumps(plan.document)),
+        "vary": [[vary.key, list(vary.values)] for vary in plan.varies],
+        "samples": samples,
+        "engine": plan.engine,
+    }
+    path, line = part_of(out), json.dumps(head).encode() + b"\n"
+    done: dict[int, str] = {}
+    last, added = monotonic(), False
 
-    def __init__(self, out: Path, plan: Plan, *, resume: bool) -> None:
-        self.path = part_of(out)
-        self.done: dict[int, str] = {}
-        self._last, self._added = monotonic(), False
-        self._file: BinaryIO
-        head = head_of(plan)
-        line = json.dumps(head).encode() + b"\n"
-        try:
-            # It may have been cut off in its first line.
-            if not self.path.exists() or _begins(self.path, line):
-                self._file = self.path.open("wb")
-                self._file.write(line)
-                self._sync()
-                return
-            if not resume:
-                raise InputError(
-                    f"{self.path} holds the finished rows of a sweep that was interrupted: go on"
-                    " with --resume, or remove the file"
-                )
-            length = self._read(head)
-            self._file = self.path.open("r+b")
-            self._file.truncate(length)
-            self._file.seek(length)
-        except OSError as error:
-            raise InputError(f"{self.path}: {error.strerror or error}") from error
+    def sync() -> None:
+        nonlocal last
+        file.flush()
+        os.fsync(file.fileno())
+        last = monotonic()
 
-    def _read(self, head: Mapping[str, Any]) -> int:
-        """Read the file that is there, and return the length of what is whole."""
-        data = self.path.read_bytes()
-        first, newline, _ = data.partition(b"\n")
-        try:
-            found = json.loads(first) if newline else None
-        except ValueError:
-            found = None
-        if not isinstance(found, dict):
-            raise InputError(f"{self.path} holds no rows of a sweep: remove it, or choose --out")
-        other = [words for key, words in WORDS.items() if found.get(key) != head[key]]
-        if other:
+    def add(begin: int, count: int, text: str) -> None:
+        nonlocal added
+        added = True
+        file.write(f"@{begin},{count}\n{text}".encode())
+        if monotonic() - last >= INTERVAL:
+            sync()
+
+    try:
+        data = path.read_bytes() if path.exists() else b""
+        # It may have been cut off in its first line.
+        new = len(data) < len(line) and line.startswith(data)
+        if not new and not resume:
             raise InputError(
-                f"{self.path} is of another sweep, with a difference in {', '.join(other)}: repeat"
-                " that command, or remove the file and begin anew"
+                f"{path} holds the finished rows of a sweep that was interrupted: go on"
+                " with --resume, or remove the file"
             )
-        length = len(first) + 1
-        for begin, text, end in _blocks(data, length):
-            self.done[begin] = text
-            length = end
-        return length
-
-    def add(self, begin: int, count: int, text: str) -> None:
-        """Append a block of rows."""
-        self._added = True
-        self._file.write(f"@{begin},{count}\n{text}".encode())
-        if monotonic() - self._last >= INTERVAL:
-            self._sync()
-
-    @property
-    def empty(self) -> bool:
-        """Whether there are no rows yet."""
-        return not self.done and not self._added
-
-    def _sync(self) -> None:
-        self._file.flush()
-        os.fsync(self._file.fileno())
-        self._last = monotonic()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._sync()
-        self._file.close()
-        if kind is None or self.empty:
-            self.path.unlink()
+        length = 0 if new else _length(path, data, head, done)
+        file = path.open("r+b" if data else "wb")
+        file.truncate(length)
+        file.seek(length)
+        if new:
+            file.write(line)
+            sync()
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from error
+    complete = False
+    try:
+        yield done, add
+        complete = True
+    finally:
+        sync()
+        file.close()
+        if complete or not (done or added):
+            path.unlink()
 
 
-def _begins(path: Path, line: bytes) -> bool:
-    """Tell whether a file holds a part of a line and nothing else."""
-    with path.open("rb") as file:
-        data = file.read(len(line))
-    return len(data) < len(line) and line.startswith(data)
-
-
-def part_of(out: Path) -> Path:
-    """Return where the finished rows are kept while the sweep goes on."""
-    return out.with_name(f"{out.name}.part")
+def _length(path: Path, data: bytes, head: Mapping[str, Any], done: dict[int, str]) -> int:
+    """Read a file of finished rows into `done`; return the length of what is whole."""
+    first, newline, _ = data.partition(b"\n")
+    try:
+        found = json.loads(first) if newline else None
+    except ValueError:
+        found = None
+    if not isinstance(found, dict):
+        raise InputError(f"{path} holds no rows of a sweep: remove it, or choose --out")
+    if other := [words for key, words in WORDS.items() if found.get(key) != head[key]]:
+        raise InputError(
+            f"{path} is of another sweep, with a difference in {', '.join(other)}: repeat"
+            " that command, or remove the file and begin anew"
+        )
+    length = len(first) + 1
+    for begin, text, end in _blocks(data, length):
+        done[begin] = text
+        length = end
+    return length
 
 
 def _blocks(data: bytes, begin: int) -> Iterator[tuple[int, str, int]]:

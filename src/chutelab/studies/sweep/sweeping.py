@@ -28,15 +28,16 @@ from chutelab.scene.variants import Vary, is_plain
 from chutelab.studies.sweep.batch import Block, swept
 from chutelab.studies.sweep.plan import Plan, planned
 from chutelab.studies.sweep.result import (
-    Part,
     Sweep,
     columns_of,
     format_of,
     text_of,
+    unfinished,
     write,
     write_csv,
 )
 from chutelab.studies.sweep.rows import NUMBERS, REASON, Columns, joined
+from chutelab.util.arrays import Progress
 from chutelab.util.errors import InputError
 
 Job = tuple[int, Any]
@@ -211,7 +212,7 @@ def sweep(
     engine: str | None = None,
     jobs: int = 1,
     executor: Executor | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Sweep:
     """Simulate many variants of a scene.
 
@@ -261,7 +262,7 @@ def sweep(
         return swept_by(plan, team, progress=progress)
 
 
-def swept_by(plan: Plan, team: Crew, *, progress: Callable[[float], None] | None = None) -> Sweep:
+def swept_by(plan: Plan, team: Crew, *, progress: Progress | None = None) -> Sweep:
     """Carry a plan out; see `sweep_to`."""
     found = dict(_work(plan, team, {}, progress))
     return _gathered(plan, [found[begin] for begin in sorted(found)])
@@ -273,7 +274,7 @@ def sweep_to(
     team: Crew,
     *,
     resume: bool = False,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | None = None,
 ) -> Sweep:
     """Carry a plan out and write its rows to a file, whole or not at all.
 
@@ -300,13 +301,13 @@ def sweep_to(
     """
     out, form = Path(out), format_of(out)
     names = (*plan.keys, *NUMBERS, REASON)
-    with Part(out, plan, resume=resume) as part:
-        texts = {begin: text for begin, text in part.done.items() if begin < plan.count}
+    with unfinished(out, plan, resume=resume) as (done, add):
+        texts = {begin: text for begin, text in done.items() if begin < plan.count}
         blocks = {begin: columns_of(names, text) for begin, text in texts.items()}
         for begin, columns in _work(plan, team, texts, progress):
             blocks[begin] = columns
             texts[begin] = text_of(columns)
-            part.add(begin, len(columns[REASON]), texts[begin])
+            add(begin, len(columns[REASON]), texts[begin])
         order = sorted(texts)
         result = _gathered(plan, [blocks[begin] for begin in order])
         if form == "csv":
@@ -320,7 +321,7 @@ def _work(
     plan: Plan,
     team: Crew,
     done: Mapping[int, object],
-    progress: Callable[[float], None] | None,
+    progress: Progress | None,
 ) -> Iterator[tuple[int, Columns]]:
     """Yield where blocks begin, and their rows, but for those that are done."""
     size = _size(plan)

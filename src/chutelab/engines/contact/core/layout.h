@@ -123,7 +123,10 @@ typedef struct {
     double pull;            /* m/s2; by which gravity makes it slip on a surface */
     double drift;           /* m/s; the slip that it makes by the middle of the step */
     double impulse[3];      /* on i: normal, tangential (N s), rolling (N m s) */
+    double swept[3];        /* the impulse two sweeps ago */
+    double course[3];       /* where it is heading to; both see `hasten` */
     double mass[3];         /* what the contact feels of masses and inertias, in the same order */
+    double light[3];        /* 1 / mass, 0 where there is none */
     double friction, arm;   /* coefficient; rolling friction as an arm, m */
     double other[3];        /* velocity of a surface or rider there: normal, tangential, spin */
     double rest;            /* coefficient of restitution */

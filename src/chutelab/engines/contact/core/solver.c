@@ -25,6 +25,8 @@
 #define PARALLEL 1e-7
 /* Steps that a contact in a crowd lasts at least if its end is told as a separation. */
 #define LASTS 10
+/* Sweeps before they are hastened: most solves need no more. */
+#define PLAIN 6
 /* Of momentum. */
 #define NOISE 1e-11
 /* Times the first change: sweeps whose changes grow so far never end. */
@@ -189,7 +191,7 @@ static double press(Contact *c) {
     double change[3] = {normal - c->impulse[0], 0, 0};
     if (change[0] != 0) push(c, change);
     c->impulse[0] = normal;
-    return fabs(change[0]) / c->mass[0];
+    return fabs(change[0]) * c->light[0];
 }
 
 /* How far a change of velocity (x, y) is from keeping all gaps closed, m/s. */
@@ -258,31 +260,56 @@ static double rub(Contact *c) {
     push(c, change);
     J[1] += change[1];
     J[2] += change[2];
-    double roll = c->mass[2] > 0 ? fabs(change[2]) / c->mass[2] * W.disks[c->i].radius : 0;
-    return MAX(fabs(change[1]) / c->mass[1], roll);
+    return MAX(fabs(change[1]) * c->light[1], fabs(change[2]) * c->light[2] * W.disks[c->i].radius);
+}
+
+/* Hasten the sweeps of a crowd: go on where they are heading to, by nonlinear conjugate gradients, of
+   which two sweeps, to and fro, are the gradient (Silcowitz-Hansen, Niebe and Erleben, The Visual
+   Computer 26, 2010). A pile of 2,000 takes half as many. `size` is the square of the gradient
+   before, in J, or -1 at first; returns that of this one. */
+static double hasten(Contact *list, int count, double size) {
+    double now = 0;
+    for (int n = 0; n < count && size >= 0; n++)
+        for (int k = 0; k < 3; k++)
+            now += square(list[n].impulse[k] - list[n].swept[k]) * list[n].light[k];
+    double go = now < size ? now / size : 0;
+    for (int n = 0; n < count; n++) {
+        Contact *c = list + n;
+        double more[3] = {0, 0, 0};
+        for (int k = 0; k < 3; k++) {
+            if (go > 0) more[k] = go * c->course[k];
+            c->course[k] = size >= 0 ? more[k] + c->impulse[k] - c->swept[k] : 0;
+            c->impulse[k] += more[k];
+            c->swept[k] = c->impulse[k];
+        }
+        if (go > 0) push(c, more);
+    }
+    return now;
 }
 
 /* Sweep over contacts, those of one disk with surfaces as one, until no relative velocity changes by
    more than `accurate`; return by how much one changed in the last sweep, or INFINITY if the sweeps
    diverge. */
 static double sweep(Contact *list, int count, int sweeps, double accurate) {
-    double first = 0, worst = 0;
+    double first = 0, worst = 0, size = 0;
     for (int n = 0; n < sweeps; n++) {
+        if (W.interact && n >= PLAIN && (n - PLAIN) % 2 == 0)
+            size = hasten(list, count, n == PLAIN ? -1 : size);
         worst = 0;
-        for (int m = 0, size; m < count; m += size) {
+        for (int m = 0, many; m < count; m += many) {
             /* To and fro, so that what one end of a pile does reaches the other in one sweep; in the
                last one surfaces come last, which do not give way. */
             int to = (sweeps - n) % 2;
             Contact *c = list + (to ? m : count - 1 - m), *last = c;
-            for (size = 1; c->j < 0 && m + size < count; size++, last += to ? 1 : -1)
+            for (many = 1; c->j < 0 && m + many < count; many++, last += to ? 1 : -1)
                 if ((to ? last + 1 : last - 1)->i != c->i || (to ? last + 1 : last - 1)->j >= 0) break;
             if (!to) c = last;
-            double change = size > 1 ? press_corner(c, size) : press(c);
-            for (int k = 0; k < size; k++) {
+            double change = many > 1 ? press_corner(c, many) : press(c);
+            for (int k = 0; k < many; k++) {
                 c[k].change = rub(c + k);
                 change = MAX(change, c[k].change);
             }
-            if (size > 1) press_corner(c, size);
+            if (many > 1) press_corner(c, many);
             worst = MAX(worst, change);
         }
         W.sweep_count++;

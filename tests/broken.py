@@ -1,0 +1,257 @@
+"""Scenes as they should not be, each with the keys at fault and a word of what is allowed."""
+
+IN = "[incoming]\nspeed = 2\npulley_radius = 0.1\n"
+PLATE = "[plate]\ndistance = 0.5\n"
+OUT = "[outgoing]\ndrop = 0.5\n"
+FREE = "[stream]\nat = [0, 1]\nvelocity = [0, 0]\n"
+HOOD = '[[surface]]\nname = "hood"\nfrom = [0, 0]\nto = [1, 0]\n'
+BIG = "9" * 400
+
+
+def expect(**keys):
+    """A machine with one expectation, some of its keys changed or, with None, left out."""
+    given = {"quantity": '"x2"', "value": "0.5", "tolerance": "0.1", "source": '"me"', **keys}
+    lines = [f"{key} = {value}\n" for key, value in given.items() if value is not None]
+    return IN + PLATE + OUT + "[[expect]]\n" + "".join(lines)
+
+
+# Text of the file, the keys at fault, and a word of what is allowed.
+BROKEN = {
+    # wrong types
+    "string for number": (IN.replace("2", '"2.0"'), ["incoming.speed"], "a number from 0"),
+    "boolean for number": (IN.replace("0.1", "true"), ["incoming.pulley_radius"], "a number > 0"),
+    "list for number": (IN + "[particle]\nmass = [1]", ["particle.mass"], "a number > 0"),
+    "date for number": (IN + "[particle]\nradius = 2020-01-01", ["particle.radius"], "a number"),
+    "table for number": (IN + "[run.dt]\nx = 1", ["run.dt"], "a number"),
+    "float for count": (IN + "[stream]\ncount = 1e4", ["stream.count"], "a whole number"),
+    "boolean for count": (IN + "[stream]\ncount = true", ["stream.count"], "a whole number"),
+    "number for switch": (IN + "[particle]\nspin = 1", ["particle.spin"], "true or false"),
+    "string for switch": (IN + '[stream]\ninteract = "no"', ["stream.interact"], "true or false"),
+    "number for title": ("title = 3\n" + IN, ["title"], "a string"),
+    "number for table": ("plate = 3\n" + IN, ["plate"], "a table"),
+    "list for table": ("run = []\n" + IN, ["run"], "a table"),
+    "table for surfaces": (IN + '[surface]\nname = "a"', ["surface"], "[[surface]]"),
+    "number for surface": ("surface = [1]\n" + IN, ["surface[0]"], "a table"),
+    "number for point": (FREE.replace("[0, 1]", "1"), ["stream.at"], "[x, y]"),
+    "text in point": (FREE.replace("[0, 1]", '[0, "1"]'), ["stream.at[1]"], "a number"),
+    "short point": (FREE.replace("[0, 1]", "[0]"), ["stream.at"], "[x, y]"),
+    "long point": (FREE.replace("[0, 1]", "[0, 1, 2]"), ["stream.at"], "[x, y]"),
+    # out of range
+    "negative radius": (IN + "[particle]\nradius = -1", ["particle.radius"], "from 0"),
+    "zero mass": (IN + "[particle]\nmass = 0", ["particle.mass"], "> 0"),
+    "negative gravity": ("gravity = -9.81\n" + IN, ["gravity"], "from 0"),
+    "negative speed": (IN.replace("2", "-2"), ["incoming.speed"], "from 0"),
+    "zero pulley": (IN.replace("0.1", "0"), ["incoming.pulley_radius"], "> 0"),
+    "restitution above 1": (IN + PLATE + "restitution = 1.1", ["plate.restitution"], "from 0 to 1"),
+    "negative friction": (IN + PLATE + "friction = -0.1", ["plate.friction"], "from 0"),
+    "plate on its side": (IN + PLATE + "angle_deg = 90", ["plate.angle_deg"], "< 90, in degrees"),
+    "plate overturned": (IN + PLATE + "angle_deg = -90", ["plate.angle_deg"], "> -90"),
+    "zero drop": (IN + PLATE + OUT.replace("0.5", "0"), ["outgoing.drop"], "> 0"),
+    "no particles": (IN + "[stream]\ncount = 0", ["stream.count"], "from 1"),
+    "huge count": (IN + "[stream]\ncount = 10_000_001", ["stream.count"], "to 10000000"),
+    "absurd count": (IN + f"[stream]\ncount = {BIG}", ["stream.count"], "to 10000000"),
+    "negative seed": (IN + "[stream]\nseed = -1", ["stream.seed"], "from 0"),
+    "zero rate": (IN + "[stream]\nrate = 0", ["stream.rate"], "a number from"),
+    "zero step": (IN + "[run]\ndt = 0.0", ["run.dt"], "a number from"),
+    "NaN": (IN + PLATE + "angle_deg = nan", ["plate.angle_deg"], "a number"),
+    "infinity": (IN.replace("2", "inf"), ["incoming.speed"], "a number"),
+    "overflow": (IN.replace("2", "1e999"), ["incoming.speed"], "a number"),
+    "NaN in point": (FREE.replace("[0, 1]", "[nan, 1]"), ["stream.at[0]"], "a number"),
+    "endless title": (f'title = "{BIG}"\n' + IN, ["title"], "at most 200 characters"),
+    # unknown words
+    "unknown engine": (
+        IN + '[run]\nengine = "box2d"',
+        ["run.engine"],
+        '"exact", "contact" or "pymunk"',
+    ),
+    "unknown ending": (IN + '[run]\nuntil = "end"', ["run.until"], '"settled" or a number'),
+    "zero ending": (IN + "[run]\nuntil = 0", ["run.until"], "> 0"),
+    "unknown grip": (IN + 'friction = "glue"', ["incoming.friction"], '"adhesion" or a number'),
+    "unknown drop_from": (
+        IN + PLATE + OUT + 'drop_from = "here"',
+        ["outgoing.drop_from"],
+        '"impact" or "top"',
+    ),
+    # unknown keys
+    "misspelt key": (IN + PLATE + "angel_deg = 3", ["plate.angel_deg"], "plate.angle_deg?"),
+    "misspelt table": (IN.replace("incoming", "incomming"), ["incomming"], "incoming?"),
+    "key in wrong table": (IN + "drop = 3", ["incoming.drop"], "[outgoing]"),
+    "key outside its table": ("restitution = 0\n" + IN, ["restitution"], "[incoming]"),
+    "unheard-of key": (IN + "[run]\nqqq = 1", ["run.qqq"], "engine, until, max_time, dt"),
+    "key of a surface": (IN + HOOD + "colour = 1", ["surface[0].colour"], "points"),
+    "quoted key": (IN + '"a.b" = 1', ['incoming."a.b"'], "unknown key"),
+    # missing
+    "no speed": (IN.replace("speed = 2", ""), ["incoming.speed"], "is missing"),
+    "no distance": (IN + "[plate]", ["plate.distance"], "is missing"),
+    "no drop": (IN + PLATE + "[outgoing]", ["outgoing.drop"], "is missing"),
+    "plate alone": (FREE + PLATE, ["incoming"], "[plate]"),
+    "outgoing alone": (
+        FREE + OUT + 'drop_from = "top"',
+        ["incoming"],
+        "[outgoing] needs the table [incoming]",
+    ),
+    "no release": ("[stream]\ncount = 2", ["stream.at", "stream.velocity"], "[incoming]"),
+    # surfaces
+    "nameless": (FREE + HOOD.replace('name = "hood"', ""), ["surface[0].name"], "is missing"),
+    "reserved name": (FREE + HOOD.replace("hood", "plate"), ["surface[0].name"], "reserved"),
+    "name twice": (FREE + HOOD + HOOD, ["surface[1].name", "surface[0].name"], "unique"),
+    "name with a dot": (FREE + HOOD.replace("hood", "a.b"), ["surface[0].name"], "dots"),
+    "empty name": (FREE + HOOD.replace("hood", ""), ["surface[0].name"], "1 to 40"),
+    "no ends": (FREE + '[[surface]]\nname = "a"', ["surface[0].points"], "from and to"),
+    "one end": (FREE + HOOD.replace("to", "# to"), ["surface[0].to", "surface[0].from"], "missing"),
+    "other end": (FREE + HOOD.replace("from", "# "), ["surface[0].from"], "missing"),
+    "no extent": (FREE + HOOD.replace("[1, 0]", "[0, 0.0]"), ["surface[0].to"], "differ"),
+    "ends and points": (
+        FREE + HOOD + "points = [[0, 0], [1, 1]]",
+        ["surface[0].from", "surface[0].to", "surface[0].points"],
+        "not both",
+    ),
+    "one point": (
+        FREE + '[[surface]]\nname = "a"\npoints = [[0, 0]]',
+        ["surface[0].points"],
+        "2 to 10000 points",
+    ),
+    "point repeated": (
+        FREE + '[[surface]]\nname = "a"\npoints = [[0, 0], [1, 1], [1, 1.0]]',
+        ["surface[0].points"],
+        "[1.0, 1.0] repeats",
+    ),
+    "second surface": (
+        FREE + HOOD + HOOD.replace("hood", "b") + "restitution = 2",
+        ["surface[1].restitution"],
+        "from 0 to 1",
+    ),
+    # conflicts, naming both keys
+    "interact and exact": (
+        IN + '[stream]\ninteract = true\ncount = 2\n[run]\nengine = "exact"',
+        ["run.engine", "stream.interact", "stream.count = 2"],
+        "contact or pymunk",
+    ),
+    "pymunk and points": (
+        IN + '[particle]\nradius = 0\n[run]\nengine = "pymunk"',
+        ["run.engine", "particle.radius"],
+        "pymunk needs disks",
+    ),
+    "contact and points": (
+        IN + '[particle]\nradius = 0\n[run]\nengine = "contact"',
+        ["run.engine", "particle.radius"],
+        "contact needs disks",
+    ),
+    "interact and points": (
+        IN + "[particle]\nradius = 0\n[stream]\ninteract = true",
+        ["stream.interact", "particle.radius"],
+        "never meet",
+    ),
+    "spin and points": (
+        IN + "[particle]\nradius = 0.0\nspin = true",
+        ["particle.spin", "particle.radius"],
+        "cannot turn",
+    ),
+    "spread on adhesive belt": (
+        IN + "[stream]\nspeed_spread = 0.1",
+        ["stream.speed_spread", "incoming.friction"],
+        "Coulomb",
+    ),
+    "velocity on adhesive belt": (
+        IN + "[stream]\nvelocity = [1, 0]",
+        ["stream.velocity", "incoming.friction"],
+        "incoming.speed",
+    ),
+    "point on adhesive belt": (
+        IN + "[stream]\nat = [-0.5, 0.104]\nvelocity = [2, 0.1]",
+        ["stream.velocity", "incoming.friction"],
+        "Coulomb",
+    ),
+    "landed nowhere": (IN + '[run]\nuntil = "landed"', ["run.until"], "[outgoing]"),
+    "impact without plate": (IN + OUT, ["outgoing.drop_from"], 'outgoing.drop_from = "top"'),
+    "plate of no length": (
+        IN + PLATE + "above = 0\nbelow = 0",
+        ["plate.above", "plate.below"],
+        "length",
+    ),
+    # expectations
+    "number for expectations": ("expect = 3\n" + IN, ["expect"], "each headed by [[expect]]"),
+    "table for expectations": (IN + "[expect]\nvalue = 1", ["expect"], "[[expect]]"),
+    "number for expectation": ("expect = [1]\n" + IN, ["expect[0]"], "a table"),
+    "nothing expected": (expect(quantity=None), ["expect[0].quantity"], "is missing"),
+    "no value expected": (expect(value=None), ["expect[0].value"], '"theory" or a number'),
+    "no tolerance": (expect(tolerance=None), ["expect[0].tolerance"], "is missing"),
+    "no source": (expect(source=None), ["expect[0].source"], "is missing"),
+    "misspelt quantity": (
+        expect(quantity='"landing.xx"'),
+        ["expect[0].quantity"],
+        "did you mean landing.x?",
+    ),
+    "unheard-of quantity": (
+        expect(quantity='"speed"'),
+        ["expect[0].quantity"],
+        "ledger.belt_work and other keys",
+    ),
+    "empty quantity": (expect(quantity='""'), ["expect[0].quantity"], "phi1_deg to slip_heat, "),
+    "quantity in radians": (
+        expect(quantity='"phi1"'),
+        ["expect[0].quantity"],
+        "did you mean phi1_deg?",
+    ),
+    "quantity of an absent table": (
+        IN + '[[expect]]\nquantity = "landing.x"\nvalue = 1\ntolerance = 0\nsource = "me"',
+        ["expect[0].quantity"],
+        "it needs [outgoing]",
+    ),
+    "velocity after a separation": (
+        expect(quantity='"separation.vx_after"'),
+        ["expect[0].quantity"],
+        "no such quantity",
+    ),
+    "statistic of a statistic": (
+        expect(quantity='"landing.x.mean.mean"'),
+        ["expect[0].quantity"],
+        "landing.x.mean?",
+    ),
+    "theory of a mean": (
+        expect(quantity='"landing.x"', value='"theory"'),
+        ["expect[0].value"],
+        "only phi1_deg",
+    ),
+    "unknown expected word": (expect(value='"thery"'), ["expect[0].value"], '"theory" or a num'),
+    "expected NaN": (expect(value="nan"), ["expect[0].value"], "a number"),
+    "expected boolean": (expect(value="true"), ["expect[0].value"], "a number"),
+    "negative tolerance": (expect(tolerance="-1"), ["expect[0].tolerance"], "from 0 to 1"),
+    "generous tolerance": (expect(tolerance="1.5"), ["expect[0].tolerance"], "from 0 to 1"),
+    "tolerance of another unit": (
+        expect(tolerance='"1 s"'),
+        ["expect[0].tolerance"],
+        '"0.5 mm"; x2 is in m',
+    ),
+    "tolerance of no unit": (expect(tolerance='"1"'), ["expect[0].tolerance"], "x2 is in m"),
+    "tolerance in words": (expect(tolerance='"little"'), ["expect[0].tolerance"], "0.5 mm"),
+    "negative length": (expect(tolerance='"-1 mm"'), ["expect[0].tolerance"], "0.5 mm"),
+    "nothing promised": (expect(tolerance='"none"'), ["expect[0].tolerance"], "0.5 mm"),
+    "tolerance for contact": (
+        expect(tolerance_contact='"no"'),
+        ["expect[0].tolerance_contact"],
+        "",
+    ),
+    "tolerance for pymunk": (
+        expect(tolerance_pymunk='"no"'),
+        ["expect[0].tolerance_pymunk"],
+        'or "none"; x2 is in m',
+    ),
+    "unit of a count": (
+        expect(quantity='"landing.count"', tolerance='"1 m"'),
+        ["expect[0].tolerance"],
+        'such as "3"; landing.count is a number of things',
+    ),
+    "key of an expectation": (
+        expect(valu="1"),
+        ["expect[0].valu"],
+        "did you mean expect[0].value?",
+    ),
+    # not TOML
+    "no value": (IN + "length = ", ["line 4, column 10"], "Invalid value"),
+    "unclosed": (IN + "length = [1,\n2", ["line 5, column 2"], "Unclosed array"),
+    "key twice": (IN + "speed = 3\n", ["line 4, column 10"], "Cannot overwrite a value"),
+    "prose": ("Dear students,\nthis is no scene", ["line 1, column 6"], "not TOML"),
+    "empty": ("", ["stream.at", "stream.velocity"], "chutelab new"),
+    "only a comment": ("# nothing\n", ["stream.at", "stream.velocity"], "chutelab new"),
+}

@@ -284,14 +284,11 @@ def _blow(
     )
     state = s.now(index)
     s.log.knots(index, state)
-    told = approach > NEGLIGIBLE
+    told = (approach > NEGLIGIBLE) | (tangential != 0.0)
     if landing is not None:
         told |= landing
     surface, push, rub = c.surface, mass * normal, mass * tangential
     count = int(np.count_nonzero(told))
-    if count < len(told):
-        told |= tangential != 0.0
-        count = int(np.count_nonzero(told))
     s.log.contacts += count
     if count < len(told):
         index, surface, state = index[told], surface[told], state[:, told]

@@ -20,7 +20,6 @@ from chutelab.studies.accuracy import (
     FLOOR,
     MOST_STEPS,
     Accuracy,
-    AccuracyError,
     Wanted,
     apart,
     each,
@@ -30,6 +29,7 @@ from chutelab.studies.accuracy import (
     stirred,
     together,
 )
+from chutelab.util.errors import InputError
 
 LONE = [name for name in sc.shipped() if "stream" not in name]
 
@@ -67,7 +67,7 @@ def test_an_accuracy_is_a_share_or_a_length(text, size, unit):
      "1e-16 m", "1 s", "1 J", "mm", "exact", "1e999", "1;2"],
 )  # fmt: skip
 def test_what_cannot_be_asked_for_is_refused_with_what_can(text):
-    with pytest.raises(AccuracyError) as caught:
+    with pytest.raises(InputError) as caught:
         parse(text)
     said = str(caught.value)
     assert repr(text) in said
@@ -77,7 +77,7 @@ def test_what_cannot_be_asked_for_is_refused_with_what_can(text):
 
 @pytest.mark.parametrize(("size", "unit"), [(0.0, "relative"), (nan, "m"), (inf, "m"), (2.0, "x")])
 def test_a_wanted_accuracy_checks_itself(size, unit):
-    with pytest.raises(AccuracyError):
+    with pytest.raises(InputError):
         Wanted(size, "m" if unit == "m" else "relative")
 
 

@@ -13,7 +13,7 @@ from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import rolling, squeezed, waits
-from chutelab.studies.accuracy import Accuracy, Wanted
+from chutelab.studies.accuracy import Accuracy, written
 from chutelab.util.tables import Sheet, number, wrapped
 
 STATIONS = 6
@@ -39,13 +39,12 @@ def report(recording: Recording, accuracy: Accuracy | None = None) -> list[Rende
     parts.append(ledger(recording))
     parts += [Sheet("", (), (), notes=(note,)) for note in _notes(recording)]
     if accuracy is not None:
-        wanted = Wanted(accuracy.asked, "m" if accuracy.unit == "m" else "relative")
         what = "relative error" if accuracy.unit == "relative" else "error of places"
         said = "cannot be told"
         if accuracy.reached is not None:
-            said = f"about {wanted.written(accuracy.reached)} ({accuracy.worst})"
+            said = f"about {written(accuracy.reached, accuracy.unit)} ({accuracy.worst})"
         met = "reached" if accuracy.met else "NOT REACHED"
-        found = wrapped(f"{what} {said}; asked for {wanted}, {met}")
+        found = wrapped(f"{what} {said}; asked for {written(accuracy.asked, accuracy.unit)}, {met}")
         how = wrapped(f"how it is known: {accuracy.method}")
         parts += [Text("\nAccuracy", style="bold"), Text("\n".join([*found, *how]))]
     return parts

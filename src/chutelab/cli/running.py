@@ -17,6 +17,7 @@ from chutelab.cli.parameters import (
     set_option,
 )
 from chutelab.cli.program import RefusedError, StuckError
+from chutelab.util.errors import InputError
 
 if TYPE_CHECKING:
     from chutelab.scene.variants import Vary
@@ -26,11 +27,11 @@ if TYPE_CHECKING:
 def _accuracy(_ctx: click.Context, _parameter: click.Parameter, text: str | None) -> Wanted | None:
     if text is None:
         return None
-    from chutelab.studies.accuracy import AccuracyError, parse
+    from chutelab.studies.accuracy import parse
 
     try:
         return parse(text)
-    except AccuracyError as error:
+    except InputError as error:
         raise click.BadParameter(str(error)) from error
 
 
@@ -100,9 +101,11 @@ def run(
     if stuck is not None:
         raise stuck
     if accuracy is not None and reached is not None and not reached.met:
+        from chutelab.studies.accuracy import written
+
         best = "how much was, cannot be told"
         if reached.reached is not None:
-            best = f"{accuracy.written(reached.reached)} was"
+            best = f"{written(reached.reached, reached.unit)} was"
         raise click.ClickException(f"the accuracy of {accuracy} was not reached; {best}")
 
 

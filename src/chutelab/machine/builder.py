@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chutelab.machine.nominal import Discharge, discharge, plate_hit
+from chutelab.machine.nominal import discharge, plate_hit
 from chutelab.machine.parts import Caution, Machine, Particle, Pulley, Segments
 from chutelab.machine.releases import ON_BELT, Releases, draw, release_point
 from chutelab.scene import Fault, Scene, SceneError
@@ -148,6 +148,12 @@ CLEARANCE_RADII = 3.0
 """The same in radii: a disk that lies on the belt passes under the plate, with one to spare."""
 
 
+Part = tuple[str, Sequence[tuple[Numbers, Numbers]], Numbers, Numbers, Numbers]
+"""A surface: its name, its points (m), its speed (m/s), restitution and friction."""
+
+
+# A flight that never meets the plate's line has NaN for its impact.
+@np.errstate(divide="ignore", invalid="ignore", over="ignore")
 def build(scene: Scene) -> Machine:
     """Resolve a validated scene, or a family of them.
 
@@ -164,186 +170,144 @@ def build(scene: Scene) -> Machine:
         place the outgoing belt, the impact lies off the finite plate, or a particle starts inside a
         surface.
     """
-    builder = _Builder(scene)
-    # A flight that never meets the plate's line has NaN for its impact.
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        belt_height = builder.incoming_and_plate(discharge(scene))
-        if scene.outgoing is not None:
-            assert belt_height is not None
-            out = scene.outgoing
-            ends = [(out.start, belt_height), (out.start + out.length, belt_height)]
-            builder.add("outgoing", ends, out.speed, out.restitution, out.friction)
-        for free in scene.surface:
-            builder.add(free.name, free.points, free.speed, free.restitution, free.friction)
-        return builder.machine()
+    parts, warnings = _conveyors(scene)
+    parts += [(s.name, s.points, s.speed, s.restitution, s.friction) for s in scene.surface]
+    names = [name for name, *_ in parts]
+    segments = sum(len(points) - 1 for _, points, *_ in parts)
+    columns, owner = np.empty((7, segments, *scene.shape)), list[int]()
+    for number, (_, points, *numbers) in enumerate(parts):
+        for start, end in pairwise(points):
+            for column, value in zip(columns, (*start, *end, *numbers), strict=True):
+                column[len(owner)] = value
+            owner.append(number)
+    speed, restitution, friction = columns[4:]
+    along = columns[2:4] - columns[0:2]
+    length = np.hypot(along[0], along[1])
+    disk, belt, until = scene.particle, scene.incoming, scene.run.until
+    releases = cleared(scene, draw(scene), columns[:4], owner, names)
+    bound = releases.t[-1].item() + scene.run.max_time
+    return Machine(
+        scene=scene,
+        surfaces=tuple(names),
+        gravity=scene.gravity,
+        particle=Particle(
+            radius=disk.radius,
+            mass=disk.mass,
+            inertia=0.5 * disk.mass * (disk.radius * disk.radius) if disk.spin else 0.0,
+        ),
+        segments=Segments(
+            start=columns[0:2].T,
+            tangent=(along / length).T,
+            length=length.T,
+            speed=speed.T,
+            restitution=restitution.T,
+            friction=friction.T,
+            surface=np.array(owner, dtype=np.int64),
+        ),
+        pulley=None
+        if belt is None
+        else Pulley(belt.pulley_radius, belt.speed, _grip(belt.friction), belt.restitution, 0),
+        releases=releases,
+        landing=names.index("outgoing") if "outgoing" in names else -1,
+        until=until if isinstance(until, str) else "time",
+        end_time=bound if isinstance(until, str) else np.minimum(bound, until),
+        dt=scene.run.dt,
+        align=scene.run.align,
+        interact=scene.stream.interact and scene.stream.count > 1,
+        pair_restitution=scene.stream.restitution,
+        pair_friction=scene.stream.friction,
+        engine=scene.run.engine,
+        plate_warnings=tuple(warnings),
+    )
 
 
-class _Builder:
-    """Collects surfaces; one short-lived object per `build`."""
-
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
-        self.names: list[str] = []
-        self.rows: list[tuple[Numbers, ...]] = []
-        self.owner: list[int] = []
-        self.warnings: list[Caution] = []
-
-    def add(
-        self,
-        name: str,
-        points: Sequence[tuple[Numbers, Numbers]],
-        speed: Numbers,
-        restitution: Numbers,
-        friction: Numbers,
-    ) -> None:
-        self.names.append(name)
-        for (x0, y0), (x1, y1) in pairwise(points):
-            self.rows.append((x0, y0, x1, y1, speed, restitution, friction))
-            self.owner.append(len(self.names) - 1)
-
-    def incoming_and_plate(self, start: Discharge) -> Numbers | None:
-        """Add the belt and the plate; return the height of the outgoing belt's surface."""
-        scene = self.scene
-        if scene.incoming is None:
-            return None
-        belt = scene.incoming
-        top = belt.pulley_radius
-        self.add("incoming", [(-belt.length, top), (0.0, top)], belt.speed, belt.restitution,
-                 _grip(belt.friction))  # fmt: skip
-        plate, out, r = scene.plate, scene.outgoing, scene.particle.radius
-        hit = plate_hit(scene, start)
-        missed = np.isnan(hit[1])
-        height: Numbers | None = None
-        if out is not None and out.drop_from == "top":
-            height = top - out.drop
-        elif out is not None:
-            self._refuse(
-                missed,
-                "outgoing.drop_from",
-                "impact",
-                lambda _: (
-                    "the nominal particle never meets the plate, so there is no impact to measure"
-                    ' from; set outgoing.drop_from = "top"'
-                ),
-            )
-            height = hit[1] - out.drop - r
-        if plate is None:
-            return height
+def _conveyors(scene: Scene) -> tuple[list[Part], list[Caution]]:
+    """Return the belts and the plate, and what may surprise about the plate."""
+    belt, plate, out, r = scene.incoming, scene.plate, scene.outgoing, scene.particle.radius
+    if belt is None:
+        return [], []
+    top, grip = belt.pulley_radius, _grip(belt.friction)
+    ends: list[tuple[Numbers, Numbers]] = [(-belt.length, top), (0.0, top)]
+    parts: list[Part] = [("incoming", ends, belt.speed, belt.restitution, grip)]
+    warnings: list[Caution] = []
+    hit = plate_hit(scene, discharge(scene))
+    missed = np.isnan(hit[1])
+    height: Numbers | None = None  # of the outgoing belt's surface
+    if out is not None and out.drop_from == "top":
+        height = top - out.drop
+    elif out is not None:
+        text = (
+            "the nominal particle never meets the plate, so there is no impact to measure from;"
+            ' set outgoing.drop_from = "top"'
+        )
+        _refuse(scene, missed, "outgoing.drop_from", "impact", lambda _: text)
+        height = hit[1] - out.drop - r
+    if plate is not None:
         alpha = np.radians(plate.angle_deg)
         sine, cosine = np.sin(alpha), np.cos(alpha)
         x, y = top + plate.distance, plate.pivot_height
-        below: Numbers
+        below: Numbers = REACH_WITHOUT_BELT
         if plate.below is not None:
             below = plate.below
-        elif height is None:
-            below = REACH_WITHOUT_BELT
-        else:
+        elif height is not None:
             lowest = height + np.maximum(CLEARANCE, CLEARANCE_RADII * r)
             below = np.maximum((y - lowest) / cosine, 0.0)
-        self._refuse(
-            np.less_equal(below + plate.above, 0.0),
-            "plate.above",
-            plate.above,
-            lambda _: "above + below must be more than 0 m",
-        )
+        none = np.less_equal(below + plate.above, 0.0)
+        least = "above + below must be more than 0 m"
+        _refuse(scene, none, "plate.above", plate.above, lambda _: least)
         # Upwards, so that the struck face (-cos α, -sin α) lies to the left of the tangent.
-        low, high = ((x - reach * sine, y + reach * cosine) for reach in (-below, plate.above))
-        self.add("plate", [low, high], 0.0, plate.restitution, plate.friction)
+        ends = [(x - reach * sine, y + reach * cosine) for reach in (-below, plate.above)]
+        parts.append(("plate", ends, 0.0, plate.restitution, plate.friction))
         if np.count_nonzero(missed):
-            self.warnings.append(Caution("plate"))
-        self._check_hit((y - hit[1]) * -cosine + (x - hit[0]) * sine, below)
-        return height
+            warnings.append(Caution("plate"))
+        warnings += _off_plate(scene, (y - hit[1]) * -cosine + (x - hit[0]) * sine, below)
+    if out is not None:
+        assert height is not None
+        ends = [(out.start, height), (out.start + out.length, height)]
+        parts.append(("outgoing", ends, out.speed, out.restitution, out.friction))
+    return parts, warnings
 
-    def _check_hit(self, along: Numbers, below: Numbers) -> None:
-        """Look whether a hit that far above the pivot, m, is on the plate; NaN is no hit."""
-        scene = self.scene
-        assert scene.plate is not None
-        above = scene.plate.above
-        too_low, too_high = np.less(along, -below), np.greater(along, above)
-        off = too_low | too_high
-        # Several times as fast as `any` where there is one number.
-        if not np.count_nonzero(off):
-            return
 
-        def allowed(place: int) -> str:
-            hit = self._at(along, place)
-            return (
-                f"{Caution('plate', hit=hit).text}: lengthen it to at least"
-                f" {ceil(1e4 * abs(hit)) / 1e4:g} m,"
-                ' or set outgoing.drop_from = "top"'
-            )
+def _off_plate(scene: Scene, along: Numbers, below: Numbers) -> list[Caution]:
+    """Warn of a hit that far above the pivot (m; NaN is no hit) if it is off the finite plate.
 
-        if scene.outgoing is not None and scene.outgoing.drop_from == "impact":
-            self._refuse(too_high, "plate.above", above, allowed)
-            self._refuse(too_low, "plate.below", below, allowed)
-        else:
-            self.warnings.append(Caution("plate", hit=self._at(along, int(np.argmax(off)))))
+    It is refused where the outgoing belt is placed by it.
+    """
+    assert scene.plate is not None
+    above = scene.plate.above
+    too_low, too_high = np.less(along, -below), np.greater(along, above)
+    off = too_low | too_high
+    # Several times as fast as `any` where there is one number.
+    if not np.count_nonzero(off):
+        return []
+    if scene.outgoing is None or scene.outgoing.drop_from != "impact":
+        return [Caution("plate", hit=_at(scene, along, int(np.argmax(off))))]
 
-    def _refuse(
-        self, bad: ArrayLike, key: str, value: ArrayLike, allowed: Callable[[int], str]
-    ) -> None:
-        """Raise if something is wrong with a key of some scenes."""
-        if np.count_nonzero(bad):
-            places = np.flatnonzero(np.broadcast_to(bad, self.scene.shape)).tolist()
-            faults = {n: Fault(key, self._at(value, n), allowed(n)) for n in places}
-            raise RefusedError(self.scene.source, faults)
-
-    def _at(self, value: ArrayLike, place: int) -> Any:
-        """Return what is a scene's own, as Python has it."""
-        return np.broadcast_to(value, self.scene.shape).flat[place].item()
-
-    def machine(self) -> Machine:
-        scene = self.scene
-        columns = np.empty((7, len(self.rows), *scene.shape))
-        for s, row in enumerate(self.rows):
-            for column, value in zip(columns, row, strict=True):
-                column[s] = value
-        speed, restitution, friction = columns[4:]
-        along = columns[2:4] - columns[0:2]
-        length = np.hypot(along[0], along[1])
-        particle = Particle(
-            radius=scene.particle.radius,
-            mass=scene.particle.mass,
-            inertia=0.5 * scene.particle.mass * (scene.particle.radius * scene.particle.radius)
-            if scene.particle.spin
-            else 0.0,
+    def allowed(place: int) -> str:
+        hit = _at(scene, along, place)
+        return (
+            f"{Caution('plate', hit=hit).text}: lengthen it to at least"
+            f' {ceil(1e4 * abs(hit)) / 1e4:g} m, or set outgoing.drop_from = "top"'
         )
-        pulley = None
-        if scene.incoming is not None:
-            belt = scene.incoming
-            pulley = Pulley(
-                belt.pulley_radius, belt.speed, _grip(belt.friction), belt.restitution, 0
-            )
-        releases = cleared(scene, draw(scene), columns[:4], self.owner, self.names)
-        bound = releases.t[-1].item() + scene.run.max_time
-        until = scene.run.until
-        return Machine(
-            scene=scene,
-            surfaces=tuple(self.names),
-            gravity=scene.gravity,
-            particle=particle,
-            segments=Segments(
-                start=columns[0:2].T,
-                tangent=(along / length).T,
-                length=length.T,
-                speed=speed.T,
-                restitution=restitution.T,
-                friction=friction.T,
-                surface=np.array(self.owner, dtype=np.int64),
-            ),
-            pulley=pulley,
-            releases=releases,
-            landing=self.names.index("outgoing") if "outgoing" in self.names else -1,
-            until=until if isinstance(until, str) else "time",
-            end_time=bound if isinstance(until, str) else np.minimum(bound, until),
-            dt=scene.run.dt,
-            align=scene.run.align,
-            interact=scene.stream.interact and scene.stream.count > 1,
-            pair_restitution=scene.stream.restitution,
-            pair_friction=scene.stream.friction,
-            engine=scene.run.engine,
-            plate_warnings=tuple(self.warnings),
-        )
+
+    _refuse(scene, too_high, "plate.above", above, allowed)
+    _refuse(scene, too_low, "plate.below", below, allowed)
+    return []
+
+
+def _refuse(
+    scene: Scene, bad: ArrayLike, key: str, value: ArrayLike, allowed: Callable[[int], str]
+) -> None:
+    """Raise if something is wrong with a key of some scenes of a family, or of the one."""
+    if np.count_nonzero(bad):
+        places = np.flatnonzero(np.broadcast_to(bad, scene.shape)).tolist()
+        faults = {n: Fault(key, _at(scene, value, n), allowed(n)) for n in places}
+        raise RefusedError(scene.source, faults)
+
+
+def _at(scene: Scene, value: ArrayLike, place: int) -> Any:
+    """Return a number of one scene of a family, as Python has it."""
+    return np.broadcast_to(value, scene.shape).flat[place].item()
 
 
 def _grip(friction: float | str) -> float:

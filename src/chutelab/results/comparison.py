@@ -14,16 +14,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chutelab.results.quantities import QUANTITIES, observed
+from chutelab.results.quantities import KINDS, QUANTITIES, observed
 from chutelab.results.recording import Recording
 from chutelab.scene import Scene
+from chutelab.scene.units import symbol
 from chutelab.theory import Transfer
 from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet, Shown, number
 
-UNITS = {
-    "angle": "°", "time": "s", "length": "m", "speed": "m/s", "energy": "J", "power": "W",
-}  # fmt: skip
+UNITS = {kind: symbol(unit) for unit, kind in KINDS.items()}
 """What each kind is shown in."""
 
 MEANINGS = {

@@ -81,27 +81,20 @@ def ledger(recording: Recording) -> Ledger:
     kinetic_first, potential_first = recording.energies(first)
     kinetic_last, potential_last = recording.energies(last)
     change = (kinetic_last - kinetic_first) + (potential_last - potential_first)
-    residual = float((change - balance(last["entries"])).sum())
-    belt_work, restitution_loss, friction_loss = (float(e) for e in last["entries"].sum(axis=0))
+    belt_work, restitution_loss, friction_loss = last["entries"].sum(axis=0).tolist()
     kinetic = float(kinetic_first.sum()), float(kinetic_last.sum())
     potential = float(potential_first.sum()), float(potential_last.sum())
-    turned_over = (
-        kinetic[0]
-        + abs(belt_work)
-        + abs(restitution_loss)
-        + abs(friction_loss)
-        + abs(potential[1] - potential[0])
-    )
+    sizes = map(abs, (belt_work, restitution_loss, friction_loss, potential[1] - potential[0]))
     return Ledger(
         kinetic=kinetic,
         potential=potential,
         belt_work=belt_work,
         restitution_loss=restitution_loss,
         friction_loss=friction_loss,
-        residual=residual,
-        turned_over=turned_over,
+        residual=float((change - balance(last["entries"])).sum()),
+        turned_over=sum(sizes, kinetic[0]),
         by_surface={
-            name: dict(zip(ENTRIES, (float(value) for value in row), strict=True))
-            for name, row in zip(recording.surfaces, recording.by_surface, strict=True)
+            name: dict(zip(ENTRIES, row, strict=True))
+            for name, row in zip(recording.surfaces, recording.by_surface.tolist(), strict=True)
         },
     )

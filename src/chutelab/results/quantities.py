@@ -20,15 +20,15 @@ from chutelab.machine.releases import Squeeze, schedule, squeeze
 from chutelab.results.ledger import ledger
 from chutelab.results.recording import ENTRIES, EVENT, REASONS, Kind, Recording
 from chutelab.scene import Scene
-from chutelab.scene.rules import NEEDED
+from chutelab.scene.rules import NEEDED, SYMBOLS
 from chutelab.util.arrays import Floats
 
-QUANTITIES = {
-    "phi1": "angle", "t2": "time", "x2": "length", "y2": "length", "v2": "speed", "phi2": "angle",
-    "phi2r": "angle", "v2r": "speed", "t3": "time", "x3": "length", "y3": "length",
-    "v3x": "speed", "v3y": "speed", "v3": "speed", "d3": "length", "dEk": "energy", "P": "power",
-    "belt_work": "energy", "slip_heat": "energy",
+KINDS = {
+    "degrees": "angle", "s": "time", "m": "length", "m/s": "speed", "J": "energy", "W": "power",
 }  # fmt: skip
+"""Kinds of quantities by their units."""
+
+QUANTITIES = {name.removesuffix("_deg"): KINDS[unit] for name, unit in SYMBOLS.items()}
 """What theory and runs both have, under the paper's symbols, and what kind of quantity it is."""
 
 ALONG = 1e-14

@@ -88,32 +88,11 @@ def balance(entries: NDArray[Any]) -> Floats:
 CELLS = 2**18
 """Times × particles in one block: some 30 arrays of 2 MB each, near enough to the cache."""
 
-COLUMNS = ("kinetic", "potential", *ENTRIES, "residual")
-"""What `energies` returns, in this order."""
-
-
-@dataclass(frozen=True, eq=False)
-class Cells:
-    """Times at which particles are on their way, arrays (c,).
-
-    Attributes
-    ----------
-    row, particle : ndarray of int
-        Indices of the time and of the particle.
-    left : ndarray of int
-        Index of the last knot that is not later; ``left + 1`` closes the interval. At the end of a
-        track it is the last knot but one.
-    h : ndarray
-        Length of the interval, s; 0 where a track ends with an impact.
-    share : ndarray
-        Part of the interval that has passed, 0 to 1; 1 where `h` is 0.
-    """
-
-    row: Ints
-    particle: Ints
-    left: Ints
-    h: Floats
-    share: Floats
+Cells = tuple[Ints, Ints, Ints, Floats]
+"""Times at which particles are on their way, arrays (c,): index of the time, and of the particle;
+index of the last knot that is not later (``left``; ``left + 1`` closes the interval, so at the end
+of a track it is the last knot but one); and the share of the interval that has passed, 0 to 1, 1
+where a track ends with an impact."""
 
 
 def blocks(knots: NDArray[Any], offsets: Ints, times: Floats) -> Iterator[Cells]:
@@ -144,12 +123,12 @@ def blocks(knots: NDArray[Any], offsets: Ints, times: Floats) -> Iterator[Cells]
             left, right = np.where(passed, middle, left), np.where(passed, right, middle)
         h = t[left + 1] - t[left]
         share = np.divide(at - t[left], h, out=np.ones_like(h), where=h > 0.0)
-        yield Cells(begin + row, released[column], left, h, share)
+        yield begin + row, released[column], left, share
 
 
-def hermite(knots: NDArray[Any], cells: Cells, axis: int) -> tuple[Floats, Floats]:
+def hermite(knots: NDArray[Any], left: Ints, share: Floats, axis: int) -> tuple[Floats, Floats]:
     """Return one coordinate (m) and its velocity (m/s) on the cubic between two knots, (c,)."""
-    left, s, h = cells.left, cells.share, cells.h
+    s, h = share, knots["t"][left + 1] - knots["t"][left]
     position, velocity = knots["position"][:, axis], knots["velocity"][:, axis]
     pa, pb, va, vb = position[left], position[left + 1], velocity[left], velocity[left + 1]
     dx = pb - pa
@@ -161,75 +140,6 @@ def hermite(knots: NDArray[Any], cells: Cells, axis: int) -> tuple[Floats, Float
     pace = va + s * (2.0 * (3.0 * slope - 2.0 * va - vb) + 3.0 * s * (va + vb - 2.0 * slope))
     over = s >= 1.0
     return np.where(over, pb, where), np.where(over, vb, pace)
-
-
-def energies(
-    knots: NDArray[Any], offsets: Ints, times: Floats, particle: Particle, gravity: float
-) -> Floats:
-    """Return the books at each time, summed over released particles, (6, T), J; see `COLUMNS`.
-
-    A particle that has ended keeps what it had. Between two knots the entries follow from what
-    goes on there: the restitution loss changes in impacts only, at knots. While a particle slips,
-    the force and so the power of the belt is constant on a face, and the friction loss is what the
-    energy balance asks for, with the residuals of the two knots interpolated linearly. While it is
-    carried without slip, the belt work is. In flight nothing is booked, and what the balance leaves
-    over is the residual.
-    """
-    released = offsets[1:] > offsets[:-1]
-    firsts, lasts = knots[offsets[:-1][released]], knots[offsets[1:][released] - 1]
-    at_release = np.zeros(len(offsets) - 1)
-    at_release[released] = sum(_energy(firsts, particle, gravity))
-
-    final = np.empty((len(COLUMNS), len(lasts)))
-    final[:2] = _energy(lasts, particle, gravity)
-    final[2:5] = lasts["entries"].T
-    final[5] = final[:2].sum(axis=0) - at_release[released] - balance(lasts["entries"])
-    order = np.argsort(lasts["t"], kind="stable")
-    sums = np.concatenate([np.zeros((len(COLUMNS), 1)), final[:, order].cumsum(axis=1)], axis=1)
-    out = sums[:, np.searchsorted(lasts["t"][order], times, side="left")]
-
-    for cells in blocks(knots, offsets, times):
-        values = _under_way(knots, cells, at_release[cells.particle], particle, gravity)
-        for total, value in zip(out, values, strict=True):
-            np.add.at(total, cells.row, value)
-    return out
-
-
-def _energy(knots: NDArray[Any], particle: Particle, gravity: float) -> tuple[Floats, Floats]:
-    """Return kinetic (rotation included) and potential energy (J) of knots of any shape."""
-    velocity = knots["velocity"]
-    kinetic = particle.kinetic(velocity[..., 0], velocity[..., 1], knots["omega"])
-    return kinetic, particle.mass * gravity * knots["position"][..., 1]
-
-
-def _under_way(
-    knots: NDArray[Any], cells: Cells, at_release: Floats, particle: Particle, gravity: float
-) -> tuple[Floats, ...]:
-    """Return the `COLUMNS` of each cell, (c,)."""
-    share, a, b = cells.share, knots[cells.left], knots[cells.left + 1]
-    (_, vx), (y, vy) = hermite(knots, cells, 0), hermite(knots, cells, 1)
-    kinetic = particle.kinetic(vx, vy, a["omega"] + share * (b["omega"] - a["omega"]))
-    potential = particle.mass * gravity * y
-    gain = kinetic + potential - at_release
-
-    (belt_a, restitution_a, friction_a), (belt_b, restitution_b, friction_b) = (
-        knot["entries"].T for knot in (a, b)
-    )
-    residual_a, residual_b = (
-        sum(_energy(knot, particle, gravity)) - at_release - balance(knot["entries"])
-        for knot in (a, b)
-    )
-    slips, driven = friction_a != friction_b, belt_a != belt_b
-    restitution = np.where(share < 1.0, restitution_a, restitution_b)
-    residual = residual_a + share * (residual_b - residual_a)
-    belt = np.where(
-        driven & ~slips,
-        gain + restitution + friction_a - residual,
-        belt_a + share * (belt_b - belt_a),
-    )
-    friction = np.where(slips, belt - restitution + residual - gain, friction_a)
-    residual = np.where(slips | driven, residual, gain - (belt - restitution - friction))
-    return kinetic, potential, belt, restitution, friction, residual
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -407,19 +317,21 @@ class Recording(Shown):
         """
         times = np.atleast_1d(np.asarray(times, dtype=np.float64))
         position, velocity = np.full((2, len(times), self.count, 2), np.nan)
-        for cells in blocks(self.knots, self.offsets, times):
+        for row, particle, left, share in blocks(self.knots, self.offsets, times):
             for axis in (0, 1):
-                where, pace = hermite(self.knots, cells, axis)
-                position[cells.row, cells.particle, axis] = where
-                velocity[cells.row, cells.particle, axis] = pace
+                where, pace = hermite(self.knots, left, share, axis)
+                position[row, particle, axis], velocity[row, particle, axis] = where, pace
         return position, velocity
 
     def energy_at(self, times: ArrayLike) -> dict[str, Floats]:
         """Return the energy ledger of all released particles up to each time.
 
-        The books are right at any time, not only at knots: between two of them the belt work, the
-        friction loss or the residual follows the energy of the particle, see
-        `chutelab.results.recording.energies`. A particle that has ended keeps its last state.
+        A particle that has ended keeps its last state. Between two knots the entries follow from
+        what goes on there: the restitution loss changes in impacts only, at knots. While a particle
+        slips, the force and so the power of the belt is constant on a face, and the friction loss
+        is what the energy balance asks for, with the residuals of the two knots interpolated
+        linearly. While it is carried without slip, the belt work is. In flight nothing is booked,
+        and what the balance leaves over is the residual.
 
         Parameters
         ----------
@@ -433,9 +345,53 @@ class Recording(Shown):
             what the balance since each release leaves over. J.
         """
         times = np.atleast_1d(np.asarray(times, dtype=np.float64))
-        values = energies(self.knots, self.offsets, times, self.particle, self.gravity)
-        return dict(zip(COLUMNS, values, strict=True))
+        firsts, lasts = self.ends()
+        at_release = np.zeros(self.count)
+        at_release[self.released] = sum(self.energies(firsts))
+
+        final = np.empty((6, len(lasts)))
+        final[:2] = self.energies(lasts)
+        final[2:5] = lasts["entries"].T
+        final[5] = final[:2].sum(axis=0) - at_release[self.released] - balance(lasts["entries"])
+        order = np.argsort(lasts["t"], kind="stable")
+        sums = np.concatenate([np.zeros((6, 1)), final[:, order].cumsum(axis=1)], axis=1)
+        out = sums[:, np.searchsorted(lasts["t"][order], times, side="left")]
+
+        for row, particle, left, share in blocks(self.knots, self.offsets, times):
+            values = self._under_way(left, share, at_release[particle])
+            for total, value in zip(out, values, strict=True):
+                np.add.at(total, row, value)
+        return dict(zip(("kinetic", "potential", *ENTRIES, "residual"), out, strict=True))
+
+    def _under_way(self, left: Ints, share: Floats, at_release: Floats) -> tuple[Floats, ...]:
+        """Return what `energy_at` does, of each cell, (c,)."""
+        a, b = self.knots[left], self.knots[left + 1]
+        (_, vx), (y, vy) = (hermite(self.knots, left, share, axis) for axis in (0, 1))
+        omega = a["omega"] + share * (b["omega"] - a["omega"])
+        kinetic = self.particle.kinetic(vx, vy, omega)
+        potential = self.particle.mass * self.gravity * y
+        gain = kinetic + potential - at_release
+
+        (belt_a, restitution_a, friction_a), (belt_b, restitution_b, friction_b) = (
+            knot["entries"].T for knot in (a, b)
+        )
+        residual_a, residual_b = (
+            sum(self.energies(knot)) - at_release - balance(knot["entries"]) for knot in (a, b)
+        )
+        slips, driven = friction_a != friction_b, belt_a != belt_b
+        restitution = np.where(share < 1.0, restitution_a, restitution_b)
+        residual = residual_a + share * (residual_b - residual_a)
+        belt = np.where(
+            driven & ~slips,
+            gain + restitution + friction_a - residual,
+            belt_a + share * (belt_b - belt_a),
+        )
+        friction = np.where(slips, belt - restitution + residual - gain, friction_a)
+        residual = np.where(slips | driven, residual, gain - (belt - restitution - friction))
+        return kinetic, potential, belt, restitution, friction, residual
 
     def energies(self, knots: NDArray[Any]) -> tuple[Floats, Floats]:
         """Return kinetic (rotation included) and potential energy (J) of knots of any shape."""
-        return _energy(knots, self.particle, self.gravity)
+        vx, vy = knots["velocity"][..., 0], knots["velocity"][..., 1]
+        potential = self.particle.mass * self.gravity * knots["position"][..., 1]
+        return self.particle.kinetic(vx, vy, knots["omega"]), potential

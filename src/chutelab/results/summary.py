@@ -2,36 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
-from math import degrees, isfinite
+from collections.abc import Mapping
+from math import degrees
 from typing import Any
 
-from chutelab.machine.releases import Squeeze
 from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
-from chutelab.results.quantities import (
-    QUANTITIES,
-    Rolling,
-    Waits,
-    column,
-    end_times,
-    first,
-    rolling,
-    squeezed,
-    waits,
-)
+from chutelab.results.quantities import column, end_times, first, rolling, squeezed, waits
 from chutelab.results.recording import REASONS, Recording
 from chutelab.scene import Scene
+from chutelab.scene.rules import SYMBOLS
 from chutelab.theory import Transfer, predict
 from chutelab.util.arrays import Floats
+from chutelab.util.tables import plain
 
 FORMAT = 1
 """Version of the object; keys are only ever added to a version."""
 
 BEFORE, AFTER = ("t", "x", "y", "vx", "vy"), ("vx_after", "vy_after")
-
-ANGLES = ("phi1", "phi2", "phi2r")
 
 
 def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> dict[str, Any]:
@@ -43,9 +31,13 @@ def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> 
     ``waited`` unless particles found their place taken (see `results.quantities.Waits`), and
     ``squeezed`` unless riders by adhesion got into each other (see `machine.releases.Squeeze`).
     """
-    compared = compare(recording)
-    ended = {"t": _column(end_times(recording)), "reason": [REASONS[k] for k in recording.ended]}
-    return {
+    error = compare(recording)
+
+    def events(event: str, *names: str) -> dict[str, Floats]:
+        found = first(recording, event)
+        return {name: column(found, name) for name in (*BEFORE, *names)}
+
+    told: dict[str, Any] = plain({
         "format": FORMAT,
         "scene": recording.title,
         "engine": recording.engine,
@@ -53,41 +45,27 @@ def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> 
         "seconds": recording.seconds,
         "steps": recording.steps,
         "contacts": recording.contacts,
-        "separation": _events(recording, "separation", BEFORE),
-        "impact": _events(recording, "impact", (*BEFORE, *AFTER)),
-        "landing": _events(recording, "landing", (*BEFORE, *AFTER)),
-        "ended": ended,
-        "rolling": _told(rolling(recording)),
-        "waited": _told(waits(recording)),
-        "squeezed": _told(squeezed(recording)),
-        "ledger": asdict(ledger(recording)),
+        "separation": events("separation"),
+        "impact": events("impact", *AFTER),
+        "landing": events("landing", *AFTER),
+        "ended": {"t": end_times(recording), "reason": [REASONS[k] for k in recording.ended]},
+        "rolling": rolling(recording),
+        "waited": waits(recording),
+        "squeezed": squeezed(recording),
+        "ledger": ledger(recording),
         "theory": _theory(recording.prediction),
         "theory_as_printed": _as_printed(recording.scene),
-        "error": {**compared.errors, "max": compared.max},
-        "accuracy": None if accuracy is None else dict(accuracy),
-    }
-
-
-def _events(recording: Recording, event: str, names: Sequence[str]) -> dict[str, list[Any]]:
-    events = first(recording, event)
-    return {name: _column(column(events, name)) for name in names}
-
-
-def _column(values: Floats) -> list[float | None]:
-    return [value if isfinite(value) else None for value in values.tolist()]
-
-
-def _told(found: Waits | Squeeze | Rolling | None) -> dict[str, Any] | None:
-    return None if found is None else asdict(found)
+        "error": {**error.errors, "max": error.max},
+        "accuracy": accuracy,
+    })  # fmt: skip
+    return told
 
 
 def _theory(prediction: Transfer) -> dict[str, Any]:
     out: dict[str, Any] = {}
-    for name in QUANTITIES:
-        value = float(getattr(prediction, name))
-        if name in ANGLES:
-            name, value = f"{name}_deg", degrees(value)
-        out[name] = value if isfinite(value) else None
+    for name in SYMBOLS:
+        value = float(getattr(prediction, name.removesuffix("_deg")))
+        out[name] = degrees(value) if name.endswith("_deg") else value
     return {**out, "reason": str(prediction.reason) or None}
 
 

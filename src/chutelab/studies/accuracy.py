@@ -10,6 +10,7 @@ of another engine. Without a witness nothing is promised.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
 from math import inf, isfinite
@@ -41,10 +42,6 @@ ALLOWED = (
 )
 
 
-class AccuracyError(InputError):
-    """An accuracy that cannot be asked for; its text says what can."""
-
-
 @dataclass(frozen=True)
 class Wanted:
     """An accuracy.
@@ -63,14 +60,15 @@ class Wanted:
     def __post_init__(self) -> None:
         most = LARGEST_SHARE if self.unit == "relative" else LARGEST_LENGTH
         if not SMALLEST <= self.size <= most:
-            raise AccuracyError(f"{self}: must be {ALLOWED}")
+            raise InputError(f"{self}: must be {ALLOWED}")
 
     def __str__(self) -> str:
-        return self.written(self.size)
+        return written(self.size, self.unit)
 
-    def written(self, size: float) -> str:
-        """Write another error in the same unit."""
-        return f"{size:.2g}" if self.unit == "relative" else write_size(size, "m", 2)
+
+def written(size: float, unit: str) -> str:
+    """Write an error, relative or in m."""
+    return f"{size:.2g}" if unit == "relative" else write_size(size, unit, 2)
 
 
 def parse(text: str) -> Wanted:
@@ -78,7 +76,7 @@ def parse(text: str) -> Wanted:
 
     Raises
     ------
-    AccuracyError
+    InputError
         If it is none that can be asked for.
 
     Examples
@@ -86,16 +84,12 @@ def parse(text: str) -> Wanted:
     >>> parse("1e-6"), parse("1mm")
     (Wanted(size=1e-06, unit='relative'), Wanted(size=0.001, unit='m'))
     """
-    try:
+    # An InputError is a ValueError, as those of `read_size` are.
+    with suppress(ValueError):
         size, unit = read_size(text)
-    except ValueError:
-        unit = "unknown"
-    if unit not in ("", "%", "m"):
-        raise AccuracyError(f"{text!r}: must be {ALLOWED}")
-    try:
-        return Wanted(size, "m" if unit == "m" else "relative")
-    except AccuracyError:
-        raise AccuracyError(f"{text!r}: must be {ALLOWED}") from None
+        if unit in ("", "%", "m"):
+            return Wanted(size, "m" if unit == "m" else "relative")
+    raise InputError(f"{text!r}: must be {ALLOWED}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,10 +213,10 @@ def apart(
     for mine, its in zip(one, other, strict=True):
         if not np.array_equal(np.isnan(mine.values), np.isnan(its.values)):
             return inf, mine.name
-        difference, value = np.abs(mine.values - its.values), np.abs(its.values)
-        if difference.ndim > 1:
-            difference, value = (np.hypot(*pair.T) if pair.shape[1] == 2 else pair[:, 0]
-                                 for pair in (difference, value))  # fmt: skip
+        difference, value = (
+            np.linalg.norm(values.reshape(len(values), -1), axis=1)
+            for values in (mine.values - its.values, its.values)
+        )
         if mine.kind == "number":
             if np.any(difference > 0.0):
                 return inf, mine.name
@@ -357,7 +351,7 @@ def reach(
 
     Raises
     ------
-    AccuracyError
+    InputError
         If that cannot be asked for.
     SceneError
         As `chutelab.simulate`.
@@ -381,19 +375,39 @@ class Search:
         self.witnesses: dict[str, tuple[Recording | None, str]] = {}
 
     def result(self) -> tuple[Recording, Accuracy]:
-        """Return what `reach` does."""
-        found = self.run(self.scene)
-        known = self.by_theory(found)
-        if known is not None and (known.met or found.engine == "exact"):
-            return found, known
-        if self.crowded:
-            return found, self.crowd(found)
-        return self.refine(found, known)
-
-    @property
-    def crowded(self) -> bool:
-        """Whether particles meet each other."""
-        return self.scene.stream.interact and self.scene.stream.count > 1
+        """Return what `reach` does: halve the steps until run and witness are near enough."""
+        found, dt, least, stale = self.run(self.scene), self.scene.run.dt, inf, 0
+        best: tuple[Recording, Accuracy] | None = None
+        while True:
+            now = self.judged(found)
+            other = self.witnesses.get(found.engine, (None, ""))[0]
+            by_theory = now.against == "theory"
+            no_witness = other is None and not by_theory
+            if now.met or now.chaotic or no_witness or (by_theory and found.engine == "exact"):
+                return found, now
+            if best is None or now.size <= best[1].size:
+                best = found, now
+            stale = 0 if now.size < STALE * least else stale + 1
+            least = min(least, now.size)
+            moving = [one for one in (found, other) if one is not None and one.engine in STEPPED]
+            why = ""
+            if not moving:
+                why = "neither has a step to shorten"
+            elif stale >= PATIENCE:
+                why = "a shorter step helps no more"
+            elif 0.5 * dt < SHORTEST:
+                why = f"a step may not be shorter than {SHORTEST:g} s"
+            elif 2.0 * max(one.steps for one in moving) > MOST_STEPS:
+                why = f"half the step would take more than {MOST_STEPS:,} steps"
+            if why:
+                last = replace(best[1], runs=self.runs, method=f"{best[1].method}; {why}")
+                return best[0], last
+            dt *= 0.5
+            finer = self.scene.with_values({"run.dt": dt, "expect": None})
+            if found.engine in STEPPED:
+                found = self.run(finer, found.engine)
+            if other is not None and other.engine in STEPPED:
+                self.witnesses[found.engine] = self.run(finer, other.engine), ""
 
     def judged(self, found: Recording) -> Accuracy:
         """Say how wrong a run is, one of the scene with any engine and step.
@@ -403,11 +417,20 @@ class Search:
         known = self.by_theory(found)
         if known is not None:
             return known
-        if self.crowded:
+        if self.scene.stream.interact and self.scene.stream.count > 1:
             return self.crowd(found)
         if found.engine not in self.witnesses:
             self.witnesses[found.engine] = self.witness(found)
-        return self.held(found, *self.witnesses[found.engine])
+        other, none = self.witnesses[found.engine]
+        if other is None:
+            return self.said(found, inf, "every answer", none, None)
+        error, which = distance(found, other, self.wanted.unit)
+        at = f" at dt = {other.scene.run.dt:.3g} s" if other.engine in STEPPED else ""
+        name = "SciPy's DOP853" if other.engine == "dop853" else f"the {other.engine} engine"
+        how = f"difference from {name}{at}"
+        if not isfinite(error):
+            how = f"none: {found.engine} and {other.engine} differ in {which}"
+        return self.said(found, error, which, how, other.engine)
 
     def run(self, scene: Scene, engine: str | None = None) -> Recording:
         """Run a scene once more."""
@@ -471,44 +494,6 @@ class Search:
                 passed.append(f"{engine} ({because(error)})")
         return None, f"none: no other answer; not {', nor '.join(passed)}"
 
-    def refine(self, found: Recording, known: Accuracy | None) -> tuple[Recording, Accuracy]:
-        """Shorten the steps of the run, or else of its witness, until the two are near enough."""
-        other, none = self.witness(found) if known is None else (None, "")
-        dt, least, stale = self.scene.run.dt, inf, 0
-        best: tuple[Recording, Accuracy] | None = None
-        while True:
-            now = self.held(found, other, none) if known is None else self.by_theory(found)
-            assert now is not None
-            if now.met or none:
-                return found, now
-            if best is None or now.size <= best[1].size:
-                best = found, now
-            stale = 0 if now.size < STALE * least else stale + 1
-            least = min(least, now.size)
-            moving = [one for one in (found, other) if one is not None and one.engine in STEPPED]
-            reason = _hopeless(moving, dt, stale)
-            if reason:
-                last = replace(best[1], runs=self.runs, method=f"{best[1].method}; {reason}")
-                return best[0], last
-            dt *= 0.5
-            finer = self.scene.with_values({"run.dt": dt, "expect": None})
-            if found.engine in STEPPED:
-                found = self.run(finer, found.engine)
-            if other is not None and other.engine in STEPPED:
-                other = self.run(finer, other.engine)
-
-    def held(self, found: Recording, other: Recording | None, none: str) -> Accuracy:
-        """Hold a run against its witness; without one, say why there is `none`."""
-        if other is None:
-            return self.said(found, inf, "every answer", none, None)
-        error, which = distance(found, other, self.wanted.unit)
-        at = f" at dt = {other.scene.run.dt:.3g} s" if other.engine in STEPPED else ""
-        name = "SciPy's DOP853" if other.engine == "dop853" else f"the {other.engine} engine"
-        how = f"difference from {name}{at}"
-        if not isfinite(error):
-            how = f"none: {found.engine} and {other.engine} differ in {which}"
-        return self.said(found, error, which, how, other.engine)
-
     def crowd(self, found: Recording) -> Accuracy:
         """Hold what can be said of a crowd as a whole against another engine's, and stirs of both.
 
@@ -530,19 +515,6 @@ class Search:
             f" {scene.run.dt:.3g} s, each with and without a change of the inputs by {STIR:g}"
         )
         return self.said(found, error, which, how, engine, chaotic=True)
-
-
-def _hopeless(moving: list[Recording], dt: float, stale: int) -> str:
-    """Return why shorter steps are not worth trying, "" if they are."""
-    if not moving:
-        return "neither has a step to shorten"
-    if stale >= PATIENCE:
-        return "a shorter step helps no more"
-    if 0.5 * dt < SHORTEST:
-        return f"a step may not be shorter than {SHORTEST:g} s"
-    if 2.0 * max(one.steps for one in moving) > MOST_STEPS:
-        return f"half the step would take more than {MOST_STEPS:,} steps"
-    return ""
 
 
 def stirred(scene: Scene, share: float) -> Scene:

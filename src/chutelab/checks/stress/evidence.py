@@ -9,7 +9,7 @@ import numpy as np
 
 from chutelab.machine import Machine
 from chutelab.results import Recording
-from chutelab.results.recording import Cells, hermite
+from chutelab.results.recording import hermite
 from chutelab.util.arrays import Floats, Ints
 
 EPS = float(np.finfo(np.float64).eps)
@@ -112,9 +112,7 @@ class Evidence:
     def between(self, left: Ints, share: Floats) -> Floats:
         """Return positions (c, 2) between knots `left` (c,) and the ones that follow them, m."""
         knots = self.recording.knots
-        h = knots["t"][left + 1] - knots["t"][left]
-        cells = Cells(np.zeros_like(left), np.zeros_like(left), left, h, share)
-        return np.stack([hermite(knots, cells, axis)[0] for axis in (0, 1)], axis=-1)
+        return np.stack([hermite(knots, left, share, axis)[0] for axis in (0, 1)], axis=-1)
 
     @cached_property
     def speed(self) -> float:

@@ -14,9 +14,6 @@ from chutelab.cli.parameters import json_option, out_option, scene_argument, set
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from chutelab.studies.measured import Fit, Residuals
-
-
 FILES = ("compare.png", "points.csv", "fit.json")
 
 
@@ -114,9 +111,12 @@ def compare(
     s² (JᵀJ)⁻¹ from how the points respond to the parameters (J) and how much they scatter (s): they
     hold if errors are independent and the model is right. Needs pip install "chutelab[fit]".
     """  # noqa: D301 - click wants the backspace
+    from rich.text import Text
+
     from chutelab.scene import load
     from chutelab.studies import measured
-    from chutelab.studies.measured.result import as_dict
+    from chutelab.studies.measured.result import advice, as_dict, points_csv
+    from chutelab.util.tables import wrapped
 
     if robust and not keys:
         raise click.UsageError("--robust is for fits: name what to fit with --fit.")
@@ -127,30 +127,16 @@ def compare(
             fit = measured.fit(loaded, film, keys, robust=robust) if keys else None
             found = measured.residuals(loaded, film) if fit is None else fit.after
         if place is not None:
+            from chutelab.pictures.plots.measured import measured as plot
+
             with progress("drawing"):
-                _write(found, fit, place)
+                plot(found, fit).write(place / "compare.png")
+                (place / "points.csv").write_text(points_csv(found), encoding="utf-8")
+                if fit is not None:
+                    write_json(as_dict(found, fit), place / "fit.json")
     if as_json:
         show_json(as_dict(found, fit))
-    else:
-        _tell(found, fit, out)
-
-
-def _write(found: Residuals, fit: Fit | None, place: Path) -> None:
-    from chutelab.pictures.plots.measured import measured
-    from chutelab.studies.measured.result import as_dict, points_csv
-
-    measured(found, fit, path=place / "compare.png")
-    (place / "points.csv").write_text(points_csv(found), encoding="utf-8")
-    if fit is not None:
-        write_json(as_dict(found, fit), place / "fit.json")
-
-
-def _tell(found: Residuals, fit: Fit | None, out: Path | None) -> None:
-    from rich.text import Text
-
-    from chutelab.studies.measured.result import advice
-    from chutelab.util.tables import wrapped
-
+        return
     head = Text(found.recording.title, style="bold")
     head.append(f"\n{found.track.said()}", style="not bold")
     parts: list[RenderableType] = [head, found] if fit is None else [head, fit, found]
@@ -158,5 +144,4 @@ def _tell(found: Residuals, fit: Fit | None, out: Path | None) -> None:
         parts.append(Text("\n" + "\n".join(wrapped(f"note: {advised}"))))
     show(*parts)
     if out is not None:
-        names = [name for name in FILES if fit is not None or name != "fit.json"]
-        click.echo(f"wrote into {out}: {', '.join(names)}")
+        click.echo(f"wrote into {out}: {', '.join(FILES if fit is not None else FILES[:-1])}")

@@ -141,7 +141,7 @@ def _write(found: Solution, place: Path) -> None:
 
     write_json(as_dict(found), place / "solve.json")
     if found.scan is not None:
-        scan(found, path=place / "scan.png")
+        scan(found).write(place / "scan.png")
     if not (found.solved or found.nearest):
         return
     values = zip(found.ranges, found.answer.values, strict=True)
@@ -191,7 +191,7 @@ def propagate(
         if plot is not None:
             from chutelab.pictures.plots.design import spread
 
-            spread(found, path=plot)
+            spread(found).write(plot)
     if as_json:
         show_json(as_dict(found))
     elif not quiet:

@@ -37,16 +37,10 @@ def discharge(scene: Scene) -> Discharge:
     position, velocity = release_point(scene), release_velocity(scene)
     if scene.incoming is None or not on_belt(scene) or velocity[1] != 0.0:
         return Discharge(position, velocity)
-    rho = scene.incoming.pulley_radius + scene.particle.radius
-    if isinstance(scene.incoming.friction, str):
-        return _let_go(scene, rho)
-    return _slip_round(scene, rho, velocity[0], -position[0])
-
-
-def _let_go(scene: Scene, rho: Numbers) -> Discharge:
-    """Leave by adhesion where cos φ1 = v²/(g ρ), at the top if that is 1 or more (Eq. (2))."""
-    assert scene.incoming is not None
-    speed = scene.incoming.speed
+    rho, speed = scene.incoming.pulley_radius + scene.particle.radius, scene.incoming.speed
+    if not isinstance(scene.incoming.friction, str):
+        return _slip_round(scene, rho, velocity[0], -position[0])
+    # Adhesion lets go where cos φ1 = v²/(g ρ), at the top if that is 1 or more: Eq. (2).
     ratio = np.divide(speed * speed, scene.gravity * rho)
     grip = np.where(np.greater(speed, 0.0), np.minimum(ratio, 1.0), nan)
     sine = np.sqrt((1.0 - grip) * (1.0 + grip))

@@ -8,10 +8,8 @@ from math import inf, prod
 import numpy as np
 
 from chutelab.scene import Scene
+from chutelab.scene.rules import ON_BELT
 from chutelab.util.arrays import Bools, Floats
-
-ON_BELT = 1e-9
-"""m; a release point this close to the riding height counts as on the belt."""
 
 TRIES = 1000
 """Draws of a height that may overlap an earlier particle before it has to wait for its place."""

@@ -380,12 +380,10 @@ def as_dict(found: Uncertainty) -> dict[str, Any]:
         "quantities": {
             name: {
                 "unit": found.units[m],
-                "nominal": found.nominal[m],
-                "mean": found.mean[m],
-                "deviation": found.deviation[m],
-                "interval": found.interval[m],
-                "first": found.indices[m].first,
-                "total": found.indices[m].total,
+                **{
+                    of: getattr(found, of)[m] for of in ("nominal", "mean", "deviation", "interval")
+                },
+                **{of: getattr(found.indices[m], of) for of in ("first", "total")},
             }
             for m, name in enumerate(found.quantities)
         },

@@ -140,16 +140,12 @@ def _of_scene(document: Mapping[str, Any], key: str) -> Parameter | str:
 def numbers(document: Mapping[str, Any]) -> Iterator[str]:
     """Yield the keys of a scene's tables whose values are numbers that can be fitted."""
     names = [surface["name"] for surface in document["surface"]]
-    for head, table in document.items():
-        entries = {head: table}
-        if isinstance(table, dict):
-            entries = {f"{head}.{name}": value for name, value in table.items()}
-        elif head == "surface":
-            entries = {
-                f"surface.{surface['name']}.{name}": value
-                for surface in table
-                for name, value in surface.items()
-            }
-        for key, value in entries.items():
-            if isinstance(value, float) and rule_at(parts_of(key, names)):
-                yield key
+    tables = {head: table for head, table in document.items() if isinstance(table, dict)}
+    tables |= {f"surface.{surface['name']}": surface for surface in document["surface"]}
+    own = {key: value for key, value in document.items() if key not in tables}
+    entries = {
+        f"{head}.{key}": value for head, table in tables.items() for key, value in table.items()
+    }
+    for key, value in (own | entries).items():
+        if isinstance(value, float) and rule_at(parts_of(key, names)):
+            yield key

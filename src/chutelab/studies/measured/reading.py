@@ -182,11 +182,26 @@ def read(
     lines = lines_of(source)
     header, separator = _header(source, lines)
     above = cells_of(lines[header - 1], separator) if header else []
-    columns = _chosen(source, _tracks(cells_of(lines[header], separator), above), track, header)
+    place = f"line {header + 1}"
+    tracks = _tracks(cells_of(lines[header], separator), above)
+    said = ", ".join(f'"{one.name}"' for one in tracks)
+    if not tracks:
+        raise refused(source, place, "each column x needs a column y after it")
+    if track is None and len(tracks) > 1:
+        raise refused(source, place, f"holds {len(tracks)} tracks; choose one of {said}")
+    columns = next((one for one in tracks if track in (None, one.name)), None)
+    if columns is None:
+        raise refused(source, place, f"no such track; there are {said}", track)
     points, numbers, skipped = _rows(source, lines, header, separator, columns)
     if len(points) < LEAST:
         text = f"{len(points)} points with a time and a position; at least {LEAST} are needed"
         raise refused(source, "", text)
+    units = sorted({columns.units["x"] or "m", columns.units["y"] or "m"})
+    if scale is None and set(units) & set(PIXELS):
+        raise refused(source, place, "x and y are in pixels: a scale, metres per pixel, is needed")
+    if scale is None and len(units) > 1:
+        raise refused(source, place, f"x and y have different units: {', '.join(units)}")
+    scale = LENGTHS[units[0]] if scale is None else scale
     table = np.array(points)
     return Track(
         name=columns.name,
@@ -194,7 +209,7 @@ def read(
         seconds=TIMES[columns.units["t"]] * table[:, 0],
         points=table[:, 1:],
         lines=np.array(numbers),
-        placement=Placement(_scale(source, columns, header, scale), origin, flip_y, t0),
+        placement=Placement(scale, origin, flip_y, t0),
         skipped=skipped,
     )
 
@@ -256,21 +271,6 @@ def _tracks(header: Sequence[str], above: Sequence[str]) -> list[_Columns]:
     return found
 
 
-def _chosen(source: Path, tracks: Sequence[_Columns], wanted: str | None, header: int) -> _Columns:
-    place = f"line {header + 1}"
-    if not tracks:
-        raise refused(source, place, "each column x needs a column y after it")
-    if wanted is None and len(tracks) == 1:
-        return tracks[0]
-    names = [columns.name for columns in tracks]
-    said = ", ".join(f'"{name}"' for name in names)
-    if wanted is None:
-        raise refused(source, place, f"holds {len(tracks)} tracks; choose one of {said}")
-    if wanted not in names:
-        raise refused(source, place, f"no such track; there are {said}", wanted)
-    return tracks[names.index(wanted)]
-
-
 def _rows(
     source: Path, lines: Sequence[str], header: int, separator: str, columns: _Columns
 ) -> tuple[list[tuple[float, ...]], list[int], int]:
@@ -313,16 +313,3 @@ def _rows(
         points.append(point)
         numbers.append(line)
     return points, numbers, skipped
-
-
-def _scale(source: Path, columns: _Columns, header: int, given: float | None) -> float:
-    """Return the metres per unit: those given, or what the header says."""
-    if given is not None:
-        return given
-    units = {columns.units["x"] or "m", columns.units["y"] or "m"}
-    place = f"line {header + 1}"
-    if units & set(PIXELS):
-        raise refused(source, place, "x and y are in pixels: a scale, metres per pixel, is needed")
-    if len(units) > 1:
-        raise refused(source, place, f"x and y have different units: {', '.join(sorted(units))}")
-    return LENGTHS[units.pop()]

@@ -100,10 +100,9 @@ def _scene(block: Block, row: int) -> Scene:
 def alone(block: Block, row: int) -> Columns:
     """Validate and simulate one variant of a block, and return its row."""
     try:
-        scene = _scene(block, row)
+        return row_of(_scene(block, row), block.engine)
     except SceneError as error:
         return because(reason(error))
-    return row_of(scene, block.engine)
 
 
 def row_of(scene: Scene, engine: str | None = None) -> Columns:

@@ -24,6 +24,7 @@ from chutelab.scene.variants import (
 )
 from chutelab.util.arrays import Floats
 from chutelab.util.errors import InputError
+from chutelab.util.versions import library
 
 DESIGNS: Final = {"lhs": "LatinHypercube", "sobol": "Sobol"}
 """Names of the designs, and of the classes of `scipy.stats.qmc` that draw them."""
@@ -159,10 +160,7 @@ def _drawn(
         raise InputError(f"--sample {count}: a whole number from 1 to {MOST_VARIANTS}")
     if seed < 0:
         raise InputError(f"--seed {seed}: a whole number from 0")
-    try:
-        from scipy.stats import qmc
-    except ImportError:
-        raise InputError('--sample needs SciPy: pip install "chutelab[design]"') from None
+    qmc = library("scipy.stats.qmc", "--sample needs SciPy", "design")
     sampler = getattr(qmc, DESIGNS[design])(d=len(varies), seed=np.random.default_rng(seed))
     if design == "sobol":
         # Of a power of two points the first ones: SciPy warns of all other numbers.

@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import chain
+from math import isnan
 from pathlib import Path
 from time import monotonic
 from typing import Any, Final
@@ -25,16 +26,18 @@ from numpy.typing import NDArray
 from chutelab.scene.variants import Quantity
 from chutelab.studies.sweep.plan import Plan
 from chutelab.studies.sweep.rows import NUMBERS, REASON
-from chutelab.util.arrays import Floats
 from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, whole, write_lines
 from chutelab.util.tables import Sheet, Shown, frame, number
-from chutelab.util.versions import version_of
+from chutelab.util.versions import library, version_of
 
 Rows = Mapping[str, NDArray[Any]]
 
 SUFFIXES: Final = {".csv": "csv", ".parquet": "parquet"}
 """Endings of files, and the formats they stand for."""
+
+PARQUET: Final = ("Parquet needs pyarrow", "parquet")
+"""What to say without it, and the extra that brings it."""
 
 
 def format_of(path: str | Path) -> str:
@@ -54,7 +57,7 @@ def format_of(path: str | Path) -> str:
     if found is None:
         raise InputError(f"{path}: the name of a table ends with {' or '.join(SUFFIXES)}")
     if found == "parquet":
-        _pyarrow()
+        library("pyarrow", *PARQUET)
     return found
 
 
@@ -62,7 +65,7 @@ def write(columns: Rows, path: str | Path, form: str) -> Path:
     """Write a table as "csv" or "parquet"."""
     if form == "csv":
         return write_csv(tuple(columns), [text_of(columns)], path)
-    pa, parquet = _pyarrow()
+    pa, parquet = library("pyarrow", *PARQUET), library("pyarrow.parquet", *PARQUET)
     table = pa.table({name: pa.array(values, from_pandas=True) for name, values in columns.items()})
     with whole(path) as unfinished:
         parquet.write_table(table, unfinished)
@@ -77,9 +80,15 @@ def write_csv(names: Sequence[str], texts: Iterable[str], path: str | Path) -> P
 def text_of(columns: Rows) -> str:
     """Return rows as lines of CSV, from which `columns_of` gets every bit back."""
     cells = [
-        values.tolist() if name == REASON else _numbers(values) for name, values in columns.items()
+        values.tolist() if name == REASON else list(map(_number, values.tolist()))
+        for name, values in columns.items()
     ]
     return "".join(csv_lines(zip(*cells, strict=True)))
+
+
+def _number(x: float) -> str:
+    """Write a number in as few digits as give it back, a whole one without a point."""
+    return "" if isnan(x) else repr(x).removesuffix(".0")
 
 
 def columns_of(names: Sequence[str], text: str) -> dict[str, NDArray[Any]]:
@@ -91,20 +100,6 @@ def columns_of(names: Sequence[str], text: str) -> dict[str, NDArray[Any]]:
         else np.array([float(cell) if cell else np.nan for cell in column])
         for name, column in zip(names, cells, strict=True)
     }
-
-
-def _numbers(values: Floats) -> list[str]:
-    """Write numbers in as few digits as give them back, whole ones without a point."""
-    return ["" if x != x else repr(x).removesuffix(".0") for x in values.tolist()]
-
-
-def _pyarrow() -> tuple[Any, Any]:
-    try:
-        import pyarrow as pa
-        from pyarrow import parquet
-    except ImportError:
-        raise InputError('Parquet needs pyarrow: pip install "chutelab[parquet]"') from None
-    return pa, parquet
 
 
 MOST_REASONS = 5

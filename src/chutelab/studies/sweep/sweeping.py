@@ -20,6 +20,7 @@ from concurrent.futures import (
     wait,
 )
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -39,6 +40,7 @@ from chutelab.studies.sweep.result import (
 from chutelab.studies.sweep.rows import NUMBERS, REASON, Columns, joined
 from chutelab.util.arrays import Progress
 from chutelab.util.errors import InputError
+from chutelab.util.versions import library
 
 Job = tuple[int, Any]
 
@@ -57,18 +59,10 @@ class LostWorkersError(RuntimeError):
     """Those who did the work are gone; the text says what to do."""
 
 
-class Here(Executor):
-    """Does at once what is submitted."""
-
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Call a function; what it raises is raised here."""
-        done: Future[Any] = Future()
-        done.set_result(fn(*args, **kwargs))
-        return done
-
-
 class Crew:
-    """An executor, how many jobs it is to have at a time, and how to get a new one if it breaks.
+    """An executor, how many jobs it has at a time, and how to get a new one if it breaks.
+
+    Without an executor this process does the work.
 
     `concurrent.futures` does the work. What it lacks: `Executor.map` takes all jobs at once (2.3 kB
     each, and there may be a million) and gives results in their order only, so that a slow run
@@ -77,7 +71,10 @@ class Crew:
     """
 
     def __init__(
-        self, executor: Executor, ahead: int, anew: Callable[[], Executor] | None = None
+        self,
+        executor: Executor | None = None,
+        ahead: int = 1,
+        anew: Callable[[], Executor] | None = None,
     ) -> None:
         self.executor, self.ahead, self.anew = executor, ahead, anew
 
@@ -89,6 +86,9 @@ class Crew:
         LostWorkersError
             If processes keep dying, or a cluster is gone.
         """
+        if self.executor is None:
+            yield from ((number, work(job)) for number, job in jobs)
+            return
         left, again, deaths = iter(jobs), list[Job](), 0
         running: dict[Future[Any], Job] = {}
         job = next(left, None)
@@ -137,42 +137,38 @@ def crew(jobs: int = 1, scheduler: str | None = None) -> Iterator[Crew]:
         return
     count = jobs or os.cpu_count() or 1
     if count == 1:
-        yield Crew(Here(), 1)
+        yield Crew()
         return
-
-    def processes() -> Executor:
-        # Not forked: there may be threads.
-        spawning = multiprocessing.get_context("spawn")
-        return ProcessPoolExecutor(count, mp_context=spawning, initializer=_ignore_interrupts)
-
+    # Not forked: there may be threads. Ctrl-C goes to all processes of a terminal; the first one
+    # tells the others.
+    processes = partial(
+        ProcessPoolExecutor,
+        count,
+        mp_context=multiprocessing.get_context("spawn"),
+        initializer=signal.signal,
+        initargs=(signal.SIGINT, signal.SIG_IGN),
+    )
     others = {child.pid for child in multiprocessing.active_children()}
     team = Crew(processes(), 2 * count, processes)
     try:
         yield team
     except BaseException:
-        team.executor.shutdown(wait=False, cancel_futures=True)
+        if team.executor is not None:
+            team.executor.shutdown(wait=False, cancel_futures=True)
         for child in multiprocessing.active_children():
             if child.pid not in others:
                 child.terminate()
         raise
-    team.executor.shutdown()
-
-
-def _ignore_interrupts() -> None:
-    # Ctrl-C goes to all processes of a terminal; the first one tells the others.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if team.executor is not None:
+        team.executor.shutdown()
 
 
 def _cluster(address: str) -> Iterator[Crew]:
-    try:
-        from distributed import Client, KilledWorker
-    except ImportError:
-        raise InputError('--scheduler needs Dask: pip install "chutelab[cluster]"') from None
+    dask = library("distributed", "--scheduler needs Dask", "cluster")
     if not ADDRESS.fullmatch(address):
         raise InputError(f"--scheduler {address}: must be like tcp://10.0.0.1:8786")
-    connect: Any = Client
     try:
-        client = connect(address, timeout=PATIENCE, set_as_default=False)
+        client = dask.Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         raise InputError(f"--scheduler {address}: no Dask scheduler answers: {error}") from error
     with client:
@@ -182,7 +178,7 @@ def _cluster(address: str) -> Iterator[Crew]:
         try:
             with client.get_executor(pure=False) as executor:
                 yield Crew(executor, 2 * threads)
-        except (KilledWorker, CancelledError) as error:
+        except (dask.KilledWorker, CancelledError) as error:
             raise LostWorkersError(
                 f"--scheduler {address}: the workers or the scheduler are gone: {error}"
             ) from error

@@ -30,8 +30,11 @@ extern World W;
 /* ... from which on what rattles between surfaces is jammed: it is solved with all it touches ... */
 #define JAM 40
 /* ... and from which on the step ends, so that the whole crowd round it is solved at once; or, where
-   that has just been done, the jam. */
+   that has just been done, less than SHORTEST of a step ago, the jam. */
 #define CROWDED 50
+#define SHORTEST 0.02
+/* ... and from which on more is left to the next step, without a bound, since jams do not calm it. */
+#define STUCK 500
 /* Disks that a jam is solved for, with all they touch: what goes on beyond are impacts of their own,
    and a pile of thousands is not solved at each of them. */
 #define JAMMED 30
@@ -119,7 +122,7 @@ void was_moved(int i);
 
 /* solver.c */
 int find_contacts(double h, int *woke);
-void sweep_contacts(Contact *list, int count, int sweeps, double accurate, double enough);
+void sweep_contacts(Contact *list, int count, int sweeps, int plain, double accurate, double enough);
 void solve_contacts(void);
 void close_step(double h);
 void take_back(int i);

@@ -70,7 +70,7 @@ double left_over(const Disk *d, int impacts, int surface, double radius) {
     /* Surfaces do not give way: with them it grows only if jams do not help. */
     int many = surface >= 0 ? 2 * JAM : MANY;
     if (impacts <= many) return least;
-    double most = skip * (MOST_SKIP / SKIP);
+    double most = skip * (MOST_SKIP / SKIP) * pow(GROW, MIN(MAX(impacts - STUCK, 0), 1000));
     return MAX(least, MIN(skip * pow(GROW, MIN(impacts - many, 1000)), most));
 }
 
@@ -259,7 +259,8 @@ static void jam(Contact *struck, double t) {
     }
     struck->impulse[0] = struck->impulse[1] = 0;
     double left = 0.5 * (MOST_SKIP / SKIP) * W.skip * W.disks[i].radius;
-    sweep_contacts(list, count, W.sweeps, 0.1 * left, left);
+    /* Not hastened: then what rattles may never be as calm as it must be. */
+    sweep_contacts(list, count, W.sweeps, W.sweeps, 0.1 * left, left);
     for (int m = i; m >= 0; m = W.disks[m].jam_next) {
         Disk *d = W.disks + m;
         double v[3] = {d->vx, d->vy, d->spin};

@@ -338,7 +338,7 @@ static int go_through(void) {
         }
         W.now = t;
         if (j != ALARM) {
-            if (W.interact && d->impacts > CROWDED && t > W.t) {
+            if (W.interact && d->impacts > CROWDED && t > W.t + SHORTEST * W.step) {
                 W.step_end = t;
                 return DONE;
             }

@@ -288,13 +288,12 @@ static double hasten(Contact *list, int count, double size) {
 }
 
 /* Sweep over contacts, those of one disk with surfaces as one, until no relative velocity changes by
-   more than `accurate`; return by how much one changed in the last sweep, or INFINITY if the sweeps
-   diverge. */
-static double sweep(Contact *list, int count, int sweeps, double accurate) {
+   more than `accurate`; the first `plain` ones are not hastened. Return by how much one changed in the
+   last sweep, or INFINITY if the sweeps diverge. */
+static double sweep(Contact *list, int count, int sweeps, int plain, double accurate) {
     double first = 0, worst = 0, size = 0;
     for (int n = 0; n < sweeps; n++) {
-        if (W.interact && n >= PLAIN && (n - PLAIN) % 2 == 0)
-            size = hasten(list, count, n == PLAIN ? -1 : size);
+        if (n >= plain && (n - plain) % 2 == 0) size = hasten(list, count, n == plain ? -1 : size);
         worst = 0;
         for (int m = 0, many; m < count; m += many) {
             /* To and fro, so that what one end of a pile does reaches the other in one sweep; in the
@@ -323,9 +322,9 @@ static double sweep(Contact *list, int count, int sweeps, double accurate) {
 /* Solve contacts by sweeps until changes are `accurate`; less will do if they are `enough`. Where
    belts drive disks into a wedge that locks itself, rigid bodies with all of the friction have no
    solution: there the friction is lowered until they have one. */
-void sweep_contacts(Contact *list, int count, int sweeps, double accurate, double enough) {
+void sweep_contacts(Contact *list, int count, int sweeps, int plain, double accurate, double enough) {
     for (int left = TRIES;; left--) {
-        double worst = sweep(list, count, sweeps, accurate);
+        double worst = sweep(list, count, sweeps, plain, accurate);
         if (worst <= accurate || left == 0) break;
         if (worst < INFINITY) {
             worst = 0;
@@ -376,7 +375,7 @@ static void turn_slip(Contact *c) {
 
 void solve_contacts(void) {
     for (int n = 0; n < W.contact_count; n++) push(W.contacts + n, W.contacts[n].impulse);
-    sweep_contacts(W.contacts, W.contact_count, W.sweeps, W.accurate,
+    sweep_contacts(W.contacts, W.contact_count, W.sweeps, W.interact ? PLAIN : W.sweeps, W.accurate,
                    W.interact ? 1e300 : MAX(W.accurate, 1e-9));
     for (int n = 0; n < W.contact_count; n++) {
         /* Rounding presses nobody; with endless friction even that would pull. */

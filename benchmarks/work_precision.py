@@ -211,7 +211,7 @@ def main(
             text = tsv_text(rows, wp.Size if scaling else wp.Record, about)
             (into / f"{name}.tsv").write_text(text, encoding="utf-8")
             draw = picture.scaling if scaling else picture.workprecision
-            draw(rows, about, path=into / f"{name}.png")
+            draw(rows, about).write(into / f"{name}.png")
     said = [] if scaling else wp.claims(rows)
     if as_json:
         told = {"sizes" if scaling else "records": [asdict(one) for one in rows]}

@@ -152,7 +152,8 @@ ABOUT = {"processor": "Some Long Processor Name 9000, 128 cores", "system": "Lin
 
 
 def test_the_picture_shows_every_engine_and_failure(tmp_path):
-    figure = draw(ROWS, "A scene", ABOUT, path=tmp_path / "a.png")
+    figure = draw(ROWS, "A scene", ABOUT)
+    figure.write(tmp_path / "a.png")
     (ax,) = figure.axes
     assert ax.get_title(loc="left") == "A scene"
     assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")

@@ -592,7 +592,8 @@ def test_restitution_dominates_and_the_picture_says_so(tmp_path):
     found = design.uncertainty(machine(), given, samples=128)
     assert found.quantities == ("landing.x", "belt_work")
     assert all(indices.first[0] > 0.8 for indices in found.indices)
-    figure = spread(found, path=tmp_path / "spread.png")
+    figure = spread(found)
+    figure.write(tmp_path / "spread.png")
     titles = [ax.get_title(loc="left") for ax in figure.axes]
     assert titles.count("against plate.restitution") == 2
     assert (tmp_path / "spread.png").stat().st_size > 10_000

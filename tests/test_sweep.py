@@ -567,7 +567,8 @@ def test_two_keys_with_many_values_make_a_heat_map():
     from chutelab.pictures.plots.design import sweep_figure
 
     swept = sweep(load("perpendicular"), ["plate.angle_deg=-10:10:9", "incoming.speed=2:4:10"])
-    figure = sweep_figure(swept, "belt_work", path="heat.png")
+    figure = sweep_figure(swept, "belt_work")
+    figure.write("heat.png")
     (mesh,) = figure.axes[0].collections
     expected = 1e3 * swept.columns["belt_work"].reshape(9, 10).T
     assert np.ma.filled(mesh.get_array(), np.nan) == pytest.approx(expected)

@@ -500,7 +500,8 @@ ABOUT = {"processor": "Some Long Processor Name 9000, 128 cores", "system": "Lin
 
 
 def test_the_picture_shows_every_method_slope_and_failure(tmp_path):
-    figure = draw(rows_for_a_picture(), ABOUT, path=tmp_path / "a.png")
+    figure = draw(rows_for_a_picture(), ABOUT)
+    figure.write(tmp_path / "a.png")
     assert len(figure.axes) == len(KNOWN) + 1
     for ax, case in zip(figure.axes, KNOWN.values(), strict=False):
         assert ax.get_title(loc="left") == case.title
@@ -582,7 +583,8 @@ def test_scaling_is_drawn_with_its_exponents(tmp_path):
         for n in (10, 100, 1000)
     ]
     sizes.append(Size("interacting", "contact", 3000, failed="StalledError: particle 7"))
-    figure = draw_scaling(sizes, ABOUT, path=tmp_path / "s.png")
+    figure = draw_scaling(sizes, ABOUT)
+    figure.write(tmp_path / "s.png")
     labels = [[t.get_text() for t in ax.get_legend().get_texts()] for ax in figure.axes]
     assert labels == [
         ["exact, ∝ N$^{1.00}$"],

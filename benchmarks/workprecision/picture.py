@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import sqrt
-from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
 import matplotlib.patheffects as pe
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from chutelab.pictures import colours
@@ -58,9 +56,7 @@ MEMORY = 1e6
 """Bytes in a megabyte."""
 
 
-def workprecision(
-    records: Sequence[Record], about: Mapping[str, str], *, path: Path | None = None
-) -> Figure:
+def workprecision(records: Sequence[Record], about: Mapping[str, str]) -> Picture:
     """Draw run time against error, a panel for each case.
 
     Parameters
@@ -69,8 +65,6 @@ def workprecision(
         From `workprecision.measure`; rows of other cases are left out.
     about : mapping
         The machine and the versions, from `chutelab.util.versions`.
-    path : Path, optional
-        Also write the figure there, whole or not at all.
     """
     shown = [case for case in cases().values() if any(one.case == case.name for one in records)]
     columns = min(3, len(shown) + 1)
@@ -89,7 +83,6 @@ def workprecision(
         )  # fmt: skip
     used = [name for name in METHODS if any(one.method == name for one in records)]
     _explain(cells[-1], used)
-    figure.write(path)
     return figure
 
 
@@ -120,7 +113,7 @@ def draw_case(
     return ax
 
 
-def scaling(sizes: Sequence[Size], about: Mapping[str, str], *, path: Path | None = None) -> Figure:
+def scaling(sizes: Sequence[Size], about: Mapping[str, str]) -> Picture:
     """Draw time and memory against the number of particles, a row for each case.
 
     Parameters are those of `workprecision`, the rows those of `measure`.
@@ -135,7 +128,6 @@ def scaling(sizes: Sequence[Size], about: Mapping[str, str], *, path: Path | Non
         ):
             style.dress(ax, "particles", unit, f"{kind} particles: {unit.partition(',')[0]}")
             draw_sizes(ax, [one for one in sizes if one.case == case.name], case.name, what)
-    figure.write(path)
     return figure
 
 

@@ -92,7 +92,7 @@ def bench(
 
             text = tsv_text(timings, Timing, {"scene": loaded.title, **about})
             (into / files[0]).write_text(text, encoding="utf-8")
-            workprecision(timings, loaded.title, about, path=into / files[1])
+            workprecision(timings, loaded.title, about).write(into / files[1])
     if as_json:
         told = {"scene": loaded.title, "environment": about, "records": timings}
         console.show_json({"format": 1, **told})

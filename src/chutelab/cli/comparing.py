@@ -130,7 +130,7 @@ def compare(
             from chutelab.pictures.plots.measured import measured as plot
 
             with progress("drawing"):
-                plot(found, fit, path=place / "compare.png")
+                plot(found, fit).write(place / "compare.png")
                 (place / "points.csv").write_text(points_csv(found), encoding="utf-8")
                 if fit is not None:
                     write_json(as_dict(found, fit), place / "fit.json")

@@ -126,7 +126,7 @@ def figure(number: int, out: Path | None, as_json: bool) -> None:
         if place is not None:
             from chutelab.pictures.plots.figure import paper_figure
 
-            paper_figure(found, path=place / picture)
+            paper_figure(found).write(place / picture)
             for name, text in files.items():
                 (place / name).write_text(text, encoding="utf-8")
     if as_json:

@@ -122,7 +122,7 @@ def solve(
             with progress("drawing", quiet=quiet):
                 write_json(as_dict(found), place / "solve.json")
                 if found.scan is not None:
-                    scan(found, path=place / "scan.png")
+                    scan(found).write(place / "scan.png")
                 if found.solved or found.nearest:
                     values = zip(found.ranges, found.answer.values, strict=True)
                     told = [f"{one.key}={value:.4g}" for one, value in values]
@@ -172,7 +172,7 @@ def propagate(
         if plot is not None:
             from chutelab.pictures.plots.design import spread
 
-            spread(found, path=plot)
+            spread(found).write(plot)
     if as_json:
         show_json(as_dict(found))
     elif not quiet:

@@ -184,7 +184,7 @@ def sweep(
     if plot is not None:
         from chutelab.pictures.plots.design import sweep_figure
 
-        sweep_figure(found, column, path=plot)
+        sweep_figure(found, column).write(plot)
     if as_json:
         told = {"scene": found.title, "variants": len(found), "columns": found.columns}
         console.show_json({"format": 1, **told})

@@ -20,7 +20,7 @@ from importlib.resources import files
 from io import BytesIO
 from pathlib import Path
 from string import Template
-from typing import Final, Self
+from typing import Final
 
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
@@ -30,44 +30,6 @@ from chutelab.classroom.lessons.reading import Lesson, LessonError, read, scene_
 from chutelab.engines.simulation import simulate
 from chutelab.scene import Fault, Scene, to_dict
 from chutelab.util.versions import own_version, version_of
-
-HEAD: Final = "chutelab lesson"
-TRAILER: Final = b"\x3b"
-"""Last byte of every GIF."""
-
-_FORM: Final = re.compile(rf"{HEAD}; inputs ([0-9a-f]{{32}}); (.+)")
-
-
-@dataclass(frozen=True)
-class Stamp:
-    """What determines every byte of a picture.
-
-    Parameters
-    ----------
-    inputs : str
-        Hash of the validated scene and the picture's settings, 32 hexadecimal digits.
-    versions : str
-        Of chutelab and of the libraries that simulate and draw, ``name version`` with commas.
-    """
-
-    inputs: str
-    versions: str
-
-    def __str__(self) -> str:
-        """Return it as the comment of a GIF."""
-        return f"{HEAD}; inputs {self.inputs}; {self.versions}"
-
-    @classmethod
-    def of(cls, gif: bytes) -> Self | None:
-        """Return the stamp of a GIF; None if there is none, or the file is not whole."""
-        try:
-            with Image.open(BytesIO(gif)) as picture:
-                comment = picture.info.get("comment", b"")
-        except UnidentifiedImageError:
-            return None
-        match = _FORM.fullmatch(comment.decode("ascii", "replace"))
-        return cls(match[1], match[2]) if match and gif.endswith(TRAILER) else None
-
 
 PICTURE: Final = "lesson.gif"
 LIBRARIES: Final = ("chutelab", "numpy", "pymunk", "matplotlib", "pillow")
@@ -115,7 +77,7 @@ def build(
     path = (lesson.folder if folder is None else folder) / PICTURE
     scene = scene_of(lesson, lesson.picture.scene, lesson.picture.set)
     wanted = stamp_of(lesson, scene)
-    if not force and path.is_file() and Stamp.of(path.read_bytes()) == wanted:
+    if not force and path.is_file() and comment_of(path.read_bytes()) == wanted:
         return Built(path, path.stat().st_size, made=False)
     from chutelab.pictures.animation import animate
 
@@ -129,7 +91,7 @@ def build(
         height=settings.height,
         slow=settings.slow,
         question=lesson.question,
-        comment=str(wanted),
+        comment=wanted,
     )
     return Built(path, path.stat().st_size, made=True)
 
@@ -140,19 +102,35 @@ def is_current(lesson: Lesson) -> bool:
     if not path.is_file():
         return False
     scene = scene_of(lesson, lesson.picture.scene, lesson.picture.set)
-    found = Stamp.of(path.read_bytes())
-    return found is not None and found.inputs == stamp_of(lesson, scene).inputs
+    found = comment_of(path.read_bytes())
+    return found.split("; ")[:2] == stamp_of(lesson, scene).split("; ")[:2]
 
 
-def stamp_of(lesson: Lesson, scene: Scene) -> Stamp:
-    """Return what the picture of a lesson is made from, `scene` being the one that is filmed."""
+def stamp_of(lesson: Lesson, scene: Scene) -> str:
+    """Return what determines every byte of a lesson's picture, in one line.
+
+    That is a hash of the scene that is filmed and of the picture's settings, then the versions of
+    all that simulates and draws.
+    """
     # Defaults belong to the version, and what a scene promises does not show in its picture.
     document = {key: value for key, value in to_dict(scene).items() if key != "expect"}
     settings = lesson.picture.model_dump(exclude_unset=True, exclude={"scene", "set"})
     inputs = {"scene": document, "picture": settings, "question": lesson.question}
     text = json.dumps(inputs, sort_keys=True, ensure_ascii=True)
     digest = hashlib.sha256(text.encode("ascii")).hexdigest()[:32]
-    return Stamp(digest, ", ".join(f"{name} {version_of(name) or 'unknown'}" for name in LIBRARIES))
+    versions = ", ".join(f"{name} {version_of(name) or 'unknown'}" for name in LIBRARIES)
+    return f"chutelab lesson; inputs {digest}; {versions}"
+
+
+def comment_of(gif: bytes) -> str:
+    """Return the comment of a GIF; "" if it has none, or is not whole."""
+    try:
+        with Image.open(BytesIO(gif)) as picture:
+            comment = picture.info.get("comment", b"")
+    except UnidentifiedImageError:
+        return ""
+    # Every GIF ends with a semicolon.
+    return str(comment.decode("ascii", "replace")) if gif.endswith(b";") else ""
 
 
 INDEX: Final = "index.html"

@@ -52,52 +52,40 @@ def contact_normal(machine: Machine, event: Any) -> Floats:
     return normal if normal @ event["velocity_before"] < 0.0 else -normal
 
 
-def losses(recording: Recording, event: Any) -> Floats:
-    """Return what an impact booked on particle 0, J: belt work, restitution and friction loss."""
-    track = recording.track(0)
-    now = np.flatnonzero(track["t"] == event["t"])
-    if not len(now):
-        return np.zeros(3)
-    return np.asarray(track["entries"][now[-1]] - track["entries"][now[0]])
-
-
 def sentence(recording: Recording, event: Any) -> str:
     """Return one or two lines on an event of particle 0."""
     kind = Kind(int(event["kind"]))
     name = recording.surfaces[event["surface"]] if event["surface"] >= 0 else PARTICLES
-    speed = hypot(*event["velocity_after"])
-    if kind in STRUCK:
-        return _impact(recording, event, kind, name)
     on = surface_words(name)
-    if kind is Kind.SEPARATION and name != "incoming":
-        return f"leaves {on} at {speed:.3g} m/s"
-    if kind is Kind.SEPARATION:
-        angle = degrees(atan2(*event["position"]))
-        where = "at the top" if angle < 5e-4 else f"{angle:.1f}° past the top"
-        return f"leaves the drive pulley {where}, at {speed:.3g} m/s"
-    return {
+    before, after = (
+        f"{hypot(*event[key]):.3g} m/s" for key in ("velocity_before", "velocity_after")
+    )
+    angle = degrees(atan2(*event["position"]))
+    past = "at the top" if angle < 5e-4 else f"{angle:.1f}° past the top"
+    pulley = f"leaves the drive pulley {past}, at {after}"
+    # The event keeps the velocity of its `particle` only.
+    hits = f"hits particle {int(event['other'])} at {before}"
+    text = {
         Kind.RELEASE: "is released",
+        Kind.SEPARATION: pulley if name == "incoming" else f"leaves {on} at {after}",
         Kind.SLIP: f"begins to slip on {on}",
         Kind.STICK: f"no longer slips on {on}",
+        Kind.IMPACT: f"strikes {on} at {before}",
+        Kind.LANDING: f"lands on {on} at {before}",
+        Kind.COLLISION: f"is hit by particle {i}" if (i := int(event["particle"])) else hits,
         Kind.SETTLE: f"has settled on {on}",
         Kind.EXIT: "has left the scene",
     }[kind]
-
-
-def _impact(recording: Recording, event: Any, kind: Kind, name: str) -> str:
-    before = hypot(*event["velocity_before"])
-    if kind is Kind.COLLISION:
-        # The event keeps the velocity of its `particle` only.
-        if event["particle"] != 0:
-            return f"is hit by particle {int(event['particle'])}"
-        return f"hits particle {int(event['other'])} at {before:.3g} m/s"
-    verb = "lands on" if kind is Kind.LANDING else "strikes"
-    text = f"{verb} {surface_words(name)} at {before:.3g} m/s"
+    if kind not in (Kind.IMPACT, Kind.LANDING):
+        return text
     normal = contact_normal(recording.machine, event)
     into, off = (abs(float(event[v] @ normal)) for v in ("velocity_before", "velocity_after"))
     if into > 0.0:
         text += f", ε = {round(off / into, 3):g}"
-    belt, restitution, friction = losses(recording, event)
+    # What the impact booked: its first knot is the state before, its last the one after.
+    track = recording.track(0)
+    booked = track["entries"][track["t"] == event["t"]]
+    belt, restitution, friction = booked[-1] - booked[0] if len(booked) else np.zeros(3)
     said = [
         f"{'+' if value > 0.0 else ''}{quantity(value, 'J')} {what}"
         for value, what in (
@@ -153,6 +141,9 @@ EDGE = 0.012
 
 TOLD = 1.2
 """s on the screen, holds not counted, for which the caption tells what happened."""
+
+LASTING = (Kind.STICK, Kind.SETTLE, Kind.EXIT)
+"""Events that the caption tells until another happens: they begin what still goes on."""
 
 TAIL = 120
 """Hundredths of a second that the last picture stays."""
@@ -308,28 +299,22 @@ def _words(
     captions = []
     for t, flies, lies in zip(times, flying.tolist(), still.tolist(), strict=True):
         story = int(np.searchsorted(mine["t"][stories], t, side="right")) - 1
-        if story >= 0 and _still_told(mine[stories[story]], t, slow, flying=flies):
-            captions.append(lines[story])
-        elif story < 0 and carried:
+        if story >= 0:
+            last = mine[stories[story]]
+            # An impact is no news any more once the particle slides.
+            news = slow * (t - last["t"]) <= TOLD and (flies or last["kind"] not in STRUCK)
+            if news or last["kind"] in LASTING:
+                captions.append(lines[story])
+                continue
+        elif carried:
             captions.append("rides the incoming belt")
-        else:
-            latest = int(np.searchsorted(mine["t"], t, side="right")) - 1
-            known = latest >= 0 and t <= gone
-            event = mine[latest]
-            captions.append(going_on(recording, event, flying=flies, still=lies) if known else "")
+            continue
+        latest = int(np.searchsorted(mine["t"], t, side="right")) - 1
+        known = latest >= 0 and t <= gone
+        said = going_on(recording, mine[latest], flying=flies, still=lies) if known else ""
+        captions.append(said)
     for i in held:
         # What else happens in the same instant has to wait for the next picture.
         at = int(np.searchsorted(times, mine["t"][i]))
         captions[at] = lines[int(np.searchsorted(stories, i))]
     return captions
-
-
-def _still_told(event: Any, t: float, slow: float, *, flying: bool) -> bool:
-    """Tell whether an event is news at time t, or the beginning of what still goes on.
-
-    An impact is no news any more once the particle slides.
-    """
-    kind = Kind(int(event["kind"]))
-    if kind in (Kind.STICK, Kind.SETTLE, Kind.EXIT):
-        return True
-    return slow * (t - float(event["t"])) <= TOLD and (flying or kind not in STRUCK)

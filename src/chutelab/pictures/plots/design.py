@@ -6,14 +6,13 @@ A sweep is drawn as lines over one varied key, a heat map over two, dots for sam
 from __future__ import annotations
 
 from collections import Counter
-from pathlib import Path
 from textwrap import fill, shorten
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.cm import ScalarMappable
 
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.style import Picture
@@ -26,29 +25,24 @@ SIZE = (9.0, 5.6)
 BARS = (style.TRACK, style.STREAM)
 
 
-def scan(solution: Solution, *, path: str | Path | None = None) -> Figure:
+def scan(solution: Solution) -> Picture:
     """Draw what a search over one key looked at: the quantity, its target, answers and jumps.
 
     Parameters
     ----------
     solution : Solution
         Of one key.
-    path : path, optional
-        Also write the figure there, whole or not at all; the suffix says the format.
 
     Raises
     ------
     ValueError
         If several keys were varied.
-    OSError
-        If the file cannot be written.
     """
     figure = Picture(SIZE)
     ax = figure.add_axes((0.105, 0.115, 0.865, 0.66))
     draw_scan(ax, solution)
     _titles(figure, solution.base.title, solution.asked)
     style.legend_above(ax, 4)
-    figure.write(path)
     return figure
 
 
@@ -58,7 +52,7 @@ def draw_scan(ax: Axes, solution: Solution) -> Axes:
     if found is None:
         raise ValueError("several keys were varied: there is no line to draw")
     key, (name, *_), (unit, *_) = solution.ranges[0], solution.quantities, solution.units
-    factor, said = _scaled(found.values, unit)
+    factor, said = style.scaled(found.values, unit)
     style.dress(ax, with_unit(key.key, key.unit), with_unit(name, said))
     label = name
     for piece in found.pieces:
@@ -113,20 +107,13 @@ def _mark(ax: Axes, solution: Solution, factor: float) -> None:
             )  # fmt: skip
 
 
-def spread(found: Uncertainty, *, path: str | Path | None = None) -> Figure:
+def spread(found: Uncertainty) -> Picture:
     """Draw how uncertain inputs spread: distribution, strongest input, and each one's share.
 
     Parameters
     ----------
     found : Uncertainty
         From `chutelab.studies.design.uncertainty`.
-    path : path, optional
-        Also write the figure there, whole or not at all; the suffix says the format.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
     """
     rows = len(found.quantities)
     height = 1.4 + 3.1 * rows
@@ -146,7 +133,6 @@ def spread(found: Uncertainty, *, path: str | Path | None = None) -> Figure:
         for one in found.spreads
     )
     _titles(figure, found.scene, given, wide=150)
-    figure.write(path)
     return figure
 
 
@@ -154,7 +140,7 @@ def draw_distribution(ax: Axes, found: Uncertainty, row: int) -> Axes:
     """Draw the distribution of a quantity, its mean and its 95 % interval."""
     values = found.outputs[:, row]
     values = values[np.isfinite(values)]
-    factor, unit = _scaled(values, found.units[row])
+    factor, unit = style.scaled(values, found.units[row])
     name = found.quantities[row]
     style.dress(ax, with_unit(name, unit), "samples", name)
     if not len(values):
@@ -175,7 +161,7 @@ def draw_strongest(ax: Axes, found: Uncertainty, row: int) -> Axes:
     k = int(np.argmax(first))
     one = found.spreads[k]
     values = found.outputs[:, row]
-    factor, unit = _scaled(values, found.units[row])
+    factor, unit = style.scaled(values, found.units[row])
     quantity = with_unit(found.quantities[row], unit)
     style.dress(ax, with_unit(one.key, one.unit), quantity, f"against {one.key}")
     ax.plot(
@@ -223,11 +209,6 @@ def _titles(figure: Picture, title: str, text: str, wide: int = 95) -> None:
     )  # fmt: skip
 
 
-def _scaled(values: Floats, unit: str) -> tuple[float, str]:
-    """Return a factor and the prefixed unit, for units that take prefixes."""
-    return style.scaled(values, unit) if unit in ("J", "W", "m") else (1.0, unit)
-
-
 SWEEP_SIZE = (8.6, 5.4)
 """Width and height of the figure, inches."""
 
@@ -244,7 +225,7 @@ LIGHTEST = 0.88
 """Share of the colours that is used for lines: what follows is too light on white."""
 
 
-def sweep_figure(swept: Sweep, column: str, *, path: str | Path | None = None) -> Figure:
+def sweep_figure(swept: Sweep, column: str) -> Picture:
     """Draw one column of a sweep over its varied keys.
 
     Parameters
@@ -253,8 +234,6 @@ def sweep_figure(swept: Sweep, column: str, *, path: str | Path | None = None) -
         With one or two keys of more than one value.
     column : str
         Name of a column of numbers.
-    path : path, optional
-        Also write the figure there, whole or not at all; the suffix says the format.
 
     Raises
     ------
@@ -264,150 +243,95 @@ def sweep_figure(swept: Sweep, column: str, *, path: str | Path | None = None) -
     if column not in NUMBERS:
         raise ValueError(f"{column}: one of {', '.join(NUMBERS)}")
     figure = Picture(SWEEP_SIZE)
-    ax = figure.add_subplot()
-    axes = varied(swept)
-    if swept.shape is None:
-        draw_samples(ax, swept, column)
-    elif len(axes) == 2 and min(len(np.unique(swept.columns[key])) for key in axes) > MOST_LINES:
-        draw_heat(ax, swept, column)
-    else:
-        draw_lines(ax, swept, column)
+    draw_sweep(figure.add_subplot(), swept, column)
     figure.subplots_adjust(left=0.115, right=0.97, top=0.86, bottom=0.18)
     figure.headline(0.03, 0.955, swept.title)
+    gone = np.flatnonzero(~np.isfinite(swept.columns[column]))
+    reasons = Counter(reason for reason in swept.columns[REASON][gone].tolist() if reason)
+    why = "".join(f", most: {reason}" for reason, _ in reasons.most_common(1))
+    said = f"{len(gone):,} of {len(swept):,} have none{why}" if len(gone) else ""
     figure.text(
-        0.03, 0.03, _missing(swept, column), fontsize=style.SMALL, color=style.MUTED, va="center"
-    )
-    figure.write(path)
+        0.03, 0.03, shorten(said, 118, placeholder=" …"), fontsize=style.SMALL, color=style.MUTED,
+        va="center",
+    )  # fmt: skip
     return figure
 
 
-def varied(swept: Sweep) -> list[str]:
-    """Return the keys that have more than one value; the first key if none has.
-
-    Raises
-    ------
-    ValueError
-        If more than two have.
-    """
+def draw_sweep(ax: Axes, swept: Sweep, column: str) -> Axes:
+    """Draw one column: dots of samples, lines, or a heat map over two keys with many values."""
     keys = [key for key in swept.quantities if len(np.unique(swept.columns[key])) > 1]
     if len(keys) > 2:
         raise ValueError(f"a picture shows one or two varied keys, not {len(keys)}")
-    return keys or list(swept.quantities)[:1]
+    keys = keys or list(swept.quantities)[:1]
+    what, unit = NUMBERS[column][0].split(",")[0], swept.unit(column)
+    what = what if what.startswith(("x ", "y ")) else what[0].upper() + what[1:]
+    if column.endswith("_spread"):
+        what = f"Standard deviation of {column.removesuffix('_spread')}"
+    scale, unit = style.scaled(swept.columns[column], unit)
+    label, z = with_unit(what, unit), scale * swept.columns[column]
+    counts = [len(np.unique(swept.columns[key])) for key in keys]
+    sampled = swept.shape is None
+    by_colour = len(keys) == 2 and (sampled or min(counts) > MOST_LINES)
+    if not by_colour:
+        # The key with the most values lies along the axis.
+        keys = sorted(keys, key=lambda key: -len(np.unique(swept.columns[key])))
+    first, second = (swept.columns[key] for key in (keys[0], keys[-1]))
+    names = [with_unit(key, swept.unit(key)) for key in keys]
+    style.dress(ax, names[0], names[1] if by_colour else label)
+    if by_colour:
+        painted = (_draw_dots if sampled else _draw_heat)(ax, first, second, z)
+        if np.isfinite(z).any():
+            bar = ax.figure.colorbar(painted, ax=ax, pad=0.02)
+            bar.set_label(label, fontsize=style.NORMAL)
+            bar.ax.tick_params(labelsize=style.SMALL)
+        return ax
+    if sampled:
+        ax.plot(first, z, "o", markersize=3.5, color=style.TRACK, alpha=0.7)
+    else:
+        _draw_lines(ax, first, second if len(keys) == 2 else np.zeros(len(z)), z)
+    if len(keys) == 2:
+        ax.legend(
+            title=names[1], loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=8, frameon=False,
+            fontsize=style.SMALL, title_fontsize=style.SMALL, columnspacing=1.2, handlelength=1.4,
+            borderaxespad=0.2, alignment="right",
+        )  # fmt: skip
+    low, high = float(first.min()), float(first.max())
+    if low < high:  # all of the range, also where there are no rows
+        margin = 0.03 * (high - low)
+        ax.set_xlim(low - margin, high + margin)
+    return ax
 
 
-def draw_lines(ax: Axes, swept: Sweep, column: str) -> Axes:
-    """Draw a line over the key with the most values, one for each value of the other key."""
-    keys = sorted(varied(swept), key=lambda key: -len(np.unique(swept.columns[key])))
-    scale, label = _axis(swept, column)
-    x, y = swept.columns[keys[0]], swept.columns[column] * scale
-    others = swept.columns[keys[1]] if len(keys) > 1 else np.zeros(len(x))
+def _draw_lines(ax: Axes, x: Floats, others: Floats, z: Floats) -> None:
+    """Draw a line over x for each value of another key."""
     values = np.unique(others)
     shades = mpl.colormaps[COLORS](np.linspace(0.0, LIGHTEST, len(values)))
     for value, shade in zip(values.tolist(), shades, strict=True):
         mine = np.flatnonzero(others == value)
         mine = mine[np.argsort(x[mine], kind="stable")]
         ax.plot(
-            x[mine], y[mine], color=shade if len(values) > 1 else style.TRACK, linewidth=1.8,
+            x[mine], z[mine], color=shade if len(values) > 1 else style.TRACK, linewidth=1.8,
             marker="o" if len(mine) <= DOTS else "", markersize=4.0, label=f"{value:g}",
         )  # fmt: skip
-    _span(ax, x)
-    style.dress(ax, _label(swept, keys[0]), label)
-    if len(values) > 1:
-        ax.legend(
-            title=_label(swept, keys[1]), loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=8,
-            frameon=False, fontsize=style.SMALL, title_fontsize=style.SMALL, columnspacing=1.2,
-            handlelength=1.4, borderaxespad=0.2, alignment="right",
-        )  # fmt: skip
-    return ax
 
 
-def draw_heat(ax: Axes, swept: Sweep, column: str) -> Axes:
-    """Draw a heat map over two keys; grey where there is nothing to tell."""
-    first, second = varied(swept)
-    (x, across), (y, up) = (
-        np.unique(swept.columns[key], return_inverse=True) for key in (first, second)
-    )
-    scale, label = _axis(swept, column)
-    field = np.full((len(y), len(x)), np.nan)
-    field[up, across] = swept.columns[column] * scale
-    ax.set_facecolor(style.STEEL_LIGHT)
-    diverges = np.nanmin(field, initial=0.0) < 0.0 < np.nanmax(field, initial=0.0)
-    reach = float(np.nanmax(np.abs(field), initial=0.0))
-    limits: dict[str, Any] = {"cmap": COLORS}
-    if diverges:
-        # White where the sign changes: that is often what is looked for.
-        limits = {"cmap": "RdBu_r", "vmin": -reach, "vmax": reach}
-    mesh = ax.pcolormesh(_edges(x), _edges(y), field, rasterized=True, **limits)
-    style.dress(ax, _label(swept, first), _label(swept, second))
-    ax.grid(visible=False)
-    if np.isfinite(field).any():
-        _bar(ax, mesh, label)
-    return ax
-
-
-def draw_samples(ax: Axes, swept: Sweep, column: str) -> Axes:
-    """Draw a dot for each sample, over one key, or over two with its value as the colour."""
-    keys = varied(swept)
-    scale, label = _axis(swept, column)
-    z = swept.columns[column] * scale
-    if len(keys) == 1:
-        ax.plot(swept.columns[keys[0]], z, "o", markersize=3.5, color=style.TRACK, alpha=0.7)
-        _span(ax, swept.columns[keys[0]])
-        return style.dress(ax, _label(swept, keys[0]), label)
-    x, y = (swept.columns[key] for key in keys)
+def _draw_dots(ax: Axes, x: Floats, y: Floats, z: Floats) -> ScalarMappable:
+    """Draw dots with their values as colours, and crosses where there is none."""
     known = np.isfinite(z)
     ax.plot(x[~known], y[~known], "x", markersize=4.0, color=style.STEEL)
-    dots = ax.scatter(x[known], y[known], c=z[known], cmap=COLORS, s=16.0)
-    style.dress(ax, _label(swept, keys[0]), _label(swept, keys[1]))
-    if known.any():
-        _bar(ax, dots, label)
-    return ax
+    return ax.scatter(x[known], y[known], c=z[known], cmap=COLORS, s=16.0)
 
 
-def _span(ax: Axes, x: Floats) -> None:
-    """Show the whole range, also where there are no rows."""
-    low, high = float(x.min()), float(x.max())
-    if low < high:
-        margin = 0.03 * (high - low)
-        ax.set_xlim(low - margin, high + margin)
-
-
-def _bar(ax: Axes, painted: Any, label: str) -> None:
-    """Add the scale of colours."""
-    bar = ax.figure.colorbar(painted, ax=ax, pad=0.02)
-    bar.set_label(label, fontsize=style.NORMAL)
-    bar.ax.tick_params(labelsize=style.SMALL)
-
-
-def _label(swept: Sweep, key: str) -> str:
-    return with_unit(key, swept.unit(key))
-
-
-def _axis(swept: Sweep, column: str) -> tuple[float, str]:
-    """Return the factor that makes a column easy to read, and its label."""
-    what, unit = NUMBERS[column][0].split(",")[0], swept.unit(column)
-    what = what if what.startswith(("x ", "y ")) else what[0].upper() + what[1:]
-    if column.endswith("_spread"):
-        what = f"Standard deviation of {column.removesuffix('_spread')}"
-    if not unit:
-        return 1.0, what
-    factor, name = style.scaled(swept.columns[column], unit)
-    return factor, f"{what}, {name}"
-
-
-def _edges(values: Floats) -> Floats:
-    """Return the borders between values, and beyond the first and the last one."""
-    middle = 0.5 * (values[1:] + values[:-1])
-    return np.concatenate(
-        [[values[0] - (middle[0] - values[0])], middle, [values[-1] + (values[-1] - middle[-1])]]
-    )
-
-
-def _missing(swept: Sweep, column: str) -> str:
-    """Say how many variants are not in the picture, and the commonest reason."""
-    gone = np.flatnonzero(~np.isfinite(swept.columns[column]))
-    if not len(gone):
-        return ""
-    reasons = Counter(reason for reason in swept.columns[REASON][gone].tolist() if reason)
-    why = "".join(f", most: {reason}" for reason, _ in reasons.most_common(1))
-    return shorten(f"{len(gone):,} of {len(swept):,} have none{why}", 118, placeholder=" …")
+def _draw_heat(ax: Axes, x: Floats, y: Floats, z: Floats) -> ScalarMappable:
+    """Draw a heat map; grey where there is nothing to tell."""
+    (x, across), (y, up) = (np.unique(values, return_inverse=True) for values in (x, y))
+    field = np.full((len(y), len(x)), np.nan)
+    field[up, across] = z
+    ax.set_facecolor(style.STEEL_LIGHT)
+    ax.grid(visible=False)
+    limits: dict[str, Any] = {"cmap": COLORS}
+    if np.nanmin(field, initial=0.0) < 0.0 < np.nanmax(field, initial=0.0):
+        # White where the sign changes: that is often what is looked for.
+        reach = float(np.nanmax(np.abs(field)))
+        limits = {"cmap": "RdBu_r", "vmin": -reach, "vmax": reach}
+    return ax.pcolormesh(x, y, field, shading="nearest", rasterized=True, **limits)

@@ -119,20 +119,13 @@ TEXT = 0.215
 """Height of a line of text, inches."""
 
 
-def paper_figure(found: PaperFigure, *, path: str | Path | None = None) -> Figure:
+def paper_figure(found: PaperFigure) -> Picture:
     """Draw a figure of the paper: panels side by side, and in words what the misprint does.
 
     Parameters
     ----------
     found : PaperFigure
         From `chutelab.theory.figures.figure`.
-    path : path, optional
-        Also write the figure there, whole or not at all; the suffix says the format.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
     """
     texts = [fill(text, WIDE) for text in found.meaning]
     texts += [fill(f"Not in the paper's text: {text}", WIDE) for text in found.missing]
@@ -163,7 +156,6 @@ def paper_figure(found: PaperFigure, *, path: str | Path | None = None) -> Figur
             color=style.INK if i < len(found.meaning) else style.MUTED,
         )  # fmt: skip
         y -= TEXT * (text.count("\n") + 1)
-    figure.write(path)
     return figure
 
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.figure import SIZE
@@ -37,7 +35,7 @@ POINTS: dict[str, Any] = {"ls": "none", "marker": "+", "ms": 7.0, "mew": 1.3}
 """How measured points are drawn."""
 
 
-def measured(found: Residuals, fit: Fit | None = None, *, path: str | Path | None = None) -> Figure:
+def measured(found: Residuals, fit: Fit | None = None) -> Picture:
     """Draw a measured track over the simulation and its analytic parabola, and the residuals.
 
     Parameters
@@ -46,13 +44,6 @@ def measured(found: Residuals, fit: Fit | None = None, *, path: str | Path | Non
         From `chutelab.measured.residuals`; of a fit, its `after`.
     fit : Fit, optional
         Also draw the track before the fit, and write the fitted values.
-    path : path, optional
-        Also write the figure there, whole or not at all; the suffix says the format.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
     """
     figure = Picture(SIZE)
     lines = 0 if fit is None else min(len(fit.parameters), PARAMETERS)
@@ -73,7 +64,6 @@ def measured(found: Residuals, fit: Fit | None = None, *, path: str | Path | Non
             0.985, 0.965 - 0.032 * i, text, fontsize=style.NORMAL, color=style.MUTED,
             horizontalalignment="right", verticalalignment="center",
         )  # fmt: skip
-    figure.write(path)
     return figure
 
 

@@ -30,7 +30,7 @@ from chutelab.pictures.plots.scenery import (
 )
 from chutelab.results import Recording
 from chutelab.results.quantities import measure
-from chutelab.scene import Incoming, Scene
+from chutelab.scene import Scene
 from chutelab.theory import Transfer
 from chutelab.theory.separation import separation
 from chutelab.util.arrays import Floats
@@ -65,62 +65,51 @@ class Arc:
 
 
 def arcs(prediction: Transfer, scene: Scene) -> tuple[Arc, ...]:
-    """Return the flight to the plate and the one from the plate to the belt, as far as known.
+    """Return the flights of particle 0 that are known in closed form, in order.
 
-    Parameters
-    ----------
-    prediction : Transfer
-        Of the scene, see `chutelab.theory.predict`; what is NaN in it is left out.
-    scene : Scene
-        For the radius R + r of the separation point, and for gravity.
+    With a plate they are the flight to it and the one from there to the belt, as far as the
+    prediction goes. Without one it is the flight from the pulley down to the outgoing belt, if
+    nothing is in the way.
     """
-    phi1 = float(prediction.phi1)
-    if scene.incoming is not None and scene.plate is None:
-        return _thrown(scene, scene.incoming)
-    if scene.incoming is None or not isfinite(phi1):
+    belt, out, g = scene.incoming, scene.outgoing, scene.gravity
+    if belt is None:
         return ()
-    riding = scene.incoming.pulley_radius + scene.particle.radius
-    point, begin = (riding * sin(phi1), riding * cos(phi1)), 0.0
-    found = []
-    # The paper counts x3 back from the plate, and both y downwards.
-    for forward, down, duration in (
-        (float(prediction.x2), float(prediction.y2), float(prediction.t2)),
-        (-float(prediction.x3), float(prediction.y3), float(prediction.t3)),
-    ):
-        if not (isfinite(forward) and isfinite(down) and 0.0 < duration < float("inf")):
+    riding = belt.pulley_radius + scene.particle.radius
+    if scene.plate is None:
+        carried = on_belt(scene) and release_velocity(scene) == (belt.speed, 0.0) and belt.speed > 0
+        met = scene.surface or (scene.stream.interact and scene.stream.count > 1)
+        if out is None or met or not g or not carried:
+            return ()
+        left = separation(
+            speed=np.array([belt.speed]),
+            ride_radius=np.array([riding]),
+            gravity=np.array([g]),
+            friction=np.array([np.inf if belt.friction == "adhesion" else float(belt.friction)]),
+            spin=np.array([scene.particle.spin]),
+        )
+        sine, cosine, speed = (float(part[0]) for part in (left.sin, left.cos, left.v1))
+        fall = riding * cosine - (riding - out.drop)
+        if fall <= 0.0:
+            return ()
+        duration = (sqrt((speed * sine) ** 2 + 2.0 * g * fall) - speed * sine) / g
+        legs = [(speed * cosine * duration, fall, duration)]
+        if not out.start <= riding * sine + legs[0][0] <= out.start + out.length:
+            return ()
+    else:
+        sine, cosine = sin(prediction.phi1), cos(prediction.phi1)
+        # The paper counts x3 back from the plate, and both y downwards.
+        legs = [
+            (float(prediction.x2), float(prediction.y2), float(prediction.t2)),
+            (-float(prediction.x3), float(prediction.y3), float(prediction.t3)),
+        ]
+    point, begin, found = (riding * sine, riding * cosine), 0.0, []
+    for forward, down, duration in legs:
+        if not (isfinite(point[0] + forward + down + duration) and duration > 0.0):
             break
-        velocity = (forward / duration, 0.5 * scene.gravity * duration - down / duration)
-        found.append(Arc(begin, begin + duration, point, velocity, scene.gravity))
+        velocity = (forward / duration, 0.5 * g * duration - down / duration)
+        found.append(Arc(begin, begin + duration, point, velocity, g))
         point, begin = (point[0] + forward, point[1] - down), begin + duration
     return tuple(found)
-
-
-def _thrown(scene: Scene, belt: Incoming) -> tuple[Arc, ...]:
-    """Return the flight from the pulley down to the outgoing belt, where nothing is in the way."""
-    out, g, r = scene.outgoing, scene.gravity, scene.particle.radius
-    if out is None or scene.surface or not g:
-        return ()
-    carried = on_belt(scene) and release_velocity(scene) == (belt.speed, 0.0) and belt.speed > 0.0
-    if not carried or (scene.stream.interact and scene.stream.count > 1):
-        return ()
-    riding = belt.pulley_radius + r
-    left = separation(
-        speed=np.array([belt.speed]),
-        ride_radius=np.array([riding]),
-        gravity=np.array([g]),
-        friction=np.array([np.inf if belt.friction == "adhesion" else float(belt.friction)]),
-        spin=np.array([scene.particle.spin]),
-    )
-    sine, cosine, speed = (float(part[0]) for part in (left.sin, left.cos, left.v1))
-    point, velocity = (riding * sine, riding * cosine), (speed * cosine, -speed * sine)
-    fall = point[1] - (belt.pulley_radius - out.drop + r)
-    if not fall > 0.0:
-        return ()
-    duration = (velocity[1] + sqrt(velocity[1] ** 2 + 2.0 * g * fall)) / g
-    landing = point[0] + velocity[0] * duration
-    if not out.start <= landing <= out.start + out.length:
-        return ()
-    return (Arc(0.0, duration, point, velocity, g),)
 
 
 def flight(parts: tuple[Arc, ...], times: ArrayLike) -> tuple[Floats, Floats]:

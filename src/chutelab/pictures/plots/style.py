@@ -58,16 +58,21 @@ SMALL, NORMAL, LARGE = 9.5, 10.5, 13.0
 
 _PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M"}
 
+PREFIXED = ("J", "W", "m")
+"""Units that are scaled: nobody reads millimetres a second or millidegrees."""
+
 
 def scaled(values: ArrayLike, unit: str) -> tuple[float, str]:
     """Return a factor and the prefixed unit that bring the largest value to between 1 and 1000.
 
-    >>> scaled([0.0202, -0.01, float("nan")], "J")
-    (1000.0, 'mJ')
+    Units that are not in `PREFIXED` stay as they are.
+
+    >>> scaled([0.0202, -0.01, float("nan")], "J"), scaled(0.3, "m/s")
+    ((1000.0, 'mJ'), (1.0, 'm/s'))
     """
     sizes = np.abs(values)
     largest = float(np.max(sizes, initial=0.0, where=np.isfinite(sizes)))
-    if largest == 0.0:
+    if largest == 0.0 or unit not in PREFIXED:
         return 1.0, unit
     power = min(max(3 * floor(log10(largest) / 3), -15), 6)
     return float(f"1e{-power}"), _PREFIXES[power] + unit
@@ -79,14 +84,9 @@ def quantity(value: float, unit: str) -> str:
     >>> quantity(0.0202, "J"), quantity(0.0, "J"), quantity(-1.5, "m/s")
     ('20.2 mJ', '0 J', '−1.50 m/s')
     """
-    if value == 0.0:
-        return f"0 {unit}"
     factor, name = scaled(float(f"{value:.2e}"), unit)
-    shown = value * factor
-    if not 0.0995 < abs(shown) < 9995.0:
-        return f"{shown:.1e} {name}".replace("-", "−")
-    digits = max(0, 2 - floor(log10(float(f"{abs(shown):.2e}"))))
-    return f"{shown:.{digits}f} {name}".replace("-", "−")
+    shown = f"{factor * value:#.3g}".rstrip(".") if value else "0"
+    return f"{shown} {name}".replace("-", "−")
 
 
 def dress(ax: Axes, x: str = "", y: str = "", title: str = "") -> Axes:

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import ceil, floor, log10
-from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
-from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from chutelab.checks.workprecision import METHODS, Timing
@@ -43,9 +41,7 @@ badly. In the order of drawing: of two at one place, the upper is the smaller.""
 TITLES = {"pymunk": "pymunk, aligned", "fixed": "pymunk, fixed step"}
 
 
-def workprecision(
-    timings: Sequence[Timing], title: str, about: Mapping[str, str], *, path: Path | None = None
-) -> Figure:
+def workprecision(timings: Sequence[Timing], title: str, about: Mapping[str, str]) -> Picture:
     """Draw run time against error.
 
     Parameters
@@ -56,8 +52,6 @@ def workprecision(
         Of the scene.
     about : mapping
         The machine and the versions, from `chutelab.util.versions`.
-    path : Path, optional
-        Also write the figure there, whole or not at all.
     """
     below = failures(timings, CHARACTERS)
     said = [f"{key} {value}" if key in PACKAGES else value for key, value in about.items()]
@@ -72,7 +66,6 @@ def workprecision(
         0.2 / WIDTH, (0.2 + LINE * len(below)) / height, "\n".join(below), fontsize=style.SMALL,
         color=style.MUTED, verticalalignment="top", gid="below",
     )  # fmt: skip
-    figure.write(path)
     return figure
 
 

@@ -156,7 +156,11 @@ def propagate(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Do what ``--uncertainty`` of ``sweep`` asks for; the arguments are its options."""
+    """Propagate uncertain inputs, as ``--uncertainty`` has them; write what was asked for.
+
+    `samples` is the number of each set of points, None for the default; `out` and `plot` are a CSV
+    file for all samples, and a picture.
+    """
     from chutelab.studies import design
     from chutelab.studies.design.uncertainty import SAMPLES, as_dict
     from chutelab.util.files import write_lines

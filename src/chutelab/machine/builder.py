@@ -18,10 +18,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chutelab.machine.nominal import discharge, plate_hit
+from chutelab.machine.nominal import plate_hit
 from chutelab.machine.parts import Caution, Machine, Particle, Pulley, Segments
-from chutelab.machine.releases import ON_BELT, Releases, draw, release_point
+from chutelab.machine.releases import Releases, draw, release_point
 from chutelab.scene import Fault, Scene, SceneError
+from chutelab.scene.rules import ON_BELT
 from chutelab.util.arrays import Floats, Ints, Numbers
 
 
@@ -67,28 +68,14 @@ ROUNDING = 64.0 * float_info.epsilon
 """Share of the largest coordinate by which a contact may seem to overlap: the engines see to it."""
 
 
-def cleared(
+def _cleared(
     scene: Scene, releases: Releases, ends: Floats, owner: Sequence[int], names: Sequence[str]
 ) -> Releases:
-    """Return releases of which none lies in a surface.
+    """Return releases of which none lies in a surface, or raise a `RefusedError`.
 
-    One less than `ON_BELT` inside, as one written with ten digits may be, is moved out.
-
-    Parameters
-    ----------
-    scene : Scene
-        For the radius, the drive pulley and messages.
-    releases : Releases
-        As drawn.
-    ends : ndarray, (4, S) or (4, S, N)
-        Each segment's x0, y0, x1, y1, m.
-    owner, names : sequence of int and of str
-        Which surface a segment belongs to, and what surfaces are called.
-
-    Raises
-    ------
-    RefusedError
-        If a particle starts further inside a surface.
+    One less than `ON_BELT` inside, as one written with ten digits may be, is moved out. ``ends``,
+    (4, S) or (4, S, N), are each segment's x0, y0, x1, y1 (m); ``owner`` says which of the surfaces
+    in ``names`` a segment belongs to.
     """
     r = scene.particle.radius
     # All start in one column, above the release point.
@@ -184,7 +171,7 @@ def build(scene: Scene) -> Machine:
     along = columns[2:4] - columns[0:2]
     length = np.hypot(along[0], along[1])
     disk, belt, until = scene.particle, scene.incoming, scene.run.until
-    releases = cleared(scene, draw(scene), columns[:4], owner, names)
+    releases = _cleared(scene, draw(scene), columns[:4], owner, names)
     bound = releases.t[-1].item() + scene.run.max_time
     return Machine(
         scene=scene,
@@ -213,7 +200,7 @@ def build(scene: Scene) -> Machine:
         end_time=bound if isinstance(until, str) else np.minimum(bound, until),
         dt=scene.run.dt,
         align=scene.run.align,
-        interact=scene.stream.interact and scene.stream.count > 1,
+        interact=scene.stream.crowded,
         pair_restitution=scene.stream.restitution,
         pair_friction=scene.stream.friction,
         engine=scene.run.engine,
@@ -230,7 +217,7 @@ def _conveyors(scene: Scene) -> tuple[list[Part], list[Caution]]:
     ends: list[tuple[Numbers, Numbers]] = [(-belt.length, top), (0.0, top)]
     parts: list[Part] = [("incoming", ends, belt.speed, belt.restitution, grip)]
     warnings: list[Caution] = []
-    hit = plate_hit(scene, discharge(scene))
+    hit = plate_hit(scene)
     missed = np.isnan(hit[1])
     height: Numbers | None = None  # of the outgoing belt's surface
     if out is not None and out.drop_from == "top":

@@ -61,23 +61,17 @@ class Caution:
 def crossings(
     names: Sequence[str], rows: Floats, owner: Sequence[int], pulley: float | None
 ) -> list[Caution]:
-    """Return every two surfaces that cross: allowed, the first contact wins.
+    """Return every two surfaces that cross; those that only touch, as at a shared end, do not.
 
     Parameters
     ----------
-    names : sequence of str
-        Of the surfaces.
+    names, owner : sequence of str, sequence of int
+        Of the surfaces; and which of them each segment belongs to, (S,).
     rows : ndarray, (S, 4)
         x and y of the first and of the second end of each segment, m.
-    owner : sequence of int, (S,)
-        Which surface a segment belongs to.
     pulley : float or None
         Radius of the drive pulley about the origin, m. The incoming belt, which lies on it, is
         surface 0 then.
-
-    Notes
-    -----
-    Surfaces that only touch, as two that share an end do, do not cross.
     """
     found: dict[tuple[int, int], None] = {}
     for s, other in combinations(range(len(rows)), 2):
@@ -264,7 +258,7 @@ class Machine:
         owner = self.segments.surface.tolist()
         return (*self.plate_warnings, *crossings(self.surfaces, ends, owner, radius))
 
-    @property
+    @cached_property
     def exit_box(self) -> tuple[float, float, float, float]:
         """Left, right, bottom and top (m) beyond which a particle has left the scene.
 

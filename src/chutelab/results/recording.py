@@ -19,13 +19,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from chutelab.machine import Machine, Particle
-from chutelab.scene import Scene
+from chutelab.scene import Scene, rules
 from chutelab.theory import Transfer, predict
 from chutelab.util.arrays import Bools, Floats, Ints
 from chutelab.util.tables import Sheet, Shown
 
-ENTRIES = ("belt_work", "restitution_loss", "friction_loss")
+ENTRIES = rules.ENTRIES
 """The three entries of the energy ledger, in the order of every array that holds them."""
+
+REASONS = rules.ENDINGS
+"""Why a particle's track ends; `Recording.ended` holds indices into this tuple."""
 
 PARTICLES = "particles"
 """Name under which the losses of particle-particle contacts are booked."""
@@ -44,9 +47,6 @@ class Kind(IntEnum):
     SETTLE = 7
     EXIT = 8
 
-
-REASONS = ("time", "landed", "settled", "exit")
-"""Why a particle's track ends; `Recording.ended` holds indices into this tuple."""
 
 EVENT = np.dtype(
     [

@@ -22,8 +22,6 @@ from chutelab.scene.rules import ConflictError, Look, conflicts
 from chutelab.scene.schema import Scene
 from chutelab.util.errors import MISSING, Fault, InputError, did_you_mean
 
-_TITLE: Final = re.compile(r"""^title\s*=\s*["'](.*?)["']\s*(?:#.*)?$""", re.MULTILINE)
-
 
 class SceneError(InputError):
     """A scene that cannot be used; its text lists every fault.
@@ -73,10 +71,9 @@ def about() -> list[About]:
     found = []
     for name, path in shipped().items():
         text = path.read_text(encoding="utf-8")
-        title = _TITLE.search(text)
         comment = takewhile(lambda line: line.startswith("#"), text.splitlines())
         look = tuple(line.lstrip("# ") for line in comment if not line.startswith("#:"))
-        found.append(About(name, title[1] if title else name, look, path))
+        found.append(About(name, tomllib.loads(text).get("title", name), look, path))
     return found
 
 
@@ -149,7 +146,11 @@ def faults_of(error: ValidationError, document: Mapping[str, Any]) -> list[Fault
                 # A point with one coordinate: show what is there, not what is not.
                 parts, missing = parts[:-1], False
             # The location of a union's error ends with the name of the member that refused.
-            parts, allowed = _allowed(parts)
+            while (rule := rule_at(parts)) is None:
+                parts = parts[:-1]
+            last_key = max(depth for depth, part in enumerate(parts) if isinstance(part, str))
+            unit = (rule_at(parts[: last_key + 1]) or {}).get("x-unit")
+            allowed = _listed(_phrases(rule)) + (f", in {unit}" if unit else "")
             text = str(cause) if cause else allowed if missing else f"must be {allowed}"
         value = MISSING if missing else at_path(document, parts)
         faults.setdefault(parts, Fault(joined(parts), value, text))
@@ -161,15 +162,6 @@ def faults_of(error: ValidationError, document: Mapping[str, Any]) -> list[Fault
         if all(isinstance(part, int) for part in parts[depth:])
     }
     return [fault for parts, fault in faults.items() if parts not in broken_lists]
-
-
-def _allowed(parts: Location) -> tuple[Location, str]:
-    """Say what is allowed at a location, and cut off what follows the last key or index."""
-    while (rule := rule_at(parts)) is None:
-        parts = parts[:-1]
-    last_key = max(depth for depth, part in enumerate(parts) if isinstance(part, str))
-    unit = (rule_at(parts[: last_key + 1]) or {}).get("x-unit")
-    return parts, _listed(_phrases(rule)) + (f", in {unit}" if unit else "")
 
 
 def _phrases(rule: Mapping[str, Any]) -> list[str]:

@@ -53,6 +53,8 @@ def schema() -> dict[str, Any]:
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **described}
 
 
+_schema = cache(schema)
+
 _SEGMENT: Final = re.compile(r"([^\s.=\[\]\"']+)((?:\[\d{1,9}\])*)")
 _FORM: Final = "must be KEY=VALUE, such as plate.angle_deg=20 or surface[0].speed=1"
 _BARE_KEY: Final = re.compile(r"[\w-]+")
@@ -156,11 +158,6 @@ def limits_of(rule: Mapping[str, Any]) -> tuple[float, float] | None:
     if "exclusiveMaximum" in limits:
         high = nextafter(limits["exclusiveMaximum"], -inf)
     return float(low), float(high)
-
-
-@cache
-def _schema() -> dict[str, Any]:
-    return schema()
 
 
 def _referred(rule: Mapping[str, Any]) -> Mapping[str, Any]:

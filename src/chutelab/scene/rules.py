@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import lru_cache
 from typing import Annotated, Any, Final, Literal
 
@@ -92,18 +93,12 @@ def suggestion(name: str, surfaces: Iterable[str]) -> str:
     for tables in (*([table] for table in absent), absent):
         if tables and unit_of(name, [*known, *tables]) is not None:
             return f"it needs {' and '.join(f'[{table}]' for table in tables)}"
-    # Of a thousand surfaces some will do: looking for likeness takes long.
-    return did_you_mean(
-        name, _units(tuple(known[:50])), f"there are {_families(known)}", cutoff=_NEAR
-    )
-
-
-def _families(surfaces: list[str]) -> str:
-    """Say which quantities a scene has, one of each kind."""
-    some = [f"{event}.x" for event, home in NEEDED.items() if home in surfaces]
+    some = [f"{event}.x" for event, home in NEEDED.items() if home in known]
     keys = ", ".join([*some, "contacts", "ledger.belt_work"])
-    theirs = "phi1_deg to slip_heat, " if {"incoming", "plate"} <= set(surfaces) else ""
-    return f"{theirs}{keys} and other keys of `chutelab run --json`"
+    theirs = "phi1_deg to slip_heat, " if {"incoming", "plate"} <= set(known) else ""
+    there_are = f"there are {theirs}{keys} and other keys of `chutelab run --json`"
+    # Of a thousand surfaces some will do: looking for likeness takes long.
+    return did_you_mean(name, _units(tuple(known[:50])), there_are, cutoff=_NEAR)
 
 
 THEORY: Final = "theory"
@@ -153,42 +148,6 @@ class Expect(Table):
         if tolerance == UNPROMISED:
             return None
         return read_size(tolerance) if isinstance(tolerance, str) else (tolerance, "%")
-
-
-def expectation_conflicts(
-    path: str, given: Mapping[str, Any], surfaces: Sequence[str]
-) -> Iterator[Fault]:
-    """Yield what is wrong with one expectation of a scene that has these surfaces."""
-    name = given.get("quantity")
-    if not isinstance(name, str):
-        return
-    unit = unit_of(name, surfaces)
-    if unit is None:
-        text = f"no such quantity here; {suggestion(name, surfaces)}"
-        yield Fault(f"{path}.quantity", name, text)
-        return
-    if given.get("value") == THEORY and name not in SYMBOLS:
-        text = f"a number; the theory has no {name}, only {', '.join(SYMBOLS)}"
-        yield Fault(f"{path}.value", THEORY, text)
-    for key in ("tolerance", "tolerance_contact", "tolerance_pymunk"):
-        tolerance = given.get(key)
-        if not isinstance(tolerance, str) or (key != "tolerance" and tolerance == UNPROMISED):
-            continue
-        if not _fits(tolerance, unit):
-            example = write_size(0.0005, unit) if unit != "degrees" else "0.1 degrees"
-            example = example if unit else "3"
-            none = ' or "none"' if key != "tolerance" else ""
-            text = f'must be a number from 0 to 1 (relative), a string such as "{example}"{none}'
-            kind = f"in {unit}" if unit else "a number of things"
-            yield Fault(f"{path}.{key}", tolerance, f"{text}; {name} is {kind}")
-
-
-def _fits(tolerance: str, unit: str) -> bool:
-    try:
-        size, found = read_size(tolerance)
-    except ValueError:
-        return False
-    return size >= 0.0 and found in (unit, "%")
 
 
 ON_BELT: Final = 1e-9
@@ -254,15 +213,8 @@ class Look:
             return math.nan
         return self._model.tables()[table].model_fields[key].default
 
-    def surfaces(self) -> list[Any]:
-        """Return the free surfaces, as far as they are tables at all."""
-        return self._list("surface")
-
-    def expectations(self) -> list[Any]:
-        """Return what the scene is expected to show, likewise."""
-        return self._list("expect")
-
-    def _list(self, key: str) -> list[Any]:
+    def several(self, key: str) -> list[Any]:
+        """Return ``[[surface]]`` or ``[[expect]]``, as far as it is a list at all."""
         found = self._document.get(key)
         return list(found) if isinstance(found, list | tuple) else []
 
@@ -316,7 +268,12 @@ def _release(look: Look) -> Iterator[Fault]:
             if not look.given("stream", key) and look.sound(f"stream.{key}"):
                 yield Fault(f"stream.{key}", MISSING, f"{what}; required without [incoming]")
         return
-    if look("incoming", "friction") != "adhesion" or not _on_belt(look):
+    on_belt = not look.given("stream", "at")
+    if look.given("stream", "at") and look.sound("stream.at"):
+        x, y = look("stream", "at")
+        height = look("incoming", "pulley_radius") + look("particle", "radius")
+        on_belt = -look("incoming", "length") <= x <= 0.0 and abs(y - height) <= ON_BELT
+    if look("incoming", "friction") != "adhesion" or not on_belt:
         return
     advice = 'incoming.friction = "adhesion" releases every particle at incoming.speed'
     if look("stream", "speed_spread") > 0.0:
@@ -329,19 +286,9 @@ def _release(look: Look) -> Iterator[Fault]:
             yield Fault("stream.velocity", velocity, text)
 
 
-def _on_belt(look: Look) -> bool:
-    if not look.given("stream", "at"):
-        return True
-    if not look.sound("stream.at"):
-        return False
-    x, y = look("stream", "at")
-    height = look("incoming", "pulley_radius") + look("particle", "radius")
-    return bool(-look("incoming", "length") <= x <= 0.0 and abs(y - height) <= ON_BELT)
-
-
 def _surfaces(look: Look) -> Iterator[Fault]:
     first: dict[str, int] = {}
-    for index, surface in enumerate(look.surfaces()):
+    for index, surface in enumerate(look.several("surface")):
         if not isinstance(surface, Mapping):
             continue
         yield from surface_conflicts(f"surface[{index}]", surface)
@@ -371,10 +318,35 @@ def surface_conflicts(path: str, surface: Mapping[str, Any]) -> Iterator[Fault]:
 
 
 def _expectations(look: Look) -> Iterator[Fault]:
-    if not look.expectations() or not look.sound("surface"):
+    if not look.several("expect") or not look.sound("surface"):
         return
-    names = [table for table in ("incoming", "plate", "outgoing") if look.has(table)]
-    names += [str(free["name"]) for free in look.surfaces()]
-    for index, given in enumerate(look.expectations()):
-        if isinstance(given, Mapping) and look.sound(f"expect[{index}]"):
-            yield from expectation_conflicts(f"expect[{index}]", given, names)
+    surfaces = [table for table in ("incoming", "plate", "outgoing") if look.has(table)]
+    surfaces += [str(free["name"]) for free in look.several("surface")]
+    for index, given in enumerate(look.several("expect")):
+        path = f"expect[{index}]"
+        if not (isinstance(given, Mapping) and look.sound(path)):
+            continue
+        name = given.get("quantity")
+        if not isinstance(name, str):
+            continue
+        unit = unit_of(name, surfaces)
+        if unit is None:
+            text = f"no such quantity here; {suggestion(name, surfaces)}"
+            yield Fault(f"{path}.quantity", name, text)
+            continue
+        if given.get("value") == THEORY and name not in SYMBOLS:
+            text = f"a number; the theory has no {name}, only {', '.join(SYMBOLS)}"
+            yield Fault(f"{path}.value", THEORY, text)
+        for key in ("tolerance", "tolerance_contact", "tolerance_pymunk"):
+            tolerance, none = given.get(key), "" if key == "tolerance" else f' or "{UNPROMISED}"'
+            if not isinstance(tolerance, str) or (none and tolerance == UNPROMISED):
+                continue
+            with suppress(ValueError):
+                size, found = read_size(tolerance)
+                if size >= 0.0 and found in (unit, "%"):
+                    continue
+            examples = {"": "3", "degrees": "0.1 degrees"}
+            example = examples.get(unit) or write_size(0.0005, unit)
+            text = f'must be a number from 0 to 1 (relative), a string such as "{example}"{none}'
+            kind = f"in {unit}" if unit else "a number of things"
+            yield Fault(f"{path}.{key}", tolerance, f"{text}; {name} is {kind}")

@@ -337,14 +337,9 @@ def accepted(path: str, values: Floats) -> Bools:
 
 
 def judged_by(mapping: Mapping[str, Any], overrides: Sequence[str | Override] = ()) -> set[str]:
-    """Return the keys of tables whose numbers decide whether a scene contradicts itself.
+    """Return the keys whose numbers decide whether a scene contradicts itself, others do not.
 
-    Another number under any other key makes no contradiction, nor takes one away.
-
-    Parameters
-    ----------
-    mapping, overrides
-        As `chutelab.scene.from_dict` takes them; each key by itself must be right.
+    The arguments are as `chutelab.scene.from_dict` takes them; each key by itself must be right.
     """
     document = plain(mapping)
     apply(document, overrides)

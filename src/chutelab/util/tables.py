@@ -107,7 +107,12 @@ class Sheet:
         return Group(*parts)
 
     def __str__(self) -> str:
-        return _printed(self)
+        """Return what rich prints, without colours, in lines as long as it takes."""
+        from rich.console import Console
+
+        out = io.StringIO()
+        Console(file=out, width=UNBOUNDED, color_system=None).print(self)
+        return "\n".join(line.rstrip() for line in out.getvalue().strip("\n").splitlines())
 
     def html(self) -> str:
         """Return the table as HTML that takes its colours from the page around it."""
@@ -163,15 +168,6 @@ def _cell(text: str) -> Any:
 
     first, end, rest = text.partition("\n")
     return Text.assemble((first, "bold"), end, rest) if end else Text(text, STYLES.get(text, ""))
-
-
-def _printed(shown: Any) -> str:
-    """Return what rich prints, without colours, in lines as long as it takes."""
-    from rich.console import Console
-
-    out = io.StringIO()
-    Console(file=out, width=UNBOUNDED, color_system=None).print(shown)
-    return "\n".join(line.rstrip() for line in out.getvalue().strip("\n").splitlines())
 
 
 def wrapped(text: str, width: int = WIDTH) -> list[str]:

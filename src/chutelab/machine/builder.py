@@ -200,7 +200,7 @@ def build(scene: Scene) -> Machine:
         end_time=bound if isinstance(until, str) else np.minimum(bound, until),
         dt=scene.run.dt,
         align=scene.run.align,
-        interact=scene.stream.interact and scene.stream.count > 1,
+        interact=scene.stream.crowded,
         pair_restitution=scene.stream.restitution,
         pair_friction=scene.stream.friction,
         engine=scene.run.engine,

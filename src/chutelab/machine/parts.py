@@ -258,7 +258,7 @@ class Machine:
         owner = self.segments.surface.tolist()
         return (*self.plate_warnings, *crossings(self.surfaces, ends, owner, radius))
 
-    @property
+    @cached_property
     def exit_box(self) -> tuple[float, float, float, float]:
         """Left, right, bottom and top (m) beyond which a particle has left the scene.
 

@@ -86,25 +86,21 @@ def first_descent(coefficients: Floats, until: Floats) -> Floats:
     scaled = coefficients * until ** np.arange(5)[:, None]
     # A polynomial lies above the smallest of its Bernstein coefficients.
     open_ = np.flatnonzero((BERNSTEIN @ scaled < 0.0).any(axis=0))
-    if len(open_):
-        first[open_] = _isolate(coefficients[:, open_], until[open_])
-    return first
-
-
-def _isolate(coefficients: Floats, until: Floats) -> Floats:
+    if not len(open_):
+        return first
+    coefficients, until = coefficients[:, open_], until[open_]
     derivatives = [coefficients]
     for _ in range(3):
         powers = np.arange(1, len(derivatives[-1]))[:, None]
         derivatives.append(derivatives[-1][1:] * powers)
-    zero = np.zeros(coefficients.shape[1])
+    zero = np.zeros(len(open_))
     knots = [zero, until]
     for derivative in reversed(derivatives[1:]):
         knots = [zero, *(_crossing(derivative, a, b) for a, b in pairwise(knots)), until]
-    first = np.full(coefficients.shape[1], np.inf)
     for a, b in reversed(list(pairwise(knots))):
         falls = polynomial(coefficients, b) < 0.0
         if falls.any():
-            first = np.where(falls, _crossing(coefficients, a, b), first)
+            first[open_] = np.where(falls, _crossing(coefficients, a, b), first[open_])
     return first
 
 
@@ -122,12 +118,10 @@ def _crossing(coefficients: Floats, low: Floats, high: Floats) -> Floats:
 
     Newton's method kept inside a shrinking bracket, halving where it would leave it.
     """
-    sign = np.where(polynomial(coefficients, high) < polynomial(coefficients, low), 1.0, -1.0)
-    changes = (sign * polynomial(coefficients, high) < 0.0) & (
-        sign * polynomial(coefficients, low) > 0.0
-    )
-    out = np.where(sign * polynomial(coefficients, low) <= 0.0, low, high)
-    which = np.flatnonzero(changes)
+    at_low, at_high = polynomial(coefficients, low), polynomial(coefficients, high)
+    sign = np.where(at_high < at_low, 1.0, -1.0)
+    out = np.where(sign * at_low <= 0.0, low, high)
+    which = np.flatnonzero((sign * at_high < 0.0) & (sign * at_low > 0.0))
     if not len(which):
         return out
     c, low, high = sign[which] * coefficients[:, which], low[which], high[which]

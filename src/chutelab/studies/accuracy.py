@@ -414,7 +414,7 @@ class Search:
         known = self.by_theory(found)
         if known is not None:
             return known
-        if self.scene.stream.interact and self.scene.stream.count > 1:
+        if self.scene.stream.crowded:
             return self.crowd(found)
         if found.engine not in self.witnesses:
             self.witnesses[found.engine] = self.witness(found)

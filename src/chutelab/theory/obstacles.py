@@ -67,11 +67,19 @@ class Flight:
         place[..., 1] -= 0.5 * self.gravity * t**2
         return place
 
-    def time_below(self, height: float) -> float:
-        """Return when it has come down to `height`, 0 if it is below and stays there; g > 0."""
-        rise, speed = self.position[1] - height, self.velocity[1]
-        square = speed**2 + 2.0 * self.gravity * rise
-        return max(float((speed + np.sqrt(square)) / self.gravity), 0.0) if square > 0.0 else 0.0
+    def horizon(self, targets: Segments, radius: float) -> float:
+        """Return a time after which a disk has passed all targets."""
+        if self.gravity > 0.0:
+            rise = self.position[1] - (float(targets.points[:, 1].min()) - radius)
+            speed = self.velocity[1]
+            square = speed**2 + 2.0 * self.gravity * rise
+            if square <= 0.0:
+                return 0.0
+            return max(float((speed + np.sqrt(square)) / self.gravity), 0.0)
+        apart = targets.points - self.position
+        reach = float(np.hypot(apart[:, 0], apart[:, 1]).max()) + 2.0 * radius
+        pace = float(np.hypot(*self.velocity))
+        return reach / pace if pace > 0.0 else 0.0
 
 
 def face_times(flight: Flight, segments: Segments, radius: float, horizon: float) -> Floats:

@@ -185,7 +185,22 @@ def predict(scene: Scene, rebound: Rebound = "corrected") -> Transfer:
     fault = _outside(scene)
     if fault:
         return cut(unanswered(), "separation", Reason.OUTSIDE.because(fault))
-    return _answer(Course(scene, rebound))
+    course = Course(scene, rebound)
+    found = course.found
+    if np.isnan(found.phi1):
+        return found
+    if scene.outgoing is not None and course.belt_height is None:
+        # Nothing places the belt, nor the plate's lower end: there is no machine to look at.
+        return cut(found, "separation", str(found.reason))
+    low, high = course.plate_reach
+    if high <= low:
+        return cut(found, "impact", Reason.OUTSIDE.because("the plate has no length"))
+    trouble = _on_the_ride(course) or _before_the_plate(course)
+    if trouble is None and scene.outgoing is None and np.isfinite(found.v2r):
+        trouble = "landing", Reason.OUTSIDE.because("there is no outgoing conveyor")
+    if trouble is None and Reason.of(found.reason) in (None, Reason.MISSES):
+        trouble = _after_the_rebound(course)
+    return found if trouble is None else cut(found, *trouble)
 
 
 def unbounded(scene: Scene) -> Transfer:
@@ -220,31 +235,16 @@ def _outside(scene: Scene) -> str:
             return "the release point stream.at is not on the incoming belt"
     if velocity is not None and tuple(velocity) != (scene.incoming.speed, 0.0):
         return "the release velocity stream.velocity is not the incoming belt's"
-    if scene.stream.interact and scene.stream.count > 1:
+    if scene.stream.crowded:
         return "particles interact"
     return ""
 
 
-def _answer(course: Course) -> Transfer:
-    """Lay the finite machine over the numbers, in the order of events."""
-    found = course.found
-    if np.isnan(found.phi1):
-        return found
-    if course.scene.outgoing is not None and course.belt_height is None:
-        # Nothing places the belt, nor the plate's lower end: there is no machine to look at.
-        return cut(found, "separation", str(found.reason))
-    low, high = course.plate_reach
-    if high <= low:
-        return cut(found, "impact", Reason.OUTSIDE.because("the plate has no length"))
-    trouble = _on_the_ride(course) or _before_the_plate(course)
-    if trouble is None and course.scene.outgoing is None and np.isfinite(found.v2r):
-        trouble = cut(found, "landing", Reason.OUTSIDE.because("there is no outgoing conveyor"))
-    if trouble is None and Reason.of(found.reason) in (None, Reason.MISSES):
-        trouble = _after_the_rebound(course)
-    return trouble or found
+Trouble = tuple[str, str] | None
+"""The first stage that is not reached as the equations assume, and the reason; None if all are."""
 
 
-def _on_the_ride(course: Course) -> Transfer | None:
+def _on_the_ride(course: Course) -> Trouble:
     obstacles = Segments.of(course.lines)
     at, radius = course.scene.stream.at, course.radius
     start = np.array([-course.belt.length if at is None else at[0], course.ride_radius])
@@ -258,54 +258,44 @@ def _on_the_ride(course: Course) -> Transfer | None:
     if index < 0:
         return None
     what = f"{obstacles.names[index]}: it is in the way of the ride"
-    return cut(course.found, "separation", Reason.EARLY.because(what))
+    return "separation", Reason.EARLY.because(what)
 
 
-def _before_the_plate(course: Course) -> Transfer | None:
+def _before_the_plate(course: Course) -> Trouble:
     found, radius, flight = course.found, course.radius, course.separation
     low, high = course.plate_reach
     foot = float((course.impact - course.pivot) @ course.up)
     hit = low <= foot <= high  # false for NaN: the line is not met
     plate = Segments.of(course.lines[:1])
     obstacles = Segments.of(course.lines[1:] if hit else course.lines)
-    horizon = float(found.t2) if hit else _horizon(flight, plate, radius)
+    horizon = float(found.t2) if hit else flight.horizon(plate, radius)
     index = first_in_flight(flight, obstacles, radius, horizon)[1]
     # What is in the way of a flight that misses the plate anyway does not matter.
     stopped = hit or np.isfinite(first_in_flight(flight, plate, radius, horizon)[0])
     if stopped and index >= 0:
         name = obstacles.names[index]
         how = "its end or its back is touched" if name == "plate" else "it is touched first"
-        return cut(found, "impact", Reason.EARLY.because(f"{name}: {how}"))
+        return "impact", Reason.EARLY.because(f"{name}: {how}")
     if hit:
         return None
     if np.isnan(foot):
-        return cut(found, "impact", str(found.reason))
+        return "impact", str(found.reason)
     where = f"{foot - high:.4g} m above" if foot > high else f"{low - foot:.4g} m below"
     what = f"the plate's line is met {where} the end of the plate"
-    return cut(found, "impact", Reason.NO_IMPACT.because(what))
+    return "impact", Reason.NO_IMPACT.because(what)
 
 
-def _horizon(flight: Flight, targets: Segments, radius: float) -> float:
-    """Return a time after which the flight is past all targets."""
-    if flight.gravity > 0.0:
-        return flight.time_below(float(targets.points[:, 1].min()) - radius)
-    apart = targets.points - flight.position
-    reach = float(np.hypot(apart[:, 0], apart[:, 1]).max()) + 2.0 * radius
-    speed = float(np.hypot(*flight.velocity))
-    return reach / speed if speed > 0.0 else 0.0
-
-
-def _after_the_rebound(course: Course) -> Transfer | None:
+def _after_the_rebound(course: Course) -> Trouble:
     found, radius, out = course.found, course.radius, course.scene.outgoing
     height = course.belt_height
     assert out is not None
     assert height is not None
     if course.impact[1] - radius < height:
-        return cut(found, "landing", Reason.MISSES.because("the plate is met below the belt"))
+        return "landing", Reason.MISSES.because("the plate is met below the belt")
     lands = bool(np.isfinite(found.t3))
     flight, top = course.rebounded, course.belt.pulley_radius
     around = Segments.of([("pulley", (-top, -top), (top, top)), *course.lines])
-    horizon = float(found.t3) if lands else _horizon(flight, around, radius)
+    horizon = float(found.t3) if lands else flight.horizon(around, radius)
     solid = Segments.of([("incoming", (-course.belt.length, top), (0.0, top)), *course.lines[2:]])
     time, index = first_in_flight(flight, solid, radius, horizon)
     time, name = min(
@@ -316,11 +306,11 @@ def _after_the_rebound(course: Course) -> Transfer | None:
     # The outgoing belt is not among them: no part of it, ends included, is met above its level.
     if np.isfinite(time):
         what = f"{name}: {time:.4g} s after the rebound"
-        return cut(found, "landing", Reason.SECOND.because(what))
+        return "landing", Reason.SECOND.because(what)
     x = float(course.impact[0] - found.x3)
     if lands and not out.start <= x <= out.start + out.length:
         what = f"it comes down at x = {x:.4g} m, off the belt"
-        return cut(found, "landing", Reason.MISSES.because(what))
+        return "landing", Reason.MISSES.because(what)
     return None
 
 

@@ -292,23 +292,26 @@ def transfer(
     """
     if rebound not in ("corrected", "as-printed"):
         raise ValueError(f'rebound must be "corrected" or "as-printed", not {rebound!r}')
-    given = _broadcast(
-        speed=speed,
-        pulley_radius=pulley_radius,
-        distance=distance,
-        angle=angle,
-        pivot_height=pulley_radius if pivot_height is None else pivot_height,
-        restitution=restitution,
-        drop=drop,
-        belt_speed=speed if belt_speed is None else belt_speed,
-        particle_radius=particle_radius,
-        mass=mass,
-        gravity=gravity,
-        friction=friction,
-        spin=spin,
-        plate_friction=plate_friction,
-        interval=np.nan if interval is None else interval,
-    )
+    numbers = {
+        "speed": speed,
+        "pulley_radius": pulley_radius,
+        "distance": distance,
+        "angle": angle,
+        "pivot_height": pulley_radius if pivot_height is None else pivot_height,
+        "restitution": restitution,
+        "drop": drop,
+        "belt_speed": speed if belt_speed is None else belt_speed,
+        "particle_radius": particle_radius,
+        "mass": mass,
+        "gravity": gravity,
+        "friction": friction,
+        "plate_friction": plate_friction,
+        "interval": np.nan if interval is None else interval,
+    }
+    arrays = [np.asarray(value, dtype=np.float64) for value in numbers.values()]
+    turning, *whole = np.broadcast_arrays(np.asarray(spin, dtype=np.bool_), *arrays)
+    flat = dict(zip(numbers, (array.ravel() for array in whole), strict=True))
+    given = Given(shape=turning.shape, spin=turning.ravel(), **flat)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         stages = Stages(given, timed=interval is not None)
         stages.separate()
@@ -316,10 +319,3 @@ def transfer(
         stages.rebound(as_printed=rebound == "as-printed")
         stages.fall(unbounded_plate=unbounded_plate)
         return stages.transfer()
-
-
-def _broadcast(*, spin: ArrayLike, **numbers: ArrayLike) -> Given:
-    arrays = [np.asarray(value, dtype=np.float64) for value in numbers.values()]
-    whole = np.broadcast_arrays(np.asarray(spin, dtype=np.bool_), *arrays)
-    flat = dict(zip(numbers, (array.ravel() for array in whole[1:]), strict=True))
-    return Given(shape=whole[0].shape, spin=whole[0].ravel(), **flat)

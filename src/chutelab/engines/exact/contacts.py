@@ -21,22 +21,17 @@ class CornerError(RuntimeError):
     """A spinning disk held between moving surfaces: beyond the exact engine."""
 
 
-def hold(s: State, index: Ints, on: tuple[Ints, Floats], other: tuple[Ints, Floats]) -> Bools:
+def _hold(s: State, index: Ints, on: tuple[Ints, Floats], other: tuple[Ints, Floats]) -> None:
     """Bring particles to rest in the corner of two obstacles, each given with its side.
 
     A moving surface under them goes on doing work, all of it heat. Where a surface is at rest its
     friction is taken as zero: it dissipates nothing, and the balance of the two normal forces needs
     none. Where friction pulls the particle in harder than any load can hold it (self-locking, as
     with adhesion) a real drive would stall: the particle stays, and nothing more is booked. Where
-    gravity pulls out of the corner it falls, from rest.
-
-    Returns
-    -------
-    ndarray of bool, (k,)
-        Which of them gravity pulls away from the one, and onto the other: they are to rest there.
+    gravity pulls out of the corner it falls, from rest, or rests on the other obstacle alone.
     """
     if not len(index):
-        return np.zeros(0, dtype=bool)
+        return
     a, b = s.contact(index, *on), s.contact(index, *other)
     moving = (a.belt != 0.0) | (b.belt != 0.0)
     if s.spins and moving.any():
@@ -67,7 +62,7 @@ def hold(s: State, index: Ints, on: tuple[Ints, Floats], other: tuple[Ints, Floa
     s.age[index[waits]] = s.stop[index[waits]]
     s.knots(index[waits])
     s.finish(index[waits], "time")
-    return np.asarray(onto)
+    rest_on(s, index[onto], other[0][onto], other[1][onto], np.zeros(np.count_nonzero(onto)))
 
 
 def _grip(c: Contact) -> Floats:
@@ -108,7 +103,7 @@ def settle_law(s: State, index: Ints) -> None:
     """
     if not len(index):
         return
-    c = s.contact(index, s.on[index], s.side[index])
+    c = s.contact(index)
     arc = s.mode[index] == Mode.ARC
     w = dot(s.v.take(index, axis=1), c.tangent)
     slip = s.slip_of(index, c, w)
@@ -135,7 +130,7 @@ def end_slip(s: State, index: Ints) -> None:
     """Make a slip that is used up exactly zero, then see whether friction holds."""
     if not len(index):
         return
-    c = s.contact(index, s.on[index], s.side[index])
+    c = s.contact(index)
     if s.spins:
         s.z[index] = c.belt - dot(s.v.take(index, axis=1), c.tangent)
     else:
@@ -211,7 +206,11 @@ def _after(
     held = mode >= Mode.FACE
     on_surface = np.count_nonzero(held) > 0
     if on_surface:
-        held[held] = _still_on(s, index[held])
+        # A blow from elsewhere may leave those that slide or ride where they are.
+        on = index[held]
+        under = s.contact(on)
+        leaving = np.abs(dot(s.v.take(on, axis=1), under.normal)) > NEGLIGIBLE
+        held[held] = ~leaving & (load_on(s, on, s.on[on], under) > 0.0)
         slides = held & live
         _slide_past(s, index[slides], obstacle[slides], side[slides], rebound[slides])
         live &= ~held
@@ -223,9 +222,8 @@ def _after(
     if np.count_nonzero(live) < len(live):
         index, obstacle, side, rebound = index[live], obstacle[live], side[live], rebound[live]
     if on_surface:
-        on = s.on[index]
-        leaves = on != NONE
-        s.part(index[leaves], s.obstacles.surface[on[leaves]])
+        leaves = index[s.on[index] != NONE]
+        s.part(leaves, s.obstacles.surface[s.on[leaves]])
     s.fly(index, obstacle, side, 2 - (rebound > 0.0))
 
 
@@ -249,18 +247,8 @@ def _stop_jammed(
     one = s.contact(index[jammed], before[jammed], before_side[jammed]).normal
     two = s.contact(index[jammed], obstacle[jammed], side[jammed]).normal
     jammed[jammed] = np.abs(one[0] * two[1] - one[1] * two[0]) > OPPOSED
-    _into_corner(
-        s, index[jammed], (before[jammed], before_side[jammed]), (obstacle[jammed], side[jammed])
-    )
+    _hold(s, index[jammed], (before[jammed], before_side[jammed]), (obstacle[jammed], side[jammed]))
     return np.asarray(jammed)
-
-
-def _into_corner(
-    s: State, index: Ints, on: tuple[Ints, Floats], other: tuple[Ints, Floats]
-) -> None:
-    """Bring particles to rest between two obstacles, or onto the other one, if it alone holds."""
-    onto = hold(s, index, on, other)
-    rest_on(s, index[onto], other[0][onto], other[1][onto], np.zeros(np.count_nonzero(onto)))
 
 
 def _touched_before(s: State, index: Ints) -> tuple[Ints, Floats]:
@@ -296,14 +284,11 @@ def _blow(
     )
     state = s.now(index)
     s.log.knots(index, state)
-    told = approach > NEGLIGIBLE
+    told = (approach > NEGLIGIBLE) | (tangential != 0.0)
     if landing is not None:
         told |= landing
     surface, push, rub = c.surface, mass * normal, mass * tangential
     count = int(np.count_nonzero(told))
-    if count < len(told):
-        told |= tangential != 0.0
-        count = int(np.count_nonzero(told))
     s.log.contacts += count
     if count < len(told):
         index, surface, state = index[told], surface[told], state[:, told]
@@ -323,13 +308,6 @@ def _blow(
     )
 
 
-def _still_on(s: State, index: Ints) -> Bools:
-    """Tell which sliding or riding particles a blow from elsewhere leaves where they are."""
-    c = s.contact(index, s.on[index], s.side[index])
-    leaving = np.abs(dot(s.v.take(index, axis=1), c.normal)) > NEGLIGIBLE
-    return ~leaving & (load_on(s, index, s.on[index], c) > 0.0)
-
-
 def _slide_past(s: State, index: Ints, obstacle: Ints, side: Floats, rebound: Floats) -> None:
     """Go on sliding after a blow from another obstacle, or stay in the corner of the two."""
     if not len(index):
@@ -339,12 +317,12 @@ def _slide_past(s: State, index: Ints, obstacle: Ints, side: Floats, rebound: Fl
     settle_law(s, index)
     kept = s.mode[index] == Mode.FACE
     index, other, other_side = index[kept], obstacle[kept], side[kept]
-    pull, _ = face_force(s, index, s.contact(index, s.on[index], s.side[index]))
+    pull, _ = face_force(s, index, s.contact(index))
     against = s.contact(index, other, other_side)
     pressed = dot(pull, against.normal) < -OPPOSED * length_of(pull)
     stuck = (rebound[kept] <= REST) & pressed
     on = (s.on[index[stuck]], s.side[index[stuck]])
-    _into_corner(s, index[stuck], on, (other[stuck], other_side[stuck]))
+    _hold(s, index[stuck], on, (other[stuck], other_side[stuck]))
 
 
 def rest_on(s: State, index: Ints, obstacle: Ints, side: Floats, rebound: Floats) -> None:

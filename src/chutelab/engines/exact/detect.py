@@ -281,7 +281,8 @@ def _reached(
     if low.shape[1] > 1:
         low = np.minimum.reduce(low, axis=1, keepdims=True)
         high = np.maximum.reduce(high, axis=1, keepdims=True)
-    each = (low < obstacles.bound_high) & (high > obstacles.bound_low)
+    lowest, highest = obstacles.bound
+    each = (low < highest) & (high > lowest)
     near = each[0] & each[1]
     if motion.never is not None:
         near &= ~motion.never

@@ -16,14 +16,15 @@ from chutelab.engines.exact.obstacles import (
     JOINT,
     NONE,
     corners_of,
+    obstacles,
     size_of,
     touch_of,
 )
-from chutelab.engines.exact.particle_state import Mode, State, World
-from chutelab.machine import Machine
+from chutelab.engines.exact.particle_state import Mode, State
+from chutelab.machine import Machine, origin
 from chutelab.results import Kind, Recording
 from chutelab.results.recorder import Recorder, StalledError
-from chutelab.util.arrays import Bools, Floats, Ints, Progress
+from chutelab.util.arrays import Bools, Ints, Progress
 
 
 def kinds(machine: Machine) -> list[Ints]:
@@ -132,28 +133,29 @@ def run(
         raise ValueError("the exact engine has no contacts between particles")
     begin = perf_counter() if began is None else began
     recorder = Recorder(machine, apart=apart)
-    rounds = 0
-
-    def recording() -> Recording:
-        return recorder.finish(engine="exact", steps=rounds, seconds=perf_counter() - begin)
-
-    world = World(machine)
+    rounds, stalled = 0, None
+    place = origin(machine)
+    surfaces = obstacles(machine, place)
     # What particles do does not depend on how many run together.
-    size = max(FEWEST, min(MOST, CELLS // max(1, len(world.obstacles.surface))))
+    size = max(FEWEST, min(MOST, CELLS // max(1, len(surfaces.surface))))
     # Roots that do not exist come out as inf or NaN, and are looked for as such.
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for first in range(0, machine.count, size):
-            s = State(world, first, min(first + size, machine.count))
+            s = State(machine, surfaces, place, first, min(first + size, machine.count))
             try:
                 _to_the_end(s, progress)
-            except StalledError as stalled:
-                rounds = max(rounds, s.rounds)
-                s.hand_over(recorder)
-                stalled.recording = recording()
-                raise
+            except StalledError as error:
+                stalled = error
             rounds = max(rounds, s.rounds)
-            s.hand_over(recorder)
-    return recording()
+            recorder.ended[first : first + len(s.ended)] = s.ended
+            s.log.close(recorder)
+            if stalled is not None:
+                break
+    recording = recorder.finish(engine="exact", steps=rounds, seconds=perf_counter() - begin)
+    if stalled is not None:
+        stalled.recording = recording
+        raise stalled
+    return recording
 
 
 def _to_the_end(s: State, progress: Progress | None) -> None:
@@ -165,7 +167,14 @@ def _to_the_end(s: State, progress: Progress | None) -> None:
             reason = f"{ROUNDS} events, and no end of them; lower run.max_time"
             raise s.stalled(int(s.mode.argmax()), reason)
         if s.rounds and s.rounds % WINDOW == 0:
-            _look_for_rattling(s, s.age - then)
+            passed = s.age - then
+            stuck = ((s.mode != Mode.DONE) & (passed < WINDOW * TICK)).nonzero()[0]
+            if len(stuck):
+                reason = (
+                    f"{WINDOW} events took {passed[stuck[0]]:.2g} s: it is driven to and fro in a"
+                    " narrow place; move the surfaces there apart, or lower their restitution"
+                )
+                raise s.stalled(int(stuck[0]), reason)
             then = s.age.copy()
         s.rounds += 1
         for mode, index in parties:
@@ -173,17 +182,6 @@ def _to_the_end(s: State, progress: Progress | None) -> None:
         if progress is not None:
             ended = s.first + len(s.mode) - int(np.count_nonzero(s.mode))
             progress(ended / s.machine.count)
-
-
-def _look_for_rattling(s: State, passed: Floats) -> None:
-    """Raise if a particle hardly got on in the time (k,), s, that a window of rounds took it."""
-    stuck = ((s.mode != Mode.DONE) & (passed < WINDOW * TICK)).nonzero()[0]
-    if len(stuck):
-        reason = (
-            f"{WINDOW} events took {passed[stuck[0]]:.2g} s: it is driven to and fro in a narrow"
-            " place; move the surfaces there apart, or lower their restitution"
-        )
-        raise s.stalled(int(stuck[0]), reason)
 
 
 def _release(s: State) -> None:

@@ -6,7 +6,6 @@ the block is through. So nothing depends on which particles share a block.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -45,7 +44,7 @@ class EventLog:
         self._knots: list[tuple[Ints, Floats]] = []
         self._events: list[tuple[Ints, int | Ints, int | Ints, Floats, Floats]] = []
         self._books: list[tuple[Ints, Floats, Ints]] = []
-        # The same, joined.
+        # The same, joined, `MANY` at a time.
         self._old_knots: list[tuple[Ints, Floats]] = []
         self._old_events: list[NDArray[Any]] = []
         self._old_books: list[tuple[Ints, Floats, Ints]] = []
@@ -53,9 +52,7 @@ class EventLog:
     def knots(self, index: Ints, state: Floats) -> None:
         """Add a knot for each of the particles; `state` (9, k) is kept, not copied."""
         self._knots.append((index, state))
-        if len(self._knots) >= MANY:
-            self._old_knots.append((_joined(self._knots, 0), _joined(self._knots, 1)))
-            self._knots.clear()
+        _join(self._knots, self._old_knots)
 
     def events(
         self,
@@ -87,10 +84,7 @@ class EventLog:
     def book(self, index: Ints, surface: Ints, entries: Floats) -> None:
         """Note ledger entries (3, k), J, on surfaces."""
         self._books.append((index, entries, surface))
-        if len(self._books) >= MANY:
-            index, entries, surface = (_joined(self._books, n) for n in range(3))
-            self._old_books.append((index, entries, surface))
-            self._books.clear()
+        _join(self._books, self._old_books)
 
     def close(self, recorder: Recorder) -> None:
         """Hand everything over."""
@@ -104,7 +98,7 @@ class EventLog:
         if self._events:
             recorder.tell(self._laid_out())
         if books:
-            owner, entries, surface = (_joined(books, n) for n in range(3))
+            owner, entries, surface = _joined(books)
             if self.count > 1:
                 order = _by_particle(owner)
                 owner, surface, entries = owner[order], surface[order], entries[:, order]
@@ -130,7 +124,7 @@ class EventLog:
 
     def _tracks(self, knots: list[tuple[Ints, Floats]]) -> tuple[Floats, Ints]:
         """Return knots, particle by particle, (K, 9), and how many each has, (count,)."""
-        owner = _joined(knots, 0)
+        owner = np.concatenate([index for index, _ in knots])
         place = np.empty(len(owner), dtype=np.int64)
         place[_by_particle(owner)] = np.arange(len(owner))
         rows, begin = np.empty((len(owner), STATE)), 0
@@ -140,9 +134,15 @@ class EventLog:
         return rows, np.bincount(owner, minlength=self.count)
 
 
-def _joined(chunks: Sequence[tuple[Any, ...]], part: int) -> NDArray[Any]:
-    """Join one part of each chunk along the particles."""
-    return np.concatenate([chunk[part] for chunk in chunks], axis=-1)
+def _joined(chunks: list[Any]) -> Any:
+    """Join each part of the chunks, a tuple each, along the particles."""
+    return tuple(np.concatenate(part, axis=-1) for part in zip(*chunks, strict=True))
+
+
+def _join(chunks: list[Any], old: list[Any]) -> None:
+    if len(chunks) >= MANY:
+        old.append(_joined(chunks))
+        chunks.clear()
 
 
 def _by_particle(owner: Ints) -> Ints:

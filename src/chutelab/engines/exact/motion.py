@@ -211,7 +211,9 @@ def slide(s: State, index: Ints) -> None:
     # The slip is linear in time, while there is one.
     slip = dot(motion.velocity, c.tangent) + s.z[index] - c.belt
     rate = dot(pull, c.tangent) + (2.0 * force if s.spins else 0.0)
-    grips, ends = _grip(s.slip[index], slip, rate), _end(s, motion)
+    fading = s.slip[index] * rate < 0.0
+    grips = np.where(fading, np.maximum(-slip / np.where(fading, rate, 1.0), 0.0), np.inf)
+    ends = _end(s, motion)
     stops = s.stop[index] - s.age[index]
     dt, hits, meeting = _next(s, motion, np.minimum(np.minimum(grips, ends), stops))
     mean = np.where(s.slip[index] == 0.0, 0.0, slip + 0.5 * rate * dt)
@@ -283,12 +285,6 @@ def _stop(s: State, index: Ints) -> None:
         s.finish(index, "time")
 
 
-def _grip(sign: Floats, slip: Floats, rate: Floats) -> Floats:
-    """Return the times until the slip is used up; inf where there is none or it grows."""
-    fading = (sign != 0.0) & (sign * rate < 0.0)
-    return np.where(fading, np.maximum(-slip / np.where(fading, rate, 1.0), 0.0), np.inf)
-
-
 def _end(s: State, motion: Motion) -> Floats:
     """Return the times until the face ends."""
     index, on, o = motion.rows, s.on[motion.rows], s.obstacles
@@ -303,7 +299,7 @@ def _exit(s: State, motion: Motion) -> Floats:
     """Time until a flight leaves the scene; never in a run that lasts a number of seconds."""
     if s.machine.until == "time":
         return np.full(len(motion.rows), np.inf)
-    left, right, bottom, top = (side[motion.rows] for side in s.exit_box)
+    left, right, bottom, top = s.exit_box[:, motion.rows]
     (x, y), (vx, vy) = motion.position, motion.velocity
     fall = rows_of(s.fall, motion.rows)
     time = _when(y - bottom, vy, fall[1])

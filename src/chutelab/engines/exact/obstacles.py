@@ -10,7 +10,7 @@ reads lies together.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from sys import float_info
 
@@ -104,14 +104,9 @@ class Obstacles:
         return np.asarray(owns & (circle != self.pulley))
 
     @cached_property
-    def bound_low(self) -> Floats:
-        """Lower sides of boxes that hold `low` for all particles, (2, S + C)."""
-        return np.asarray(self.low[..., 0] if self.low.shape[-1] == 1 else self.low.min(axis=-1))
-
-    @cached_property
-    def bound_high(self) -> Floats:
-        """Upper sides of the same boxes."""
-        return np.asarray(self.high[..., 0] if self.high.shape[-1] == 1 else self.high.max(axis=-1))
+    def bound(self) -> tuple[Floats, Floats]:
+        """Lower and upper sides of boxes that hold those of all particles, (2, S + C) each, m."""
+        return self.low.min(axis=-1), self.high.max(axis=-1)
 
     @cached_property
     def numbers(self) -> tuple[Ints, Ints]:
@@ -171,7 +166,6 @@ class Obstacles:
         """Return the obstacles of the particles from `first` up to `last`."""
         if self.length.shape[-1] == 1:
             return self
-        assert {f.name for f in fields(self)}.issuperset(PER_PARTICLE)
         return replace(
             self, **{name: getattr(self, name)[..., first:last] for name in PER_PARTICLE}
         )

@@ -1,8 +1,7 @@
-"""The state of a block of particles of an exact run, and what all blocks share, the `World`."""
+"""The state of a block of particles of an exact run."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from sys import float_info
 from typing import NamedTuple
@@ -12,40 +11,12 @@ from numpy.typing import ArrayLike
 
 from chutelab.engines.exact.detect import Bounds, Past
 from chutelab.engines.exact.event_log import STATE, EventLog
-from chutelab.engines.exact.obstacles import NONE, Obstacles, along, obstacles, pick
-from chutelab.machine import Machine, origin
+from chutelab.engines.exact.obstacles import NONE, Obstacles, along, pick
+from chutelab.machine import Machine
 from chutelab.mechanics.impact import DISK_SHARE
 from chutelab.results import REASONS, Kind
-from chutelab.results.recorder import Recorder, StalledError
-from chutelab.util.arrays import Bools, Floats, Ints, Numbers
-
-
-@dataclass(eq=False)
-class World:
-    """A machine as all blocks share it."""
-
-    machine: Machine
-
-    @cached_property
-    def origin(self) -> tuple[float, float]:
-        """World point from which the engine counts positions, m."""
-        return origin(self.machine)
-
-    @cached_property
-    def obstacles(self) -> Obstacles:
-        """Its surfaces, from there."""
-        return obstacles(self.machine, self.origin)
-
-    @cached_property
-    def exit_box(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Left, right, bottom and top of `Machine.exit_box`, from the origin, (N,) each, m."""
-        left, right, bottom, top = map(self.of_each, self.machine.exit_box)
-        x, y = self.origin
-        return left - x, right - x, bottom - y, top - y
-
-    def of_each(self, value: Numbers) -> Floats:
-        """Return a number of the machine for each particle, (N,)."""
-        return np.broadcast_to(value, self.machine.count)
+from chutelab.results.recorder import StalledError
+from chutelab.util.arrays import Bools, Floats, Ints
 
 
 class Mode:
@@ -115,15 +86,21 @@ class State:
         Why each ended, an index into `REASONS`.
     """
 
-    def __init__(self, world: World, first: int, last: int) -> None:
-        machine, count = world.machine, last - first
-        self.world, self.machine = world, machine
-        self.obstacles = world.obstacles.of(first, last)
-        self.origin = np.reshape(world.origin, (2, 1)) if any(world.origin) else None
+    def __init__(
+        self,
+        machine: Machine,
+        surfaces: Obstacles,
+        origin: tuple[float, float],
+        first: int,
+        last: int,
+    ) -> None:
+        count = last - first
+        self.machine, self.obstacles = machine, surfaces.of(first, last)
+        self.origin = np.reshape(origin, (2, 1)) if any(origin) else None
         self.log = EventLog(first, count)
         mine, particle = slice(first, last), machine.particle
         self.radius, self.mass, self.gravity, inertia, end = (
-            world.of_each(value)[mine]
+            np.broadcast_to(value, machine.count)[mine]
             for value in (
                 particle.radius, particle.mass, machine.gravity, particle.inertia, machine.end_time,
             )
@@ -158,21 +135,16 @@ class State:
         self.first, self.rounds = first, 0
 
     @cached_property
-    def exit_box(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Left, right, bottom and top beyond which each particle has left the scene, m."""
+    def exit_box(self) -> Floats:
+        """Left, right, bottom and top beyond which each particle has left the scene, (4, k), m."""
         mine = slice(self.first, self.first + len(self.mode))
-        left, right, bottom, top = (side[mine] for side in self.world.exit_box)
-        return left, right, bottom, top
+        each = [np.broadcast_to(side, self.machine.count)[mine] for side in self.machine.exit_box]
+        return np.stack(each) - (0.0 if self.origin is None else np.repeat(self.origin, 2, axis=0))
 
     @cached_property
     def bounds(self) -> Bounds:
         """Where rides round circles end."""
         return Bounds.free(len(self.mode))
-
-    def hand_over(self, recorder: Recorder) -> None:
-        """Give all that was written down to the recorder."""
-        recorder.ended[self.first : self.first + len(self.ended)] = self.ended
-        self.log.close(recorder)
 
     def count_idle(self, index: Ints, dt: Floats) -> None:
         """Count events in a row that take no time, and raise rather than hang if they never end."""
@@ -211,13 +183,20 @@ class State:
         return self.z[index] / self.radius[index] if self.spins else np.zeros(len(index))
 
     def contact(
-        self, index: Ints, obstacle: Ints, side: Floats, normal: Floats | None = None
+        self,
+        index: Ints,
+        obstacle: Ints | None = None,
+        side: Floats | None = None,
+        normal: Floats | None = None,
     ) -> Contact:
         """Return what a contact with an obstacle is like where the particles are now.
 
-        The side of a circle may be left open, 0: it is that where they are.
+        By default with the one they are on. The side of a circle may be left open, 0: it is that
+        where they are.
         """
         o = self.obstacles
+        obstacle = self.on[index] if obstacle is None else obstacle
+        side = self.side[index] if side is None else side
         if normal is None:
             normal = o.normal_at(index, obstacle, side, self.p)
         tangent, material = along(normal), pick(o.material, index, obstacle)

@@ -247,9 +247,9 @@ def test_a_run_says_who_rode_into_others_round_the_pulley():
     assert list(found) == ["particles", "deepest", "grip"]
     assert 1 < found["particles"] <= 20
     assert 0.0 < found["deepest"] < 2.0 * 0.004
-    said = f"{found['particles']} particles rode into others round the pulley, "
+    said = f"{found['particles']} particles ride into others round the pulley, "
     assert f"{said}{found['deepest']:.6g} m deep at most" in text
-    assert "rode into" not in call("run", "stream", "--set", "stream.count=3").stdout
+    assert "ride into" not in call("run", "stream", "--set", "stream.count=3").stdout
 
 
 def test_an_accuracy_is_reported_in_text_json_and_file():

@@ -14,7 +14,7 @@ from time import perf_counter
 from types import FrameType
 from typing import Any
 
-from chutelab.checks.stress import Evidence, Finding, judge
+from chutelab.checks.stress import Evidence, Verdict, judge
 from chutelab.checks.stress.laws import unseen
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
@@ -75,7 +75,7 @@ def run(
     return Evidence(build(scene), recording)
 
 
-def findings(case: Case, engine: str, dt: float | None) -> list[Finding]:
+def findings(case: Case, engine: str, dt: float | None) -> list[Verdict]:
     """Run a case and judge it by all laws and by what it asks for besides.
 
     Returns nothing if the engine refuses the scene, and may.
@@ -99,10 +99,10 @@ def findings(case: Case, engine: str, dt: float | None) -> list[Finding]:
     found = judge(e)
     for name, verdict in demands(case, e).items():
         excused = name in UNSEEN and not verdict.holds
-        found.append(Finding(name, verdict, unseen(e) if excused else ""))
+        found.append(replace(verdict, law=name, unpromised=unseen(e) if excused else ""))
     if case.twin is not None:
         other = run(case.twin.tables, engine, dt, case.patience, case.name)
-        found.append(Finding(case.twin.law, symmetric(e, other, case.twin)))
+        found.append(replace(symmetric(e, other, case.twin), law=case.twin.law))
     return found
 
 

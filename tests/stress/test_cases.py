@@ -27,7 +27,7 @@ def test_it_keeps_the_laws(case, engine, dt):
     found = findings(case, engine, dt)
     for one in found:
         if one.unpromised:
-            print(f"not promised: {one.law}, {one.verdict.detail}; {one.unpromised}")  # noqa: T201
+            print(f"not promised: {one.law}, {one.detail}; {one.unpromised}")  # noqa: T201
     assert [one for one in found if one.broken] == []
 
 

@@ -88,7 +88,7 @@ def test_a_run_is_judged_by_every_law_that_applies():
         "no one through", "no one inside", "bounces off something", "released into room",
         "energy never rises", "ledger closes", "ends as it must",
     ]  # fmt: skip
-    assert all(one.verdict.holds for one in found)
+    assert all(one.holds for one in found)
 
 
 def test_a_broken_law_a_broken_demand_and_another_twin_are_found(monkeypatch):

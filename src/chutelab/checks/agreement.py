@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import groupby
 from math import degrees, inf, isfinite, log, nan, radians
 from typing import Final
 
@@ -20,10 +21,12 @@ from chutelab.results import Recording
 from chutelab.results.comparison import compare, relative_error, scales
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import measure
-from chutelab.scene import Expect, Scene, SceneError
+from chutelab.scene import Scene, SceneError
 from chutelab.scene.rules import SYMBOLS, unit_of
+from chutelab.scene.units import with_unit, write_size
 from chutelab.studies.accuracy import UNABLE, answer, because, distance, stirred
-from chutelab.theory import Transfer, predict
+from chutelab.theory import predict
+from chutelab.util.tables import Sheet
 
 ANSWERS: Final = {
     "theory": ("closed form, NumPy", "nothing, not even the machine"),
@@ -72,8 +75,8 @@ class Agreement:
 
     pair: str
     quantity: str
-    difference: float | None
-    tolerance: float | None
+    difference: float | None = None
+    tolerance: float | None = None
     least: bool = False
 
     @property
@@ -105,7 +108,7 @@ def agreement(scene: Scene) -> tuple[Agreement, ...]:
         try:
             found[name] = answer(alone, name)
         except UNABLE as error:
-            rows.append(Agreement(name, f"left out: {because(error)}", None, None))
+            rows.append(Agreement(name, f"left out: {because(error)}"))
     if not found:
         return tuple(rows)
     base = next(iter(found))
@@ -121,13 +124,11 @@ def agreement(scene: Scene) -> tuple[Agreement, ...]:
             what = "largest relative error"
             rows.append(Agreement(f"{name}, theory", what, compared.max, allowed))
         elif name == base:
-            rows.append(Agreement(f"{name}, theory", compared.reason, None, None))
+            rows.append(Agreement(f"{name}, theory", compared.reason))
         if name != base:
             rows.append(_with_base(alone, name, recording, found[base], allowed))
     if not isfinite(growth):
-        rows.append(
-            Agreement(base, f"a change of the inputs by {STIR:g} changes what happens", None, None)
-        )
+        rows.append(Agreement(base, f"a change of the inputs by {STIR:g} changes what happens"))
     return tuple(rows)
 
 
@@ -248,6 +249,47 @@ class Verification:
         rows: tuple[Finding | Agreement, ...] = (*self.findings, *self.agreements)
         return sum(not row.holds for row in rows)
 
+    def sheets(self, title: str) -> tuple[Sheet, Sheet]:
+        """Return what the scene is to show, and its particle 0 in one answer against another."""
+        rows: list[tuple[str, ...]] = []
+        for (quantity, source, unit), findings in groupby(
+            self.findings, lambda row: (row.quantity, row.source, row.unit)
+        ):
+            rows.append((f"{with_unit(quantity, unit)}: {source}",))
+            for row in findings:
+                size = "%" if row.relative else unit
+                rows.append((
+                    row.engine,
+                    *(f"{x:.8g}" if isfinite(x) else "-" for x in (row.expected, row.simulated)),
+                    write_size(row.error, size, 2) if isfinite(row.error) else "-",
+                    "-" if row.tolerance is None else write_size(row.tolerance, size),
+                    _verdict(row),
+                ))  # fmt: skip
+        heads = ("", "expected", "simulated", "error", "tolerance", "") if rows else ("",) * 6
+        left_out = tuple(f"{engine} is left out: {why}" for engine, why in self.skipped.items())
+        pairs, notes = [], []
+        for one in self.agreements:
+            said = f"{one.pair.replace(', ', ' - ')}: {one.quantity}"
+            form = ".1f" if one.least else ".1e"
+            difference, tolerance = (
+                "-" if x is None else f"{x:{form}}" for x in (one.difference, one.tolerance)
+            )
+            if difference == tolerance == "-":
+                notes.append(said)
+            else:
+                pairs.append((said, difference, ">= " * one.least + tolerance, _verdict(one)))
+        alone = "Particle 0 alone, one answer against another"
+        return (
+            Sheet(title, heads, tuple(rows), tail=1, notes=left_out),
+            Sheet(
+                alone, ("", "difference", "tolerance", ""), tuple(pairs), tail=1, notes=tuple(notes)
+            ),
+        )
+
+
+def _verdict(row: Finding | Agreement) -> str:
+    return "" if row.tolerance is None else "ok" if row.holds else "FAILED"
+
 
 def verify(scene: Scene, progress: Callable[[float], None] | None = None) -> Verification:
     """Run a scene on every engine that applies; look at what it is expected to show.
@@ -270,70 +312,49 @@ def verify(scene: Scene, progress: Callable[[float], None] | None = None) -> Ver
     prediction = predict(scene)
     findings: list[Finding] = []
     for expect in scene.expect:
-        for engine, recording in recordings.items():
-            value = measure(recording, expect.quantity)
-            turned_over = ledger(recording).turned_over
-            findings.append(_finding(scene, expect, engine, value, prediction, turned_over))
-        # What the theory has to say of an expectation that is not its own.
-        if expect.value != "theory" and expect.quantity in SYMBOLS:
-            value = _predicted(prediction, expect.quantity)
-            if isfinite(value):
-                findings.append(_finding(scene, expect, "theory", value, prediction, nan))
+        quantity, unit = expect.quantity, unit_of(expect.quantity, scene.surfaces)
+        assert unit is not None
+        predicted = nan
+        if quantity in SYMBOLS:
+            predicted = float(getattr(prediction, quantity.removesuffix("_deg")))
+            predicted = degrees(predicted) if quantity.endswith("_deg") else predicted
+        values = {engine: measure(recordings[engine], quantity) for engine in recordings}
+        expected = predicted
+        if not isinstance(expect.value, str):
+            expected = float(expect.value)
+            # What the theory has to say of an expectation that is not its own.
+            if isfinite(predicted):
+                values["theory"] = predicted
+        for engine, simulated in values.items():
+            tolerance, size = expect.allowed(engine) or (None, "%")
+            # An entry is measured by itself, but what should be nothing by what was turned over.
+            scale = 0.0
+            if quantity == "ledger.residual":
+                scale = ledger(recordings[engine]).turned_over
+            elif unit and not quantity.startswith("ledger."):
+                scale = scales(scene, prediction)[KINDS[unit]]
+            off = abs(simulated - expected)
+            if size == "%":
+                one, other = simulated, expected
+                if unit == "degrees":
+                    one, other = radians(one), radians(other)
+                off = float(relative_error(one, other, scale))
+            findings.append(
+                Finding(
+                    quantity, unit, expect.source, engine, expected, simulated, off,
+                    tolerance, relative=size == "%",
+                )
+            )  # fmt: skip
     return Verification(tuple(findings), agreement(scene), skipped)
 
 
 def _skipped(scene: Scene) -> dict[str, str]:
     """Return the engines that a scene is not for, with the reason."""
     stream = scene.stream
-    if stream.interact and stream.count > 1:
+    if stream.crowded:
         return {"exact": "particles meet each other"}
     if scene.particle.radius == 0.0:
         return dict.fromkeys(("contact", "pymunk"), "it has no mass points")
     if stream.count > MOST_ALONE:
         return {"pymunk": f"{stream.count} particles that do not meet would take it minutes"}
     return {}
-
-
-def _predicted(prediction: Transfer, symbol: str) -> float:
-    value = float(getattr(prediction, symbol.removesuffix("_deg")))
-    return degrees(value) if symbol.endswith("_deg") else value
-
-
-def _finding(
-    scene: Scene,
-    expect: Expect,
-    engine: str,
-    simulated: float,
-    prediction: Transfer,
-    turned_over: float,
-) -> Finding:
-    unit = unit_of(expect.quantity, scene.surfaces)
-    assert unit is not None
-    expected = (
-        _predicted(prediction, expect.quantity)
-        if isinstance(expect.value, str)
-        else float(expect.value)
-    )
-    allowed = expect.allowed(engine)
-    relative = allowed is None or allowed[1] == "%"
-    # An entry is measured by itself, but what should be nothing by what was turned over.
-    scale = turned_over if expect.quantity == "ledger.residual" else 0.0
-    if unit and not expect.quantity.startswith("ledger."):
-        scale = scales(scene, prediction)[KINDS[unit]]
-    if not relative:
-        error = abs(simulated - expected)
-    elif unit == "degrees":
-        error = float(relative_error(radians(simulated), radians(expected), scale))
-    else:
-        error = float(relative_error(simulated, expected, scale))
-    return Finding(
-        quantity=expect.quantity,
-        unit=unit,
-        source=expect.source,
-        engine=engine,
-        expected=expected,
-        simulated=simulated,
-        error=error,
-        tolerance=None if allowed is None else allowed[0],
-        relative=relative,
-    )

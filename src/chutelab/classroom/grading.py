@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, Final
 from chutelab.classroom.exercises import ExerciseError, Task, lesson
 from chutelab.classroom.exercises.catalogue import UNNAMED
 from chutelab.classroom.exercises.exercise import plain
-from chutelab.util.errors import InputError
+from chutelab.util.errors import InputError, MissingLibraryError
 from chutelab.util.files import csv_lines, write_lines
 
 if TYPE_CHECKING:  # of the extra "notebook"
@@ -239,14 +239,14 @@ def grade(
 
     Raises
     ------
-    ImportError
+    MissingLibraryError
         Without nbclient, which the extra ``notebook`` brings.
     """
     try:
         import nbclient  # noqa: F401 - with it come nbformat and jupyter_client
     except ModuleNotFoundError as error:
         message = 'grading needs nbclient: python -m pip install "chutelab[notebook]"'
-        raise ImportError(message) from error
+        raise MissingLibraryError(message) from error
     files = [str(path) for path in paths]
     grades: list[Grade] = []
     for index, file in enumerate(files):

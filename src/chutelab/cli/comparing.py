@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -11,24 +10,15 @@ from chutelab.cli.console import progress, show, show_json
 from chutelab.cli.output import destination, write_json
 from chutelab.cli.parameters import json_option, out_option, scene_argument, set_option
 
-if TYPE_CHECKING:
-    from rich.console import RenderableType
-
 FILES = ("compare.png", "points.csv", "fit.json")
 
 
-def _point(_ctx: click.Context, _parameter: click.Parameter, text: str) -> tuple[float, float]:
+def _point(text: str) -> tuple[float, float]:
     try:
         x, y = (float(part) for part in text.split(","))
     except ValueError:
         raise click.BadParameter(f"{text!r}: two numbers X,Y, such as 320,95.5") from None
     return x, y
-
-
-def _keys(
-    _ctx: click.Context, _parameter: click.Parameter, values: tuple[str, ...]
-) -> tuple[str, ...]:
-    return tuple(key.strip() for value in values for key in value.split(","))
 
 
 @click.command(short_help="Lay measured points over a scene; fit the scene to them.")
@@ -51,7 +41,7 @@ def _keys(
     "--origin",
     metavar="X,Y",
     default="0,0",
-    callback=_point,
+    type=_point,
     help="The pulley's axis, in the units of the file.",
 )
 @click.option("--flip-y", is_flag=True, help="y is counted downward in the file, as pixels are.")
@@ -64,10 +54,9 @@ def _keys(
 )
 @click.option(
     "--fit",
-    "keys",
+    "fitted",
     metavar="KEYS",
     multiple=True,
-    callback=_keys,
     help="Fit these, such as plate.restitution,incoming.speed. May be repeated.",
 )
 @click.option("--robust", is_flag=True, help="With --fit: give points far off less weight.")
@@ -82,7 +71,7 @@ def compare(
     origin: tuple[float, float],
     flip_y: bool,
     t0: float,
-    keys: tuple[str, ...],
+    fitted: tuple[str, ...],
     robust: bool,
     overrides: tuple[str, ...],
     out: Path | None,
@@ -111,13 +100,12 @@ def compare(
     s² (JᵀJ)⁻¹ from how the points respond to the parameters (J) and how much they scatter (s): they
     hold if errors are independent and the model is right. Needs pip install "chutelab[fit]".
     """  # noqa: D301 - click wants the backspace
-    from rich.text import Text
-
     from chutelab.scene import load
     from chutelab.studies import measured
     from chutelab.studies.measured.result import advice, as_dict, points_csv
     from chutelab.util.tables import wrapped
 
+    keys = tuple(key.strip() for value in fitted for key in value.split(","))
     if robust and not keys:
         raise click.UsageError("--robust is for fits: name what to fit with --fit.")
     loaded = load(scene, overrides)
@@ -127,21 +115,24 @@ def compare(
             fit = measured.fit(loaded, film, keys, robust=robust) if keys else None
             found = measured.residuals(loaded, film) if fit is None else fit.after
         if place is not None:
-            from chutelab.pictures.plots.measured import measured as plot
+            from chutelab.pictures.plots.measured import measured as draw
 
             with progress("drawing"):
-                plot(found, fit).write(place / "compare.png")
+                draw(found, fit).write(place / "compare.png")
                 (place / "points.csv").write_text(points_csv(found), encoding="utf-8")
                 if fit is not None:
                     write_json(as_dict(found, fit), place / "fit.json")
     if as_json:
         show_json(as_dict(found, fit))
         return
-    head = Text(found.recording.title, style="bold")
-    head.append(f"\n{found.track.said()}", style="not bold")
+    from rich.console import RenderableType
+    from rich.text import Text
+
+    head = Text(found.recording.title, style="bold").append(f"\n{film.said()}", style="not bold")
     parts: list[RenderableType] = [head, found] if fit is None else [head, fit, found]
     if fit is None and (advised := advice(found)):
         parts.append(Text("\n" + "\n".join(wrapped(f"note: {advised}"))))
     show(*parts)
     if out is not None:
-        click.echo(f"wrote into {out}: {', '.join(FILES if fit is not None else FILES[:-1])}")
+        names = [name for name in FILES if fit is not None or name != "fit.json"]
+        click.echo(f"wrote into {out}: {', '.join(names)}")

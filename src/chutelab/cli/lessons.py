@@ -247,11 +247,8 @@ def grade(files: tuple[Path, ...], out: Path | None, time_limit: float, quiet: b
             raise RefusedError(f"{file}: there is no notebook (*.ipynb) in this folder")
         notebooks += found
     check_file("--out", out)
-    try:
-        with progress("running the notebooks", quiet=quiet) as update:
-            grades = grade_notebooks(notebooks, time_limit=time_limit, progress=update)
-    except ImportError as error:
-        raise RefusedError(str(error)) from error
+    with progress("running the notebooks", quiet=quiet) as update:
+        grades = grade_notebooks(notebooks, time_limit=time_limit, progress=update)
     if not quiet:
         rows = []
         for one in grades:

@@ -52,18 +52,8 @@ USUAL = ("png", "gif", "csv", "npz", "json")
 def destination(folder: Path | None, names: Iterable[str] = ()) -> Iterator[Path | None]:
     """Give an empty folder to write to; at the end its files move to `folder`, which is made.
 
-    To be entered before a long run, so that a folder that cannot be written to is refused at once.
-    None stays None.
-
-    Parameters
-    ----------
-    names : iterable of str
-        Of files that may be written: none may be the name of a folder in there.
-
-    Raises
-    ------
-    RefusedError
-        If the folder cannot be written to, or is none.
+    To be entered before a long run: refused at once is what cannot be written to, is no folder, or
+    has folders in it that are called like the files, `names`. None stays None.
     """
     if folder is None:
         yield None
@@ -88,21 +78,9 @@ def destination(folder: Path | None, names: Iterable[str] = ()) -> Iterator[Path
 
 
 def check_file(option: str, path: Path | None, suffixes: Sequence[str] = ()) -> None:
-    """Refuse, before anything runs, a file that cannot be written.
+    """Refuse, before anything runs, the file of an option if it cannot be written.
 
-    Parameters
-    ----------
-    option : str
-        What it was given with.
-    path : Path or None
-        The file; None is no file, which will do.
-    suffixes : sequence of str
-        Those allowed, with their points; none allows any.
-
-    Raises
-    ------
-    RefusedError
-        If the name ends otherwise, or it is a folder, or is in none.
+    So if it is a folder, is in none, or does not end in one of `suffixes`, if there are some.
     """
     if path is None:
         return
@@ -116,19 +94,9 @@ def check_file(option: str, path: Path | None, suffixes: Sequence[str] = ()) -> 
 
 @contextmanager
 def writing(what: str = "", instead: str = "") -> Iterator[None]:
-    """Turn a file that cannot be written into a message.
+    """Turn the OSError of a file that cannot be written into a `RefusedError`.
 
-    Parameters
-    ----------
-    what : str
-        What the message calls it; by default what the error does.
-    instead : str
-        What to give in its place, if something can be given.
-
-    Raises
-    ------
-    RefusedError
-        From an OSError.
+    It calls the file `what`, by default what the error does, and says what to give `instead`.
     """
     try:
         yield
@@ -254,12 +222,9 @@ def output_options(command: Callable[..., None]) -> Callable[..., None]:
                 )
             kinds = tuple(kind for kind in KINDS if kind == film or kind in set(kinds) - set(FILMS))
         for kind in {"mp4", "webm"}.intersection(kinds):
-            from chutelab.pictures.animation import VideoError, need_video
+            from chutelab.pictures.animation import need_video
 
-            try:
-                need_video(kind)
-            except VideoError as error:
-                raise RefusedError(str(error)) from error
+            need_video(kind)
         command(**others, output=Output(out, kinds, as_json, quiet))
 
     options = (

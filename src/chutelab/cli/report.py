@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
 
 import numpy as np
 from rich.console import RenderableType
@@ -37,7 +36,8 @@ def report(recording: Recording, accuracy: Accuracy | None = None) -> list[Rende
     if compared.notes and (way := _way(recording)).rows:
         parts.append(way)
     parts.append(ledger(recording))
-    parts += [Sheet("", (), (), notes=(note,)) for note in _notes(recording)]
+    notes = (waits(recording), squeezed(recording), rolling(recording))
+    parts += [Sheet("", (), (), notes=(f"{note}.",)) for note in notes if note is not None]
     if accuracy is not None:
         what = "relative error" if accuracy.unit == "relative" else "error of places"
         said = "cannot be told"
@@ -66,32 +66,3 @@ def _way(recording: Recording) -> Sheet:
         rows.append((f"{what} {name}", *(number(float(value)) for value in numbers)))
     heads = ("", "t, s", "x, m", "y, m", "vx, m/s", "vy, m/s")
     return Sheet("Particle 0, its first contacts", heads, tuple(rows))
-
-
-def _notes(recording: Recording) -> Iterator[str]:
-    """Yield what happened that is easily overlooked."""
-    if (late := waits(recording)) is not None:
-        said = []
-        if late.particles:
-            said.append(
-                f"{_many(late.particles, 'particle')} waited for a free place to be released,"
-                f" {number(late.longest)} s at most and {number(late.mean)} s on average"
-            )
-        if late.never:
-            said.append(f"{late.never} found no free place until the end")
-        yield "; ".join(said) + "."
-    if (pressed := squeezed(recording)) is not None:
-        yield (
-            f"{pressed.particles} particles rode into others round the pulley,"
-            f" {number(pressed.deepest)} m deep at most: adhesion carries all layers at one speed,"
-            f" the lower ones on smaller circles, and v²/(g rho) = {pressed.grip:.3g} keeps the"
-            " highest there past the top."
-        )
-    if (left := rolling(recording)) is not None:
-        disks = "1 disk rolls" if left.particles == 1 else f"{left.particles} disks roll"
-        yield (
-            f"{disks} on the outgoing belt: nothing slips, and nothing is carried along. The belt"
-            f" has paid {number(left.belt_work)} J, loads that are carried take"
-            f" {number(left.belt_work_carried)} J (a disk that arrives without turning takes a"
-            " third of a carried load's work)."
-        )

@@ -20,13 +20,10 @@ from chutelab.cli.program import RefusedError, StuckError
 from chutelab.util.errors import InputError
 
 if TYPE_CHECKING:
-    from chutelab.scene.variants import Vary
     from chutelab.studies.accuracy import Accuracy, Wanted
 
 
-def _accuracy(_ctx: click.Context, _parameter: click.Parameter, text: str | None) -> Wanted | None:
-    if text is None:
-        return None
+def _accuracy(text: str) -> Wanted:
     from chutelab.studies.accuracy import parse
 
     try:
@@ -42,7 +39,7 @@ def _accuracy(_ctx: click.Context, _parameter: click.Parameter, text: str | None
 @click.option(
     "--accuracy",
     metavar="A",
-    callback=_accuracy,
+    type=_accuracy,
     help="Choose engine and step so that errors are at most this: relative, such as 1e-6, or a"
     " length, such as 1mm; say what was reached.",
 )
@@ -134,14 +131,6 @@ def show(recording: Path, output: Output) -> None:
     output.tell(loaded)
 
 
-def _varies(
-    _ctx: click.Context, _parameter: click.Parameter, texts: tuple[str, ...]
-) -> tuple[Vary, ...]:
-    from chutelab.scene.variants import parse
-
-    return tuple(parse(text) for text in texts)
-
-
 @click.command(short_help="Write a page with sliders that any browser opens.")
 @scene_argument
 @click.option(
@@ -149,7 +138,6 @@ def _varies(
     "varies",
     metavar="KEY=FROM:TO:COUNT",
     multiple=True,
-    callback=_varies,
     help="A slider: a key of the scene and its values, such as plate.angle_deg=-20:70:46 or"
     " incoming.speed=1,2,4. May be given twice.",
 )
@@ -166,7 +154,7 @@ def _varies(
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing, and no progress bar.")
 def page(
     scene: str,
-    varies: tuple[Vary, ...],
+    varies: tuple[str, ...],
     overrides: tuple[str, ...],
     output: Path | None,
     quiet: bool,
@@ -178,7 +166,9 @@ def page(
     """
     from chutelab.pictures.live.page import write
     from chutelab.scene import load
+    from chutelab.scene.variants import parse
 
+    sliders = [parse(text) for text in varies]
     path = output or Path(f"{Path(scene).name.removesuffix('.toml')}.html")
     if path.is_dir():
         raise RefusedError(f"{path} is a folder; give the name of a file, such as {path}/page.html")
@@ -186,7 +176,7 @@ def page(
         raise RefusedError(f"{path}: there is no folder {path.parent}")
     loaded = load(scene, overrides)
     with writing(str(path)), progress(f"simulating {scene}", quiet=quiet) as update:
-        written = write(loaded, varies, path, progress=update)
+        written = write(loaded, sliders, path, progress=update)
     if not quiet:
         variants = "1 variant" if written.variants == 1 else f"{written.variants} variants"
         click.echo(f"wrote {written.path}, {written.size / 1000:.0f} kB: {variants}")

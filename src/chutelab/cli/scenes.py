@@ -130,16 +130,8 @@ def figure(number: int, out: Path | None, as_json: bool) -> None:
             for name, text in files.items():
                 (place / name).write_text(text, encoding="utf-8")
     if as_json:
-        console.show_json(
-            {
-                "format": 1,
-                "figure": found.number,
-                "title": found.title,
-                "meaning": list(found.meaning),
-                "missing": list(found.missing),
-                "columns": {name: column.tolist() for name, column in found.columns.items()},
-            }
-        )
+        told = {key: getattr(found, key) for key in ("title", "meaning", "missing", "columns")}
+        console.show_json({"format": 1, "figure": found.number, **told})
         return
     console.show(found)
     if out is not None:

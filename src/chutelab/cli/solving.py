@@ -163,18 +163,10 @@ def propagate(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Propagate uncertain inputs, write what was asked for, and print the rest.
+    """Propagate uncertain inputs, as ``--uncertainty`` has them; write what was asked for.
 
-    Parameters
-    ----------
-    scene : Scene
-        Loaded.
-    given : sequence of str
-        What ``--uncertainty`` was given.
-    samples : int or None
-        Of each set of points; None is the default.
-    out, plot : Path or None
-        A CSV file for all samples, and a picture.
+    `samples` is the number of each set of points, None for the default; `out` and `plot` are a CSV
+    file for all samples, and a picture.
     """
     from chutelab.studies import design
     from chutelab.studies.design.uncertainty import SAMPLES, as_dict

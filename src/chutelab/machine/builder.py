@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chutelab.machine.nominal import discharge, plate_hit
+from chutelab.machine.nominal import plate_hit
 from chutelab.machine.parts import Caution, Machine, Particle, Pulley, Segments
 from chutelab.machine.releases import Releases, draw, release_point
 from chutelab.scene import Fault, Scene, SceneError
@@ -200,7 +200,7 @@ def build(scene: Scene) -> Machine:
         end_time=bound if isinstance(until, str) else np.minimum(bound, until),
         dt=scene.run.dt,
         align=scene.run.align,
-        interact=scene.stream.interact and scene.stream.count > 1,
+        interact=scene.stream.crowded,
         pair_restitution=scene.stream.restitution,
         pair_friction=scene.stream.friction,
         engine=scene.run.engine,
@@ -217,7 +217,7 @@ def _conveyors(scene: Scene) -> tuple[list[Part], list[Caution]]:
     ends: list[tuple[Numbers, Numbers]] = [(-belt.length, top), (0.0, top)]
     parts: list[Part] = [("incoming", ends, belt.speed, belt.restitution, grip)]
     warnings: list[Caution] = []
-    hit = plate_hit(scene, discharge(scene))
+    hit = plate_hit(scene)
     missed = np.isnan(hit[1])
     height: Numbers | None = None  # of the outgoing belt's surface
     if out is not None and out.drop_from == "top":

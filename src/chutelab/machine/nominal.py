@@ -5,7 +5,7 @@ Of a family of scenes, the nominal particles of all: what depends on a varied ke
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import inf, nan
 
 import numpy as np
@@ -21,22 +21,19 @@ STEPS = 100_000
 fall off the very top 2,000."""
 
 
-@dataclass(frozen=True)
-class Discharge:
-    """Where free flight begins: position (m) and velocity (m/s), two numbers each.
+Pair = tuple[Numbers, Numbers]
+"""A place (m) or a velocity (m/s) in the world frame."""
 
-    NaN if the particle never leaves forwards (a belt at rest, or one that throws it off backwards).
+
+def discharge(scene: Scene) -> tuple[Pair, Pair]:
+    """Return where free flight of the nominal particle begins: position (m) and velocity (m/s).
+
+    It is followed along belt and pulley. NaN if it never leaves forwards (a belt at rest, or one
+    that throws it off backwards).
     """
-
-    position: tuple[Numbers, Numbers]
-    velocity: tuple[Numbers, Numbers]
-
-
-def discharge(scene: Scene) -> Discharge:
-    """Follow the nominal particle along belt and pulley until it flies."""
     position, velocity = release_point(scene), release_velocity(scene)
     if scene.incoming is None or not on_belt(scene) or velocity[1] != 0.0:
-        return Discharge(position, velocity)
+        return position, velocity
     rho, speed = scene.incoming.pulley_radius + scene.particle.radius, scene.incoming.speed
     if not isinstance(scene.incoming.friction, str):
         return _slip_round(scene, rho, velocity[0], -position[0])
@@ -44,10 +41,10 @@ def discharge(scene: Scene) -> Discharge:
     ratio = np.divide(speed * speed, scene.gravity * rho)
     grip = np.where(np.greater(speed, 0.0), np.minimum(ratio, 1.0), nan)
     sine = np.sqrt((1.0 - grip) * (1.0 + grip))
-    return Discharge((rho * sine, rho * grip), (speed * grip, 0.0 - speed * sine))
+    return (rho * sine, rho * grip), (speed * grip, 0.0 - speed * sine)
 
 
-def _slip_round(scene: Scene, rho: Numbers, speed: Numbers, distance: Numbers) -> Discharge:
+def _slip_round(scene: Scene, rho: Numbers, speed: Numbers, distance: Numbers) -> tuple[Pair, Pair]:
     """Go along belt and pulley with Coulomb friction."""
     assert scene.incoming is not None
     given = (
@@ -68,7 +65,7 @@ def _slip_round(scene: Scene, rho: Numbers, speed: Numbers, distance: Numbers) -
     circle = replace(circle, slip=np.where(slip == 0.0, grip_slip(circle), np.sign(slip)))
     phi, w = (values.reshape(shape) for values in _round_pulley(circle))
     rho, sine, cosine = rho.reshape(shape), np.sin(phi), np.cos(phi)
-    return Discharge((rho * sine, rho * cosine), (w * cosine, -w * sine))
+    return (rho * sine, rho * cosine), (w * cosine, -w * sine)
 
 
 def _along_belt(
@@ -118,7 +115,7 @@ def _some(circle: Circle, which: Ints | Bools) -> Circle:
     return Circle(**{name: array[which] for name, array in vars(circle).items()})
 
 
-def plate_hit(scene: Scene, start: Discharge) -> tuple[Numbers, Numbers]:
+def plate_hit(scene: Scene) -> Pair:
     """Return the centre (m) as it meets the struck face of the unbounded plate; NaN if never.
 
     The face's normal is (-cos α, -sin α); contact is when the centre is r in front of it.
@@ -129,7 +126,7 @@ def plate_hit(scene: Scene, start: Discharge) -> tuple[Numbers, Numbers]:
     nx, ny = -np.cos(alpha), -np.sin(alpha)
     pivot_x = scene.incoming.pulley_radius + scene.plate.distance
     pivot_y = scene.plate.pivot_height
-    (x, y), (vx, vy) = start.position, start.velocity
+    (x, y), (vx, vy) = discharge(scene)
     gap = (x - pivot_x) * nx + (y - pivot_y) * ny - scene.particle.radius
     pace, pull = vx * nx + vy * ny, -scene.gravity * ny
     t = descent(gap, pace, pull)

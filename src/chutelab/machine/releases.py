@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, prod
+from math import acos, degrees, inf, prod
 
 import numpy as np
 
 from chutelab.scene import Scene
 from chutelab.scene.rules import ON_BELT
 from chutelab.util.arrays import Bools, Floats
+from chutelab.util.tables import number
 
 TRIES = 1000
 """Draws of a height that may overlap an earlier particle before it has to wait for its place."""
@@ -101,6 +102,14 @@ class Squeeze:
     deepest: float
     grip: float
 
+    def __str__(self) -> str:
+        return (
+            f"{self.particles} particles ride into others round the pulley,"
+            f" {number(self.deepest)} m deep at most: adhesion carries all layers at one speed, the"
+            f" lower ones on smaller circles, and v²/(g rho) = {self.grip:.3g} keeps the highest"
+            f" there for {degrees(acos(self.grip)):.3g}°, past the top"
+        )
+
 
 def squeeze(scene: Scene, t: Floats, position: Floats) -> Squeeze | None:
     """Return who rides into others; None if nobody does.
@@ -153,7 +162,7 @@ def draw(scene: Scene) -> Releases:
     the bed has room: an engine lets the others wait until their place is free.
     """
     stream, t = scene.stream, schedule(scene)
-    crowded, count = stream.interact and stream.count > 1, len(t)
+    crowded, count = stream.crowded, len(t)
     position, velocity = np.empty((2, count, 2))
     velocity[:, 0], velocity[:, 1] = release_velocity(scene)
     height = np.zeros(count)

@@ -22,6 +22,7 @@ from chutelab.results.recording import ENTRIES, EVENT, REASONS, Kind, Recording
 from chutelab.scene import Scene
 from chutelab.scene.rules import NEEDED, SYMBOLS
 from chutelab.util.arrays import Floats
+from chutelab.util.tables import number
 
 KINDS = {
     "degrees": "angle", "s": "time", "m": "length", "m/s": "speed", "J": "energy", "W": "power",
@@ -255,6 +256,18 @@ class Waits:
     mean: float
     never: int
 
+    def __str__(self) -> str:
+        said = []
+        if self.particles:
+            who = "1 particle" if self.particles == 1 else f"{self.particles} particles"
+            said.append(
+                f"{who} waited for a free place to be released, {number(self.longest)} s at most"
+                f" and {number(self.mean)} s on average"
+            )
+        if self.never:
+            said.append(f"{self.never} found no free place until the end")
+        return "; ".join(said)
+
 
 def waits(recording: Recording) -> Waits | None:
     """Return who waited for its place; None if nobody did."""
@@ -299,6 +312,15 @@ class Rolling:
     particles: int
     belt_work: float
     belt_work_carried: float
+
+    def __str__(self) -> str:
+        disks = "1 disk rolls" if self.particles == 1 else f"{self.particles} disks roll"
+        return (
+            f"{disks} on the outgoing belt: nothing slips, and nothing is carried along. The belt"
+            f" has paid {number(self.belt_work)} J, loads that are carried take"
+            f" {number(self.belt_work_carried)} J (a disk that arrives without turning takes a"
+            " third of a carried load's work)"
+        )
 
 
 def rolling(recording: Recording) -> Rolling | None:

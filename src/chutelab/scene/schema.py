@@ -178,6 +178,11 @@ class Stream(Table):
     restitution: Number = pair_restitution(0.5, "particle-particle")
     friction: Friction = pair_friction(0.3, "particle-particle")
 
+    @property
+    def crowded(self) -> bool:
+        """Whether particles meet each other."""
+        return self.interact and self.count > 1
+
 
 class Run(Table):
     """How the scene is simulated, and until when."""

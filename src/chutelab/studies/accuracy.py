@@ -136,11 +136,8 @@ def _ends(recording: Recording) -> Floats:
 
     Others end where they do because a run has to stop somewhere.
     """
-    scene = recording.scene
-    tables = {"incoming": scene.incoming, "outgoing": scene.outgoing}
-    parts = tables | {free.name: free for free in scene.surface}
-    driven = {name for name, part in parts.items() if part is not None and part.speed != 0.0}
-    still = [k for k, name in enumerate(recording.surfaces[:-1]) if name not in driven]
+    segments = recording.machine.segments
+    still = segments.surface[segments.speed == 0.0]
     settled = recording.select(Kind.SETTLE)
     told = recording.ended == REASONS.index("time")
     told[settled["particle"][np.isin(settled["surface"], still)]] = True
@@ -417,7 +414,7 @@ class Search:
         known = self.by_theory(found)
         if known is not None:
             return known
-        if self.scene.stream.interact and self.scene.stream.count > 1:
+        if self.scene.stream.crowded:
             return self.crowd(found)
         if found.engine not in self.witnesses:
             self.witnesses[found.engine] = self.witness(found)

@@ -7,7 +7,8 @@ recommended.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import acos, ceil, cos, degrees, floor, isnan, log10, radians, sqrt
+from contextlib import suppress
+from math import ceil, cos, floor, isnan, log10, radians, sqrt
 from typing import Any
 
 import numpy as np
@@ -54,22 +55,15 @@ LANDING_ROOM = 0.5
 def advice(
     scene: Scene, machine: Machine, tried: Trial, steps: Stepping | None, cost: Effort
 ) -> Iterator[Advice]:
-    """Yield what may surprise about a scene that works.
-
-    Parameters
-    ----------
-    scene, machine : Scene, Machine
-        The scene, and the same resolved.
-    tried : Trial
-        A run of its first particles.
-    steps : Stepping or None
-        None for the exact engine.
-    cost : Effort
-        What the run is estimated to cost.
-    """
+    """Yield what may surprise about a scene that works; `steps` is None for the exact engine."""
     for caution in machine.warnings:
-        candidates = _candidates(scene, machine, caution)
-        mended = next((one for one in candidates if _helps(scene, machine, one)), {})
+        mended: Settings = {}
+        for settings in _candidates(scene, machine, caution):
+            with suppress(SceneError):
+                changed = build(scene.with_values({**settings, "expect": None}))
+                if len(changed.warnings) < len(machine.warnings):
+                    mended = settings
+                    break
         yield _advised(str(caution), mended, otherwise=LEAVE if caution.crosses else LOOK)
     if steps is not None and not steps.safe and steps.way is not None and steps.longest is not None:
         yield _advised(
@@ -81,7 +75,7 @@ def advice(
     if steps is not None and scene.particle.radius < SMALL:
         small = write_size(SMALL, "m")
         warning = f"particles of less than {small} radius are beyond what pymunk resolves"
-        if scene.stream.interact and scene.stream.count > 1:
+        if scene.stream.crowded:
             yield _advised(warning, {"particle.radius": SMALL})
         else:
             yield _advised(warning, {"run.engine": "auto"}, after=", for the exact engine")
@@ -95,8 +89,7 @@ def advice(
         # Each waits for all that waited before it.
         period = 1.0 / scene.stream.rate + waited.longest / max(1, tried.count - 1)
         yield _advised(
-            f"of {tried.count} particles tried, {waited.particles} wait for a free place to"
-            f" be released, up to {waited.longest:.3g} s",
+            f"of {tried.count} particles tried, {waited}",
             {"stream.rate": _down((1.0 - MARGIN) / period)},
             after=", or a larger stream.bed_height",
         )
@@ -105,10 +98,7 @@ def advice(
         bed = scene.stream.bed_height
         highest = scene.incoming.pulley_radius + scene.particle.radius + bed
         yield _advised(
-            f"of {machine.count} particles, {pressed.particles} ride into others round the pulley,"
-            f" up to {write_size(pressed.deepest, 'm')} deep: all layers run at"
-            f" {scene.incoming.speed:g} m/s, the lower ones on smaller circles, and v²/(g rho) ="
-            f" {pressed.grip:.3g} keeps the highest there for {degrees(acos(pressed.grip)):.3g}°",
+            f"of {machine.count} particles, {pressed}",
             {"incoming.speed": _up(sqrt(scene.gravity * highest))},
             after=f", to leave at the top{', or stream.bed_height = 0' if bed > 0.0 else ''}",
         )
@@ -130,15 +120,6 @@ def _advised(
         for key, value in (settings or {}).items()
     ]
     return Advice(warning, " and ".join(written) + after if written else otherwise, settings or {})
-
-
-def _helps(scene: Scene, machine: Machine, settings: Settings) -> bool:
-    """Tell whether the machine has fewer warnings with some settings."""
-    try:
-        changed = build(scene.with_values({**settings, "expect": None}))
-    except SceneError:
-        return False
-    return len(changed.warnings) < len(machine.warnings)
 
 
 def _candidates(scene: Scene, machine: Machine, caution: Caution) -> Iterator[Settings]:

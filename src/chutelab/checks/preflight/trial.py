@@ -68,11 +68,6 @@ class Trial:
     trouble: str = ""
 
 
-def is_crowd(scene: Scene) -> bool:
-    """Tell whether particles meet each other."""
-    return scene.stream.interact and scene.stream.count > 1
-
-
 def trial(scene: Scene, engine: str) -> Trial:
     """Run the first particles of a scene until they end, or patience does.
 
@@ -81,7 +76,7 @@ def trial(scene: Scene, engine: str) -> Trial:
     SceneError
         If the engine that the scene asks for cannot run it.
     """
-    crowd = is_crowd(scene)
+    crowd = scene.stream.crowded
     most = CROWD if crowd else ALONE if engine == "pymunk" else INDEPENDENT
     count = min(scene.stream.count, most)
     landed = crowd and scene.run.until == "settled" and scene.outgoing is not None
@@ -179,7 +174,7 @@ def effort(scene: Scene, engine: str, tried: Trial) -> Effort:
         who = f"the first of {count:,} particles"
     # How much longer a step takes with all particles than with a few.
     fuller = (BODIES + count) / (BODIES + some)
-    if is_crowd(scene) and (tried.landed or recording is None):
+    if scene.stream.crowded and (tried.landed or recording is None):
         return _crowd(scene, tried, who, fuller)
     if recording is None:
         each = max(1, tried.rounds // ROUNDS) if tried.lone is None else tried.lone.contacts
@@ -191,7 +186,7 @@ def effort(scene: Scene, engine: str, tried: Trial) -> Effort:
     growth = count / some
     if engine == "exact":
         growth = (TOGETHER + count) / (TOGETHER + some)
-    elif is_crowd(scene):
+    elif scene.stream.crowded:
         lasted = float(recording.ends()[1]["t"].max(initial=0.0))
         later = (count - some) / scene.stream.rate
         growth = (1.0 + later / lasted if lasted > 0.0 else 1.0) * fuller

@@ -10,7 +10,7 @@ The scenes that are hard on an engine, and what each asks for besides, are in ``
 """
 
 from chutelab.checks.stress.evidence import EPS, ROUNDINGS, Evidence, Verdict
-from chutelab.checks.stress.laws import A_CONTACT, LAWS, Finding, judge
+from chutelab.checks.stress.laws import A_CONTACT, LAWS, judge
 
 __all__ = [
     "A_CONTACT",
@@ -18,7 +18,6 @@ __all__ = [
     "LAWS",
     "ROUNDINGS",
     "Evidence",
-    "Finding",
     "Verdict",
     "judge",
 ]

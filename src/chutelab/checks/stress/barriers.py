@@ -188,20 +188,21 @@ def _pairs(e: Evidence) -> Iterator[tuple[float, Floats, Floats, tuple[Ints, Int
     for now in _instants(e):
         (first, last), _ = e.recording.at([now, now + e.dt])
         there = np.flatnonzero(np.isfinite(first[:, 0]) & np.isfinite(last[:, 0]))
-        there = there[np.argsort(first[there, 0], kind="stable")]
-        found = [np.zeros((2, 0), dtype=np.int64)]
         room = reach + 2.0 * np.abs(last[there] - first[there]).max(initial=0.0)
-        for n in range(1, len(there)):
-            i, j = there[:-n], there[n:]
-            near = first[j, 0] - first[i, 0] < room
-            if not near.any():
-                break
-            pair = np.stack([i[near], j[near]])
-            touch = np.minimum(_apart(first, pair), _apart(last, pair)) < reach
-            found.append(pair[:, touch])
-        i, j = np.concatenate(found, axis=1)
+        pairs = there[_neighbours(first[there, 0], room)]
+        i, j = pairs[:, np.minimum(_apart(first, pairs), _apart(last, pairs)) < reach]
         if len(i):
             yield float(now), first, last, (i, j)
+
+
+def _neighbours(x: Floats, room: float) -> Ints:
+    """Return all pairs (2, k) whose x differ by less than `room`, m."""
+    order = np.argsort(x, kind="stable")
+    index = np.arange(len(x))
+    ends = np.searchsorted(x[order], x[order] + room)
+    left = np.repeat(index, np.maximum(ends - index - 1, 0))
+    right = left + 1 + np.arange(len(left)) - np.searchsorted(left, left)
+    return order[np.stack([left, right])]
 
 
 def _apart(place: Floats, pairs: tuple[Ints, Ints] | Ints) -> Floats:
@@ -293,17 +294,9 @@ def settled_to_stay(e: Evidence) -> Verdict | None:
 
 def closest(position: Floats, radius: float) -> tuple[float, int, int]:
     """Deepest overlap (m, negative if there is none) of places (n, 2), and of which two."""
-    best = (-np.inf, 0, 0)
-    order = np.argsort(position[:, 0])
-    x, y = position[order].T
-    for n in range(1, len(order)):
-        dx = x[n:] - x[:-n]
-        near = np.flatnonzero(dx < 2.0 * radius)
-        if not len(near):
-            break
-        apart = np.hypot(dx[near], y[n:][near] - y[:-n][near])
-        low = int(np.argmin(apart))
-        found = 2.0 * radius - float(apart[low])
-        if found > best[0]:
-            best = (found, int(order[near[low]]), int(order[near[low] + n]))
-    return best
+    i, j = pairs = _neighbours(position[:, 0], 2.0 * radius)
+    if not len(i):
+        return -np.inf, 0, 0
+    apart = _apart(position, pairs)
+    low = int(np.argmin(apart))
+    return 2.0 * radius - float(apart[low]), int(i[low]), int(j[low])

@@ -187,13 +187,24 @@ class Verdict:
         What it must not exceed.
     detail : str
         Unit, and where it was.
+    law : str
+        The law's name.
+    unpromised : str
+        Why the engine does not promise the law in this run; empty if it does or if it is kept.
     """
 
     figure: float
     bound: float
     detail: str = ""
+    law: str = ""
+    unpromised: str = ""
 
     @property
     def holds(self) -> bool:
         """Whether the law is kept; it never is by a figure that is no number."""
         return self.figure <= self.bound
+
+    @property
+    def broken(self) -> bool:
+        """Whether a promised law is not kept."""
+        return not self.holds and not self.unpromised

@@ -8,7 +8,7 @@ step.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import replace
 from math import ceil, isfinite
 from typing import Any
 
@@ -276,35 +276,11 @@ LAWS: dict[str, Law] = {
 """Every law by its name in the table."""
 
 
-@dataclass(frozen=True)
-class Finding:
-    """What a law says of a run.
-
-    Attributes
-    ----------
-    law : str
-        Its name.
-    verdict : Verdict
-        Figure and bound.
-    unpromised : str
-        Why the engine does not promise the law in this run; empty if it does or if it is kept.
-    """
-
-    law: str
-    verdict: Verdict
-    unpromised: str = ""
-
-    @property
-    def broken(self) -> bool:
-        """Whether a promised law is not kept."""
-        return not self.verdict.holds and not self.unpromised
-
-
-def judge(e: Evidence) -> list[Finding]:
+def judge(e: Evidence) -> list[Verdict]:
     """Judge a run by every law that says something about it."""
     found = []
     for name, law in LAWS.items():
         if (verdict := law(e)) is not None:
             excused = name in UNSEEN and not verdict.holds
-            found.append(Finding(name, verdict, unseen(e) if excused else ""))
+            found.append(replace(verdict, law=name, unpromised=unseen(e) if excused else ""))
     return found

@@ -20,6 +20,7 @@ from chutelab.pictures.animation.moments import film, frame_delay, slowness, spa
 from chutelab.pictures.animation.stage import SHOWS, Stage, lay_out
 from chutelab.pictures.plots import style
 from chutelab.results import Recording
+from chutelab.util.errors import MissingLibraryError
 from chutelab.util.files import whole
 
 GREYS = (style.MUTED, style.STEEL, style.STEEL_LIGHT, style.ENERGY["start"])
@@ -98,7 +99,7 @@ QUALITY = {
 """Lines and letters stay sharp; the file begins to play before it is all there."""
 
 
-class VideoError(RuntimeError):
+class VideoError(MissingLibraryError):
     """A video cannot be written, and what to do about it."""
 
 

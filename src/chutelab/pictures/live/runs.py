@@ -141,10 +141,7 @@ def _check(found: Sequence[Variant]) -> None:
             f"stream.count = {most}: a page shows at most {MOST_PARTICLES} particles; add"
             f" --set stream.count={MOST_PARTICLES}"
         )
-    stepped = sum(
-        scene.run.engine == "pymunk" or (scene.stream.interact and scene.stream.count > 1)
-        for scene in scenes
-    )
+    stepped = sum(scene.run.engine == "pymunk" or scene.stream.crowded for scene in scenes)
     if stepped > MOST_STEPPED:
         raise InputError(
             f"{stepped} variants are stepped, at most {MOST_STEPPED} are allowed,"

@@ -7,6 +7,7 @@ out.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,7 +19,6 @@ from chutelab.cli.parameters import json_option, out_option, retitled, scene_arg
 
 if TYPE_CHECKING:
     from chutelab.scene import Scene
-    from chutelab.studies.design import Solution
 
 FILES = ("overlay.png", "scan.png", "solution.toml", "nearest.toml", "solve.json")
 """What ``--out`` may write: scan.png with one key, nearest.toml if there is no solution."""
@@ -98,7 +98,8 @@ def solve(
     is 1 if there is no solution; the nearest thing to one is shown then. It needs
     pip install "chutelab[design]".
     """  # noqa: D301 - click wants the backspace
-    from chutelab.scene import load
+    from chutelab.engines.simulation import simulate
+    from chutelab.scene import load, to_toml
     from chutelab.studies import design
     from chutelab.studies.design.answers import as_dict
 
@@ -108,17 +109,29 @@ def solve(
     written = []
     with destination(out, FILES) as place:
         with progress("searching", quiet=quiet) as meter:
-            if targets:
-                found = design.solve(
-                    loaded, vary, targets, points=points, seed=seed, progress=meter
-                )
-            else:
-                extremum = design.minimize if minimize else design.maximize
-                quantity = minimize or maximize or ""
-                found = extremum(loaded, vary, quantity, points=points, seed=seed, progress=meter)
+            search = partial(design.solve, target=targets)
+            if minimize:
+                search = partial(design.minimize, quantity=minimize)
+            if maximize:
+                search = partial(design.maximize, quantity=maximize)
+            found = search(loaded, vary, points=points, seed=seed, progress=meter)
         if place is not None:
+            from chutelab.pictures.plots import overlay
+            from chutelab.pictures.plots.design import scan
+
             with progress("drawing", quiet=quiet):
-                _write(found, place)
+                write_json(as_dict(found), place / "solve.json")
+                if found.scan is not None:
+                    scan(found).write(place / "scan.png")
+                if found.solved or found.nearest:
+                    values = zip(found.ranges, found.answer.values, strict=True)
+                    told = [f"{one.key}={value:.4g}" for one, value in values]
+                    at = retitled(found.scene, told)
+                    outcome = "solution" if found.solved else "no solution, the nearest to one"
+                    name = "solution.toml" if found.solved else "nearest.toml"
+                    text = to_toml(at, f"{found.asked}: {outcome}.")
+                    (place / name).write_text(text, encoding="utf-8")
+                    overlay(simulate(at), path=place / "overlay.png")
             written = sorted(file.name for file in place.iterdir())
     if as_json:
         show_json(as_dict(found))
@@ -130,26 +143,6 @@ def solve(
             click.echo(f"\nwrote into {out}: {', '.join(written)}")
     if not found.solved:
         click.get_current_context().exit(1)
-
-
-def _write(found: Solution, place: Path) -> None:
-    from chutelab.engines.simulation import simulate
-    from chutelab.pictures.plots import overlay
-    from chutelab.pictures.plots.design import scan
-    from chutelab.scene import to_toml
-    from chutelab.studies.design.answers import as_dict
-
-    write_json(as_dict(found), place / "solve.json")
-    if found.scan is not None:
-        scan(found).write(place / "scan.png")
-    if not (found.solved or found.nearest):
-        return
-    values = zip(found.ranges, found.answer.values, strict=True)
-    scene = retitled(found.scene, [f"{one.key}={value:.4g}" for one, value in values])
-    name = "solution.toml" if found.solved else "nearest.toml"
-    comment = f"{found.asked}: {'solution' if found.solved else 'no solution, the nearest to one'}."
-    (place / name).write_text(to_toml(scene, comment), encoding="utf-8")
-    overlay(simulate(scene), path=place / "overlay.png")
 
 
 def propagate(

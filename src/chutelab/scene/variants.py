@@ -246,17 +246,7 @@ MOST_VARIED: Final = 2
 
 @dataclass(frozen=True)
 class Variant:
-    """One combination of values.
-
-    Attributes
-    ----------
-    values : tuple of float
-        One for each varied key.
-    scene : Scene or None
-        None if these values make no scene.
-    fault : str
-        Why not, in words; "" if they do.
-    """
+    """One combination of values; without a scene, `fault` says why they make none."""
 
     values: tuple[float, ...]
     scene: Scene | None

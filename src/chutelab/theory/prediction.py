@@ -6,7 +6,6 @@ the plate is there, what is touched between rebound and landing, whether the bel
 
 from __future__ import annotations
 
-from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +15,6 @@ from numpy.typing import ArrayLike
 from chutelab.theory.obstacles import Flight, Segments, corner_times, first_in_flight, first_on_arc
 from chutelab.theory.results import Reason, Transfer, cut, unanswered
 from chutelab.theory.transfer import Rebound, transfer
-from chutelab.util.arrays import Floats
 
 if TYPE_CHECKING:
     # The paper's tables are there without the model of a scene.
@@ -33,125 +31,66 @@ REACH_WITHOUT_BELT = 2.0
 
 
 class Course:
-    """Particle 0 on its way through one scene that has an incoming belt and a plate."""
+    """Particle 0 on its way through one scene that has an incoming belt and a plate.
 
-    def __init__(self, scene: Scene, rebound: Rebound) -> None:
+    Attributes
+    ----------
+    found : Transfer
+        What the equations say about unbounded plate and belt, 0-d.
+    up, normal, pivot : ndarray, (2,)
+        Unit vectors up along the plate and out of its struck face; where it is hung, m.
+    separation, rebounded : Flight
+        The flights from the pulley and from the plate.
+    impact : ndarray, (2,)
+        World position of the centre on the plate's line, m; NaN if it never gets there.
+    belt_height : float or None
+        World y of the outgoing belt, m; None if there is none or nothing to measure it from.
+    plate_reach : tuple of float
+        Ends of the plate, measured upwards from the pivot along it, m.
+    lines : list of (name, first end, second end)
+        Plate, outgoing belt and free surfaces, in this order.
+    """
+
+    def __init__(self, scene: Scene, found: Transfer) -> None:
         assert scene.incoming is not None
         assert scene.plate is not None
-        self.scene = scene
-        self.rebound = rebound
-        self.belt = scene.incoming
-        self.plate = scene.plate
+        self.scene, self.found = scene, found
+        self.belt, plate, out = scene.incoming, scene.plate, scene.outgoing
         self.radius = scene.particle.radius
         self.ride_radius = self.belt.pulley_radius + self.radius
-        self.angle = np.radians(self.plate.angle_deg)
+        self.angle = np.radians(plate.angle_deg)
+        self.up = np.array([-np.sin(self.angle), np.cos(self.angle)])
+        self.normal = np.array([-np.cos(self.angle), -np.sin(self.angle)])
+        ahead = self.belt.pulley_radius + plate.distance
+        self.pivot = np.array([ahead, plate.pivot_height], dtype=np.float64)
 
-    @cached_property
-    def up(self) -> Floats:
-        """Unit vector up along the plate, (2,)."""
-        return np.array([-np.sin(self.angle), np.cos(self.angle)])
+        cos, sin = np.cos(found.phi1), np.sin(found.phi1)
+        left = self.ride_radius * np.array([sin, cos])
+        self.separation = Flight(left, found.v1 * np.array([cos, -sin]), scene.gravity)
+        self.impact = np.array([left[0] + found.x2, left[1] - found.y2])
+        away, down = found.v2r * np.sin(found.phi2r), found.v2r * np.cos(found.phi2r)
+        self.rebounded = Flight(self.impact, away * self.normal - down * self.up, scene.gravity)
 
-    @cached_property
-    def normal(self) -> Floats:
-        """Unit vector out of the struck face, (2,)."""
-        return np.array([-np.cos(self.angle), -np.sin(self.angle)])
-
-    @cached_property
-    def pivot(self) -> Floats:
-        """Where the plate is hung, (2,), m."""
-        ahead = self.belt.pulley_radius + self.plate.distance
-        return np.array([ahead, self.plate.pivot_height], dtype=np.float64)
-
-    @cached_property
-    def found(self) -> Transfer:
-        """What the equations say about unbounded plate and belt; of a family, arrays (N,)."""
-        out = self.scene.outgoing
-        if out is None:
-            return self._transfer(drop=0.0, belt_speed=0.0)
-        if out.drop_from == "impact":
-            return self._transfer(drop=out.drop, belt_speed=out.speed)
-        impact = self._transfer(drop=0.0, belt_speed=out.speed)
-        # Eq. (16) solved for d2; `predict` refuses a belt above the impact
-        sunk = self.ride_radius * (1.0 - np.cos(impact.phi1)) + impact.y2
-        return self._transfer(drop=np.maximum(out.drop - sunk, 0.0), belt_speed=out.speed)
-
-    def _transfer(self, **outgoing: ArrayLike) -> Transfer:
-        scene = self.scene
-        grip = self.belt.friction
-        return transfer(
-            speed=self.belt.speed,
-            pulley_radius=self.belt.pulley_radius,
-            distance=self.plate.distance,
-            angle=self.angle,
-            pivot_height=self.plate.pivot_height,
-            restitution=self.plate.restitution,
-            particle_radius=self.radius,
-            mass=scene.particle.mass,
-            gravity=scene.gravity,
-            friction=np.inf if isinstance(grip, str) else grip,
-            spin=scene.particle.spin,
-            plate_friction=self.plate.friction,
-            interval=1.0 / scene.stream.rate,
-            rebound=self.rebound,
-            unbounded_plate=False,
-            **outgoing,
-        )
-
-    @cached_property
-    def separation(self) -> Flight:
-        """The flight from the pulley."""
-        phi, speed = self.found.phi1, self.found.v1
-        ahead, outward = np.array([np.cos(phi), -np.sin(phi)]), np.array([np.sin(phi), np.cos(phi)])
-        return Flight(self.ride_radius * outward, speed * ahead, self.scene.gravity)
-
-    @cached_property
-    def impact(self) -> Floats:
-        """World position of the centre on the plate's line, (2,); NaN if it never gets there."""
-        left = self.separation.position
-        return np.array([left[0] + self.found.x2, left[1] - self.found.y2])
-
-    @cached_property
-    def rebounded(self) -> Flight:
-        """The flight from the plate."""
-        speed, angle = self.found.v2r, self.found.phi2r
-        away, down = speed * np.sin(angle), speed * np.cos(angle)
-        return Flight(self.impact, away * self.normal - down * self.up, self.scene.gravity)
-
-    @property
-    def belt_height(self) -> float | None:
-        """World y of the outgoing belt; None if there is none or nothing to measure it from."""
-        out = self.scene.outgoing
-        if out is None:
-            return None
-        if out.drop_from == "top":
-            return self.belt.pulley_radius - out.drop
-        height = float(self.impact[1] - out.drop - self.radius)
-        return height if np.isfinite(height) else None
-
-    @cached_property
-    def plate_reach(self) -> tuple[float, float]:
-        """Ends of the plate, measured upwards from the pivot along it, m."""
-        below, height = self.plate.below, self.belt_height
+        self.belt_height: float | None = None
+        if out is not None and out.drop_from == "top":
+            self.belt_height = self.belt.pulley_radius - out.drop
+        elif out is not None and np.isfinite(self.impact[1]):
+            self.belt_height = float(self.impact[1] - out.drop - self.radius)
+        below = plate.below
         if below is None:
             below = REACH_WITHOUT_BELT
-            if height is not None:
-                lowest = height + max(LEAST_CLEARANCE, RADII_CLEARANCE * self.radius)
+            if self.belt_height is not None:
+                lowest = self.belt_height + max(LEAST_CLEARANCE, RADII_CLEARANCE * self.radius)
                 below = max((self.pivot[1] - lowest) / np.cos(self.angle), 0.0)
-        return -below, self.plate.above
-
-    @cached_property
-    def lines(self) -> list[tuple[str, Any, Any]]:
-        """Plate, outgoing belt and free surfaces, in this order."""
-        low, high = self.plate_reach
-        lines: list[tuple[str, Any, Any]] = [
-            ("plate", self.pivot + low * self.up, self.pivot + high * self.up)
+        self.plate_reach = -below, plate.above
+        self.lines: list[tuple[str, Any, Any]] = [
+            ("plate", self.pivot - below * self.up, self.pivot + plate.above * self.up)
         ]
-        out, height = self.scene.outgoing, self.belt_height
-        if out is not None and height is not None:
-            lines.append(("outgoing", (out.start, height), (out.start + out.length, height)))
-        for free in self.scene.surface:
-            lines += [(free.name, first, second) for first, second in pairwise(free.points)]
-        return lines
+        if out is not None and self.belt_height is not None:
+            y = self.belt_height
+            self.lines.append(("outgoing", (out.start, y), (out.start + out.length, y)))
+        for free in scene.surface:
+            self.lines += [(free.name, first, second) for first, second in pairwise(free.points)]
 
 
 ON_BELT = 1e-12
@@ -185,10 +124,10 @@ def predict(scene: Scene, rebound: Rebound = "corrected") -> Transfer:
     fault = _outside(scene)
     if fault:
         return cut(unanswered(), "separation", Reason.OUTSIDE.because(fault))
-    course = Course(scene, rebound)
-    found = course.found
+    found = _unbounded(scene, rebound)
     if np.isnan(found.phi1):
         return found
+    course = Course(scene, found)
     if scene.outgoing is not None and course.belt_height is None:
         # Nothing places the belt, nor the plate's lower end: there is no machine to look at.
         return cut(found, "separation", str(found.reason))
@@ -219,7 +158,44 @@ def unbounded(scene: Scene) -> Transfer:
     Transfer
         0-d arrays; of a family, (N,).
     """
-    return Course(scene, "corrected").found
+    return _unbounded(scene, "corrected")
+
+
+def _unbounded(scene: Scene, rebound: Rebound) -> Transfer:
+    belt, plate, out = scene.incoming, scene.plate, scene.outgoing
+    assert belt is not None
+    assert plate is not None
+
+    def found(drop: ArrayLike, belt_speed: ArrayLike) -> Transfer:
+        return transfer(
+            speed=belt.speed,
+            pulley_radius=belt.pulley_radius,
+            distance=plate.distance,
+            angle=np.radians(plate.angle_deg),
+            pivot_height=plate.pivot_height,
+            restitution=plate.restitution,
+            drop=drop,
+            belt_speed=belt_speed,
+            particle_radius=scene.particle.radius,
+            mass=scene.particle.mass,
+            gravity=scene.gravity,
+            friction=np.inf if isinstance(belt.friction, str) else belt.friction,
+            spin=scene.particle.spin,
+            plate_friction=plate.friction,
+            interval=1.0 / scene.stream.rate,
+            rebound=rebound,
+            unbounded_plate=False,
+        )
+
+    if out is None:
+        return found(0.0, 0.0)
+    if out.drop_from == "impact":
+        return found(out.drop, out.speed)
+    impact = found(0.0, out.speed)
+    # Eq. (16) solved for d2; `predict` refuses a belt above the impact
+    ride_radius = belt.pulley_radius + scene.particle.radius
+    sunk = ride_radius * (1.0 - np.cos(impact.phi1)) + impact.y2
+    return found(np.maximum(out.drop - sunk, 0.0), out.speed)
 
 
 def _outside(scene: Scene) -> str:

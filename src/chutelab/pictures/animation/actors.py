@@ -43,7 +43,7 @@ DRAWN = 300
 SMALLEST = 6.0
 """pt; the diameter a particle is drawn with if to scale it would be smaller."""
 
-MARKS = 5
+MARKS = 3
 """Marks on a belt across the window; they move with it."""
 
 HOLES = 3
@@ -110,7 +110,7 @@ class Nominal:
             animated=True,
         )
         self.least = SEEN * HEAD / _points(ax, 1.0)
-        self.dot = _dots(ax, recording.particle.radius, style.STRIKE)
+        self.dot = _dots(ax, recording.particle.radius, style.STRIKE, 0.4)
         self._strobes = strobe
 
     @property
@@ -168,7 +168,8 @@ class Crowd:
         self.since = np.maximum(back, 0) if trail else None
         light = tint(style.STREAM, 0.5)
         (self.trails,) = ax.plot([], [], color=light, linewidth=1.0, animated=True)
-        self.dots = _dots(ax, recording.particle.radius, style.STREAM)
+        # Told apart where they overlap.
+        self.dots = _dots(ax, recording.particle.radius, style.STREAM, 0.8)
 
     @property
     def artists(self) -> list[Artist]:
@@ -233,10 +234,10 @@ def _points(ax: Axes, length: float) -> float:
     return pixels * 72.0 / ax.figure.dpi
 
 
-def _dots(ax: Axes, radius: float, color: str) -> Line2D:
-    """Return disks to scale (m), or of `SMALLEST` size."""
+def _dots(ax: Axes, radius: float, color: str, edge: float) -> Line2D:
+    """Return disks to scale (m), or of `SMALLEST` size, with a white edge (pt)."""
     size = max(_points(ax, 2.0 * radius), SMALLEST)
-    (dots,) = ax.plot([], [], "o", color=color, ms=size, mew=0.4, mec="white", animated=True)
+    (dots,) = ax.plot([], [], "o", color=color, ms=size, mew=edge, mec="white", animated=True)
     return dots
 
 

@@ -87,16 +87,14 @@ def write_gif(
     )
 
 
-VIDEOS = ("mp4", "webm")
-"""Kinds of video, by the suffix of their files."""
-
-CODECS = {"mp4": "libx264", "webm": "libvpx-vp9"}
-
-QUALITY = {
-    "mp4": ["-crf", "20", "-preset", "medium", "-movflags", "+faststart"],
-    "webm": ["-crf", "28", "-b:v", "0", "-deadline", "realtime", "-cpu-used", "7", "-row-mt", "1"],
+VIDEOS = {
+    "mp4": ("libx264", "-crf 20 -preset medium -movflags +faststart"),
+    "webm": ("libvpx-vp9", "-crf 28 -b:v 0 -deadline realtime -cpu-used 7 -row-mt 1"),
 }
-"""Lines and letters stay sharp; the file begins to play before it is all there."""
+"""Codec of each kind of video and its options, by the suffix of the file.
+
+Lines and letters stay sharp; the file begins to play before it is all there.
+"""
 
 
 class VideoError(MissingLibraryError):
@@ -124,12 +122,13 @@ def write_video(
     need_video(kind)
     from imageio.v2 import get_writer
 
+    codec, parameters = VIDEOS[kind]
     options: dict[str, Any] = {
-        "codec": CODECS[kind],
+        "codec": codec,
         "quality": None,
         "pixelformat": "yuv420p",
         "macro_block_size": 2,
-        "output_params": QUALITY[kind],
+        "output_params": parameters.split(),
         "ffmpeg_log_level": "error",
     }
     with cast(Any, get_writer(path, format="FFMPEG", mode="I", fps=fps, **options)) as video:

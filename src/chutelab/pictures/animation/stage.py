@@ -172,6 +172,9 @@ class Stage:
     ) -> None:
         self.moments = moments
         times = np.array([moment.t for moment in moments])
+        # The clock has no digits that change too fast to be read: they would cost as much as all
+        # particles.
+        self.digits = 2 if len(times) > 1 and np.median(np.diff(times)) >= 0.01 else 3
         # A hundredth of a pixel more: the canvas rounds down.
         inches = (layout.width + 0.01) / layout.dpi, (layout.height + 0.01) / layout.dpi
         self.figure = Figure(figsize=inches, dpi=layout.dpi)
@@ -214,7 +217,7 @@ class Stage:
         self.drives.show(moment.t)
         self.crowd.show(index)
         self.nominal.show(index)
-        self.clock.text = f"t = {moment.t:.3f} s"
+        self.clock.text = f"t = {moment.t:.{self.digits}f} s"
         self.words.text = moment.words
         if self.bars is not None:
             self.bars.show(index)

@@ -139,8 +139,16 @@ def paper_figure(found: PaperFigure) -> Picture:
         wspace=0.16 if len(panels) == 2 else 0.3,
     )  # fmt: skip
     axes = [draw_panel(figure.add_subplot(grid[i]), panel) for i, panel in enumerate(panels)]
-    for i in range(0, len(panels), 2):
-        _alike(axes[i], axes[i + 1])
+    for pair in zip(axes[::2], axes[1::2], strict=True):
+        # The same axes for both: the eye compares heights.
+        corners = np.concatenate([ax.dataLim.get_points() for ax in pair])
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        margin = MARGIN * (high - low)
+        for ax in pair:
+            ax.set_xlim(low[0] - margin[0], high[0] + margin[0])
+            ax.set_ylim(low[1] - margin[1], high[1] + margin[1])
+            if low[1] > 2.0 * margin[1]:
+                style.note(ax, "axis not from 0")
     if panels[0].to_scale:
         figure.legend(
             *axes[0].get_legend_handles_labels(), loc="upper right",
@@ -174,15 +182,3 @@ def draw_panel(ax: Axes, panel: Panel) -> Axes:
     else:
         ax.legend(loc="best", fontsize=style.SMALL, framealpha=0.85, edgecolor="none")
     return ax
-
-
-def _alike(left: Axes, right: Axes) -> None:
-    """Give two panels the same axes: the eye compares heights."""
-    corners = np.concatenate([ax.dataLim.get_points() for ax in (left, right)])
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    margin = MARGIN * (high - low)
-    for ax in (left, right):
-        ax.set_xlim(low[0] - margin[0], high[0] + margin[0])
-        ax.set_ylim(low[1] - margin[1], high[1] + margin[1])
-        if low[1] > 2.0 * margin[1]:
-            style.note(ax, "axis not from 0")

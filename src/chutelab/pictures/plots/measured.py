@@ -58,8 +58,13 @@ def measured(found: Residuals, fit: Fit | None = None) -> Picture:
     upper.set_xlabel("")
     draw_residuals(figure.add_subplot(grid[1]), found, 1)
     figure.headline(0.06, 0.965, found.recording.title, 60)
-    said = [] if fit is None else _said(fit)
-    for i, text in enumerate(said or [f"{len(found.track)} measured points, nothing fitted"]):
+    said = [f"{len(found.track)} measured points, nothing fitted"]
+    if fit is not None:
+        fitted = zip(fit.parameters[:PARAMETERS], fit.values, fit.errors, strict=False)
+        said = [
+            f"{one.key} = {plus_minus(x, error)} {one.unit}".rstrip() for one, x, error in fitted
+        ]
+    for i, text in enumerate(said):
         figure.text(
             0.985, 0.965 - 0.032 * i, text, fontsize=style.NORMAL, color=style.MUTED,
             horizontalalignment="right", verticalalignment="center",
@@ -141,12 +146,3 @@ def draw_residuals(ax: Axes, found: Residuals, axis: int) -> Axes:
                 horizontalalignment="right", verticalalignment="top",
             )  # fmt: skip
     return ax
-
-
-def _said(fit: Fit) -> list[str]:
-    return [
-        f"{parameter.key} = {plus_minus(value, error)} {parameter.unit}".rstrip()
-        for parameter, value, error in zip(
-            fit.parameters[:PARAMETERS], fit.values, fit.errors, strict=False
-        )
-    ]

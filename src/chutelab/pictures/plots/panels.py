@@ -145,8 +145,17 @@ def draw_tracks(ax: Axes, recording: Recording) -> Axes:
 
     Of a stream, up to `STREAM_TRACKS` tracks are drawn, thin and translucent.
     """
-    if recording.count > 1:
-        _draw_stream(ax, recording)
+    lines = []
+    chosen = spread(recording.count, STREAM_TRACKS)[1:]
+    for i in chosen[np.diff(recording.offsets)[chosen] > 0]:
+        one = subset(recording, [i])
+        knots = np.unique(one.knots["t"])
+        times = np.union1d(np.linspace(knots[0], knots[-1], 200), knots[:: len(knots) // 200 + 1])
+        lines.append(one.at(times)[0][:, 0])
+    if lines:
+        tracks = LineCollection(lines, colors=style.STREAM, lw=0.8, alpha=0.35, zorder=3.0)
+        tracks.set_gid("stream")
+        ax.add_collection(tracks, autolim=False)
     position, _ = nominal(recording, track_times(recording))
     ax.plot(*position.T, color=style.TRACK, lw=1.6, zorder=5.0, gid="track", label="track")
     dots, _ = nominal(recording, strobe_times(recording))
@@ -159,19 +168,6 @@ def draw_tracks(ax: Axes, recording: Recording) -> Axes:
         (cross,) = ax.plot(*where.T, "x", color=style.STRIKE, ms=8.0, mew=2.0, zorder=7.0)
         cross.set(gid="impacts", label="impact")
     return ax
-
-
-def _draw_stream(ax: Axes, recording: Recording) -> None:
-    chosen = spread(recording.count, STREAM_TRACKS)[1:]
-    lines = []
-    for i in chosen[np.diff(recording.offsets)[chosen] > 0]:
-        one = subset(recording, [i])
-        knots = np.unique(one.knots["t"])
-        times = np.union1d(np.linspace(knots[0], knots[-1], 200), knots[:: len(knots) // 200 + 1])
-        lines.append(one.at(times)[0][:, 0])
-    tracks = LineCollection(lines, colors=style.STREAM, linewidths=0.8, alpha=0.35, zorder=3.0)
-    tracks.set_gid("stream")
-    ax.add_collection(tracks, autolim=False)
 
 
 def draw_analytic(ax: Axes, parts: tuple[Arc, ...]) -> Axes:

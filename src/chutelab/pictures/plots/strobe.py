@@ -8,8 +8,6 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.path import Path as MplPath
-from matplotlib.text import Annotation
 from matplotlib.transforms import Bbox
 
 from chutelab.pictures.plots import style
@@ -19,7 +17,6 @@ from chutelab.pictures.plots.scenery import HALO, nominal, strobe_step, strobe_t
 from chutelab.pictures.plots.style import Picture
 from chutelab.results import Recording
 from chutelab.theory import Transfer
-from chutelab.util.arrays import Floats
 
 SIZE = (9.0, 5.6)
 """Width and height of the figure, inches."""
@@ -65,82 +62,57 @@ def strobe(
     figure = Picture(SIZE, DPI)
     ax = figure.add_axes((0.095, 0.09, 0.885, 0.77))
     draw_view(ax, recording, analytic_of(recording, prediction)[0])
-    _write_times(ax, recording)
+    draw_times(ax, recording)
     figure.headline(0.095, 0.955, recording.title, 70)
     figure.write(path)
     return figure
 
 
-def _write_times(ax: Axes, recording: Recording) -> None:
-    """Write the time beside each strobe dot in the picture, where there is room for it."""
+def draw_times(ax: Axes, recording: Recording) -> Axes:
+    """Write the time beside each strobe dot, on the first of `SIDES` where it hides nothing.
+
+    Its own dot must be the nearest of all to its middle, or it would be read as another's. Where no
+    side is free there is no time.
+    """
     times = strobe_times(recording)
     dots, _ = nominal(recording, times)
     digits = max(0, -floor(log10(strobe_step(recording)) + 1e-9))
-    half = 0.4 * AWAY * ax.figure.dpi / 72.0
-    taken = [text.get_window_extent() for text in ax.texts]
+    # All in pixels from here on: dots, texts and lines that are drawn already.
     pixels = ax.transData.transform(dots)
+    half, gap = np.array([0.4 * AWAY, GAP]) * ax.figure.dpi / 72.0
+    taken = [text.get_window_extent() for text in ax.texts]
     taken += [Bbox([dot - half, dot + half]) for dot in pixels]
-    lines = _lines(ax)
-    gap = GAP * ax.figure.dpi / 72.0
-    frame = ax.get_window_extent()
-    inside = Bbox.from_extents(frame.x0 + half, frame.y0 + half, frame.x1 - half, frame.y1 - half)
-    for n, (t, dot) in enumerate(zip(times, dots, strict=True)):
-        label = ax.annotate(
-            f"{t + 0.0:.{digits}f}".replace("-", "−"),
-            dot,
-            xytext=(0.0, 0.0),
-            textcoords="offset points",
-            fontsize=style.SMALL,
-            color=style.TRACK,
-            path_effects=HALO,
-            zorder=8.0,
-            gid="time",
-        )
-        if not _placed(label, n, pixels, inside, taken, lines, gap):
-            label.remove()
-    said = ax.text(1.0, 1.01, "beside the dots: time, s", ha="right", va="bottom")
-    said.set(transform=ax.transAxes, fontsize=style.SMALL, color=style.TRACK)
+    lines = [line for line in ax.lines if line.get_linestyle() != "None"]
+    paths = [line.get_path().transformed(line.get_transform()) for line in lines]
+    tracks = [path for collection in ax.collections for path in collection.get_paths()]
+    paths += [path.transformed(ax.transData) for path in tracks]
+    filled = [patch.get_path().transformed(patch.get_transform()) for patch in ax.patches]
+    inside = ax.get_window_extent().padded(-half)
 
-
-def _lines(ax: Axes) -> list[tuple[MplPath, bool]]:
-    """Return what is drawn as paths in pixels, and whether each is filled."""
-    drawn = [line for line in ax.lines if line.get_linestyle() != "None"]
-    paths = [(line.get_path().transformed(line.get_transform()), False) for line in drawn]
-    paths += [
-        (path.transformed(ax.transData), False)
-        for collection in ax.collections
-        for path in collection.get_paths()
-    ]
-    return paths + [
-        (patch.get_path().transformed(patch.get_transform()), True) for patch in ax.patches
-    ]
-
-
-def _placed(
-    label: Annotation,
-    own: int,
-    dots: Floats,
-    inside: Bbox,
-    taken: list[Bbox],
-    lines: list[tuple[MplPath, bool]],
-    gap: float,
-) -> bool:
-    """Put a text on the first side where it hides nothing, and tell whether there is one.
-
-    Its own dot must be the nearest of all to its middle, or it would be read as another's.
-    """
-    for x, y in SIDES:
-        label.xyann = (AWAY * x, AWAY * y)
-        label.set_horizontalalignment("left" if x > 0.0 else "right" if x < 0.0 else "center")
-        label.set_verticalalignment("bottom" if y > 0.0 else "top" if y < 0.0 else "center")
-        box = label.get_window_extent().padded(gap)
-        if (
+    def free(box: Bbox, own: int) -> bool:
+        return bool(
             inside.contains(box.x0, box.y0)
             and inside.contains(box.x1, box.y1)
-            and np.hypot(*(dots - np.mean(box.corners(), axis=0)).T).argmin() == own
+            and np.hypot(*(pixels - np.mean(box.corners(), axis=0)).T).argmin() == own
             and not box.count_overlaps(taken)
-            and not any(path.intersects_bbox(box, filled=filled) for path, filled in lines)
-        ):
-            taken.append(box)
-            return True
-    return False
+            and not any(path.intersects_bbox(box, filled=False) for path in paths)
+            and not any(path.intersects_bbox(box, filled=True) for path in filled)
+        )
+
+    for own, (t, dot) in enumerate(zip(times, dots, strict=True)):
+        said = f"{t + 0.0:.{digits}f}".replace("-", "−")
+        label = ax.annotate(said, dot, xytext=(0.0, 0.0), textcoords="offset points", gid="time")
+        label.set(fontsize=style.SMALL, color=style.TRACK, path_effects=HALO, zorder=8.0)
+        for x, y in SIDES:
+            label.xyann = (AWAY * x, AWAY * y)
+            label.set_horizontalalignment("left" if x > 0.0 else "right" if x < 0.0 else "center")
+            label.set_verticalalignment("bottom" if y > 0.0 else "top" if y < 0.0 else "center")
+            box = label.get_window_extent().padded(gap)
+            if free(box, own):
+                taken.append(box)
+                break
+        else:
+            label.remove()
+    note = ax.text(1.0, 1.01, "beside the dots: time, s", ha="right", va="bottom")
+    note.set(transform=ax.transAxes, fontsize=style.SMALL, color=style.TRACK)
+    return ax

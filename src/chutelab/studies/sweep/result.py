@@ -300,26 +300,17 @@ def _length(path: Path, data: bytes, head: Mapping[str, Any], done: dict[int, st
             f"{path} is of another sweep, with a difference in {', '.join(other)}: repeat"
             " that command, or remove the file and begin anew"
         )
-    length = len(first) + 1
-    for begin, text, end in _blocks(data, length):
-        done[begin] = text
-        length = end
-    return length
-
-
-def _blocks(data: bytes, begin: int) -> Iterator[tuple[int, str, int]]:
-    """Yield where a block of rows begins, its text, and where it ends in the file."""
-    lines = data[begin:].split(b"\n")[:-1]
-    at = 0
-    while at < len(lines):
+    length, lines, at = len(first) + 1, data.split(b"\n")[1:-1], 0
+    while at < len(lines) and lines[at].startswith(b"@"):
         try:
-            first, count = map(int, lines[at].removeprefix(b"@").split(b","))
+            begin, count = map(int, lines[at].removeprefix(b"@").split(b","))
             rows = lines[at + 1 : at + 1 + count]
             text = b"".join(row + b"\n" for row in rows).decode()
         except ValueError:
-            return
-        if not lines[at].startswith(b"@") or len(rows) < count:
-            return
-        begin += len(lines[at]) + 1 + sum(len(row) + 1 for row in rows)
+            break
+        if len(rows) < count:
+            break
+        done[begin] = text
+        length += sum(len(line) + 1 for line in [lines[at], *rows])
         at += 1 + count
-        yield first, text, begin
+    return length

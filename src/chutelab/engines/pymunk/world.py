@@ -221,8 +221,8 @@ class World:
                 if gap < -hair and t > 0.0:
                     return bisected(lambda t: face.gap(path.at(t)[0])[0] < -0.5 * hair, last, t)[0]
                 leaving = gap <= hair and (rate <= slow or rate * rate <= 2.0 * LOW * g * hair)
-            elif gap <= self.rounding:
-                # A hair deep or less a curve is grazed, not met.
+            elif gap <= self.rounding or (gap <= hair and abs(rate) <= slow):
+                # A hair deep or less a curve is grazed, not met; nor is what runs alongside.
                 graze = v.length * sqrt(2.0 * hair / r)
                 if rate < -slow and (rate < -graze or not self.curved(face, x)):
                     return t

@@ -57,6 +57,9 @@ LEVERS = 2.0
 SLACK = 1e-9
 """Share of the weight that is no load, and of the friction limit below which a contact grips."""
 
+TILT = 2e-13
+"""Share of the momentum of what has no weight that is no load: rounding tilts normals by as much."""
+
 SHORT = 1e-5
 """Share of a step; a contact that lasts less has ended."""
 
@@ -183,6 +186,8 @@ class Lone:
     def _after(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
         face, normal = self.world.by_shape[arbiter.shapes[1]], -arbiter.normal
         j, least = arbiter.total_impulse, SLACK * self.weight * self.last
+        if self.weight == 0.0:
+            least = TILT * self.body.mass * self.v.length
         if (push := float(j.dot(normal))) > least:
             self.contacts.append(Contact(face, normal, push, float(j.cross(normal))))
 

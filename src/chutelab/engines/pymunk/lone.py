@@ -58,7 +58,7 @@ SLACK = 1e-9
 """Share of the weight that is no load, and of the friction limit below which a contact grips."""
 
 TILT = 2e-13
-"""Share of the momentum of what has no weight that is no load: rounding tilts normals by as much."""
+"""Share of the momentum that is no load, where nothing weighs: rounding tilts normals so much."""
 
 SHORT = 1e-5
 """Share of a step; a contact that lasts less has ended."""

@@ -8,8 +8,8 @@ import numpy as np
 
 from chutelab.engines.exact.detect import bounds
 from chutelab.engines.exact.obstacles import NONE, bare, dot, length_of, pick
-from chutelab.engines.exact.particle_state import COLLAPSE, Contact, Mode, State, below
-from chutelab.mechanics.impact import impulses, limited
+from chutelab.engines.exact.particle_state import COLLAPSE, Contact, Mode, State
+from chutelab.mechanics.contact import grip_limit, impulses, limited
 from chutelab.results import Kind
 from chutelab.util.arrays import Bools, Floats, Ints
 
@@ -114,7 +114,7 @@ def settle_law(s: State, index: Ints) -> None:
         w = np.where(still, c.belt, w)
     s.v[:, index] = w * c.tangent
     pull, load = s.weight_along(index, c.normal), load_on(s, index, s.on[index], c)
-    grips = still & below(s.share * np.abs(pull), c.friction, load)
+    grips = still & (s.share * np.abs(pull) <= grip_limit(c.friction, load))
     begins = grips & (s.slip[index] != 0.0)
     s.slip[index] = np.where(grips, 0.0, np.where(still, np.sign(pull), np.sign(slip)))
     s.event(int(Kind.STICK), index[begins], c.surface[begins])

@@ -13,7 +13,7 @@ from chutelab.engines.exact.detect import FEW, Motion, bounds, first_contact
 from chutelab.engines.exact.obstacles import NONE, bare, dot, pick, rows_of
 from chutelab.engines.exact.particle_state import Mode, State
 from chutelab.mechanics.ballistics import descent
-from chutelab.mechanics.ride import STEP_ANGLE, Circle, Outcome, advance, normal_force
+from chutelab.mechanics.contact import STEP_ANGLE, Circle, Outcome, advance, normal_force
 from chutelab.results import Kind
 from chutelab.util.arrays import Bools, Floats, Ints
 

@@ -13,10 +13,10 @@ from chutelab.engines.exact.detect import Bounds, Past
 from chutelab.engines.exact.event_log import STATE, EventLog
 from chutelab.engines.exact.obstacles import NONE, Obstacles, along, pick
 from chutelab.machine import Machine
-from chutelab.mechanics.impact import DISK_SHARE
+from chutelab.mechanics.contact import DISK_SHARE
 from chutelab.results import REASONS, Kind
 from chutelab.results.recorder import StalledError
-from chutelab.util.arrays import Bools, Floats, Ints
+from chutelab.util.arrays import Floats, Ints
 
 
 class Mode:
@@ -298,9 +298,3 @@ ROUNDING = 4.0 * float_info.epsilon
 
 NO_SLIP = 1e-13
 """Share of the speeds involved below which a slip is rounding."""
-
-
-def below(limit: Floats, friction: Floats, load: Floats) -> Bools:
-    """Tell whether a force is within Coulomb's limit; friction may be inf."""
-    finite = np.where(np.isinf(friction), 0.0, friction)
-    return np.isinf(friction) | (limit <= finite * load)

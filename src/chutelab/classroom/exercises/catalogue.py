@@ -129,8 +129,8 @@ class Task:
         case = self._cases[index]
         self._standings[index].revealed = True
         right = f"{shown(case.right)} {case.question.unit}".strip()
-        text = f"{case.numbers.text(case.question.working)}\nAnswer: {right}"
-        text += f"\nSource: {case.question.source}"
+        lines = [case.numbers.text(line) for line in case.question.working.splitlines()]
+        text = "\n".join([*lines, f"Answer: {right}", f"Source: {case.question.source}"])
         return Passage(index + 1, f"Working of question {index + 1}", text, case.question.unit)
 
     def progress(self) -> Progress:

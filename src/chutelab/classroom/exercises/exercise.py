@@ -20,9 +20,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cache, cached_property
 from hashlib import sha256
-from importlib.resources.abc import Traversable
 from itertools import combinations
 from math import degrees, isfinite, radians
+from pathlib import Path
 from types import CodeType, SimpleNamespace
 from typing import Any, Final
 
@@ -226,7 +226,7 @@ class Exercise:
     fits: Sequence[str] = ()
 
 
-def read(file: Traversable) -> Exercise:
+def read(file: Path) -> Exercise:
     """Read the exercise in a TOML file."""
     found = tomllib.loads(file.read_text(encoding="utf-8"))
     for asked in found["questions"]:
@@ -235,7 +235,7 @@ def read(file: Traversable) -> Exercise:
     found["parameters"] = [
         Parameter(*words, _choices(values)) for *words, values in found["parameters"]
     ]
-    return Exercise(name=file.name.removesuffix(".toml"), **found)
+    return Exercise(name=file.stem, **found)
 
 
 def _choices(values: list[float] | dict[str, float]) -> list[float]:
@@ -309,8 +309,9 @@ LEAST: Final = 1e-9
 
 @dataclass(frozen=True)
 class Case:
-    """One question for one student: the numbers behind it."""
+    """One question for one student: its number, and the numbers behind it."""
 
+    number: int
     question: Question
     numbers: Numbers
 
@@ -358,7 +359,7 @@ def attempt(exercise: Exercise, student: str, number: int) -> tuple[Case, ...] |
         random = int.from_bytes(sha256(key.encode("utf-8", "replace")).digest()[:8])
         drawn[parameter.name] = float(parameter.values[random % len(parameter.values)])
     numbers = Numbers(drawn, exercise.formulas)
-    cases = tuple(Case(question, numbers) for question in exercise.questions)
+    cases = tuple(Case(n, asked, numbers) for n, asked in enumerate(exercise.questions, start=1))
     try:
         fits = all(map(numbers.of, exercise.fits)) and all(case.clear for case in cases)
     except ValueError:

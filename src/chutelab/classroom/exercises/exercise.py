@@ -233,7 +233,8 @@ def read(file: Path) -> Exercise:
         asked["mistakes"] = [Mistake(*row) for row in asked["mistakes"]]
     found["questions"] = [Question(**asked) for asked in found["questions"]]
     found["parameters"] = [
-        Parameter(*words, _choices(values)) for *words, values in found["parameters"]
+        Parameter(name, symbol, unit, meaning, _choices(values))
+        for name, symbol, unit, meaning, values in found["parameters"]
     ]
     return Exercise(name=file.stem, **found)
 

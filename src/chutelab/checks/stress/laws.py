@@ -51,7 +51,7 @@ def finite(e: Evidence) -> Verdict:
     """Every number of a recording is finite; the figure counts those that are not."""
     bad, where = 0, ""
     for array in (e.recording.knots, e.recording.events):
-        for name in array.dtype.names:
+        for name in array.dtype.names or ():
             found = int(np.count_nonzero(~np.isfinite(array[name])))
             bad, where = bad + found, where or (name if found else "")
     bad += int(np.count_nonzero(~np.isfinite(e.recording.by_surface)))

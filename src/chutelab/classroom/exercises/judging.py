@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 
 from chutelab.classroom.exercises.exercise import TOLERANCE, Case, shown
-from chutelab.pictures import colours
+from chutelab.pictures import GREEN, GREY, ORANGE, SKY, VERMILION
 from chutelab.util.tables import Sheet
 
 WIDTH: Final = 88
@@ -37,12 +37,12 @@ class Verdict(StrEnum):
 
 
 MARKS: Final = {
-    Verdict.RIGHT: ("✓", colours.GREEN),
-    Verdict.MISTAKE: ("✗", colours.VERMILION),
-    Verdict.OFF: ("✗", colours.VERMILION),
-    Verdict.UNREAD: ("?", colours.ORANGE),
-    Verdict.BLANK: ("○", colours.GREY),
-    Verdict.UNKNOWN: ("?", colours.ORANGE),
+    Verdict.RIGHT: ("✓", GREEN),
+    Verdict.MISTAKE: ("✗", VERMILION),
+    Verdict.OFF: ("✗", VERMILION),
+    Verdict.UNREAD: ("?", ORANGE),
+    Verdict.BLANK: ("○", GREY),
+    Verdict.UNKNOWN: ("?", ORANGE),
 }
 """Sign and colour of each verdict; the words always say it too."""
 
@@ -52,7 +52,7 @@ def filled(text: str) -> str:
     return "\n".join(textwrap.fill(line, WIDTH) for line in text.split("\n"))
 
 
-def box(heading: str, text: str, colour: str = colours.SKY) -> str:
+def box(heading: str, text: str, colour: str = SKY) -> str:
     """Return a heading and a text beside a coloured bar, as HTML."""
     body = escape(text).replace("\n", "<br>")
     return (

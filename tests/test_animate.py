@@ -36,7 +36,6 @@ from chutelab.pictures.animation.moments import (
     span,
 )
 from chutelab.pictures.animation.stage import TRAIL, Layout, lay_out
-from chutelab.pictures.colours import tint
 from chutelab.pictures.plots import style, window_of
 from chutelab.pictures.plots.scenery import energies
 from chutelab.results import Kind, Recording
@@ -847,9 +846,9 @@ def test_only_what_changed_is_in_a_frame_and_what_stays_is_one_frame() -> None:
 
 
 def test_tints_are_mixtures() -> None:
-    assert tint("#204060", 1.0) == "#204060"
-    assert tint("#204060", 0.0, "#808080") == "#808080"
-    assert tint("#204060", 0.25, "#60A0E0") == "#5088C0"
+    assert style.tint("#204060", 1.0) == "#204060"
+    assert style.tint("#204060", 0.0, "#808080") == "#808080"
+    assert style.tint("#204060", 0.25, "#60A0E0") == "#5088C0"
 
 
 @pytest.mark.parametrize("suffix", [".avi", "", ".gif.txt"])

@@ -15,7 +15,6 @@ from matplotlib.patches import Rectangle
 from PIL import ImageDraw, ImageFont
 
 from chutelab.machine import Machine
-from chutelab.pictures.colours import tint
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.scenery import (
     nominal,
@@ -166,7 +165,7 @@ class Crowd:
         # A trail reaches back to the picture before at least.
         back = np.minimum(np.searchsorted(times, times - trail), np.arange(len(times)) - 1)
         self.since = np.maximum(back, 0) if trail else None
-        light = tint(style.STREAM, 0.5)
+        light = style.tint(style.STREAM, 0.5)
         (self.trails,) = ax.plot([], [], color=light, linewidth=1.0, animated=True)
         # Told apart where they overlap.
         self.dots = _dots(ax, recording.particle.radius, style.STREAM, 0.8)

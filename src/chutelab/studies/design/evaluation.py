@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -18,7 +17,7 @@ from numpy.typing import ArrayLike
 from chutelab.engines.simulation import simulate
 from chutelab.results import ENTRIES, Recording
 from chutelab.results.recorder import StalledError
-from chutelab.scene import Scene, SceneError, rules, to_dict
+from chutelab.scene import Scene, SceneError, rules
 from chutelab.scene.overrides import value_at
 from chutelab.scene.variants import is_plain, parse_range, quantity, reason
 from chutelab.studies.design.quantities import (
@@ -194,9 +193,10 @@ class Evaluator:
         if len(table) >= MANY and suits(self.scene, self.keys, self.quantities):
             left = set()
             for ending in endings:
-                base, keys = self.scene.with_values(_until(ending)), tuple(self.keys)
-                block = Block(to_dict(base), base.source, keys, keys, table, None)
-                refused, alone = together(block, partial(read, ending))
+                base = self.scene.with_values(_until(ending))
+                runs, refused, alone = together(Block(base, tuple(self.keys), table))
+                for recording, rows in runs:
+                    read(ending, recording, rows)
                 for row, fault in refused.items():
                     faults[row] = one_line(fault)
                 left.update(alone)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -18,7 +17,7 @@ from numpy.typing import ArrayLike
 from chutelab.engines.simulation import simulate
 from chutelab.results import ENTRIES, Recording
 from chutelab.results.recorder import StalledError
-from chutelab.scene import Scene, SceneError, rules, to_dict
+from chutelab.scene import Scene, SceneError, rules
 from chutelab.scene.overrides import value_at
 from chutelab.scene.variants import is_plain, parse_range, quantity, reason
 from chutelab.studies.design.quantities import (
@@ -202,10 +201,10 @@ class Evaluator:
         for column, ending in enumerate(wanted):
             endings.setdefault(common if ending == "any" else ending, []).append(column)
 
-        def read(rows: Ints, columns: list[int], recording: Recording, some: Ints) -> None:
+        def read(rows: Ints, columns: list[int], recording: Recording) -> None:
             for column in columns:
-                values[rows[some], column] = self.quantities[column].of(recording)
-            courses[rows[some]] = courses_of(recording, len(some))
+                values[rows, column] = self.quantities[column].of(recording)
+            courses[rows] = courses_of(recording, len(rows))
 
         def ran(runs: float) -> None:
             self._done += runs
@@ -217,9 +216,11 @@ class Evaluator:
             left = set()
             for rows in np.split(np.arange(len(table)), range(BLOCK, len(table), BLOCK)):
                 for ending, columns in endings.items():
-                    base, keys = self.scene.with_values(_until(ending)), tuple(self.keys)
-                    block = Block(to_dict(base), base.source, keys, keys, table[rows], None)
-                    refused, alone = together(block, partial(read, rows, columns))
+                    base = self.scene.with_values(_until(ending))
+                    block = Block(base, tuple(self.keys), table[rows])
+                    runs, refused, alone = together(block)
+                    for recording, some in runs:
+                        read(rows[some], columns, recording)
                     for row, fault in refused.items():
                         faults[rows[row]] = one_line(fault)
                     left |= set(rows[alone].tolist())
@@ -229,7 +230,7 @@ class Evaluator:
             try:
                 for ending, columns in endings.items():
                     recording = simulate(self.scene.with_values(given | _until(ending)))
-                    read(np.array([row]), columns, recording, np.array([0]))
+                    read(np.array([row]), columns, recording)
             except (SceneError, StalledError) as error:
                 faults[row] = reason(error) if isinstance(error, SceneError) else str(error)
             ran(1)

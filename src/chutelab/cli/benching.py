@@ -10,7 +10,13 @@ import click
 
 from chutelab.cli.console import progress, tell
 from chutelab.cli.output import destination
-from chutelab.cli.parameters import json_option, out_option, retitled, scene_argument, set_option
+from chutelab.cli.parameters import (
+    json_option,
+    loaded_as_told,
+    out_option,
+    scene_argument,
+    set_option,
+)
 
 if TYPE_CHECKING:
     from chutelab.checks.workprecision import Timing
@@ -76,11 +82,10 @@ def bench(
     lower, take that engine for the accuracy you need.
     """
     from chutelab.checks.workprecision import Timing, measure
-    from chutelab.scene import load
     from chutelab.util.files import tsv_text
     from chutelab.util.versions import environment, measured_on
 
-    loaded = retitled(load(scene, overrides), overrides)
+    loaded = loaded_as_told(scene, overrides)
     about = environment()
     files = ["work-precision.tsv", "work-precision.png"]
     with destination(out, files) as into:

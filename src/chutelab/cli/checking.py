@@ -108,11 +108,7 @@ def verify(scenes: tuple[str, ...], as_json: bool) -> None:
 @set_option
 @json_option()
 def stress(
-    scene: str,
-    engine: str | None,
-    dt: float | None,
-    overrides: tuple[str, ...],
-    as_json: bool,
+    scene: str, engine: str | None, dt: float | None, overrides: tuple[str, ...], as_json: bool
 ) -> None:
     """Run SCENE and judge the run by laws that it must keep, whatever the scene.
 

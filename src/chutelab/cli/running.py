@@ -12,6 +12,7 @@ from chutelab.cli.output import KINDS, Output, destination, output_options, writ
 from chutelab.cli.parameters import (
     dt_option,
     engine_option,
+    file_option,
     loaded_as_told,
     scene_argument,
     set_option,
@@ -139,15 +140,10 @@ def show(recording: Path, output: Output) -> None:
     " incoming.speed=1,2,4. May be given twice.",
 )
 @set_option
-@click.option(
-    "-o",
-    "--out",
-    "--output",
-    "output",
-    metavar="FILE",
-    type=click.Path(path_type=Path),
-    help="The file to write; default: the scene's name with .html, here.",
-)
+@file_option(
+    "-o", "--out", "--output", "output",
+    text="The file to write; default: the scene's name with .html, here.",
+)  # fmt: skip
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing, and no progress bar.")
 def page(
     scene: str,

@@ -12,7 +12,13 @@ from click.shell_completion import CompletionItem
 
 from chutelab.cli import console
 from chutelab.cli.output import PICTURES, check_file, writing
-from chutelab.cli.parameters import engine_option, json_option, scene_argument, set_option
+from chutelab.cli.parameters import (
+    engine_option,
+    file_option,
+    json_option,
+    scene_argument,
+    set_option,
+)
 from chutelab.cli.program import RefusedError
 
 if TYPE_CHECKING:
@@ -66,21 +72,11 @@ def _complete_column(
 @click.option("--seed", type=int, default=0, help="Seed of the samples.", show_default=True)
 @engine_option
 @set_option
-@click.option(
-    "--out",
-    metavar="FILE",
-    type=click.Path(path_type=Path),
-    help="Write all rows into this file, .csv or .parquet.",
-)
+@file_option("--out", text="Write all rows into this file, .csv or .parquet.")
 @click.option(
     "--resume", is_flag=True, help="Go on with an interrupted sweep that was to write this file."
 )
-@click.option(
-    "--plot",
-    metavar="FILE",
-    type=click.Path(path_type=Path),
-    help="Draw one or two varied keys into this file: lines, or a heat map.",
-)
+@file_option("--plot", text="Draw one or two varied keys into this file: lines, or a heat map.")
 @click.option(
     "--of",
     "column",
@@ -136,14 +132,7 @@ def sweep(
     """
     from chutelab.scene import load
     from chutelab.scene.overrides import Override
-    from chutelab.studies.sweep import (
-        NUMBERS,
-        LostWorkersError,
-        crew,
-        planned,
-        sweep_to,
-        swept_by,
-    )
+    from chutelab.studies.sweep import NUMBERS, LostWorkersError, crew, planned, sweep_to, swept_by
 
     wrote = "\n".join(f"wrote {path}" for path in (out, plot) if path is not None)
     if bool(varies) == bool(uncertain):

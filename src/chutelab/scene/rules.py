@@ -18,7 +18,16 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field
 
-from chutelab.scene.units import LARGEST, Number, Table, Text, described, read_size, write_size
+from chutelab.scene.units import (
+    LARGEST,
+    Number,
+    Share,
+    Table,
+    Text,
+    described,
+    read_size,
+    write_size,
+)
 from chutelab.util.errors import MISSING, Fault, did_you_mean
 
 SYMBOLS: Final = {
@@ -105,7 +114,6 @@ THEORY: Final = "theory"
 UNPROMISED: Final = "none"
 
 Value = Annotated[Number, Field(ge=-(LARGEST**2), le=LARGEST**2)]
-Tolerance = Annotated[Number, Field(ge=0.0, le=1.0)]
 Words = Annotated[Text, Field(max_length=40)]
 
 
@@ -123,15 +131,15 @@ class Expect(Table):
         'What it should be, in its unit (SI; degrees for names in _deg), or "theory": what the '
         "closed form gives",
     )
-    tolerance: Tolerance | Words = described(
+    tolerance: Share | Words = described(
         ...,
         "What it may be off: a number is relative (0.01 is 1 %; of the value, or of what such "
         'quantities are measured by in the scene if that is more), a string absolute ("0.5 mm")',
     )
-    tolerance_contact: Tolerance | Words | None = described(
+    tolerance_contact: Share | Words | None = described(
         None, 'The same for the contact engine, or "none"; default: tolerance'
     )
-    tolerance_pymunk: Tolerance | Words | None = described(
+    tolerance_pymunk: Share | Words | None = described(
         None, 'The same for the pymunk engine, or "none"; default: tolerance'
     )
     source: Text = described(

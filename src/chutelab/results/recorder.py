@@ -19,19 +19,9 @@ from chutelab.util.arrays import Ints
 class StalledError(RuntimeError):
     """A loop reached its bound: a particle goes on without getting on.
 
-    Parameters
-    ----------
-    particle : int
-        Which one.
-    t : float
-        When, s.
-    position : tuple of float
-        Where its centre is, m.
-    reason : str
-        What happened too often, and what to do about it; a half-sentence.
-    recording : Recording, optional
-        What was recorded until then. Tracks that were under way end at their last knots, with
-        reason ``"time"``.
+    It says which one, when (s) and where its centre is (m); the reason is a half-sentence: what
+    happened too often, and what to do about it. The recording is of what went before: tracks that
+    were under way end at their last knots, with reason ``"time"``.
     """
 
     def __init__(
@@ -56,14 +46,9 @@ class StalledError(RuntimeError):
 
 
 class Recorder:
-    """Grows by chunks; `finish` turns it into a frozen `Recording`.
+    """Grows by chunks; `finish` turns it into a frozen `Recording` of the machine's run.
 
-    Parameters
-    ----------
-    machine : Machine
-        What is run; its N particles and its surfaces are what is recorded.
-    apart : bool
-        Whether the books of each particle are kept apart: `by_surface` is (N, S, 3) then.
+    With `apart` the books of each particle are kept apart: `by_surface` is (N, S, 3) then.
     """
 
     def __init__(self, machine: Machine, *, apart: bool = False) -> None:

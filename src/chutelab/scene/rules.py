@@ -50,21 +50,12 @@ NEEDED: Final = {"separation": "incoming", "impact": "plate", "landing": "outgoi
 """Events, and the table without which there are none; impacts on free surfaces go by name."""
 
 
-_NEAR: Final = 0.6
-"""Likeness of a misspelt quantity and the one that was meant: phi1 is taken for phi1_deg."""
-
-
 def unit_of(name: str, surfaces: Iterable[str]) -> str | None:
     """Return the unit of a quantity, "" for a number of things; None if the scene has none such.
 
-    Parameters
-    ----------
-    name
-        Such as ``x2``, ``landing.x``, ``landing.x.mean``, ``impact.ramp.t``, ``landing.count``,
-        ``ended.settled``, ``ledger.belt_work``, ``ledger.kinetic.end`` or
-        ``ledger.by_surface.outgoing.belt_work``.
-    surfaces
-        Names of the scene's surfaces: incoming, plate, outgoing and free ones, as far as there.
+    Names are such as ``x2``, ``landing.x``, ``landing.x.mean``, ``impact.ramp.t``,
+    ``landing.count``, ``ended.settled``, ``ledger.belt_work``, ``ledger.kinetic.end`` or
+    ``ledger.by_surface.outgoing.belt_work``; the surfaces are all that the scene has.
 
     Examples
     --------
@@ -107,7 +98,7 @@ def suggestion(name: str, surfaces: Iterable[str]) -> str:
     theirs = "phi1_deg to slip_heat, " if {"incoming", "plate"} <= set(known) else ""
     there_are = f"there are {theirs}{keys} and other keys of `chutelab run --json`"
     # Of a thousand surfaces some will do: looking for likeness takes long.
-    return did_you_mean(name, _units(tuple(known[:50])), there_are, cutoff=_NEAR)
+    return did_you_mean(name, _units(tuple(known[:50])), there_are)
 
 
 THEORY: Final = "theory"
@@ -171,21 +162,11 @@ class ConflictError(ValueError):
 
 
 class Look:
-    """Read-only look at a scene as nested mappings, sound or not.
+    """Read-only look at a scene's tables, as its file has them or as it dumps them, sound or not.
 
-    Parameters
-    ----------
-    document
-        The tables as the file has them, or as a scene dumps them.
-    model
-        The scene's Pydantic model, for the defaults.
-    faulty
-        Full paths that are already known to be at fault.
-
-    Attributes
-    ----------
-    asked : set of str
-        Keys whose values were asked for: the rules can depend on no others.
+    The defaults come from `model`, which is `Scene`; `faulty` holds the full paths that are already
+    known to be at fault, `asked` the keys whose values were asked for: the rules can depend on no
+    others.
     """
 
     def __init__(self, document: Mapping[str, Any], model: Any, faulty: Collection[str] = ()):

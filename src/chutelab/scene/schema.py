@@ -216,16 +216,17 @@ class Scene(Table):
     @classmethod
     def tables(cls) -> dict[str, type[Table]]:
         """Model of each table by its key."""
-        return {
-            "particle": Particle,
-            "incoming": Incoming,
-            "plate": Plate,
-            "outgoing": Outgoing,
-            "surface": Surface,
-            "stream": Stream,
-            "run": Run,
-            "expect": Expect,
-        }
+        tables: tuple[type[Table], ...] = (
+            Particle,
+            Incoming,
+            Plate,
+            Outgoing,
+            Surface,
+            Stream,
+            Run,
+            Expect,
+        )
+        return {table.__name__.lower(): table for table in tables}
 
     @property
     def source(self) -> str:

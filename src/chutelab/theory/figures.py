@@ -42,18 +42,10 @@ SAID: Final = {"as-printed": "Eq. (9) as printed", "corrected": "Eq. (9) correct
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """One line of a panel.
+    """One line of a panel: its points, and those (M, 2) that are marked on it.
 
-    Attributes
-    ----------
-    label : str
-        For the legend; "" for none.
-    x, y : ndarray
-        Points, SI units.
-    role : {"first", "second", "third", "fourth", "plate", "belt"}
-        What it is drawn like.
-    marks : ndarray or None
-        Points (M, 2) that are marked on it.
+    The label is for the legend, "" for none. The role says what it is drawn like: "first" to
+    "fourth", "plate" or "belt".
     """
 
     label: str

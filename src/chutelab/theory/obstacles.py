@@ -162,19 +162,9 @@ def first_in_flight(
 def first_on_arc(
     ride_radius: float, last: float, segments: Segments, radius: float
 ) -> tuple[float, int]:
-    """Return angle from the top and segment of the first collision of the ride round the pulley.
+    """Return angle from the top and segment of the first collision of the ride; (inf, -1) if none.
 
-    Parameters
-    ----------
-    ride_radius, last : float
-        Rc (m) of the centre's path round the origin, and φ (rad) where it ends.
-    segments, radius : Segments, float
-        What may be in the way, and the disk's radius (m).
-
-    Returns
-    -------
-    float, int
-        (inf, -1) if the way is free.
+    The centre's path has radius Rc (m) round the origin and ends at the angle `last` (rad).
     """
     tangent, normal, length = segments.frames()
     level = np.sum(segments.start * normal, axis=1)

@@ -39,18 +39,10 @@ FALL = 0.5
 
 @dataclass(frozen=True)
 class Cell:
-    """One number of a table.
+    """One number of a table, as the paper has it and as the equations give it, in the same unit.
 
-    Attributes
-    ----------
-    printed : str
-        As the paper has it.
-    computed : float
-        What the equations give, in the same unit.
-    rounded : str
-        `computed` with the printed number of decimals, halves away from zero.
-    differs : bool
-        Whether the two are more than half a unit of the last printed digit apart; ties agree.
+    `rounded` is the computed one with the printed number of decimals, halves away from zero. It
+    differs if the two are more than half a unit of the last printed digit apart; ties agree.
     """
 
     printed: str

@@ -25,7 +25,7 @@ from chutelab.checks.stress.barriers import (
     released_free,
     settled_to_stay,
 )
-from chutelab.checks.stress.evidence import EPS, ROUNDINGS, Evidence, Verdict
+from chutelab.checks.stress.evidence import EPS, ROUNDINGS, Evidence, Verdict, worst
 from chutelab.results.ledger import ledger
 
 Law = Callable[[Evidence], Verdict | None]
@@ -50,13 +50,8 @@ BALANCES = 2000
 def finite(e: Evidence) -> Verdict:
     """Every number of a recording is finite; the figure counts those that are not."""
     bad, where = 0, ""
-    for array, names in (
-        (e.recording.knots, ("t", "position", "velocity", "omega", "entries")),
-        (e.recording.events, ("t", "position", "velocity_before", "velocity_after",
-                              "omega_before", "omega_after", "normal_impulse",
-                              "tangential_impulse")),
-    ):  # fmt: skip
-        for name in names:
+    for array in (e.recording.knots, e.recording.events):
+        for name in array.dtype.names or ():
             found = int(np.count_nonzero(~np.isfinite(array[name])))
             bad, where = bad + found, where or (name if found else "")
     bad += int(np.count_nonzero(~np.isfinite(e.recording.by_surface)))
@@ -99,18 +94,17 @@ def energy(e: Evidence) -> Verdict | None:
         return _energy_of_crowd(e)
     knots, offsets = e.recording.knots, e.recording.offsets
     total = np.sum(e.recording.energies(knots), axis=0) - knots["entries"][:, 0]
-    worst, where = 0.0, ""
+    rises = []
     for i in range(e.recording.count):
         own = total[offsets[i] : offsets[i + 1]]
         if len(own):
             rise = own - np.minimum.accumulate(own)
             at = int(np.argmax(rise))
-            if rise[at] > worst:
-                worst = float(rise[at])
-                where = f", particle {i} at t = {e.recording.track(i)['t'][at]:.6g} s"
+            t = knots["t"][offsets[i] + at]
+            rises.append((rise[at] / e.energy, f"particle {i} at t = {t:.6g} s"))
     # A knot in contact holds the mean velocity of a step, half a step's pull off its books.
     known = e.speed * e.machine.gravity * (e.dt or 0.0) * e.machine.particle.mass / e.energy
-    return Verdict(worst / e.energy, _energy_bound(e) + known, f"of {e.energy:.3g} J{where}")
+    return worst(rises, _energy_bound(e) + known, f"of {e.energy:.3g} J")
 
 
 def _energy_of_crowd(e: Evidence) -> Verdict:
@@ -158,9 +152,8 @@ def residual(e: Evidence) -> Verdict | None:
 def _energy_bound(e: Evidence) -> float:
     """Bound what numbers may do to the energy, as a share of the energy in play.
 
-    Contacts round it. In a stepped engine a lone particle's is moved, besides, where an overlap is
-    parted: each contact by the weight times `Evidence.late`, as impulses are booked to the last
-    bit.
+    Contacts round it. In a stepped engine each contact moves it, besides, by the weight times
+    `Evidence.late`, where an overlap is parted: impulses themselves are booked to the last bit.
     """
     rounding = EPS * (ROUNDINGS + A_CONTACT * e.recording.contacts)
     if e.dt is None:

@@ -58,7 +58,6 @@ class Recorder:
         self.by_surface = np.zeros((*((count,) if apart else ()), owners, 3))
         self.ended = np.zeros(count, dtype=np.int8)
         self.contacts = 0
-        self.sizes = np.zeros(count, dtype=np.int64)
         self._knots: list[NDArray[Any]] = []
         self._owners: list[Ints] = []
         self._events: list[NDArray[Any]] = []
@@ -133,14 +132,6 @@ class Recorder:
         """Add finished events."""
         self._events.append(events)
 
-    def tracks(self, first: int, sizes: Ints, knots: NDArray[Any]) -> None:
-        """Add the whole tracks of the particles from `first` on, in their order.
-
-        Tracks have that many knots each; an engine that adds them so adds no others.
-        """
-        self.sizes[first : first + len(sizes)] = sizes
-        self._knots.append(knots)
-
     def finish(
         self,
         *,
@@ -151,12 +142,12 @@ class Recorder:
     ) -> Recording:
         """Sort what was collected, counted from `origin` (m), and freeze it."""
         count = len(self.ended)
-        knots, sizes = _joined(self._knots, KNOT), self.sizes
-        if self._owners:
-            owners = np.concatenate(self._owners)
-            self._owners.clear()
+        knots = _joined(self._knots, KNOT)
+        owners = np.concatenate([np.empty(0, dtype=np.int64), *self._owners])
+        self._owners.clear()
+        if np.any(owners[1:] < owners[:-1]):
             knots = knots.take(np.argsort(owners, kind="stable"))
-            sizes = np.bincount(owners, minlength=count)
+        sizes = np.bincount(owners, minlength=count)
         offsets = np.zeros(count + 1, dtype=np.int64)
         sizes.cumsum(out=offsets[1:])
         lonely = (sizes == 1).nonzero()[0]

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from chutelab.machine import build
 from chutelab.results.recording import ENTRIES, EVENT, KNOT, REASONS, Kind, Recording
@@ -98,7 +97,7 @@ def _about(recording: Recording) -> dict[str, Any]:
     }
 
 
-def _recording(about: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Recording:
+def _recording(about: dict[str, Any], arrays: dict[str, Any]) -> Recording:
     """Return what header and arrays hold; a ValueError if they contradict each other or the scene.
 
     Every index has to lead somewhere. The scene's text may be an older one, without later keys.

@@ -149,16 +149,15 @@ def table(number: int, rebound: Rebound = "as-printed") -> Table:
     raise ValueError(f"no table {number}: the paper's results are in tables 1, 3, 4 and 5")
 
 
-def _cell(printed: str, computed: float) -> Cell:
-    claim, found = Decimal(printed), Decimal(repr(float(computed)))
-    unit = Decimal(1).scaleb(int(claim.as_tuple().exponent))
-    nearest = found.quantize(unit * SLACK, ROUND_HALF_UP).quantize(unit, ROUND_HALF_UP)
-    differs = abs(found - claim) > unit * (Decimal("0.5") + SLACK)
-    return Cell(printed, float(computed), f"{nearest:f}", differs)
-
-
 def _row(label: str, printed: Sequence[str], computed: Sequence[float]) -> Row:
-    return Row(label, tuple(_cell(*pair) for pair in zip(printed, computed, strict=True)))
+    cells = []
+    for text, value in zip(printed, map(float, computed), strict=True):
+        claim, found = Decimal(text), Decimal(repr(value))
+        unit = Decimal(1).scaleb(int(claim.as_tuple().exponent))
+        nearest = found.quantize(unit * SLACK, ROUND_HALF_UP).quantize(unit, ROUND_HALF_UP)
+        differs = abs(found - claim) > unit * (Decimal("0.5") + SLACK)
+        cells.append(Cell(text, value, f"{nearest:f}", differs))
+    return Row(label, tuple(cells))
 
 
 def _paper(speed: str, distance: str, rebound: Rebound) -> Transfer:

@@ -267,30 +267,27 @@ def remarks(solution: Solution) -> Iterator[str]:
             f"Every {one.key} from {_size(low, one.unit)} to {_size(high, one.unit)} is a solution:"
             " the target does not depend on it there."
         )
-    if count:
-        if solution.answer.place == "end":
-            yield "It is at the end of the range: beyond it there may be better ones."
-        elif solution.answer.place == "change":
-            yield "It is a limit: right beyond it the particle goes another way."
-    if solution.goal != "solve":
-        if not count:
-            yield "No variant in the range has this quantity."
-    elif count > 1:
+    if count and solution.answer.place == "end":
+        yield "It is at the end of the range: beyond it there may be better ones."
+    if count and solution.answer.place == "change":
+        yield "It is a limit: right beyond it the particle goes another way."
+    if solution.goal == "solve" and count > 1:
         yield (
             f"{count} solutions; pictures and scene are of solution {solution.best + 1}, the"
             " nearest to the scene's own value. A narrower range chooses another."
         )
-    elif not count and solution.nearest is None:
-        yield "No solution: no variant in the range has these quantities."
-    elif not count:
-        near = solution.answer
+    if not count and solution.nearest is not None:
+        near = solution.nearest
+        numbers = zip(solution.quantities, solution.units, near.found, near.wanted, strict=True)
         parts = [
             f"{name} = {_size(found, unit)} instead of {_size(wanted, unit)}"
-            for name, unit, found, wanted in zip(
-                solution.quantities, solution.units, near.found, near.wanted, strict=True
-            )
+            for name, unit, found, wanted in numbers
         ]
         yield f"No solution in the range. Nearest to one: {', '.join(parts)}."
+    elif not count and solution.goal == "solve":
+        yield "No solution: no variant in the range has these quantities."
+    elif not count:
+        yield "No variant in the range has this quantity."
     unit, quantity = solution.units[0], solution.quantities[0]
     for jump in solution.jumps[:MOST]:
         yield (

@@ -73,25 +73,25 @@ class Spread:
     def cut(self) -> float:
         """Share of the distribution that the scene does not allow."""
         stats = scipy("stats")
-        whole = stats.norm(self.mean, self.spread)
         if self.law == "uniform":
             whole = stats.uniform(self.mean - self.spread, 2.0 * self.spread)
+        else:
+            whole = stats.norm(self.mean, self.spread)
         return float(whole.cdf(self.low) + whole.sf(self.high))
 
     def values(self, shares: Floats) -> Floats:
         """Return the values below which given shares, 0 to 1, of the (cut) distribution lie."""
-        stats = scipy("stats")
+        # Sobol points begin at 0, where a normal distribution has no value.
+        shares = np.clip(shares, 1e-12, 1.0 - 1e-12)
         if self.law == "uniform":
             low = max(self.low, self.mean - self.spread)
             high = min(self.high, self.mean + self.spread)
-            law = stats.uniform(low, high - low)
+            found = low + shares * (high - low)
         else:
             low, high = ((end - self.mean) / self.spread for end in (self.low, self.high))
-            law = stats.truncnorm(low, high, self.mean, self.spread)
-        # Sobol points begin at 0, where a normal distribution has no value; and rounding must not
-        # take a value past what the scene allows.
-        found: Floats = np.clip(law.ppf(np.clip(shares, 1e-12, 1.0 - 1e-12)), self.low, self.high)
-        return found
+            found = scipy("stats").truncnorm.ppf(shares, low, high, self.mean, self.spread)
+        # Rounding must not take a value past what the scene allows.
+        return np.asarray(np.clip(found, self.low, self.high))
 
 
 def spreads(scene: Scene, texts: Sequence[str]) -> tuple[Spread, ...]:

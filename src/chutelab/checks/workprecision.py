@@ -102,12 +102,9 @@ def clocked(run: Callable[[], T], number: int = 1) -> tuple[float, T]:
 
 
 class Stopwatch:
-    """Repeats of a call whose first run took `first` seconds: that one filled caches.
+    """Repeats of a call whose first run took `first` s: that one filled caches.
 
-    Parameters
-    ----------
-    patience : float
-        s of repeats, after which no further one is begun.
+    After `patience`, s, of repeats no further one is begun.
     """
 
     def __init__(self, run: Callable[[], object], first: float, patience: float) -> None:

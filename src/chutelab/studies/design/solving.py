@@ -17,11 +17,12 @@ from numpy.typing import ArrayLike
 from chutelab.scene import Scene
 from chutelab.studies.design.answers import Answer, Goal, Solution, asked
 from chutelab.studies.design.evaluation import Evaluator, ranges
-from chutelab.studies.design.quantities import DesignError, Quantity, measured, scipy
+from chutelab.studies.design.quantities import Quantity, measured, scipy
 from chutelab.studies.design.quantities import target as wish
 from chutelab.studies.design.roots import CLOSE, Scan, level, minima, roots, scan
 from chutelab.studies.design.sensitivity import sensitivities
 from chutelab.util.arrays import Floats, Progress
+from chutelab.util.errors import InputError
 
 NOWHERE: Final = 1e30
 """Stands for a variant without the quantity: worse than any other, but a number still."""
@@ -154,18 +155,20 @@ def solve(
     search = _Search(scene, vary, points, seed, progress)
     texts = [target] if isinstance(target, str) else list(target)
     if not texts:
-        raise DesignError("--target", "name at least one, such as landing.vx=outgoing.speed")
+        raise InputError("name at least one, such as landing.vx=outgoing.speed", "--target")
     wishes = [wish(scene, text) for text in texts]
     keys, count = len(search.ranges), len(wishes)
     if count > keys:
-        raise DesignError(
-            f"--target {texts[-1]}", f"{count} targets need as many keys to vary, {keys} given"
+        raise InputError(
+            f"{count} targets need as many keys to vary, {keys} given", f"--target {texts[-1]}"
         )
-    if len({one.left.key for one in wishes}) < count:
-        raise DesignError(f"--target {texts[-1]}", "this quantity has a target already")
-    search.look_at([side for one in wishes for side in (one.left, one.right)])
+    if len({left.key for left, _ in wishes}) < count:
+        raise InputError("this quantity has a target already", f"--target {texts[-1]}")
+    search.look_at([side for wanted in wishes for side in wanted])
     found = search.roots() if keys == 1 else search.system(count)
-    return search.solution("solve", ", ".join(map(str, wishes)), **found)
+    return search.solution(
+        "solve", ", ".join(f"{left.name} = {right.name}" for left, right in wishes), **found
+    )
 
 
 def minimize(
@@ -217,9 +220,9 @@ class _Search:
         progress: Progress | None,
     ) -> None:
         if not FEWEST <= points <= MOST:
-            raise DesignError(f"--points {points}", f"must be from {FEWEST} to {MOST}")
+            raise InputError(f"must be from {FEWEST} to {MOST}", f"--points {points}")
         if seed < 0:
-            raise DesignError(f"--seed {seed}", "must be a whole number from 0")
+            raise InputError("must be a whole number from 0", f"--seed {seed}")
         self.scene = scene
         self.ranges = ranges(scene, [vary] if isinstance(vary, str) else list(vary))
         self.points, self.seed, self.progress = points, seed, progress

@@ -65,33 +65,33 @@ Blow = tuple[Floats, Floats, Floats, Floats]
 
 
 class Rows:
-    """Rows of numbers of particles, in the order in which they came."""
+    """Rows of n numbers of particles, in the order in which they came."""
 
     def __init__(self) -> None:
-        self._chunks: list[tuple[Ints, Floats]] = []
-        self._long: list[tuple[Ints, Floats]] = []
+        self.chunks: list[tuple[Ints, Floats]] = []
+        self._short = 0
 
     def add(self, index: Ints, rows: Floats) -> None:
-        """Add a row (n,) for each of the particles (k,); `rows` (n, k) is kept, not copied."""
-        self._chunks.append((index, rows))
-        if len(self._chunks) >= MANY:
-            self._long.append(_joined(self._chunks))
-            self._chunks.clear()
-
-    def __len__(self) -> int:
-        return len(self._long) + len(self._chunks)
+        """Add a row for each of the particles (k,); `rows` (n, k) is kept, not copied."""
+        self.chunks.append((index, rows))
+        self._short += 1
+        if self._short == MANY:
+            owners, parts = zip(*self.chunks[-MANY:], strict=True)
+            self.chunks[-MANY:] = [(np.concatenate(owners), np.concatenate(parts, axis=1))]
+            self._short = 0
 
     def by_particle(self) -> tuple[Ints, Floats]:
         """Return whose each row is, ascending, (K,), and the rows, (K, n)."""
-        owner, rows = _joined(self._long + self._chunks)
+        owner = np.concatenate([index for index, _ in self.chunks])
         # 16-bit integers are sorted by radix, in linear time.
         order = np.argsort(owner.astype(np.int16), kind="stable")
-        return owner[order], rows.T[order]
-
-
-def _joined(chunks: list[tuple[Ints, Floats]]) -> tuple[Ints, Floats]:
-    owner = np.concatenate([index for index, _ in chunks])
-    return owner, np.concatenate([rows.T for _, rows in chunks]).T
+        place = np.empty(len(owner), dtype=np.int64)
+        place[order] = np.arange(len(owner))
+        out, begin = np.empty((len(owner), len(self.chunks[0][1]))), 0
+        for index, rows in self.chunks:
+            out[place[begin : begin + len(index)]] = rows.T
+            begin += len(index)
+        return owner[order], out
 
 
 class State:
@@ -281,18 +281,22 @@ class State:
         """Hand over everything, in the order of the particles: blocks do not show."""
         recorder.contacts += self.contacts
         recorder.ended[self.first : self.first + len(self.ended)] = self.ended
-        if self.log:
+        if self.log.chunks:
             owner, rows = self.log.by_particle()
             sizes = np.bincount(owner, minlength=len(self.mode))
             recorder.tracks(self.first, sizes, rows.view(KNOT)[:, 0])
-        if self.events:
-            owner, rows = self.events.by_particle()
-            events = np.empty(len(owner), dtype=EVENT)
-            events["particle"], events["other"] = owner + self.first, NONE
-            events["kind"], events["surface"], events["t"] = rows[:, 0], rows[:, 1], rows[:, 2]
-            events.view(NUMBERS)["numbers"] = rows[:, 3:]
+        if self.events.chunks:
+            events = np.empty(sum(len(index) for index, _ in self.events.chunks), dtype=EVENT)
+            events["other"] = NONE
+            begin = 0
+            for index, rows in self.events.chunks:
+                part = events[begin : begin + len(index)]
+                part["particle"] = index + self.first
+                part["kind"], part["surface"], part["t"] = rows[:3]
+                part.view(NUMBERS)["numbers"] = rows[3:].T
+                begin += len(index)
             recorder.tell(events)
-        if self.books:
+        if self.books.chunks:
             owner, rows = self.books.by_particle()
             surface = rows[:, 0].astype(np.int64)
             place = (owner + self.first, surface) if recorder.apart else surface

@@ -130,15 +130,14 @@ def paper_figure(found: PaperFigure) -> Picture:
     texts = [fill(text, WIDE) for text in found.meaning]
     texts += [fill(f"Not in the paper's text: {text}", WIDE) for text in found.missing]
     lines = sum(text.count("\n") + 1 for text in texts)
-    panels = [panel for pair in found.panels for panel in pair]
     below = TEXT * lines + 0.85
     height = 1.0 + 4.1 + below
     figure = Picture((13.0, height))
     grid = figure.add_gridspec(
-        1, len(panels), left=0.06, right=0.985, top=1.0 - 1.0 / height, bottom=below / height,
-        wspace=0.16 if len(panels) == 2 else 0.3,
+        1, len(found.panels), left=0.06, right=0.985, top=1.0 - 1.0 / height, bottom=below / height,
+        wspace=0.16 if len(found.panels) == 2 else 0.3,
     )  # fmt: skip
-    axes = [draw_panel(figure.add_subplot(grid[i]), panel) for i, panel in enumerate(panels)]
+    axes = [draw_panel(figure.add_subplot(grid[i]), panel) for i, panel in enumerate(found.panels)]
     for pair in zip(axes[::2], axes[1::2], strict=True):
         # The same axes for both: the eye compares heights.
         corners = np.concatenate([ax.dataLim.get_points() for ax in pair])
@@ -149,7 +148,7 @@ def paper_figure(found: PaperFigure) -> Picture:
             ax.set_ylim(low[1] - margin[1], high[1] + margin[1])
             if low[1] > 2.0 * margin[1]:
                 style.note(ax, "axis not from 0")
-    if panels[0].to_scale:
+    if found.panels[0].to_scale:
         figure.legend(
             *axes[0].get_legend_handles_labels(), loc="upper right",
             bbox_to_anchor=(0.985, 1.0 - 0.12 / height), ncols=4, fontsize=style.SMALL,

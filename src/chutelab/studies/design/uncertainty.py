@@ -9,8 +9,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import islice
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import numpy as np
 
@@ -19,9 +18,10 @@ from chutelab.scene.overrides import limits_of, parts_of, rule_at, value_at
 from chutelab.scene.units import read_size, with_unit
 from chutelab.scene.variants import Vary, quantity, reason
 from chutelab.studies.design.evaluation import INSIDE, Evaluator
-from chutelab.studies.design.quantities import DesignError, each_once, measured, scipy
-from chutelab.studies.design.sensitivity import Indices, crossed, design, indices
+from chutelab.studies.design.quantities import each_once, measured, scipy
+from chutelab.studies.design.sensitivity import Indices, indices, sampled
 from chutelab.util.arrays import Floats, Progress
+from chutelab.util.errors import InputError
 from chutelab.util.files import csv_text
 from chutelab.util.tables import Sheet, Shown, frame, plain
 
@@ -40,7 +40,9 @@ HOMES: Final = ("plate", "incoming", "outgoing", "particle", "stream")
 MOST: Final = 12
 """Uncertain inputs at once."""
 
-_SIGN: Final = re.compile(r"±|\+/-|\+-")
+_GIVEN: Final = re.compile(
+    r"(?P<key>[^=]+)=(?P<mean>[^:]*?)(?:±|\+/-|\+-)(?P<spread>[^:]*?)(?::(?P<law>.*))?"
+)
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,7 @@ class Spread:
     unit: str
     mean: float
     spread: float
-    law: Literal["normal", "uniform"]
+    law: str
     low: float
     high: float
 
@@ -93,61 +95,56 @@ class Spread:
 
 
 def spreads(scene: Scene, texts: Sequence[str]) -> tuple[Spread, ...]:
-    """Read what ``--uncertainty`` takes, several times.
-
-    Raises
-    ------
-    InputError
-        If one cannot be read, or is of a key that is unknown, no continuous number, or given twice.
-    """
+    """Read what ``--uncertainty`` takes, several times; each is tried on the scene."""
 
     def read(text: str) -> Spread:
         typed = f"--uncertainty {text}"
-        key, equals, given = (part.strip() for part in text.partition("="))
-        given, _, law = (part.strip() for part in given.partition(":"))
-        parts = [part.strip() for part in _SIGN.split(given)]
-        if not (key and equals) or len(parts) != 2 or not parts[1]:
-            raise DesignError(typed, FORM)
+        match = _GIVEN.fullmatch(text)
+        if match is None:
+            raise InputError(FORM, typed)
+        key, middle, width, law = (part.strip() for part in match.groups(default=""))
         if law not in ("", *LAWS):
             known = " and ".join(LAWS)
-            raise DesignError(typed, f"{law} is no distribution here; there are {known}")
-        if "." not in key and "[" not in key and key not in Scene.model_fields:
-            homes = (home for home in HOMES if getattr(scene, home) is not None)
-            known_in = (home for home in homes if key in Scene.tables()[home].model_fields)
-            key = ".".join([*islice(known_in, 1), key])
+            raise InputError(f"{law} is no distribution here; there are {known}", typed)
+        homes = [
+            home
+            for home in HOMES
+            if getattr(scene, home) is not None and key in Scene.tables()[home].model_fields
+        ]
+        if homes and key not in Scene.model_fields:
+            key = f"{homes[0]}.{key}"
         about = quantity(scene, Vary(key, (0.0,), typed))
 
         def number(text: str, unit: str) -> float:
             try:
                 value, found = read_size(text)
             except ValueError as error:
-                raise DesignError(typed, f"{text or 'nothing'}: {error}; it {FORM}") from None
+                raise InputError(f"{text or 'nothing'}: {error}; it {FORM}", typed) from None
             if found not in ("", unit):
                 allowed = f"it is in {unit}" if unit else "it is a pure number"
-                raise DesignError(typed, f"wrong unit in {text}: {allowed}")
+                raise InputError(f"wrong unit in {text}: {allowed}", typed)
             return value
 
         own = value_at(scene, about.path)
-        if parts[0]:
-            mean = number(parts[0], about.unit)
+        if middle:
+            mean = number(middle, about.unit)
         elif isinstance(own, (int, float)):
             mean = float(own)
         else:
-            raise DesignError(typed, f"{about.path} has no value in this scene: give the mean, too")
-        if parts[1].endswith("%"):
-            spread = abs(mean) * number(parts[1].removesuffix("%"), "") / 100.0
+            raise InputError(f"{about.path} has no value in this scene: give the mean, too", typed)
+        if width.endswith("%"):
+            spread = abs(mean) * number(width.removesuffix("%"), "") / 100.0
         else:
-            spread = number(parts[1], about.unit)
+            spread = number(width, about.unit)
         if not spread > 0.0:
-            raise DesignError(typed, f"the spread {parts[1]} must be more than 0; it {FORM}")
+            raise InputError(f"the spread {width} must be more than 0; it {FORM}", typed)
         low, high = limits_of(rule_at(parts_of(about.path)) or {}) or (-np.inf, np.inf)
         for value in (mean, float(np.clip(mean + INSIDE * spread, low, high))):
             try:
                 scene.with_values({about.path: value})
             except SceneError as error:
-                raise DesignError(typed, reason(error)) from None
-        kind: Literal["normal", "uniform"] = "uniform" if law == "uniform" else "normal"
-        return Spread(about.path, about.unit, mean, spread, kind, low, high)
+                raise InputError(reason(error), typed) from None
+        return Spread(about.path, about.unit, mean, spread, law or "normal", low, high)
 
     return each_once("--uncertainty", texts, read, ASK, MOST)
 
@@ -182,10 +179,8 @@ class Uncertainty(Shown):
         What is looked at.
     nominal : ndarray, shape (M,)
         The quantities with all inputs at their means.
-    inputs : ndarray, shape (N, K)
-        Values that were run: a sample of the inputs.
-    outputs : ndarray, shape (N, M)
-        What came of them, NaN where it did not happen.
+    inputs, outputs : ndarray, shape (N, K) and (N, M)
+        A sample of the inputs, and what came of it, NaN where it did not happen.
     indices : tuple of Indices
         Of each quantity.
     lost : dict of str
@@ -337,17 +332,16 @@ def uncertainty(
     names = list(dict.fromkeys(quantities))
     wanted = [measured(scene, name, f"quantity {name}") for name in names]
     if not wanted:
-        raise DesignError("quantities", "name at least one, such as landing.x")
+        raise InputError("name at least one, such as landing.x", "quantities")
     if not FEWEST <= samples <= MOST_SAMPLES:
-        raise DesignError(f"samples {samples}", f"must be from {FEWEST} to {MOST_SAMPLES}")
+        raise InputError(f"must be from {FEWEST} to {MOST_SAMPLES}", f"samples {samples}")
     if seed < 0:
-        raise DesignError(f"seed {seed}", "must be a whole number from 0")
+        raise InputError("must be a whole number from 0", f"seed {seed}")
     samples = 1 << (int(samples) - 1).bit_length()
     runs = samples * (len(inputs) + 2) + 1
     evaluate = Evaluator(scene, [one.key for one in inputs], wanted, progress, runs)
     nominal = evaluate(np.array([[one.mean for one in inputs]])).values[0]
-    a, b = design(len(inputs), samples, seed)
-    shares = np.concatenate([a, b, crossed(a, b).reshape(-1, len(inputs))])
+    shares = sampled(len(inputs), samples, seed).reshape(-1, len(inputs))
     points = np.column_stack(
         [one.values(column) for one, column in zip(inputs, shares.T, strict=True)]
     )
@@ -363,7 +357,7 @@ def uncertainty(
         scene.title, inputs, tuple(names), tuple(one.unit for one in wanted), nominal,
         points[:used], outcomes.values[:used],
         tuple(
-            indices(sets[0], sets[1], sets[2:], seed)
+            indices(sets, seed)
             for sets in outcomes.values.T.reshape(len(wanted), -1, samples)
         ),
         dict(lost), evaluate.runs, samples, seed,
@@ -373,6 +367,7 @@ def uncertainty(
 def as_dict(found: Uncertainty) -> dict[str, Any]:
     """Return the result as plain lists and floats, for JSON; without the samples."""
     inputs = ("key", "unit", "mean", "spread", "law", "cut")
+    columns = {name: getattr(found, name) for name in ("nominal", "mean", "deviation", "interval")}
     told = {
         "format": 1,
         "scene": found.scene,
@@ -380,10 +375,9 @@ def as_dict(found: Uncertainty) -> dict[str, Any]:
         "quantities": {
             name: {
                 "unit": found.units[m],
-                **{
-                    of: getattr(found, of)[m] for of in ("nominal", "mean", "deviation", "interval")
-                },
-                **{of: getattr(found.indices[m], of) for of in ("first", "total")},
+                **{of: values[m] for of, values in columns.items()},
+                "first": found.indices[m].first,
+                "total": found.indices[m].total,
             }
             for m, name in enumerate(found.quantities)
         },

@@ -19,8 +19,8 @@ import chutelab
 from chutelab import design, scene
 from chutelab.cli import main
 from chutelab.pictures.plots.design import draw_scan, scan, spread
-from chutelab.studies.design import sensitivity
-from chutelab.studies.design.evaluation import Evaluator, suits
+from chutelab.studies.design import roots, sensitivity
+from chutelab.studies.design.evaluation import Evaluator, Outcomes, suits
 from chutelab.studies.design.quantities import SHORT, measured, target
 from chutelab.studies.design.uncertainty import spreads
 from chutelab.util.errors import InputError
@@ -191,6 +191,19 @@ def test_a_jump_over_the_target_is_no_root():
     assert jump.high - jump.low < 1e-14
     assert jump.courses == ("plate, incoming, outgoing", "plate, outgoing")
     assert "jumps over" in repr(found)
+
+
+def test_a_course_between_two_equal_ones_is_not_lost():
+    def evaluate(points):
+        x = points[:, 0]
+        courses = np.select([x < 0.6, x < 0.601, x < 0.9], ["a", "c", "b"], "c").tolist()
+        return Outcomes(points, courses, [""] * len(x))
+
+    found = roots.scan(evaluate, 0.0, 1.0, 3)
+    assert found.complete
+    assert [piece.course for piece in found.pieces] == ["a", "c", "b", "c"]
+    np.testing.assert_allclose([change.at for change in found.changes], [0.6, 0.601, 0.9])
+    assert all(change.high - change.low < 1e-15 for change in found.changes)
 
 
 def test_where_the_plate_is_missed_every_angle_is_a_solution():

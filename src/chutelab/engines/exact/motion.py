@@ -10,7 +10,7 @@ import numpy as np
 
 from chutelab.engines.exact.contacts import end_slip, face_force, rest_on, settle_law, strike
 from chutelab.engines.exact.detect import FEW, Motion, bounds, first_contact
-from chutelab.engines.exact.obstacles import NONE, bare, dot, pick, rows_of
+from chutelab.engines.exact.obstacles import NONE, dot, pick, rows_of
 from chutelab.engines.exact.particle_state import Mode, State
 from chutelab.mechanics.ballistics import descent
 from chutelab.mechanics.contact import STEP_ANGLE, Circle, Outcome, advance, normal_force
@@ -243,7 +243,7 @@ def _motion(s: State, index: Ints, acceleration: Floats) -> Motion:
         s.left[index],
         s.left_side[index],
         s.order[index],
-        past=None if s.past is None else s.past.of(index),
+        s.past,
     )
 
 
@@ -268,7 +268,7 @@ def _move(s: State, motion: Motion, dt: Floats) -> None:
         touch = rows_of(s.obstacles.touch, motion.rows)
         away = (np.abs(place - middle) > CLEAR * touch).any(axis=0)
         s.past.place[:, motion.rows[away]] = middle[:, away]
-    s.v[:, at] = motion.velocity + bare(dt) * motion.acceleration
+    s.v[:, at] = motion.velocity + dt * motion.acceleration
 
 
 def _strike(s: State, index: Ints, hits: Bools, obstacle: Ints, side: Floats) -> None:

@@ -175,7 +175,7 @@ class Obstacles:
 
         `position` (2, n) is that of all particles.
         """
-        normal = bare(side) * pick(self.normal, rows, obstacle)
+        normal = side * pick(self.normal, rows, obstacle)
         round_ = (obstacle >= self.segments).nonzero()[0]
         if len(round_):
             circle = obstacle[round_] - self.segments
@@ -191,11 +191,6 @@ class Obstacles:
         """
         crown = pick(self.crown, rows, obstacle - self.segments)
         return np.where(dot(normal, crown) >= 0.0, 1.0, -1.0)
-
-
-def bare(values: Floats) -> Floats:
-    """Values (k,) to meet vectors (2, k): a lone one without axes, which NumPy is quicker with."""
-    return values.reshape(()) if values.shape == (1,) else values
 
 
 def dot(a: Floats, b: Floats) -> Floats:

@@ -84,19 +84,15 @@ def overlay(
     said = "one particle" if recording.count == 1 else f"{recording.count:,} particles"
     if recording.count > STREAM_TRACKS:
         said += f", {STREAM_TRACKS} tracks drawn"
-    engine = figure.text(
-        0.985, 0.965, f"engine {recording.engine}, {said}", ha="right", va="center"
-    )
-    engine.set(fontsize=style.NORMAL, color=style.MUTED)
+    figure.remark(0.985, 0.965, f"engine {recording.engine}, {said}", ha="right", va="center")
     figure.write(path)
     return figure
 
 
 def draw_view(ax: Axes, recording: Recording, parts: tuple[Arc, ...]) -> Axes:
     """Draw the scene to scale with tracks, strobe dots and the analytic parabola, and a legend."""
-    machine = recording.machine
     style.dress(ax, "x, m", "y, m")
-    draw_scene(ax, machine, window_of(recording, machine))
+    draw_scene(ax, recording.machine, window_of(recording))
     draw_tracks(draw_analytic(ax, parts), recording)
     style.legend_above(ax, 4)
     return ax
@@ -120,13 +116,7 @@ TEXT = 0.215
 
 
 def paper_figure(found: PaperFigure) -> Picture:
-    """Draw a figure of the paper: panels side by side, and in words what the misprint does.
-
-    Parameters
-    ----------
-    found : PaperFigure
-        From `chutelab.theory.figures.figure`.
-    """
+    """Draw a figure of the paper: panels side by side, and in words what the misprint does."""
     texts = [fill(text, WIDE) for text in found.meaning]
     texts += [fill(f"Not in the paper's text: {text}", WIDE) for text in found.missing]
     lines = sum(text.count("\n") + 1 for text in texts)
@@ -159,10 +149,8 @@ def paper_figure(found: PaperFigure) -> Picture:
     figure.headline(0.02, 1.0 - 0.3 / height, title, 150)
     y = below - 0.65
     for i, text in enumerate(texts):
-        figure.text(
-            0.02, y / height, text, fontsize=style.SMALL, verticalalignment="top",
-            color=style.INK if i < len(found.meaning) else style.MUTED,
-        )  # fmt: skip
+        color = style.INK if i < len(found.meaning) else style.MUTED
+        figure.remark(0.02, y / height, text, fontsize=style.SMALL, color=color)
         y -= TEXT * (text.count("\n") + 1)
     return figure
 

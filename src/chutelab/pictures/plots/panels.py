@@ -147,7 +147,7 @@ def draw_tracks(ax: Axes, recording: Recording) -> Axes:
     """
     lines = []
     chosen = spread(recording.count, STREAM_TRACKS)[1:]
-    for i in chosen[np.diff(recording.offsets)[chosen] > 0]:
+    for i in chosen[recording.released[chosen]]:
         one = subset(recording, [i])
         knots = np.unique(one.knots["t"])
         times = np.union1d(np.linspace(knots[0], knots[-1], 200), knots[:: len(knots) // 200 + 1])
@@ -188,12 +188,8 @@ def draw_residual(
 ) -> Axes:
     """Draw the distance between simulated and analytic positions of particle 0, on a log scale.
 
-    Parameters
-    ----------
-    parts, start : tuple of Arc, float
-        See `analytic_of`; without arcs the panel says so, and why.
-    reason : str, optional
-        Why there is no analytic parabola, or none to the end.
+    `parts` and `start` are of `analytic_of`; without arcs the panel says so. `reason` says why
+    there is no analytic parabola, or none to the end.
     """
     note = shorten(f"; then {reason}", 95, placeholder=" …") if reason else ""
     style.dress(ax, f"time since separation, s{note}", "distance, m", "Simulated − analytic")

@@ -127,17 +127,13 @@ def upright(times: Floats, jumps: Floats) -> Floats:
     return np.unique(np.concatenate([times, jumps, before[before >= times[0]]]))
 
 
-def energies(recording: Recording, times: ArrayLike) -> dict[str, Floats]:
-    """Return `Recording.energy_at` with the energy at release, all potential energy above 0.
+def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
+    """Return the ledger at times (T,), J, with potential energy above 0: it can be stacked.
 
-    Returns
-    -------
-    dict of ndarray, shape (T,)
-        What `energy_at` gives, and ``start``, kinetic and potential energy at the release of all
-        particles released so far; J. Potential energy is counted from the lowest point of the
-        particles that stay in the scene (of all, if it is negative otherwise): it can be stacked.
+    It is what `Recording.energy_at` gives, and ``start``, kinetic and potential energy at the
+    release of all particles released so far. Potential energy is counted from the lowest point of
+    the particles that stay in the scene (of all, if it is negative otherwise).
     """
-    times = np.atleast_1d(np.asarray(times, dtype=np.float64))
     books = recording.energy_at(times)
     first, _ = recording.ends()
     order = np.argsort(first["t"], kind="stable")
@@ -224,7 +220,7 @@ class Window:
         return (start + low * along, start + high * along) if low < high else None
 
 
-def window_of(recording: Recording, machine: Machine) -> Window:
+def window_of(recording: Recording) -> Window:
     """Return the window in which something happens, with room for labels.
 
     It holds particle 0 from separation (or release, without one) to its landing (or last impact),
@@ -232,6 +228,7 @@ def window_of(recording: Recording, machine: Machine) -> Window:
     of the other particles, as much as does not make all else small.
     """
     path, tail = _path(recording)
+    machine = recording.machine
     points = [path]
     if machine.pulley is not None:
         corner = np.full(2, machine.pulley.radius)
@@ -277,7 +274,7 @@ def _crowd(recording: Recording) -> Floats:
     """
     events = recording.events
     carried = np.isin(events["particle"], recording.select(Kind.SEPARATION)["particle"])
-    counts = np.isin(events["kind"], [int(kind) for kind in STRUCK])
+    counts = np.isin(events["kind"], STRUCK)
     counts |= ~carried & (events["kind"] == Kind.RELEASE)
     others = events[counts & (events["particle"] != 0)]
     if not len(others):
@@ -303,14 +300,7 @@ TWO_LINES = 32.0
 def draw_scene(ax: Axes, machine: Machine, window: Window | None = None) -> Axes:
     """Draw the machine's surfaces to scale, with their names.
 
-    Parameters
-    ----------
-    ax : Axes
-        Its limits are set to hold the window at equal scales.
-    machine : Machine
-        With one set of surfaces for all particles, segments (S,).
-    window : Window, optional
-        What to show, see `window_of`; by default all surfaces.
+    The limits of the axes are set to hold the window at equal scales; by default all surfaces.
     """
     if window is None:
         ends = np.concatenate([machine.segments.start, machine.segments.end])

@@ -318,7 +318,7 @@ def test_variants_run_at_once_give_the_bits_of_single_runs(name, keys, low, high
     known = [one for one in NAMES if _has(given, one)]
     quantities = [measured(given, one) for one in known]
     if given.outgoing is not None:
-        quantities.append(target(given, "landing.vx=outgoing.speed").right)
+        quantities += target(given, "landing.vx=outgoing.speed")[1:]
     draws = np.random.default_rng(5).uniform(low, high, size=(24, 2))
     together = Evaluator(given, keys, quantities)(draws)
     alone = Evaluator(given, keys, quantities)
@@ -349,10 +349,10 @@ def test_streams_and_released_particles_run_one_by_one():
 def test_units_and_sides_of_a_target():
     given = machine()
     run = chutelab.simulate(given)
-    assert target(given, "landing.x = 300 mm").right.of(run) == pytest.approx(0.3)
-    assert target(given, "landing.x=0.3").right.unit == "m"
-    assert target(given, "landing.vx=incoming.speed").right.of(run) == V
-    assert target(given, "landing.vx=impact.vx").right.key == "impact.vx"
+    assert target(given, "landing.x = 300 mm")[1].of(run) == pytest.approx(0.3)
+    assert target(given, "landing.x=0.3")[1].unit == "m"
+    assert target(given, "landing.vx=incoming.speed")[1].of(run) == V
+    assert target(given, "landing.vx=impact.vx")[1].key == "impact.vx"
     for name in SHORT:
         assert measured(given, name).unit in ("J", "W")
 

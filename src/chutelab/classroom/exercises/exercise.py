@@ -145,85 +145,41 @@ class Parameter:
 class Mistake:
     """A way to go wrong that is recognised by the number it leads to.
 
-    Attributes
-    ----------
-    name
-        A few words; a general mistake of this name is left out.
-    formula
-        The wrong answer.
-    says
-        What the student is told: what seems to have happened, and never the right number. A
-        template.
+    What the student is told is a template: what seems to have happened, never the right number.
     """
 
-    name: str
-    formula: str
+    name: str  # a few words; a general mistake of this name is left out
+    formula: str  # of the wrong answer
     says: str
 
 
 @dataclass(frozen=True)
 class Question:
-    """One question with one number for an answer. All texts are templates.
-
-    Attributes
-    ----------
-    title, text
-        A few words, and the question itself.
-    unit
-        Of the answer; empty for a pure number. Angles are asked for in ``degrees``.
-    answer
-        Formula of the right number.
-    mistakes
-        Those of this question; the general ones come on top.
-    hints
-        Each says more than the one before.
-    working
-        The way to the answer, line by line.
-    source
-        Equation or law behind it.
-    """
+    """One question with one number for an answer. All texts are templates."""
 
     title: str
     text: str
-    unit: str
-    answer: str
-    mistakes: Sequence[Mistake]
-    hints: Sequence[str]
-    working: str
-    source: str
+    unit: str  # of the answer; "" for a pure number, "degrees" for an angle
+    answer: str  # formula of the right number
+    mistakes: Sequence[Mistake]  # of this question; the general ones come on top
+    hints: Sequence[str]  # each says more than the one before
+    working: str  # the way to the answer, line by line
+    source: str  # equation or law behind it
 
 
 @dataclass(frozen=True)
 class Exercise:
-    """The exercise of one lesson.
+    """The exercise of one lesson."""
 
-    Attributes
-    ----------
-    number
-        Of the lesson.
-    name, title
-        As in ``the-bounce``; as a heading.
-    story
-        What all questions share, a template.
-    parameters, questions
-        What is drawn, and what is asked.
-    formulas
-        What texts and other formulas need besides.
-    tell
-        Formulas whose numbers are told to the student too.
-    fits
-        Conditions of a draw that the lesson is about.
-    """
-
-    number: int
-    name: str
+    number: int  # of the lesson
+    name: str  # such as the-bounce
     title: str
-    story: str
+    story: str  # what all questions share, a template
     parameters: Sequence[Parameter]
     questions: Sequence[Question]
-    formulas: Mapping[str, str]
-    tell: Sequence[str] = ()
-    fits: Sequence[str] = ()
+    formulas: Mapping[str, str]  # what texts and other formulas need besides
+    tell: Sequence[str] = ()  # formulas whose numbers are told to the student too
+    fits: Sequence[str] = ()  # conditions of a draw that the lesson is about
 
 
 def read(file: Path) -> Exercise:

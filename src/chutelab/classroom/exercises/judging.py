@@ -126,27 +126,15 @@ class Passage:
 
 @dataclass
 class Standing:
-    """How far a student got with one question.
-
-    Attributes
-    ----------
-    verdict, answer
-        Of the last answer, and the last number that was checked.
-    tries
-        Answers given, blank ones not counted.
-    hints
-        Hints read.
-    revealed
-        Whether the working was shown.
-    """
+    """How far a student got with one question."""
 
     number: int
     title: str
-    verdict: Verdict = Verdict.BLANK
-    answer: float | None = None
-    tries: int = 0
-    hints: int = 0
-    revealed: bool = False
+    verdict: Verdict = Verdict.BLANK  # of the last answer
+    answer: float | None = None  # the last number that was checked
+    tries: int = 0  # blank answers are not counted
+    hints: int = 0  # how many were read
+    revealed: bool = False  # whether the working was shown
 
     @property
     def remarks(self) -> str:

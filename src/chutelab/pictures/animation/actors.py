@@ -38,11 +38,8 @@ DRAWN = 300
 SMALLEST = 6.0
 """pt; the diameter a particle is drawn with if to scale it would be smaller."""
 
-MARKS = 3
-"""Marks on a belt across the window; they move with it."""
-
-HOLES = 3
-"""Holes in the pulley; they turn with it."""
+MARKS, HOLES = 3, 3
+"""Marks on a belt across the window, and holes in the pulley; they move with it."""
 
 
 def line(ax: Axes, gid: str, points: Callable[[int], Floats], **look: Any) -> Moving:
@@ -67,9 +64,7 @@ def _points(ax: Axes, length: float) -> float:
 
 def trail(ax: Axes, recording: Recording, times: Floats, reach: float) -> Moving:
     """Return the way that particle 0 came in the last `reach` seconds of the recording."""
-    clock = recording.track(0)["t"]
-    filmed = times[(times >= clock[0]) & (times <= clock[-1])]
-    passed = np.union1d(filmed, track_times(recording))
+    passed = np.union1d(times, track_times(recording))
     path, _ = nominal(recording, passed)
 
     def behind(index: int) -> Floats:

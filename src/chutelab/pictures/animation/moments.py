@@ -127,14 +127,12 @@ RUNNING = 4.2
 LIVES = 3.0
 """A stream is filmed for at most this many times what particle 0 takes."""
 
-HOLDS = 4
-"""Impacts that the film stops at, the hardest; more would be a slide show."""
+HOLDS, WORTH = 4, 0.05
+"""The film stops at the hardest impacts only: at most so many, or it would be a slide show, and at
+none with less than this share of the largest impulse."""
 
-WORTH = 0.05
-"""Share of the largest impulse that an impact needs for the film to stop at it."""
-
-HOLD_TOTAL, HOLD_LONGEST = 300, 130
-"""Hundredths of a second: all holds together at most, and one of them."""
+HOLD_TOTAL, HOLD_LONGEST, TAIL = 300, 130, 120
+"""Hundredths of a second: all holds together at most, one of them, and the last picture."""
 
 EDGE = 0.012
 """Share of the window's larger side that particle 0 is inside it as the film begins: all of it."""
@@ -144,9 +142,6 @@ TOLD = 1.2
 
 LASTING = (Kind.STICK, Kind.SETTLE, Kind.EXIT)
 """Events that the caption tells until another happens: they begin what still goes on."""
-
-TAIL = 120
-"""Hundredths of a second that the last picture stays."""
 
 
 @dataclass(frozen=True)

@@ -188,7 +188,7 @@ class Stage:
         for spine in view.spines.values():
             spine.set_color(style.STEEL_LIGHT)
         _draw_scale(view)
-        parts = analytic_of(recording, recording.prediction)[0] if "parabola" in shows else ()
+        parts = analytic_of(recording)[0] if "parabola" in shows else ()
         draw_analytic(view, parts)
         position, velocity = nominal(recording, times)
         reach = layout.reach(TRAIL, "trails")

@@ -50,7 +50,7 @@ def draw_scan(ax: Axes, solution: Solution) -> Axes:
     factor, said = style.scaled(found.values, unit)
     style.dress(ax, with_unit(key.key, key.unit), with_unit(name, said))
     for i, piece in enumerate(found.pieces):
-        look = {"color": style.TRACK, "lw": 1.8, "zorder": 4.0, "gid": "quantity"}
+        look: dict[str, Any] = {"color": style.TRACK, "lw": 1.8, "zorder": 4.0, "gid": "quantity"}
         ax.plot(piece.x, factor * piece.values[:, 0], label="" if i else name, **look)
     if solution.goal == "solve":
         look = {"color": style.ANALYTIC, "lw": 1.6, "ls": "--", "zorder": 3.0, "gid": "target"}
@@ -142,7 +142,7 @@ def draw_strongest(ax: Axes, found: Uncertainty, row: int) -> Axes:
     factor, unit = style.scaled(values, found.units[row])
     quantity = with_unit(found.quantities[row], unit)
     style.dress(ax, with_unit(one.key, one.unit), quantity, f"against {one.key}")
-    look = {"color": style.TRACK, "ms": 3.0, "alpha": 0.5, "zorder": 3.0}
+    look: dict[str, Any] = {"color": style.TRACK, "ms": 3.0, "alpha": 0.5, "zorder": 3.0}
     ax.plot(found.inputs[:, k], factor * values, ".", **look)
     return ax
 
@@ -185,17 +185,13 @@ def _titles(figure: Picture, title: str, text: str, wide: int = 95) -> None:
 SWEEP_SIZE = (8.6, 5.4)
 """Width and height of the figure, inches."""
 
-MOST_LINES = 8
-"""Values of a second key up to which each has a line; more make a heat map."""
+MOST_LINES, DOTS = 8, 60
+"""Values of a second key up to which each has a line (more make a heat map), and values up to which
+a line shows where they are."""
 
-DOTS = 60
-"""Values up to which a line shows where they are."""
-
-COLORS = "viridis"
-"""From dark to light with growing values, also for colour-blind readers and in print."""
-
-LIGHTEST = 0.88
-"""Share of the colours that is used for lines: what follows is too light on white."""
+COLORS, LIGHTEST = "viridis", 0.88
+"""From dark to light with growing values, also for colour-blind readers and in print; the share of
+it that is used for lines: what follows is too light on white."""
 
 
 def sweep_figure(swept: Sweep, column: str) -> Picture:
@@ -222,7 +218,10 @@ def sweep_figure(swept: Sweep, column: str) -> Picture:
 
 
 def draw_sweep(ax: Axes, swept: Sweep, column: str) -> Axes:
-    """Draw one column: dots of samples, lines, or a heat map over two keys with many values."""
+    """Draw one column: lines, a heat map over two keys with many values, or dots of samples.
+
+    Dots over two keys have their values as colours; crosses are where there is none.
+    """
     keys = [key for key in swept.quantities if len(np.unique(swept.columns[key])) > 1]
     if len(keys) > 2:
         raise ValueError(f"a picture shows one or two varied keys, not {len(keys)}")
@@ -243,8 +242,15 @@ def draw_sweep(ax: Axes, swept: Sweep, column: str) -> Axes:
     names = [with_unit(key, swept.unit(key)) for key in keys]
     style.dress(ax, names[0], names[1] if by_colour else label)
     if by_colour:
-        painted = (_draw_dots if sampled else _draw_heat)(ax, first, second, z)
-        if np.isfinite(z).any():
+        known = np.isfinite(z)
+        if sampled:
+            ax.plot(first[~known], second[~known], "x", markersize=4.0, color=style.STEEL)
+            painted: ScalarMappable = ax.scatter(
+                first[known], second[known], c=z[known], cmap=COLORS, s=16.0
+            )
+        else:
+            painted = _draw_heat(ax, first, second, z)
+        if known.any():
             bar = ax.figure.colorbar(painted, ax=ax, pad=0.02)
             bar.set_label(label, fontsize=style.NORMAL)
             bar.ax.tick_params(labelsize=style.SMALL)
@@ -277,13 +283,6 @@ def _draw_lines(ax: Axes, x: Floats, others: Floats, z: Floats) -> None:
             x[mine], z[mine], color=shade if len(values) > 1 else style.TRACK, linewidth=1.8,
             marker="o" if len(mine) <= DOTS else "", markersize=4.0, label=f"{value:g}",
         )  # fmt: skip
-
-
-def _draw_dots(ax: Axes, x: Floats, y: Floats, z: Floats) -> ScalarMappable:
-    """Draw dots with their values as colours, and crosses where there is none."""
-    known = np.isfinite(z)
-    ax.plot(x[~known], y[~known], "x", markersize=4.0, color=style.STEEL)
-    return ax.scatter(x[known], y[known], c=z[known], cmap=COLORS, s=16.0)
 
 
 def _draw_heat(ax: Axes, x: Floats, y: Floats, z: Floats) -> ScalarMappable:

@@ -8,7 +8,6 @@ from __future__ import annotations
 from pathlib import Path
 from textwrap import fill
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -128,17 +127,17 @@ def paper_figure(found: PaperFigure) -> Picture:
         1, len(panels), left=0.06, right=0.985, top=1.0 - 1.0 / height, bottom=below / height,
         wspace=0.16 if len(panels) == 2 else 0.3,
     )  # fmt: skip
-    axes = [draw_panel(figure.add_subplot(grid[i]), panel) for i, panel in enumerate(panels)]
-    for pair in zip(axes[::2], axes[1::2], strict=True):
-        # The same axes for both: the eye compares heights.
-        corners = np.concatenate([ax.dataLim.get_points() for ax in pair])
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        margin = MARGIN * (high - low)
-        for ax in pair:
-            ax.set_xlim(low[0] - margin[0], high[0] + margin[0])
-            ax.set_ylim(low[1] - margin[1], high[1] + margin[1])
-            if low[1] > 2.0 * margin[1]:
-                style.note(ax, "axis not from 0")
+    axes: list[Axes] = []
+    for i, panel in enumerate(panels):
+        # Both of a pair have the same limits: the eye compares heights.
+        first = axes[-1] if i % 2 else None
+        ax = figure.add_subplot(grid[i], sharex=first, sharey=first)
+        ax.margins(MARGIN)
+        axes.append(draw_panel(ax, panel))
+    for ax in axes:
+        low, high = ax.get_ylim()
+        if low > MARGIN * (high - low):
+            style.note(ax, "axis not from 0")
     if panels[0].to_scale:
         figure.legend(
             *axes[0].get_legend_handles_labels(), loc="upper right",

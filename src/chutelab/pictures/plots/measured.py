@@ -74,7 +74,7 @@ def draw_measured(ax: Axes, found: Residuals, before: Recording | None = None) -
     style.dress(ax, "x, m", "y, m")
     shown = far.holds(position)
     draw_scene(ax, recording.machine, around(np.concatenate([corners, position[shown]])))
-    parts, _ = analytic_of(recording, recording.prediction)
+    parts, _ = analytic_of(recording)
     draw_analytic(ax, parts)
     for run, gid, colour, line, label in (
         (before, "before", style.MUTED, ":", "before the fit"),

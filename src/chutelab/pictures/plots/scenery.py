@@ -107,13 +107,13 @@ def strobe_times(recording: Recording) -> Floats:
 
 
 def track_times(
-    recording: Recording, begin: float | None = None, end: float | None = None, count: int = 400
+    recording: Recording, begin: float | None = None, end: float | None = None
 ) -> Floats:
     """Return even times, joined by the knots of particle 0 and the moments just before them.
 
     So a jump at an impact is drawn upright, not slanted. By default all of its track.
     """
-    knots = recording.track(0)["t"]
+    count, knots = 400, recording.track(0)["t"]
     begin, end = knots[0] if begin is None else begin, knots[-1] if end is None else end
     if len(knots) > count:
         knots = recording.events["t"][recording.events["particle"] == 0][:count]
@@ -156,11 +156,9 @@ def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
 MANY = 60
 """Particles from which on some may stray out of the window."""
 
-NEARBY = 0.35
-"""Share of the action's size around it within which the ends of surfaces are shown."""
-
-FAR = 1.0
-"""Share of the action's size around it within which what happens later is shown."""
+NEARBY, FAR = 0.35, 1.0
+"""Shares of the action's size: around it within the first the ends of surfaces are shown, within
+the second what happens later."""
 
 
 @dataclass(frozen=True)

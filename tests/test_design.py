@@ -18,8 +18,6 @@ from scipy.stats import norm
 import chutelab
 from chutelab import design, scene
 from chutelab.cli import main
-from chutelab.cli.program import RefusedError
-from chutelab.cli.solving import propagate
 from chutelab.pictures.plots.design import draw_scan, scan, spread
 from chutelab.studies.design import sensitivity
 from chutelab.studies.design.evaluation import Evaluator, suits
@@ -609,11 +607,22 @@ def test_the_legend_of_the_shares_covers_no_bar():
         assert not any(legend.overlaps(bar.get_window_extent()) for bar in ax.patches)
 
 
-def test_the_command_behind_sweep_writes_samples_and_picture(tmp_path, capsys):
-    options = {"samples": 64, "seed": 0, "as_json": False, "quiet": False}
+def propagate(folder, given, *options, code=0):
+    """Call ``sweep --uncertainty`` on `machine`, with 64 samples."""
+    path = folder / "machine.toml"
+    path.write_text(scene.to_toml(machine()), encoding="utf-8")
+    command = ["sweep", path, "--uncertainty", given, "--sample", 64, *options]
+    result = CliRunner().invoke(main, [str(word) for word in command])
+    assert result.exit_code == code, result.output
+    return result
+
+
+def test_sweep_writes_samples_and_picture_of_uncertainties(tmp_path):
     out, plot = tmp_path / "samples.csv", tmp_path / "spread.png"
-    propagate(machine(), ["restitution=0.5±0.05"], out=out, plot=plot, **options)
-    assert "share of plate.restitution" in capsys.readouterr().out
+    shown = propagate(tmp_path, "plate.restitution=0.5±0.05", "--out", out, "--plot", plot).stdout
+    assert "share of plate.restitution" in shown
+    assert shown.endswith(f"wrote {out}\nwrote {plot}\n")
+    assert plot.stat().st_size > 10_000
     head, *rows = out.read_text(encoding="utf-8").splitlines()
     assert head == "plate.restitution,landing.x,belt_work"
     assert len(rows) == 128
@@ -623,27 +632,24 @@ def test_the_command_behind_sweep_writes_samples_and_picture(tmp_path, capsys):
     t3 = (sqrt(falls**2 + 2.0 * G * DROP) - falls) / G
     assert x == pytest.approx(R + D - epsilon * V * t3, rel=1e-12)
     assert work == pytest.approx(M * V * (V + epsilon * V), rel=1e-12)
-    propagate(machine(), ["restitution=0.5±0.05"], out=None, plot=None, samples=64, seed=0,
-              as_json=True, quiet=False)  # fmt: skip
-    told = json.loads(capsys.readouterr().out)
+    told = json.loads(propagate(tmp_path, "plate.restitution=0.5±0.05", "--json").stdout)
     assert told["quantities"]["landing.x"]["first"][0] == pytest.approx(1.0, abs=1e-6)
 
 
 @pytest.mark.parametrize(
-    ("given", "out", "plot", "said"),
+    ("given", "options", "said"),
     [
-        ("restitution=0.5", None, None, "must be KEY=MEAN±SPREAD"),
-        ("restitution=0.5±0.1", "rows.parquet", None, "ends in .csv"),
-        ("restitution=0.5±0.1", None, "picture.gif", "ends in .png or .svg"),
-        ("restitution=0.5±0.1", "not/there.csv", None, "there is no folder not"),
+        ("restitution=0.5", [], "must be KEY=MEAN±SPREAD"),
+        ("restitution=0.5±0.1", ["--out", "rows.parquet"], "ends in .csv"),
+        ("restitution=0.5±0.1", ["--plot", "picture.gif"], "ends in .png or .svg"),
+        ("restitution=0.5±0.1", ["--out", "not/there.csv"], "there is no folder not"),
     ],
 )
-def test_the_command_behind_sweep_refuses_before_it_runs(given, out, plot, said, monkeypatch):
+def test_sweep_refuses_uncertainties_before_it_runs(given, options, said, monkeypatch, tmp_path):
     monkeypatch.setattr("chutelab.studies.design.evaluation.simulate", None)
     monkeypatch.setattr("chutelab.studies.sweep.batch.run", None)
-    paths = {"out": out and Path(out), "plot": plot and Path(plot)}
-    with pytest.raises((RefusedError, InputError), match=said):
-        propagate(machine(), [given], samples=64, seed=0, as_json=False, quiet=True, **paths)
+    monkeypatch.chdir(tmp_path)
+    assert said in propagate(tmp_path, given, *options, code=2).stderr
 
 
 def test_frames_need_pandas_or_say_so(linear, monkeypatch):

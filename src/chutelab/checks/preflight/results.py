@@ -37,6 +37,24 @@ class Stepping:
     longest: float | None  # step with which it would, s
     safe: bool  # no particle can pass through a surface unseen
 
+    def rows(self) -> list[tuple[str, str]]:
+        """Return it in words, under headings."""
+        longest = write_size(self.dt, "s")
+        if self.aligned:
+            return [
+                ("steps", f"at most {longest} while contacts last"),
+                ("tunnelling", "none at any speed: blows have their own instants"),
+            ]
+        room = f"a surface catches it within {write_size(self.bound, 'm')}"
+        passing = f"nothing moved in the trial run; {room}"
+        if self.way is not None and self.longest is not None:
+            passing = (
+                f"{'none' if self.safe else 'POSSIBLE'}: at {self.speed:.3g} m/s a particle covers"
+                f" {write_size(self.way, 'm')} in a step, and {room}: safe below dt ="
+                f" {write_size(self.longest, 's')}"
+            )
+        return [("steps", f"all of {longest}"), ("tunnelling", passing)]
+
 
 @dataclass(frozen=True)
 class Effort:
@@ -88,7 +106,7 @@ class Preflight(Shown):
         rows += [("skipped",), *map(astuple, self.skipped)]
         rows += [("how it runs",), ("engine", f"{self.engine}: {self.why}"), ("ends", self.ends)]
         if self.stepping is not None:
-            rows += _told(self.stepping)
+            rows += self.stepping.rows()
         about = "at least" if self.effort.at_least else "about"
         # Two digits of contacts and one of the time are known.
         contacts = int(float(f"{self.effort.contacts:.2g}"))
@@ -107,25 +125,6 @@ class Preflight(Shown):
         for advice in self.advice:
             rows += [("warning", advice.warning), ("change", advice.change)]
         return Sheet(self.title, ("", ""), tuple(rows), texts=2)
-
-
-def _told(steps: Stepping) -> list[tuple[str, ...]]:
-    """Return the rows on finite steps."""
-    longest = write_size(steps.dt, "s")
-    if steps.aligned:
-        return [
-            ("steps", f"at most {longest} while contacts last"),
-            ("tunnelling", "none at any speed: blows have their own instants"),
-        ]
-    room = f"a surface catches it within {write_size(steps.bound, 'm')}"
-    passing = f"nothing moved in the trial run; {room}"
-    if steps.way is not None and steps.longest is not None:
-        passing = (
-            f"{'none' if steps.safe else 'POSSIBLE'}: at {steps.speed:.3g} m/s a particle covers"
-            f" {write_size(steps.way, 'm')} in a step, and {room}: safe below dt ="
-            f" {write_size(steps.longest, 's')}"
-        )
-    return [("steps", f"all of {longest}"), ("tunnelling", passing)]
 
 
 WORDS = {

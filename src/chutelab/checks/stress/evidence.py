@@ -11,6 +11,7 @@ import numpy as np
 
 from chutelab.machine import Machine
 from chutelab.results import Recording
+from chutelab.results.ledger import ledger
 from chutelab.results.recording import hermite
 from chutelab.util.arrays import Floats, Ints
 
@@ -122,9 +123,12 @@ class Evidence:
 
     @cached_property
     def energy(self) -> float:
-        """Energy in play, J: what every particle had at most, and what was booked on it."""
-        if not len(self.recording.knots):
-            return 0.0
+        """Energy in play, J: what every particle had at most, and what was booked on it.
+
+        Of a crowd it is what was turned over.
+        """
+        if self.crowd or not len(self.recording.knots):
+            return ledger(self.recording).turned_over
         kinetic, potential = self.recording.energies(self.recording.knots)
         height = kinetic + np.abs(potential) + np.abs(self.recording.knots["entries"]).sum(axis=1)
         offsets = self.recording.offsets

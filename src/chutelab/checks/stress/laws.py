@@ -85,8 +85,7 @@ def lasting(e: Evidence) -> Verdict:
 def energy(e: Evidence) -> Verdict | None:
     """Kinetic and potential energy never rise but by a belt's work.
 
-    The figure is the largest rise above any earlier value, as a share of the energy in play (for a
-    crowd: turned over).
+    The figure is the largest rise above any earlier value, as a share of the energy in play.
     """
     if not e.energy:
         return None
@@ -127,8 +126,8 @@ def _energy_of_crowd(e: Evidence) -> Verdict:
     start = np.concatenate([[0.0], np.cumsum(brought)])[entered]
     gain = books["kinetic"] + books["potential"] - start - books["belt_work"]
     rise = gain - np.minimum.accumulate(gain)
-    at, scale = int(np.argmax(rise)), ledger(e.recording).turned_over
-    where = f"of {scale:.3g} J, at t = {times[at]:.6g} s"
+    at = int(np.argmax(rise))
+    where = f"of {e.energy:.3g} J, at t = {times[at]:.6g} s"
     # An overlap that is parted lifts a disk by no more than it was deep.
     p = e.machine.particle
     allowed = e.recording.count * p.mass * e.machine.gravity * e.late
@@ -136,17 +135,15 @@ def _energy_of_crowd(e: Evidence) -> Verdict:
         # The pymunk engine leaves out touches that move a track by less than `ROUGH` of the radius.
         # A cubic whose end velocity is off by w is off by 4/27 w τ in place, τ a step or more.
         allowed += 2.0 * p.mass * e.speed * 27.0 / 4.0 * ROUGH * p.radius / e.dt
-    allowed = _energy_bound(e) + allowed / scale
-    return Verdict(float(rise[at]) / scale, allowed, where)
+    return Verdict(float(rise[at]) / e.energy, _energy_bound(e) + allowed / e.energy, where)
 
 
 def residual(e: Evidence) -> Verdict | None:
-    """Ledgers close; the figure is a share of the energy in play (crowd: turned over)."""
-    books = ledger(e.recording)
-    scale = books.turned_over if e.crowd else e.energy
-    if not scale:
+    """Ledgers close; the figure is a share of the energy in play."""
+    if not e.energy:
         return None
-    return Verdict(abs(books.residual) / scale, _energy_bound(e), f"of {scale:.3g} J")
+    figure = abs(ledger(e.recording).residual) / e.energy
+    return Verdict(figure, _energy_bound(e), f"of {e.energy:.3g} J")
 
 
 def _energy_bound(e: Evidence) -> float:
@@ -162,10 +159,9 @@ def _energy_bound(e: Evidence) -> float:
         return BOOKED
     m, steps = e.machine, EPS * A_CONTACT * e.recording.steps
     touched = max(1, e.recording.contacts)
-    scale = ledger(e.recording).turned_over if e.crowd else e.energy
     if e.engine != "contact":
         steps += touched * HAIR
-    return rounding + steps + touched * m.particle.mass * m.gravity * e.late / scale
+    return rounding + steps + touched * m.particle.mass * m.gravity * e.late / e.energy
 
 
 def momentum(e: Evidence) -> Verdict | None:

@@ -64,14 +64,7 @@ class Span:
 
 
 def ranges(scene: Scene, texts: Sequence[str]) -> tuple[Span, ...]:
-    """Read what ``--vary`` takes, several times.
-
-    Raises
-    ------
-    InputError
-        If a range cannot be read, is empty, goes beyond what the scene allows, or is of a key that
-        is unknown, no continuous number, or given twice.
-    """
+    """Read what ``--vary`` takes, several times; each is tried on the scene."""
 
     def read(text: str) -> Span:
         if text.count(":") != 1:

@@ -147,8 +147,8 @@ def scan(evaluate: Evaluator, low: float, high: float, points: int) -> Scan:
     changes = []
     for (*_, a), (b, *_) in pairwise(wide):
         fault = a.fault if a.course == NO_RUN else b.fault
-        values = np.stack([a.values, b.values])
-        changes.append(Change(a.x, b.x, values, (a.course, b.course), fault))
+        sides = np.stack([a.values, b.values])
+        changes.append(Change(a.x, b.x, sides, (a.course, b.course), fault))
     return Scan(tuple(pieces), tuple(changes), complete)
 
 

@@ -250,7 +250,7 @@ class _Search:
 
         def apart(points: Floats) -> Floats:
             sides = self.evaluate(points).values.reshape(-1, targets, 2)
-            return (sides[:, :, 0] - sides[:, :, 1]) / sizes
+            return np.asarray((sides[:, :, 0] - sides[:, :, 1]) / sizes)
 
         keys = len(self.ranges)
         middle = self.evaluate([[one.low + 0.5 * one.width for one in self.ranges]]).values[0]

@@ -41,7 +41,9 @@ HOMES: Final = ("plate", "incoming", "outgoing", "particle", "stream")
 MOST: Final = 12
 """Uncertain inputs at once."""
 
-_SIGN: Final = re.compile(r"±|\+/-|\+-")
+_GIVEN: Final = re.compile(
+    r"(?P<key>[^=]+)=(?P<mean>[^:]*?)(?:±|\+/-|\+-)(?P<spread>[^:]*?)(?::(?P<law>.*))?"
+)
 
 
 @dataclass(frozen=True)
@@ -94,21 +96,14 @@ class Spread:
 
 
 def spreads(scene: Scene, texts: Sequence[str]) -> tuple[Spread, ...]:
-    """Read what ``--uncertainty`` takes, several times.
-
-    Raises
-    ------
-    InputError
-        If one cannot be read, or is of a key that is unknown, no continuous number, or given twice.
-    """
+    """Read what ``--uncertainty`` takes, several times; each is tried on the scene."""
 
     def read(text: str) -> Spread:
         typed = f"--uncertainty {text}"
-        key, equals, given = (part.strip() for part in text.partition("="))
-        given, _, law = (part.strip() for part in given.partition(":"))
-        parts = [part.strip() for part in _SIGN.split(given)]
-        if not (key and equals) or len(parts) != 2 or not parts[1]:
+        match = _GIVEN.fullmatch(text)
+        if match is None:
             raise InputError(FORM, typed)
+        key, middle, width, law = (part.strip() for part in match.groups(default=""))
         if law not in ("", *LAWS):
             known = " and ".join(LAWS)
             raise InputError(f"{law} is no distribution here; there are {known}", typed)
@@ -129,18 +124,18 @@ def spreads(scene: Scene, texts: Sequence[str]) -> tuple[Spread, ...]:
             return value
 
         own = value_at(scene, about.path)
-        if parts[0]:
-            mean = number(parts[0], about.unit)
+        if middle:
+            mean = number(middle, about.unit)
         elif isinstance(own, (int, float)):
             mean = float(own)
         else:
             raise InputError(f"{about.path} has no value in this scene: give the mean, too", typed)
-        if parts[1].endswith("%"):
-            spread = abs(mean) * number(parts[1].removesuffix("%"), "") / 100.0
+        if width.endswith("%"):
+            spread = abs(mean) * number(width.removesuffix("%"), "") / 100.0
         else:
-            spread = number(parts[1], about.unit)
+            spread = number(width, about.unit)
         if not spread > 0.0:
-            raise InputError(f"the spread {parts[1]} must be more than 0; it {FORM}", typed)
+            raise InputError(f"the spread {width} must be more than 0; it {FORM}", typed)
         low, high = limits_of(rule_at(parts_of(about.path)) or {}) or (-np.inf, np.inf)
         for value in (mean, float(np.clip(mean + INSIDE * spread, low, high))):
             try:

@@ -511,8 +511,8 @@ def test_sobol_indices_of_ishigamis_function():
     # Ishigami and Homma (1990): V1 = ½ (1 + b π⁴/5)², V2 = a²/8, V13 = 8 b² π⁸/225.
     v1, v2, v13 = 0.5 * (1.0 + b * pi**4 / 5.0) ** 2, a**2 / 8.0, 8.0 * b**2 * pi**8 / 225.0
     variance = v1 + v2 + v13
-    one, other = (pi * (2.0 * shares - 1.0) for shares in sensitivity.design(3, 4096, seed=0))
-    found = sensitivity.indices(f(one), f(other), f(sensitivity.crossed(one, other)), seed=0)
+    points = pi * (2.0 * sensitivity.sampled(3, 4096, seed=0) - 1.0)
+    found = sensitivity.indices(f(points), seed=0)
     np.testing.assert_allclose(found.first, np.array([v1, v2, 0.0]) / variance, atol=0.01)
     np.testing.assert_allclose(found.total, np.array([v1 + v13, v2, v13]) / variance, atol=0.01)
     assert (found.first_interval[:, 0] < found.first + 1e-12).all()

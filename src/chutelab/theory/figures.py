@@ -42,18 +42,10 @@ SAID: Final = {"as-printed": "Eq. (9) as printed", "corrected": "Eq. (9) correct
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """One line of a panel.
+    """One line of a panel: its points, and those (M, 2) that are marked on it.
 
-    Attributes
-    ----------
-    label : str
-        For the legend; "" for none.
-    x, y : ndarray
-        Points, SI units.
-    role : {"first", "second", "third", "fourth", "plate", "belt"}
-        What it is drawn like.
-    marks : ndarray or None
-        Points (M, 2) that are marked on it.
+    The label is for the legend, "" for none. The role says what it is drawn like: "first" to
+    "fourth", "plate" or "belt".
     """
 
     label: str
@@ -84,8 +76,8 @@ class PaperFigure(Shown):
         As in the paper.
     title : str
         What it shows.
-    panels : tuple of tuple of Panel
-        Rows of two: as printed, corrected.
+    panels : tuple of Panel
+        By twos: as printed, corrected.
     meaning : tuple of str
         What the misprint does to the figure's conclusion.
     missing : tuple of str
@@ -102,7 +94,7 @@ class PaperFigure(Shown):
 
     number: int
     title: str
-    panels: tuple[tuple[Panel, ...], ...]
+    panels: tuple[Panel, ...]
     meaning: tuple[str, ...]
     missing: tuple[str, ...]
     columns: dict[str, NDArray[Any]]
@@ -238,7 +230,7 @@ def _against_the_radius(
         MASS, speed, float(GRID[0]), {"distance": NEAR},
     )  # fmt: skip
     return PaperFigure(
-        number, title, (panels,), meaning, missing, {"R, m": GRID, **columns}, SHOWN,
+        number, title, panels, meaning, missing, {"R, m": GRID, **columns}, SHOWN,
         {f"figure-{number}": scene}, SWEEP.format(number),
     )  # fmt: skip
 
@@ -441,12 +433,8 @@ def _trajectories(number: int) -> PaperFigure:
     # The first and the last point of each flight to the belt.
     rows = [2 * POINTS * n + row for n in range(len(paths)) for row in (POINTS, 2 * POINTS - 1)]
     panels = tuple(
-        tuple(
-            Panel(f"{case}, {SAID[form]}", "x, m", "y, m", _lines(case, found), to_scale=True)
-            for (one, form), found in paths.items()
-            if one == case
-        )
-        for case in cases
+        Panel(f"{case}, {SAID[form]}", "x, m", "y, m", _lines(case, found), to_scale=True)
+        for (case, form), found in paths.items()
     )
     scenes = {
         case.name: _scene(

@@ -283,8 +283,7 @@ class State:
         recorder.ended[self.first : self.first + len(self.ended)] = self.ended
         if self.log:
             owner, rows = self.log.by_particle()
-            sizes = np.bincount(owner, minlength=len(self.mode))
-            recorder.tracks(self.first, sizes, rows.view(KNOT)[:, 0])
+            recorder.add(self.first + owner, rows.view(KNOT)[:, 0])
         if self.events:
             owner, rows = self.events.by_particle()
             events = np.empty(len(owner), dtype=EVENT)

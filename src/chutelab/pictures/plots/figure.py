@@ -119,16 +119,15 @@ def paper_figure(found: PaperFigure) -> Picture:
     texts = [fill(text, WIDE) for text in found.meaning]
     texts += [fill(f"Not in the paper's text: {text}", WIDE) for text in found.missing]
     lines = sum(text.count("\n") + 1 for text in texts)
-    panels = [panel for pair in found.panels for panel in pair]
     below = TEXT * lines + 0.85
     height = 1.0 + 4.1 + below
     figure = Picture((13.0, height))
     grid = figure.add_gridspec(
-        1, len(panels), left=0.06, right=0.985, top=1.0 - 1.0 / height, bottom=below / height,
-        wspace=0.16 if len(panels) == 2 else 0.3,
+        1, len(found.panels), left=0.06, right=0.985, top=1.0 - 1.0 / height, bottom=below / height,
+        wspace=0.16 if len(found.panels) == 2 else 0.3,
     )  # fmt: skip
     axes: list[Axes] = []
-    for i, panel in enumerate(panels):
+    for i, panel in enumerate(found.panels):
         # Both of a pair have the same limits: the eye compares heights.
         first = axes[-1] if i % 2 else None
         ax = figure.add_subplot(grid[i], sharex=first, sharey=first)
@@ -138,7 +137,7 @@ def paper_figure(found: PaperFigure) -> Picture:
         low, high = ax.get_ylim()
         if low > MARGIN * (high - low):
             style.note(ax, "axis not from 0")
-    if panels[0].to_scale:
+    if found.panels[0].to_scale:
         figure.legend(
             *axes[0].get_legend_handles_labels(), loc="upper right",
             bbox_to_anchor=(0.985, 1.0 - 0.12 / height), ncols=4, fontsize=style.SMALL,

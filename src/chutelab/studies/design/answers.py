@@ -69,10 +69,8 @@ class Solution(Shown):
 
     Attributes
     ----------
-    asked : str
-        The question in words.
-    goal : {"solve", "minimize", "maximize"}
-        Its kind.
+    asked, goal : str
+        The question in words, and its kind.
     ranges : tuple of Span
         The varied keys.
     quantities, units : tuple of str
@@ -173,14 +171,14 @@ class Solution(Shown):
         """Return the answers in a table, with what to know of them."""
         keys = [with_unit(one.key, one.unit) for one in self.ranges]
         names = [with_unit(*one) for one in zip(self.quantities, self.units, strict=True)]
-        first, other = {
-            "solve": ("solution", "solution"), "minimize": ("least", "also"),
-            "maximize": ("most", "also"),
-        }[self.goal]  # fmt: skip
         rows = []
         for i, answer in enumerate(self.answers or filter(None, [self.nearest])):
-            head = (other if i else first) if self.solved else "nearest"
-            if self.goal == "solve" and len(self.answers) > 1:
+            head = {"solve": "solution", "minimize": "least", "maximize": "most"}[self.goal]
+            if not self.solved:
+                head = "nearest"
+            elif self.goal != "solve":
+                head = "also" if i else head
+            elif len(self.answers) > 1:
                 head += f" {i + 1}"
             numbers = (f"{value:.{DIGITS}g}" for value in (*answer.values, *answer.found))
             rows.append((head, *numbers, answer.course))
@@ -237,7 +235,7 @@ def as_dict(solution: Solution) -> dict[str, Any]:
         "format": 1,
         "scene": solution.base.title,
         **some(solution, "asked", "goal", "solved"),
-        "ranges": [some(one, "key", "unit", "low", "high", "start") for one in solution.ranges],
+        "ranges": solution.ranges,
         "quantities": dict(zip(solution.quantities, solution.units, strict=True)),
         "answers": [answer(one) for one in solution.answers],
         "best": solution.best if solution.solved else None,

@@ -155,14 +155,17 @@ def to_csv(
     if step is not None and not 0.0 < step < inf:
         raise ValueError(f"step = {step!r}: a finite number above 0 s")
     written = []
-    for name, rows in (("events", _events), ("trajectory", _trajectory)):
+    for name, rows in (
+        ("events", _events(recording)),
+        ("trajectory", _trajectory(recording, step)),
+    ):
         if name in only:
             path = Path(folder) / f"{name}.csv"
-            written.append(write_lines(path, csv_lines(rows(recording, step))))
+            written.append(write_lines(path, csv_lines(rows)))
     return written
 
 
-def _events(recording: Recording, _step: float | None) -> Iterator[Sequence[object]]:
+def _events(recording: Recording) -> Iterator[Sequence[object]]:
     places = ("x", "y", "vx_before", "vy_before", "vx_after", "vy_after")
     vectors = ("position", "velocity_before", "velocity_after")
     scalars = ("omega_before", "omega_after", "normal_impulse", "tangential_impulse")

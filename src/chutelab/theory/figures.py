@@ -21,8 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.scene import Scene, from_dict
-from chutelab.theory.paper import BALL_MASS, DISTANCES, FALL, PLATE_AHEAD, RADII
-from chutelab.theory.results import Transfer
+from chutelab.theory.paper import BALL_MASS, DISTANCES, FALL, PLATE_AHEAD, RADII, at_radii
 from chutelab.theory.transfer import Rebound, transfer
 from chutelab.util.arrays import Floats
 from chutelab.util.errors import InputError
@@ -197,13 +196,6 @@ SWEEP: Final = "chutelab sweep figure-{}.toml --vary incoming.pulley_radius=0.05
 """The same radii with the engine."""
 
 
-def _over_the_grid(speed: float, distance: float, form: Rebound) -> Transfer:
-    return transfer(
-        speed=speed, pulley_radius=GRID, distance=distance, restitution=RESTITUTION, drop=FALL,
-        mass=MASS, gravity=GRAVITY, rebound=form,
-    )  # fmt: skip
-
-
 def _against_the_radius(
     number: int,
     title: str,
@@ -239,7 +231,7 @@ def _energies(number: int) -> PaperFigure:
     """Figures 6 and 7: energy of Eq. (14)."""
     speed = SPEEDS[number]
     curves: dict[Rebound, dict[str, Floats]] = {
-        form: {f"d_okr = {d:g} m": 1000.0 * _over_the_grid(speed, d, form).dEk for d in (NEAR, FAR)}
+        form: {f"d_okr = {d:g} m": 1000.0 * at_radii(GRID, speed, d, form).dEk for d in (NEAR, FAR)}
         for form in FORMS
     }
     printed, right = (curves[form][f"d_okr = {NEAR:g} m"] for form in FORMS)
@@ -283,7 +275,7 @@ def _energies(number: int) -> PaperFigure:
 def _velocities(number: int) -> PaperFigure:
     """Figures 8 and 9: velocities of the three phases."""
     speed = SPEEDS[number]
-    found = {form: _over_the_grid(speed, NEAR, form) for form in FORMS}
+    found = {form: at_radii(GRID, speed, NEAR, form) for form in FORMS}
     printed, right = found.values()
     columns = {"v1, m/s": right.v1, "v2, m/s": right.v2}
     curves: dict[Rebound, dict[str, Floats]] = {}

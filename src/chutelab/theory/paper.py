@@ -9,8 +9,11 @@ from decimal import ROUND_HALF_UP, Decimal
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from chutelab.theory.results import Transfer
 from chutelab.theory.transfer import Rebound, transfer
+from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet, Shown
 
 PRINTED: dict[str, Any] = tomllib.loads(
@@ -160,21 +163,18 @@ def _row(label: str, printed: Sequence[str], computed: Sequence[float]) -> Row:
     return Row(label, tuple(cells))
 
 
-def _paper(speed: str, distance: str, rebound: Rebound) -> Transfer:
-    """Mass point, perpendicular plate, ε = 0.5: one entry per radius."""
+def at_radii(radii: Floats, speed: float, distance: float, rebound: Rebound) -> Transfer:
+    """Carry a point of 8 g over an upright plate with ε = 0.5, from pulleys of these radii (m)."""
     return transfer(
-        speed=float(speed),
-        pulley_radius=[float(radius) for radius in RADII],
-        distance=float(distance),
-        drop=FALL,
-        rebound=rebound,
-    )
+        speed=speed, pulley_radius=radii, distance=distance, restitution=0.5, drop=FALL,
+        mass=0.008, gravity=9.81, rebound=rebound,
+    )  # fmt: skip
 
 
 def _impacts(rebound: Rebound) -> Table:
     rows = []
     for speed, printed in PRINTED["impacts"].items():
-        found = _paper(speed, "0.5", rebound)
+        found = at_radii(np.array(RADII, dtype=float), float(speed), 0.5, rebound)
         computed = zip(found.x2, found.y2, found.x3, found.y3, strict=True)
         rows += [
             _row(f"v0 = {speed} m/s, R = {radius} m", *pair)
@@ -198,7 +198,8 @@ def _impacts(rebound: Rebound) -> Table:
 
 def _heights(number: int, rebound: Rebound) -> Table:
     speed = "2" if number == 4 else "4"
-    columns = [_paper(speed, distance, rebound).d3 for distance in DISTANCES]
+    radii, v0 = np.array(RADII, dtype=float), float(speed)
+    columns = [at_radii(radii, v0, float(distance), rebound).d3 for distance in DISTANCES]
     computed = zip(*columns, strict=True)
     return Table(
         number,

@@ -137,19 +137,8 @@ def unbounded(scene: Scene, rebound: Rebound = "corrected") -> Transfer:
     """Return what the equations say of a scene if nothing else were in the way.
 
     Plate and outgoing belt are without ends, the pulley is met no more, and what the scene says of
-    releases is not looked at.
-
-    Parameters
-    ----------
-    scene : Scene
-        With an incoming conveyor and a plate; or a family of such, see `chutelab.scene.variants`.
-    rebound : {"corrected", "as-printed"}
-        Which Eq. (9), see `transfer`.
-
-    Returns
-    -------
-    Transfer
-        0-d arrays; of a family, (N,).
+    releases is not looked at. The scene has an incoming conveyor and a plate; the arrays are 0-d,
+    those of a family of such scenes (see `chutelab.scene.variants`) are (N,).
     """
     belt, plate, out = scene.incoming, scene.plate, scene.outgoing
     assert belt is not None

@@ -208,7 +208,7 @@ class Job:
             what = FULL[status]
             room = getattr(module.world, f"{what}_room")
             # Taking many knots or events has made room.
-            if counts.get(what, 0) < room // 2:
+            if counts.get(what, 0) <= room // 2:
                 # Of what was there, only contacts of the step before are needed.
                 count = module.world.earlier_count if what == "contact" else 0
                 earlier = module.array("earlier", dtype("Contact"), count).copy()

@@ -128,7 +128,12 @@ def together(block: Block) -> tuple[list[tuple[Recording, Ints]], dict[int, str]
         in the block, (N,); why there is no run, by row; and the rows that have to be run alone.
     """
     template, which, faults = screened(block)
-    if template is None or not _fits(template, block):
+    if template is None:
+        return [], faults, which.tolist()
+    stepped = (block.engine or template.run.engine) in ("contact", "pymunk")
+    # Whether a release lies on the belt is a matter of the last digits.
+    close = {"particle.radius", "incoming.pulley_radius", "incoming.length"} & {*block.paths}
+    if stepped or template.stream.count > 1 or (close and template.stream.at is not None):
         return [], faults, which.tolist()
 
     def scenes(some: Ints) -> Scene:
@@ -153,16 +158,6 @@ def together(block: Block) -> tuple[list[tuple[Recording, Ints]], dict[int, str]
             groups += halves
             left += [] if halves else which.tolist()
     return runs, faults, left
-
-
-def _fits(scene: Scene, block: Block) -> bool:
-    """Tell whether a scene and the like of it go through the exact engine, one particle each."""
-    wanted = block.engine or scene.run.engine
-    if wanted in ("contact", "pymunk") or scene.stream.count > 1:
-        return False
-    # Whether such a release lies on the belt is a matter of the last digits.
-    at_risk = {"particle.radius", "incoming.pulley_radius", "incoming.length"}
-    return scene.stream.at is None or at_risk.isdisjoint(block.paths)
 
 
 def swept(block: Block) -> Columns:

@@ -176,22 +176,9 @@ def first_contact(
     Finds: faces within a segment's length, ends of segments (for a disk), the pulley. Misses, by
     design: a point against the end of a segment, and anything the particle overlaps already.
 
-    Parameters
-    ----------
-    motion : Motion
-        k particles.
-    obstacles : Obstacles
-        What they can meet.
-    radius : ndarray, (k,)
-        r, m.
-    until : ndarray, (k,)
-        Finite time after which nothing matters, s.
-
-    Returns
-    -------
-    time, hits, obstacle, side
-        Time from now, not longer than `until`: a contact at that very time comes first. The last
-        two are any numbers where there is none; side is +1 or -1 for a face, 0 for a circle.
+    Times count from now, and are not longer than `until` (s, finite, after which nothing matters):
+    a contact at that very time comes first. Number and side are anything where there is no contact;
+    the side is +1 or -1 for a face, 0 for a circle.
     """
     segments, count = obstacles.segments, len(until)
     held = motion.never is not None or motion.on is not None
@@ -245,7 +232,7 @@ def _reached(
     `places` are the boxes of the paths; without them all may.
     """
     if places is None:
-        return obstacles.numbers
+        return np.arange(obstacles.segments), np.arange(len(obstacles.rho))
     low, high = places
     if low.shape[1] > 1:
         low = np.minimum.reduce(low, axis=1, keepdims=True)
@@ -358,18 +345,9 @@ def bounds(
 ) -> NDArray[Any]:  # fmt: skip
     """Return what stops rides round circles backwards and forwards, (2, k), dtype `BOUND`.
 
-    Parameters
-    ----------
-    obstacles : Obstacles
-        All of them.
-    rows, circle : ndarray, (k,)
-        Particles, and the circles (obstacle number less S) they ride.
-    side : ndarray, (k,)
-        On which half of it, see `Obstacles.rim_side`.
-    rho, phi : ndarray, (k,)
-        Radius of the centre's path (m) and angle now, from the top, clockwise (rad).
-    radius : ndarray, (k,)
-        r, m.
+    Of particles `rows` on circles (obstacle number less S), on the half that `side` tells (see
+    `Obstacles.rim_side`), whose centres move at a radius `rho` (m) and are now at `phi` (rad, from
+    the top, clockwise).
     """
     found = np.zeros((2, len(rows)), dtype=BOUND)
     found["angle"], found["obstacle"] = WAYS * np.inf, NONE

@@ -43,7 +43,7 @@ class Program(InOrder):
             try:
                 code = super().main(*args, **kwargs)
             except (KeyboardInterrupt, Exception) as error:
-                if asked["debug"] and not isinstance(error, (*EXPECTED, KeyboardInterrupt)):
+                if asked["debug"] and not isinstance(error, EXPECTED) and not exit_code(error):
                     raise
                 code = _told(error)
             sys.exit(code or 0)
@@ -57,7 +57,8 @@ class Program(InOrder):
         return super().invoke(ctx)
 
 
-EXPECTED = (click.ClickException, click.Abort, InputError, MissingLibraryError)
+EXPECTED = (click.ClickException, InputError, MissingLibraryError)
+"""What somebody gave: told the same with ``--debug``."""
 
 
 def _told(error: BaseException) -> int:

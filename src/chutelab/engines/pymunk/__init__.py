@@ -10,18 +10,19 @@ outside.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from contextlib import suppress
 from time import perf_counter
 
 from chutelab.engines.pymunk.lone import Lone
 from chutelab.engines.pymunk.shared import Shared
 from chutelab.engines.pymunk.world import World
 from chutelab.machine import Machine, moved, origin
-from chutelab.results import Recording
-from chutelab.results.recorder import Recorder, StalledError
+from chutelab.results import REASONS, Recording
+from chutelab.results.recorder import EnoughError, Recorder, StalledError
+from chutelab.util.arrays import Progress
 
 
-def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Recording:
+def run(machine: Machine, progress: Progress | None = None) -> Recording:
     """Run a machine in Pymunk.
 
     Parameters
@@ -29,7 +30,7 @@ def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Re
     machine : Machine
         From `chutelab.machine.build`; the radius must be more than 0.
     progress : callable, optional
-        Called with the share of the run that is done.
+        Called now and then with the share of the run that is done; may end the run.
 
     Returns
     -------
@@ -66,13 +67,16 @@ def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Re
             steps = shared.steps
         else:
             for i in range(machine.count):
-                lone = Lone(machine, world, recorder, i)
+                lone = Lone(machine, world, recorder, i, report)
                 try:
                     lone.run()
+                except EnoughError:
+                    recorder.ended[i + 1 :] = REASONS.index("stopped")
+                    break
                 finally:
                     steps += lone.steps
-                report((i + 1) / machine.count)
-        report(1.0)
+        with suppress(EnoughError):
+            report(1.0)
     except StalledError as stalled:
         stalled.recording = finished()
         x, y = stalled.position

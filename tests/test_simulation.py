@@ -132,15 +132,15 @@ def test_progress_goes_from_0_to_1(engine):
 STOPPABLE = (
     # scene, engine, what is changed, looks until the end
     ("stream", "contact", (), 7),
-    ("stream", "pymunk", ("stream.count=20", "run.until=0.7"), 500),
+    ("stream", "pymunk", ("stream.count=20", "run.until=0.7"), 9),
     ("stream-independent", "exact", ("stream.count=6000",), 4),
     ("stream-independent", "exact", ("stream.count=6000", "run.until=settled"), 6),
     ("stream-independent", "contact", ("stream.count=300",), 8),
-    ("stream-independent", "pymunk", ("stream.count=5",), 9),
+    ("stream-independent", "pymunk", ("stream.count=5", "run.until=settled"), 9),
     ("belt-landing", "exact", (), 3),
     ("belt-landing", "contact", (), 5),
-    ("belt-landing", "pymunk", ("run.until=0.8",), 4),
-    ("perpendicular", "pymunk", ("run.align=false",), 200),
+    ("belt-landing", "pymunk", (), 9),
+    ("perpendicular", "pymunk", ("run.align=false",), 6),
 )
 
 

@@ -21,6 +21,9 @@ from chutelab.results import REASONS, Recording
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Progress
 
+LOOK, SLICE = 64, 0.05
+"""Steps and s of wall time between two reports of progress, about: whichever is over first."""
+
 
 def run(machine: Machine, progress: Progress | None = None) -> Recording:
     """Run a machine in Pymunk.
@@ -58,7 +61,15 @@ def run(machine: Machine, progress: Progress | None = None) -> Recording:
             engine="pymunk", steps=steps, seconds=perf_counter() - begin, origin=place
         )
 
-    report = progress or (lambda _share: None)
+    asked, told = 0, begin
+
+    def report(share: float) -> None:
+        nonlocal asked, told
+        asked += 1
+        if progress is not None and (asked % LOOK == 0 or perf_counter() - told > SLICE):
+            told = perf_counter()
+            progress(share)
+
     world = World(machine)
     try:
         if machine.interact or not machine.align:
@@ -75,8 +86,9 @@ def run(machine: Machine, progress: Progress | None = None) -> Recording:
                     break
                 finally:
                     steps += lone.steps
-        with suppress(EnoughError):
-            report(1.0)
+        if progress is not None:
+            with suppress(EnoughError):
+                progress(1.0)
     except StalledError as stalled:
         stalled.recording = finished()
         x, y = stalled.position

@@ -70,8 +70,8 @@ WINDOW = 10_000
 TICK = 1e-12
 """s; blows closer to each other are at one instant."""
 
-OFTEN = 10_000
-"""Steps of a flight between two reports of progress."""
+OFTEN = 1000
+"""Steps of a flight between two reports of progress; they take 2 ms."""
 
 TURNS = 200
 """Blows at one instant, one surface after the other, before all are solved together."""

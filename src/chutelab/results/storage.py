@@ -1,4 +1,7 @@
-"""Recordings on disk: one npz file that round-trips to the last bit, and CSV for spreadsheets."""
+"""Recordings on disk: one npz file that round-trips to the last bit, and CSV for spreadsheets.
+
+How long the run took is not in them: the same run makes the same bytes.
+"""
 
 from __future__ import annotations
 
@@ -93,7 +96,6 @@ def _about(recording: Recording) -> dict[str, Any]:
         "surfaces": list(recording.surfaces),
         "steps": recording.steps,
         "contacts": recording.contacts,
-        "seconds": recording.seconds,
     }
 
 
@@ -103,7 +105,8 @@ def _recording(about: dict[str, Any], arrays: dict[str, Any]) -> Recording:
     Every index has to lead somewhere. The scene's text may be an older one, without later keys.
     """
     scene = from_dict(json.loads(about["scene"]), about["title"])
-    told = {name: about[name] for name in ("engine", "steps", "contacts", "seconds")}
+    about.pop("seconds", None)  # earlier files tell how long the run took
+    told = {name: about[name] for name in ("engine", "steps", "contacts")}
     recording = Recording(machine=build(scene), **told, **arrays)
     if _about(recording) | {"scene": about["scene"]} != about:
         raise ValueError("the header is of another scene")

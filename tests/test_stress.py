@@ -231,7 +231,7 @@ def test_a_signal_during_a_run_leaves_nothing(tmp_path, sent, code, says):
     assert listed(tmp_path) == ["endless.toml"]
 
 
-@pytest.mark.parametrize("name", ["overlay.png", ".lesson.gif-*"])
+@pytest.mark.parametrize("name", ["overlay.png", ".chutelab-*/lesson.gif"])
 def test_ctrl_c_during_writing_leaves_nothing(tmp_path, name):
     def when():
         return bool(list(tmp_path.glob(f".chutelab-*/{name}")))

@@ -26,7 +26,8 @@ from chutelab.studies.sweep import (
     sweep_to,
 )
 from chutelab.studies.sweep.batch import alone
-from chutelab.studies.sweep.result import columns_of, part_of, text_of
+from chutelab.studies.sweep.part import part_of
+from chutelab.studies.sweep.result import columns_of, text_of
 from chutelab.studies.sweep.rows import joined
 from chutelab.util.errors import InputError
 

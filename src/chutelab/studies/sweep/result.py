@@ -6,6 +6,7 @@ Rows are written as text that gives them back to the bit, in CSV or Parquet, who
 from __future__ import annotations
 
 import csv
+import io
 import os
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -22,7 +23,7 @@ from numpy.typing import NDArray
 from chutelab.scene.variants import Quantity
 from chutelab.studies.sweep.rows import NUMBERS, REASON
 from chutelab.util.errors import InputError
-from chutelab.util.files import csv_lines, whole, write_lines
+from chutelab.util.files import csv_lines, unquoted, whole, write_lines
 from chutelab.util.tables import Sheet, Shown, frame, number
 from chutelab.util.versions import library
 
@@ -101,9 +102,9 @@ def _number(x: float) -> str:
 
 def columns_of(names: Sequence[str], text: str) -> dict[str, NDArray[Any]]:
     """Read what `text_of` wrote."""
-    cells = list(zip(*csv.reader(text.splitlines()), strict=True))
+    cells = list(zip(*csv.reader(io.StringIO(text, newline="")), strict=True))
     return {
-        name: np.array(column, dtype=object)
+        name: np.array(list(map(unquoted, column)), dtype=object)
         if name == REASON
         else np.array([float(cell) if cell else np.nan for cell in column])
         for name, column in zip(names, cells, strict=True)

@@ -119,7 +119,8 @@ def sweep(
 
     A variant that cannot be, or misses the outgoing belt, is a row with its reason. Rows that are
     finished are kept beside --out FILE until all are: --resume goes on after an interruption, and
-    writes the same file as a sweep that was not interrupted.
+    writes the same file as a sweep that was not interrupted. Rows that were changed meanwhile are
+    refused, and so is a file that another sweep is writing.
 
     Columns are the varied keys, then, in SI units: landing.x, landing.y, landing.vx, landing.vy
     (mean over the particles; x, vx and vy also with _spread, the standard deviation), landing.t and

@@ -28,6 +28,7 @@ from chutelab.studies.sweep.plan import Plan
 from chutelab.studies.sweep.result import columns_of, synced, text_of, writing
 from chutelab.studies.sweep.rows import NUMBERS, REASON, Columns
 from chutelab.util.errors import InputError
+from chutelab.util.files import remove_unfinished
 from chutelab.util.versions import version_of
 
 if sys.platform == "win32":
@@ -77,6 +78,7 @@ def unfinished(out: Path, plan: Plan, *, resume: bool) -> Iterator[Part]:
     try:
         with writing(part.path):
             part.take_up(resume=resume)
+            remove_unfinished(out)
         yield part
         complete = True
     finally:

@@ -56,7 +56,7 @@ MEASURE = import_module("workprecision.measure")
 
 def one(case, method, value=None):
     """One record, as little of it as possible."""
-    trial = MEASURE.Trial(KNOWN[case], METHODS[method], value, patience=0.3)
+    trial = MEASURE.Trial(KNOWN[case], METHODS[method], value, patience=0.03)
     trial.repeat()
     return trial.record()
 

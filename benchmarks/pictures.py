@@ -13,13 +13,11 @@ from statistics import median
 from time import process_time
 
 from matplotlib.animation import FuncAnimation, PillowWriter
-from matplotlib.patches import Rectangle
 
 from chutelab.engines.simulation import simulate
 from chutelab.pictures.animation import Stage, animate, film
 from chutelab.pictures.animation.moments import span
 from chutelab.pictures.animation.stage import lay_out
-from chutelab.pictures.plots import style
 from chutelab.scene import load, shipped
 
 FRAMES, PARTICLES, FPS = 120, 60, 25
@@ -55,11 +53,6 @@ def usual(recording, slow, layout, moments):
     def make(path):
         stage = Stage(recording, layout, moments, slow=slow)
         figure, high = stage.figure, stage.figure.bbox.height
-        bars = []
-        for x in (-0.4, 0.6):
-            bars.append({n: Rectangle((x, 0), 0.8, 0, color=c) for n, c in style.ENERGY.items()})
-            for bar in bars[-1].values():
-                stage.bars.ax.add_patch(bar)
         texts = []
         for one in stage.writings:
             across, down = one.place
@@ -69,15 +62,10 @@ def usual(recording, slow, layout, moments):
             texts.append(figure.text(*place, "", fontsize=size, **align))
 
         def update(index):
-            stage.show(index)
-            for side, heights in zip(bars, stage.bars.heights, strict=True):
-                base = 0.0
-                for name, height in heights.items():
-                    side[name].set_y(base)
-                    side[name].set_height(height)
-                    base += height
+            for _, show in stage.moving:
+                show(index)
             for text, one in zip(texts, stage.writings, strict=True):
-                text.set_text(one.text)
+                text.set_text(one.said(index))
             return []
 
         animation = FuncAnimation(figure, update, init_func=list, frames=len(moments))

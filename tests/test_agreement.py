@@ -14,7 +14,7 @@ from chutelab import machine, scene, theory
 from chutelab.checks.agreement import ANSWERS, agreement, order, verify
 from chutelab.engines import exact, reference
 from chutelab.engines.exact import contacts
-from chutelab.mechanics import ballistics, impact
+from chutelab.mechanics import ballistics, contact
 from chutelab.results import REASONS, Kind
 from chutelab.results.comparison import compare
 from chutelab.results.quantities import QUANTITIES
@@ -199,7 +199,7 @@ WRONG = 1e-6
 
 def restitution_on_the_slip(approach, slip, restitution, friction, share):
     """The printed Eq. (9) in an engine: the wrong component is damped."""
-    normal, _ = impact.impulses(approach, slip, 1.0, friction, share)
+    normal, _ = contact.impulses(approach, slip, 1.0, friction, share)
     return normal, -(1.0 - np.asarray(restitution)) * np.asarray(slip)
 
 

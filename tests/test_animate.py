@@ -15,6 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw
@@ -36,7 +37,6 @@ from chutelab.pictures.animation.moments import (
     span,
 )
 from chutelab.pictures.animation.stage import TRAIL, Layout, lay_out
-from chutelab.pictures.colours import tint
 from chutelab.pictures.plots import style, window_of
 from chutelab.pictures.plots.scenery import energies
 from chutelab.results import Kind, Recording
@@ -75,6 +75,36 @@ def stage_of(
     recording: Recording, at: tuple[Moment, ...], slow: float = 5.0, layout: Layout | None = None
 ) -> Stage:
     return Stage(recording, layout or laid_out(recording), at, slow=slow)
+
+
+def moved(stage: Stage, index: int) -> dict[str, Any]:
+    """Draw a moment; return what moves in the scene, by name."""
+    stage.frame(index)
+    return {one.get_gid(): one for one, _ in stage.moving if one.axes is stage.view}
+
+
+def blocks_of(stage: Stage, index: int) -> list[dict[str, float]]:
+    """Draw a moment; return the heights of the entries in each bar: put in, and is now."""
+    stage.frame(index)
+    blocks = [one for one, _ in stage.moving if isinstance(one, Rectangle)]
+    return [
+        {str(one.get_gid()): one.get_height() for one in blocks if one.get_x() == left}
+        for left in (-0.4, 0.6)
+    ]
+
+
+def bar_axes(stage: Stage) -> Any:
+    (axes,) = {one.axes for one, _ in stage.moving if isinstance(one, Rectangle)}
+    return axes
+
+
+def clock(stage: Stage, index: int) -> str:
+    return stage.writings[0].said(index)
+
+
+def figures(stage: Stage, index: int) -> dict[str, str]:
+    """Return what is written beneath the bars; clock and caption are written before."""
+    return {name: one.said(index) for name, one in zip(SIGNS, stage.writings[2:], strict=True)}
 
 
 @pytest.fixture(scope="module")
@@ -359,22 +389,21 @@ def test_actors_stand_where_the_particle_is() -> None:
     layout = laid_out(recording)
     stage = stage_of(recording, moments_at(times), layout=layout)
     for i, t in enumerate(times):
-        stage.show(i)
+        drawn = moved(stage, i)
         known, pace = (values[0] for values in (expected(np.array([t - BELT_TIME]))))
-        assert np.asarray(stage.nominal.dot.get_xydata())[0] == pytest.approx(known, abs=1e-14)
-        trail = np.asarray(stage.nominal.trail.get_xydata())
+        assert np.asarray(drawn["disk"].get_xydata())[0] == pytest.approx(known, abs=1e-14)
+        trail = np.asarray(drawn["trail"].get_xydata())
         assert trail[-1] == pytest.approx(known, abs=1e-14)
         begun = expected(np.array([t - BELT_TIME - layout.reach(TRAIL, "trails")]))[0][0]
         assert trail[0] == pytest.approx(begun, abs=0.02)
-        strobe = np.asarray(stage.nominal.strobe.get_xydata())
+        strobe = np.asarray(drawn["strobe"].get_xydata())
         passed = 0.05 * np.arange(int(t / 0.05) + 1)
         assert len(strobe) == len(passed)
         flown = passed > BELT_TIME + 1e-9
         assert strobe[flown] == pytest.approx(expected(passed[flown] - BELT_TIME)[0], abs=1e-13)
-        assert f"t = {t:.2f} s" == stage.clock.text
+        assert f"t = {t:.2f} s" == clock(stage, i)
         # The corner opposite the shaft's middle is the tip of an arrow.
-        stage.frame(i)
-        arrows = stage.nominal.arrows
+        arrows = drawn["arrows"]
         corners = np.array([path.vertices[3] for path in arrows.get_paths()])
         scale = stage.view.transData.transform([(0.0, 0.0), (layout.arrow, 0.0)])
         tips = np.array([(pace[0], 0.0), (0.0, pace[1]), pace])
@@ -386,8 +415,8 @@ def test_a_component_is_drawn_only_beside_another() -> None:
     stage = stage_of(by_hand(), moments_at([0.3, BELT_TIME + 0.2]))
     lengths = []
     for i in range(2):
-        stage.show(i)
-        lengths.append(np.hypot(stage.nominal.arrows.U, stage.nominal.arrows.V))
+        arrows = moved(stage, i)["arrows"]
+        lengths.append(np.hypot(arrows.U, arrows.V))
     assert lengths[0].tolist() == [0.0, 0.0, 2.0]
     assert (lengths[1] > 1.0).all()
 
@@ -425,16 +454,19 @@ def test_crowd_is_at_the_recorded_positions_and_says_how_many() -> None:
     recording = simulate(scene.parse(text))
     times = [0.3, 0.8, 1.2]
     stage = stage_of(recording, moments_at(times))
-    assert len(stage.crowd.particles) == 299
-    assert stage.crowd.since is not None
-    assert 0 not in stage.crowd.particles
+    # At 0.8 s all 700 fly, each in a place of its own.
+    places = recording.at([0.8])[0][0]
+    drawn = np.asarray(moved(stage, 1)["crowd"].get_xydata())
+    same, particles = (drawn[:, None] == places).all(axis=2).nonzero()
+    assert same.tolist() == list(range(299))
+    assert len(set(particles) - {0}) == 299
     for i, t in enumerate(times):
-        stage.show(i)
-        positions = recording.at([t])[0][0, stage.crowd.particles]
-        np.testing.assert_array_equal(stage.crowd.dots.get_xydata(), positions)
-        # Each trail ends at its particle, and NaN comes before the next one.
-        back = i - stage.crowd.since[i]
-        trails = np.asarray(stage.crowd.trails.get_xydata()).reshape(299, back + 2, 2)
+        drawn = moved(stage, i)
+        positions = recording.at([t])[0][0, particles]
+        np.testing.assert_array_equal(drawn["crowd"].get_xydata(), positions)
+        # Each trail begins in the picture before and ends at its particle, and NaN comes before
+        # the next one.
+        trails = np.asarray(drawn["trails"].get_xydata()).reshape(299, min(i, 1) + 2, 2)
         np.testing.assert_array_equal(trails[:, -2], positions)
         assert np.isnan(trails[:, -1]).all()
     legend = stage.view.get_legend()
@@ -447,7 +479,7 @@ def test_particles_are_drawn_to_scale_or_visibly() -> None:
         text = f"{TEXT}[particle]\nradius = {radius}\n"
         stage = stage_of(simulate(scene.parse(text)), moments_at([0.6]))
         (x0, _), (x1, _) = stage.view.transData.transform([(0.0, 0.0), (2.0 * radius, 0.0)])
-        return stage.nominal.dot.get_markersize() / 72.0 * stage.figure.dpi, x1 - x0
+        return moved(stage, 0)["disk"].get_markersize() / 72.0 * stage.figure.dpi, x1 - x0
 
     drawn, true = width(0.05)
     assert drawn == pytest.approx(true, rel=1e-9)
@@ -458,12 +490,11 @@ def test_particles_are_drawn_to_scale_or_visibly() -> None:
 
 def stacked(stage: Stage) -> list[list[tuple[str, int]]]:
     """Return what is painted in each bar, from the bottom up: names, and rows of pixels."""
-    assert stage.bars is not None
     shown = np.asarray(stage.frame(0))
     names = {bytes.fromhex(colour[1:]): name for name, colour in style.ENERGY.items()}
     found = []
     for x in (0.0, 1.0):
-        column, base = stage.bars.ax.transData.transform((x, 0.0))
+        column, base = bar_axes(stage).transData.transform((x, 0.0))
         pixels = shown[: HEIGHT - round(base), round(column)][::-1]
         rows = [names.get(pixel.tobytes()) for pixel in pixels]
         end = rows.index(None)
@@ -474,23 +505,20 @@ def stacked(stage: Stage) -> list[list[tuple[str, int]]]:
 def test_bars_add_up_to_the_energies_at_all_times() -> None:
     times = [0.2, BELT_TIME + 0.2, BELT_TIME + t_impact(), BELT_TIME + t_landing()]
     stage = stage_of(by_hand(), moments_at(times))
-    assert stage.bars is not None
     lowest = R + PARTICLE - 0.5 * G * t_landing() ** 2
     at_release = 1e3 * (0.5 * MASS * V**2 + MASS * G * (R + PARTICLE - lowest))
     push = min(MU * MASS * G * t_landing(), MASS * V * (1.0 + EPS))
     for i in range(4):
-        stage.show(i)
-        put_in, is_now = stage.bars.heights
+        put_in, is_now = blocks_of(stage, i)
         assert sum(put_in.values()) == pytest.approx(sum(is_now.values()), rel=1e-12)
         assert put_in["start"] == pytest.approx(at_release, rel=1e-12)
-        assert stage.bars.values["start"].text == f"{at_release:.1f}"
+        assert figures(stage, i)["start"] == f"{at_release:.1f}"
     assert put_in["belt_work"] == pytest.approx(1e3 * push * V, rel=1e-12)
     assert is_now["kinetic"] == pytest.approx(
         1e3 * 0.5 * MASS * (push / MASS - EPS * V) ** 2, rel=1e-12
     )
-    stage.show(1)
     fall = 0.5 * G * 0.2**2
-    _, is_now = stage.bars.heights
+    _, is_now = blocks_of(stage, 1)
     assert is_now["kinetic"] == pytest.approx(1e3 * 0.5 * MASS * (V**2 + (0.2 * G) ** 2), rel=1e-12)
     assert is_now["potential"] == pytest.approx(
         1e3 * MASS * G * (R + PARTICLE - fall - lowest), rel=1e-11
@@ -500,13 +528,13 @@ def test_bars_add_up_to_the_energies_at_all_times() -> None:
 @pytest.mark.parametrize("t", [0.2, BELT_TIME + 0.2, BELT_TIME + t_landing()])
 def test_bars_are_painted_one_on_the_other_to_equal_heights(t: float) -> None:
     stage = stage_of(by_hand(), moments_at([t]))
-    assert stage.bars is not None
     painted = stacked(stage)
     assert len({sum(rows for _, rows in bar) for bar in painted}) == 1
-    scale = stage.bars.ax.transData.transform([(0.0, 0.0), (0.0, 1.0)])[:, 1]
-    for bar, heights in zip(painted, stage.bars.heights, strict=True):
+    heights = blocks_of(stage, 0)
+    scale = bar_axes(stage).transData.transform([(0.0, 0.0), (0.0, 1.0)])[:, 1]
+    for bar, entries in zip(painted, heights, strict=True):
         rows = dict(bar)
-        for name, height in heights.items():
+        for name, height in entries.items():
             # Edges are rounded to whole pixels.
             assert rows.get(name, 0) == pytest.approx(height * np.ptp(scale), abs=1.0), name
 
@@ -514,13 +542,11 @@ def test_bars_are_painted_one_on_the_other_to_equal_heights(t: float) -> None:
 @pytest.mark.parametrize("planted", [0.003, -0.003])
 def test_bars_add_up_with_the_residual_in_sight(planted: float) -> None:
     stage = stage_of(by_hand(residual=planted), moments_at([BELT_TIME + t_landing()]))
-    assert stage.bars is not None
-    stage.show(0)
-    put_in, is_now = stage.bars.heights
+    put_in, is_now = blocks_of(stage, 0)
     assert sum(put_in.values()) == pytest.approx(sum(is_now.values()), rel=1e-12)
     shown = put_in["residual"] - is_now["residual"]
     assert shown == pytest.approx(-1e3 * planted, rel=1e-9)
-    assert stage.bars.values["residual"].text == ("−3e−3 J" if planted > 0 else "3e−3 J")
+    assert figures(stage, 0)["residual"] == ("−3e−3 J" if planted > 0 else "3e−3 J")
     left, right = (dict(bar) for bar in stacked(stage))
     assert ("residual" in left) is (planted < 0.0)
     assert ("residual" in right) is (planted > 0.0)
@@ -545,30 +571,27 @@ def test_books_of_every_run_balance_at_every_moment(runs: dict[str, Recording]) 
 
 def test_pulley_turns_and_belt_marks_run_with_the_belt() -> None:
     stage = stage_of(by_hand(), moments_at([0.60, 0.61]))
-    stage.show(0)
-    holes, marks = (
-        np.asarray(line.get_xydata()) for line in (stage.drives.holes, stage.drives.marks)
-    )
+    drawn = moved(stage, 0)
+    holes, marks = (np.asarray(drawn[name].get_xydata()) for name in ("holes", "marks"))
     angle = V * 0.6 / R
     assert holes[0] == pytest.approx(0.6 * R * np.array([np.sin(angle), np.cos(angle)]), abs=1e-14)
     assert np.hypot(*holes.T) == pytest.approx(0.6 * R, rel=1e-12)
     assert holes.sum(axis=0) == pytest.approx([0.0, 0.0], abs=1e-14)
-    stage.show(1)
-    moved = np.asarray(stage.drives.marks.get_xydata())
-    shift = np.abs(moved[:, None, 0] - marks[None, :, 0] - V * 0.01).min(axis=1)
+    later = np.asarray(moved(stage, 1)["marks"].get_xydata())
+    shift = np.abs(later[:, None, 0] - marks[None, :, 0] - V * 0.01).min(axis=1)
     assert np.mean(shift < 1e-12) > 0.9  # all but those that came in at an end
 
 
 def test_what_is_not_asked_for_is_not_shown() -> None:
     recording, at = by_hand(), moments_at([BELT_TIME + 0.2])
     full = stage_of(recording, at)
-    full.show(0)
-    assert full.bars is not None
     bare = stage_of(recording, at, layout=laid_out(recording, shows=frozenset()))
-    bare.show(0)
-    assert bare.bars is None
-    assert bare.nominal.artists == [bare.nominal.dot]
-    assert set(full.nominal.artists) > {full.nominal.trail, full.nominal.strobe, full.nominal.dot}
+    assert set(moved(bare, 0)) == {"marks", "holes", "disk"}
+    assert set(moved(full, 0)) == {"marks", "holes", "disk", "trail", "strobe", "arrows"}
+    assert any(blocks_of(full, 0))
+    assert not any(blocks_of(bare, 0))
+    assert len(bare.writings) == 2
+    assert [line for line in full.view.lines if line.get_gid() == "analytic"]
     assert not [line for line in bare.view.lines if line.get_gid() == "analytic"]
     assert bare.view.get_position().width > 1.4 * full.view.get_position().width
 
@@ -603,21 +626,22 @@ def test_frames_leave_no_traces_in_each_other(runs: dict[str, Recording]) -> Non
     np.testing.assert_array_equal(np.asarray(fresh.frame(0))[scene_alone], last[scene_alone])
 
 
-def boxes_of(stage: Stage) -> list[tuple[str, Bbox]]:
+def boxes_of(stage: Stage, index: int) -> list[tuple[str, Bbox]]:
     """Return where text is in the picture, what is painted as pixels included."""
     found = [(text.get_text(), text.get_window_extent()) for text in seen(stage.figure)]
     for text in seen(stage.figure):
         assert text.get_fontsize() >= 9.0, text
     draw = ImageDraw.Draw(Image.new("RGB", (WIDTH, HEIGHT)))
     for one in stage.writings:
-        left, top, right, bottom = draw.textbbox(one.place, one.text, one.font, one.anchor)
-        found.append((one.text, Bbox.from_extents(left, HEIGHT - bottom, right, HEIGHT - top)))
+        text = one.said(index)
+        left, top, right, bottom = draw.textbbox(one.place, text, one.font, one.anchor)
+        found.append((text, Bbox.from_extents(left, HEIGHT - bottom, right, HEIGHT - top)))
     return found
 
 
 def assert_readable(stage: Stage, index: int) -> None:
     stage.frame(index)
-    boxes = boxes_of(stage)
+    boxes = boxes_of(stage, index)
     for text, box in boxes:
         assert min(box.x0, box.y0) >= 0.0, text
         assert box.x1 <= WIDTH, text
@@ -657,9 +681,8 @@ def test_what_changes_is_set_as_matplotlib_would(text: str) -> None:
     figure.text(0.05, 0.3, text, fontsize=10.5)
     canvas.draw()
     picture = Image.new("RGB", size, "white")
-    writing = Writing(10.5, 100.0, 0.05 * size[0], 0.7 * size[1], "ls")
-    writing.text = text
-    writing.paint(ImageDraw.Draw(picture))
+    writing = Writing(10.5, 100.0, 0.05 * size[0], 0.7 * size[1], "ls", lambda _: text)
+    writing.paint(ImageDraw.Draw(picture), 0)
     theirs, ours = (255.0 - np.asarray(shown)[..., 0] for shown in (canvas.buffer_rgba(), picture))
     assert ours.sum() == pytest.approx(theirs.sum(), rel=0.15)
     for axis in (0, 1):
@@ -847,9 +870,9 @@ def test_only_what_changed_is_in_a_frame_and_what_stays_is_one_frame() -> None:
 
 
 def test_tints_are_mixtures() -> None:
-    assert tint("#204060", 1.0) == "#204060"
-    assert tint("#204060", 0.0, "#808080") == "#808080"
-    assert tint("#204060", 0.25, "#60A0E0") == "#5088C0"
+    assert style.tint("#204060", 1.0) == "#204060"
+    assert style.tint("#204060", 0.0, "#808080") == "#808080"
+    assert style.tint("#204060", 0.25, "#60A0E0") == "#5088C0"
 
 
 @pytest.mark.parametrize("suffix", [".avi", "", ".gif.txt"])

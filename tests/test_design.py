@@ -18,8 +18,6 @@ from scipy.stats import norm
 import chutelab
 from chutelab import design, scene
 from chutelab.cli import main
-from chutelab.cli.program import RefusedError
-from chutelab.cli.solving import propagate
 from chutelab.pictures.plots.design import draw_scan, scan, spread
 from chutelab.studies.design import sensitivity
 from chutelab.studies.design.evaluation import Evaluator, suits
@@ -318,7 +316,7 @@ def test_variants_run_at_once_give_the_bits_of_single_runs(name, keys, low, high
     known = [one for one in NAMES if _has(given, one)]
     quantities = [measured(given, one) for one in known]
     if given.outgoing is not None:
-        quantities.append(target(given, "landing.vx=outgoing.speed").right)
+        quantities += target(given, "landing.vx=outgoing.speed")[1:]
     draws = np.random.default_rng(5).uniform(low, high, size=(24, 2))
     together = Evaluator(given, keys, quantities)(draws)
     alone = Evaluator(given, keys, quantities)
@@ -349,10 +347,10 @@ def test_streams_and_released_particles_run_one_by_one():
 def test_units_and_sides_of_a_target():
     given = machine()
     run = chutelab.simulate(given)
-    assert target(given, "landing.x = 300 mm").right.of(run) == pytest.approx(0.3)
-    assert target(given, "landing.x=0.3").right.unit == "m"
-    assert target(given, "landing.vx=incoming.speed").right.of(run) == V
-    assert target(given, "landing.vx=impact.vx").right.key == "impact.vx"
+    assert target(given, "landing.x = 300 mm")[1].of(run) == pytest.approx(0.3)
+    assert target(given, "landing.x=0.3")[1].unit == "m"
+    assert target(given, "landing.vx=incoming.speed")[1].of(run) == V
+    assert target(given, "landing.vx=impact.vx")[1].key == "impact.vx"
     for name in SHORT:
         assert measured(given, name).unit in ("J", "W")
 
@@ -609,11 +607,22 @@ def test_the_legend_of_the_shares_covers_no_bar():
         assert not any(legend.overlaps(bar.get_window_extent()) for bar in ax.patches)
 
 
-def test_the_command_behind_sweep_writes_samples_and_picture(tmp_path, capsys):
-    options = {"samples": 64, "seed": 0, "as_json": False, "quiet": False}
+def propagate(folder, given, *options, code=0):
+    """Call ``sweep --uncertainty`` on `machine`, with 64 samples."""
+    path = folder / "machine.toml"
+    path.write_text(scene.to_toml(machine()), encoding="utf-8")
+    command = ["sweep", path, "--uncertainty", given, "--sample", 64, *options]
+    result = CliRunner().invoke(main, [str(word) for word in command])
+    assert result.exit_code == code, result.output
+    return result
+
+
+def test_sweep_writes_samples_and_picture_of_uncertainties(tmp_path):
     out, plot = tmp_path / "samples.csv", tmp_path / "spread.png"
-    propagate(machine(), ["restitution=0.5±0.05"], out=out, plot=plot, **options)
-    assert "share of plate.restitution" in capsys.readouterr().out
+    shown = propagate(tmp_path, "plate.restitution=0.5±0.05", "--out", out, "--plot", plot).stdout
+    assert "share of plate.restitution" in shown
+    assert shown.endswith(f"wrote {out}\nwrote {plot}\n")
+    assert plot.stat().st_size > 10_000
     head, *rows = out.read_text(encoding="utf-8").splitlines()
     assert head == "plate.restitution,landing.x,belt_work"
     assert len(rows) == 128
@@ -623,27 +632,24 @@ def test_the_command_behind_sweep_writes_samples_and_picture(tmp_path, capsys):
     t3 = (sqrt(falls**2 + 2.0 * G * DROP) - falls) / G
     assert x == pytest.approx(R + D - epsilon * V * t3, rel=1e-12)
     assert work == pytest.approx(M * V * (V + epsilon * V), rel=1e-12)
-    propagate(machine(), ["restitution=0.5±0.05"], out=None, plot=None, samples=64, seed=0,
-              as_json=True, quiet=False)  # fmt: skip
-    told = json.loads(capsys.readouterr().out)
+    told = json.loads(propagate(tmp_path, "plate.restitution=0.5±0.05", "--json").stdout)
     assert told["quantities"]["landing.x"]["first"][0] == pytest.approx(1.0, abs=1e-6)
 
 
 @pytest.mark.parametrize(
-    ("given", "out", "plot", "said"),
+    ("given", "options", "said"),
     [
-        ("restitution=0.5", None, None, "must be KEY=MEAN±SPREAD"),
-        ("restitution=0.5±0.1", "rows.parquet", None, "ends in .csv"),
-        ("restitution=0.5±0.1", None, "picture.gif", "ends in .png or .svg"),
-        ("restitution=0.5±0.1", "not/there.csv", None, "there is no folder not"),
+        ("restitution=0.5", [], "must be KEY=MEAN±SPREAD"),
+        ("restitution=0.5±0.1", ["--out", "rows.parquet"], "ends in .csv"),
+        ("restitution=0.5±0.1", ["--plot", "picture.gif"], "ends in .png or .svg"),
+        ("restitution=0.5±0.1", ["--out", "not/there.csv"], "there is no folder not"),
     ],
 )
-def test_the_command_behind_sweep_refuses_before_it_runs(given, out, plot, said, monkeypatch):
+def test_sweep_refuses_uncertainties_before_it_runs(given, options, said, monkeypatch, tmp_path):
     monkeypatch.setattr("chutelab.studies.design.evaluation.simulate", None)
     monkeypatch.setattr("chutelab.studies.sweep.batch.run", None)
-    paths = {"out": out and Path(out), "plot": plot and Path(plot)}
-    with pytest.raises((RefusedError, InputError), match=said):
-        propagate(machine(), [given], samples=64, seed=0, as_json=False, quiet=True, **paths)
+    monkeypatch.chdir(tmp_path)
+    assert said in propagate(tmp_path, given, *options, code=2).stderr
 
 
 def test_frames_need_pandas_or_say_so(linear, monkeypatch):

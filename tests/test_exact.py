@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 
 from chutelab import machine, scene
 from chutelab.engines import exact
-from chutelab.engines.exact import engine, event_log
+from chutelab.engines.exact import engine, particle_state
 from chutelab.machine.releases import Releases
 from chutelab.results import Kind
 from chutelab.results.ledger import ledger
@@ -641,7 +641,7 @@ def test_a_particle_that_hardly_gets_on_is_stopped(monkeypatch):
 def test_long_runs_join_their_chunks_and_lose_nothing(monkeypatch):
     floor = {**FLOOR, "restitution": 0.9, "friction": 0.2}
     whole = thrown([0.0, 0.5], [0.3, 0.0], floor, until="settled")
-    monkeypatch.setattr(event_log, "MANY", 7)
+    monkeypatch.setattr(particle_state, "MANY", 7)
     pieces = thrown([0.0, 0.5], [0.3, 0.0], floor, until="settled")
     for array in ("knots", "offsets", "events", "by_surface"):
         assert getattr(whole, array).tobytes() == getattr(pieces, array).tobytes()

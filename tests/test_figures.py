@@ -15,7 +15,7 @@ import chutelab
 from chutelab.cli import main
 from chutelab.pictures.plots.figure import paper_figure
 from chutelab.results import Kind
-from chutelab.theory.figures import CASES, DRAWINGS, NUMBERS, FigureError, figure, path
+from chutelab.theory.figures import CASES, DRAWINGS, NUMBERS, Case, FigureError, figure, path
 
 G, EPSILON, FALL, MASS = 9.81, 0.5, 0.5, 0.008
 
@@ -86,21 +86,19 @@ def test_the_engine_runs_the_corrected_paths(found, number):
     for case, scene in zip(CASES[number], found[number].scenes.values(), strict=True):
         recording = chutelab.simulate(scene, engine="exact")
         landing = recording.first(recording.select(Kind.LANDING))[0]
-        radius = scene.incoming.pulley_radius
-        expected = path(case.speed, case.angle, case.ahead, "corrected", radius)
-        np.testing.assert_allclose(
-            landing["position"], expected.second.position[-1], rtol=0.0, atol=1e-12
-        )
-        np.testing.assert_allclose(landing["velocity_before"], expected.landing, rtol=1e-12)
+        assert scene.incoming.pulley_radius == case.radius
+        last = path(case, "corrected")[1, -1]
+        np.testing.assert_allclose(landing["position"], last["position"], rtol=0.0, atol=1e-12)
+        np.testing.assert_allclose(landing["velocity_before"], last["velocity"], rtol=1e-12)
 
 
 @pytest.mark.parametrize(("form", "along", "into"), [("corrected", 1.0, 0.5), ("as-printed", 0, 0)])
 def test_a_path_obeys_the_equations_at_an_inclined_plate(form, along, into):
     angle = np.radians(20.0)
-    way = path(2.0, 20.0, 0.1, form)
+    first, second = path(Case("inclined", 2.0, 20.0, 0.1, radius=0.1), form)
     down = np.array([np.sin(angle), -np.cos(angle)])
     away = np.array([-np.cos(angle), -np.sin(angle)])
-    before, after = way.first.velocity[-1], way.second.velocity[0]
+    before, after = first["velocity"][-1], second["velocity"][0]
     if form == "corrected":
         assert after @ down == pytest.approx(along * (before @ down), rel=1e-12)
         assert after @ away == pytest.approx(-into * (before @ away), rel=1e-12)
@@ -111,9 +109,9 @@ def test_a_path_obeys_the_equations_at_an_inclined_plate(form, along, into):
         tangent = (after @ away) / (after @ down)
         assert tangent == pytest.approx(EPSILON * (-before @ away) / (before @ down), rel=1e-12)
     # The plate's line goes through the pivot, 0.1 m ahead at the height of the belt.
-    meet = way.first.position[-1] - np.array([0.1, 0.1])
+    meet = first["position"][-1] - np.array([0.1, 0.1])
     assert meet @ away == pytest.approx(0.0, abs=1e-15)
-    assert way.second.position[-1, 1] == pytest.approx(way.second.position[0, 1] - FALL)
+    assert second["position"][-1, 1] == pytest.approx(second["position"][0, 1] - FALL)
 
 
 def test_words_carry_the_numbers(found):

@@ -233,15 +233,17 @@ def test_nothing_half_written_is_left(copied, monkeypatch):
     assert {path.name: path.read_bytes() for path in copied.iterdir()} == before
 
 
-def test_the_stamp_is_the_comment_of_the_picture(small):
+def test_the_stamp_is_the_comment_of_the_picture(small, tmp_path):
     data = (small / "lesson.gif").read_bytes()
-    stamp = comment_of(data)
+    stamp = comment_of(small / "lesson.gif")
     versions = r"chutelab \d.*, numpy \d.*, matplotlib \d.*, pillow \d.*"
     assert re.fullmatch(rf"chutelab lesson; inputs [0-9a-f]{{32}}; {versions}", stamp)
     with Image.open(small / "lesson.gif") as gif:
         assert gif.info["comment"].decode() == stamp
-    assert comment_of(data[:-1]) == ""
-    assert comment_of(b"\x89PNG;") == ""
+    for broken in (data[:-1], b"\x89PNG;", b""):
+        (tmp_path / "broken.gif").write_bytes(broken)
+        assert comment_of(tmp_path / "broken.gif") == ""
+    assert comment_of(tmp_path / "missing.gif") == ""
 
 
 @pytest.mark.parametrize("lesson", shipped_lessons(), ids=lambda lesson: lesson.name)

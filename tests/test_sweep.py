@@ -21,7 +21,7 @@ from chutelab.machine import build
 from chutelab.results import Kind
 from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
-from chutelab.scene import SceneError, load, parse, to_dict
+from chutelab.scene import SceneError, load, parse
 from chutelab.scene.variants import (
     Vary,
     accepted,
@@ -40,7 +40,7 @@ from chutelab.studies.sweep import (
     planned,
     sweep,
 )
-from chutelab.studies.sweep.batch import Block, alone
+from chutelab.studies.sweep.batch import alone
 from chutelab.studies.sweep.rows import joined
 from chutelab.util.errors import InputError
 
@@ -79,9 +79,7 @@ def call(*arguments, code=0):
 
 def block_of(scene, varies, **options):
     plan = planned(scene, varies, **options)
-    paths = tuple(quantity.path for quantity in plan.quantities)
-    values = plan.values(0, plan.count)
-    return Block(plan.document, plan.source, plan.keys, paths, values, plan.engine)
+    return plan.block(0, plan.count)
 
 
 ROUNDING = {"error": 1e-12, "residual": 1e-15}
@@ -380,13 +378,13 @@ def test_plain_numbers_are_known():
 
 
 def test_rules_are_asked_which_keys_they_look_at():
-    document = to_dict(load("perpendicular"))
-    assert "plate.restitution" not in judged_by(document)
-    assert "incoming.speed" not in judged_by(document)
-    given = judged_by(document, ["incoming.friction=0.3", "stream.velocity=[2.0,0.0]"])
+    scene = load("perpendicular")
+    assert "plate.restitution" not in judged_by(scene, {})
+    assert "incoming.speed" not in judged_by(scene, {})
+    given = judged_by(scene, {"incoming.friction": 0.3, "stream.velocity": [2.0, 0.0]})
     assert "incoming.speed" not in given
     assert {"particle.radius", "incoming.friction"} <= given
-    assert "incoming.speed" in judged_by(document, ["stream.velocity=[2.0,0.0]"])
+    assert "incoming.speed" in judged_by(scene, {"stream.velocity": [2.0, 0.0]})
 
 
 def test_a_family_fills_defaults_that_are_other_keys():
@@ -492,28 +490,28 @@ def test_a_latin_hypercube_has_one_sample_in_each_row_and_column():
     plan = planned(
         load("perpendicular"), ["plate.angle_deg=0:50", "incoming.speed=1:2"], sample=50, seed=3
     )
-    shares = (plan.values(0, 50) - [0.0, 1.0]) / [50.0, 1.0]
+    shares = (plan.samples - [0.0, 1.0]) / [50.0, 1.0]
     for column in shares.T:
         assert sorted(np.floor(50 * column).tolist()) == list(range(50))
     again = planned(
         load("perpendicular"), ["plate.angle_deg=0:50", "incoming.speed=1:2"], sample=50, seed=3
     )
-    assert again.values(0, 50).tobytes() == plan.values(0, 50).tobytes()
+    assert again.samples.tobytes() == plan.samples.tobytes()
 
 
 def test_sobol_points_fill_the_ranges_evenly():
     varies = ["plate.angle_deg=0:64", "incoming.speed=1:2"]
     plan = planned(load("perpendicular"), varies, sample=64, design="sobol")
-    values = plan.values(0, 64)
+    values = plan.samples
     # A scrambled (0, 6, 2)-net: one point in each strip of 1/64.
     assert sorted(np.floor(values[:, 0]).tolist()) == list(range(64))
     fewer = planned(load("perpendicular"), varies, sample=40, design="sobol")
-    assert fewer.values(0, 40).tobytes() == values[:40].tobytes()
+    assert fewer.samples.tobytes() == values[:40].tobytes()
 
 
 def test_whole_numbers_are_drawn_as_such_with_both_ends():
     plan = planned(load("stream-independent"), ["stream.seed=3:5"], sample=300)
-    seeds, counts = np.unique(plan.values(0, 300), return_counts=True)
+    seeds, counts = np.unique(plan.samples, return_counts=True)
     assert seeds.tolist() == [3.0, 4.0, 5.0]
     assert counts.tolist() == [100, 100, 100]
 

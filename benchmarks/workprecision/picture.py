@@ -11,7 +11,7 @@ import matplotlib.patheffects as pe
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
-from chutelab.pictures import colours
+from chutelab.pictures import PURPLE, VERMILION
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.style import Picture
 from chutelab.pictures.plots.workprecision import LOOKS as ENGINES
@@ -38,8 +38,8 @@ LEAST = 1e-16
 """Errors are drawn no smaller: that is the last digit of a double."""
 
 LOOKS: dict[str, dict[str, Any]] = {
-    "plain": {"color": colours.VERMILION, "marker": "^", "markersize": 8.0},
-    "dop853": {"color": colours.PURPLE, "marker": "D", "markersize": 6.5},
+    "plain": {"color": VERMILION, "marker": "^", "markersize": 8.0},
+    "dop853": {"color": PURPLE, "marker": "D", "markersize": 6.5},
     "fixed": ENGINES["fixed"],
     "aligned": ENGINES["pymunk"],
     "contact": ENGINES["contact"],

@@ -25,7 +25,7 @@ def place_error(e: Evidence, x: float, y: float) -> Verdict:
     """Distance of particle 0 from where a formula has it at the end, m."""
     found = e.recording.track(0)["position"][-1]
     apart = float(np.hypot(*(found - [x, y])))
-    return Verdict(apart, e.rounding + (ALIGNED * e.length if e.stepped else 0.0), "m")
+    return Verdict(apart, e.rounding + (ALIGNED * e.length if e.dt is not None else 0.0), "m")
 
 
 SHOT_UNTIL, SHOT_SPEED, SHOT_RADIUS = 0.01, 200.0, 0.004
@@ -178,7 +178,7 @@ def _belts() -> list[Case]:
         def carried(e: Evidence, speed: float = speed) -> Verdict:
             # It settles where it no longer slips: at the speed of the belt.
             found = float(e.recording.track(0)["velocity"][-1, 0])
-            bound = e.rounding + (ALIGNED * max(1.0, abs(speed)) if e.stepped else 0.0)
+            bound = e.rounding + (ALIGNED * max(1.0, abs(speed)) if e.dt is not None else 0.0)
             return Verdict(abs(found - speed), bound, "m/s")
 
         for spin in (False, True):
@@ -229,7 +229,7 @@ def _bounces() -> list[Case]:
 
     def at_rest(e: Evidence) -> Verdict | None:
         # Flights shrink by ε: after the fall they last 2 u (1 + ε + ε² ...)/g, u the rebound.
-        if e.stepped:
+        if e.dt is not None:
             return None
         fall = sqrt(2.0 * drop / G)
         expected = fall + 2.0 * restitution * G * fall / (G * (1.0 - restitution))

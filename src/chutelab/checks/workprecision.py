@@ -52,43 +52,19 @@ as with `timeit`. A single run of a millisecond would measure what others left i
 
 @dataclass(frozen=True)
 class Timing:
-    """One engine on the scene with one step; None is what it has not.
+    """One engine on the scene with one step; None is what it has not."""
 
-    Attributes
-    ----------
-    method : str
-        One of `METHODS`.
-    parameter, value : str, float
-        ``"dt"`` and the step, s; "" and None for the exact engine.
-    first : float
-        s of the first run, imports excluded.
-    repeats : int
-        Runs after it.
-    median : float
-        s, their median; the first run where it was so long that it was not repeated.
-    error : float
-        Relative, the largest of all answers of the run; see `chutelab.studies.accuracy`.
-    quantity : str
-        Which answer it is the error of.
-    against : str
-        What it is the difference from: "theory", "dop853" or an engine.
-    how : str
-        How the error is known, in words.
-    failed : str
-        Why there are no figures, "" if there are.
-    """
-
-    method: str
-    parameter: str = ""
-    value: float | None = None
-    first: float | None = None
-    repeats: int = 0
-    median: float | None = None
-    error: float | None = None
-    quantity: str = ""
-    against: str = ""
-    how: str = ""
-    failed: str = ""
+    method: str  # one of `METHODS`
+    parameter: str = ""  # "dt", or "" for the exact engine
+    value: float | None = None  # the step, s
+    first: float | None = None  # s of the first run, imports excluded
+    repeats: int = 0  # runs after it
+    median: float | None = None  # of the repeats, s; of the first run if it was too long to repeat
+    error: float | None = None  # relative, the largest of all answers, see `studies.accuracy`
+    quantity: str = ""  # which answer it is the error of
+    against: str = ""  # what it is the difference from: "theory", "dop853" or an engine
+    how: str = ""  # the error is known, in words
+    failed: str = ""  # why there are no figures, "" if there are
 
 
 def clocked(run: Callable[[], T], number: int = 1) -> tuple[float, T]:
@@ -102,12 +78,9 @@ def clocked(run: Callable[[], T], number: int = 1) -> tuple[float, T]:
 
 
 class Stopwatch:
-    """Repeats of a call whose first run took `first` seconds: that one filled caches.
+    """Repeats of a call whose first run took `first` s, which filled caches too.
 
-    Parameters
-    ----------
-    patience : float
-        s of repeats, after which no further one is begun.
+    After `patience` s of repeats no further one is begun.
     """
 
     def __init__(self, run: Callable[[], object], first: float, patience: float) -> None:
@@ -137,25 +110,16 @@ def measure(
     repeats: int = REPEATS,
     progress: Progress | None = None,
 ) -> list[Timing]:
-    """Measure the engines on a scene.
+    """Measure engines on a scene; nothing is left out, what failed says why.
 
     Parameters
     ----------
-    scene : Scene
-        From `chutelab.load`.
     methods : sequence of str
         Of `METHODS`; by default all, of many particles all but "fixed".
     steps : sequence of float
         ``run.dt``, s; by default `STEPS` or `MANY_STEPS`. A witness that steps takes the shortest.
     repeats : int
         Timed runs after the first, at most; fewer where they take longer than `PATIENCE`.
-    progress : callable, optional
-        Called with the share that is done.
-
-    Returns
-    -------
-    list of Timing
-        Nothing is left out: what failed says why.
     """
     many = scene.stream.count > 1
     steps = sorted(set(steps or (MANY_STEPS if many else STEPS)), reverse=True)

@@ -184,31 +184,15 @@ def _execute(client: NotebookClient, source: str, seconds: float) -> list[Any]:
 
 @dataclass(frozen=True)
 class Grade:
-    """The row of one notebook.
+    """The row of one notebook; what it does not have is empty."""
 
-    Attributes
-    ----------
-    file : str
-        The notebook, as it was given.
-    student, lesson : str
-        As the notebook has them; empty if it has none.
-    marks : tuple of int
-        1 for a right answer, 0 for any other or none, by question; empty without a lesson.
-    out_of : int
-        Number of questions.
-    revealed : tuple of int
-        Questions whose working was shown before the end; they count all the same.
-    reason : str
-        What to know about this row, or empty.
-    """
-
-    file: str
+    file: str  # as it was given
     student: str = ""
     lesson: str = ""
-    marks: tuple[int, ...] = ()
-    out_of: int = 0
-    revealed: tuple[int, ...] = ()
-    reason: str = ""
+    marks: tuple[int, ...] = ()  # 1 for a right answer, 0 for any other or none, by question
+    out_of: int = 0  # number of questions
+    revealed: tuple[int, ...] = ()  # questions whose working was shown; they count all the same
+    reason: str = ""  # what to know about this row
 
     @property
     def total(self) -> int:
@@ -225,11 +209,11 @@ def grade(
 
     Parameters
     ----------
-    paths : iterable of path
+    paths
         Notebooks.
-    time_limit : float
+    time_limit
         s for each. One that hangs is stopped, and marked for what it had answered by then.
-    progress : callable, optional
+    progress
         Called with the share that is done, 0 to 1.
 
     Returns
@@ -272,12 +256,13 @@ def write_csv(grades: Sequence[Grade], path: str | Path) -> Path:
     most = max((len(row.marks) for row in grades), default=0)
     heads = [f"q{i + 1}" for i in range(most)]
     rows = [["file", "student", "lesson", *heads, "total", "out_of", "revealed", "reason"]]
+    formula = ("=", "+", "-", "@", "\t", "\r")
     for row in grades:
-        texts = [_harmless(text) for text in (row.file, row.student, row.lesson)]
         marks = [*map(str, row.marks), *[""] * (most - len(row.marks))]
         revealed = " ".join(map(str, row.revealed))
-        end = [str(row.total), str(row.out_of), revealed, _harmless(row.reason)]
-        rows.append([*texts, *marks, *end])
+        cells = [row.file, row.student, row.lesson, *marks]
+        cells += [str(row.total), str(row.out_of), revealed, row.reason]
+        rows.append([f"'{cell}" if cell.startswith(formula) else cell for cell in cells])
     return write_lines(path, csv_lines(rows, end="\r\n"), errors="replace")
 
 
@@ -333,7 +318,3 @@ def _task(reports: list[Any]) -> tuple[Task | None, list[str]]:
         if task is not chosen and task.answers
     ]
     return chosen, notes
-
-
-def _harmless(text: str) -> str:
-    return f"'{text}" if text.startswith(("=", "+", "-", "@", "\t", "\r")) else text

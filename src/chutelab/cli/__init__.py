@@ -7,11 +7,11 @@
 `scenes`         ``scenes``, ``schema``, ``new``, ``tables``, ``figure``
 `comparing`      ``compare``
 `sweeping`       ``sweep``
-`solving`        ``solve``, and ``sweep --uncertainty``
+`solving`        ``solve``
 `lessons`        ``lesson``: list, show, build, new, grade, page
 `benching`       ``bench``
 `parameters`     what several commands take: scenes, overrides, folders
-`output`         what is left: the files of ``--out``, all of them or none; a run's summary
+`output`         files of ``--out``, all of them or none; what ``run`` and ``show`` leave
 `report`         summaries as tables for people
 `console`        text and JSON on standard output, a bar on standard error
 ===============  ==================================================================================
@@ -31,23 +31,9 @@ from chutelab.cli.solving import solve
 from chutelab.cli.sweeping import sweep
 
 for _command in (
-    run,
-    check,
-    show,
-    sweep,
-    solve,
-    compare,
-    lesson,
-    page,
-    figure,
-    tables,
-    scenes,
-    new,
-    schema,
-    verify,
-    stress,
-    bench,
-):
+    run, check, show, sweep, solve, compare, lesson, page,
+    figure, tables, scenes, new, schema, verify, stress, bench,
+):  # fmt: skip
     main.add_command(_command)
 
 __all__ = ["main"]

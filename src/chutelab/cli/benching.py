@@ -8,10 +8,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from chutelab.cli import console
-from chutelab.cli.console import progress
+from chutelab.cli.console import progress, tell
 from chutelab.cli.output import destination
-from chutelab.cli.parameters import json_option, out_option, retitled, scene_argument, set_option
+from chutelab.cli.parameters import (
+    json_option,
+    loaded_as_told,
+    out_option,
+    scene_argument,
+    set_option,
+)
 
 if TYPE_CHECKING:
     from chutelab.checks.workprecision import Timing
@@ -77,11 +82,10 @@ def bench(
     lower, take that engine for the accuracy you need.
     """
     from chutelab.checks.workprecision import Timing, measure
-    from chutelab.scene import load
     from chutelab.util.files import tsv_text
     from chutelab.util.versions import environment, measured_on
 
-    loaded = retitled(load(scene, list(overrides)), overrides)
+    loaded = loaded_as_told(scene, overrides)
     about = environment()
     files = ["work-precision.tsv", "work-precision.png"]
     with destination(out, files) as into:
@@ -93,13 +97,10 @@ def bench(
             text = tsv_text(timings, Timing, {"scene": loaded.title, **about})
             (into / files[0]).write_text(text, encoding="utf-8")
             workprecision(timings, loaded.title, about).write(into / files[1])
-    if as_json:
-        told = {"scene": loaded.title, "environment": about, "records": timings}
-        console.show_json({"format": 1, **told})
-        return
-    console.show(_table(loaded.title, timings, measured_on(about)))
-    if out is not None:
-        click.echo(f"wrote into {out}: {', '.join(files)}")
+    told = {"scene": loaded.title, "environment": about, "records": timings}
+    table = _table(loaded.title, timings, measured_on(about))
+    wrote = f"wrote into {out}: {', '.join(files)}" if out else ""
+    tell(told, table, as_json=as_json, wrote=wrote)
 
 
 def _table(title: str, timings: Sequence[Timing], measured: str) -> Sheet:

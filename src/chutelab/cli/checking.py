@@ -7,7 +7,7 @@ from itertools import chain
 
 import click
 
-from chutelab.cli.console import progress, show, show_json
+from chutelab.cli.console import progress, tell
 from chutelab.cli.parameters import (
     complete_scene,
     dt_option,
@@ -17,7 +17,6 @@ from chutelab.cli.parameters import (
     scene_argument,
     set_option,
 )
-from chutelab.cli.program import StuckError
 
 
 @click.command(short_help="Look at a scene before it runs, or say all that is wrong.")
@@ -44,12 +43,9 @@ def check(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool) ->
         except SceneError as error:
             refused = True
             click.echo(f"Error: {error}", err=True)
-    if as_json:
-        looks = [{"scene": name, **plain(look)} for name, look in found.items()]
-        show_json({"format": 1, "scenes": looks})
-    else:
-        titled = (replace(look, title=f"{name}: {look.title}") for name, look in found.items())
-        show(*titled)
+    looks = [{"scene": name, **plain(look)} for name, look in found.items()]
+    titled = (replace(look, title=f"{name}: {look.title}") for name, look in found.items())
+    tell({"scenes": looks}, *titled, as_json=as_json)
     if refused:
         click.get_current_context().exit(2)
 
@@ -76,29 +72,31 @@ def verify(scenes: tuple[str, ...], as_json: bool) -> None:
                 update(done / len(loaded))
             found[name] = agreement.verify(scene)
     failures = sum(answer.failures for answer in found.values())
-    if as_json:
-        answers = [
-            {
-                "scene": name,
-                "title": loaded[name].title,
-                "expectations": [{**plain(row), "holds": row.holds} for row in answer.findings],
-                "agreement": [
-                    {**plain(row), "pair": row.pair.split(", "), "holds": row.holds}
-                    for row in answer.agreements
-                ],
-                "skipped": answer.skipped,
-            }
-            for name, answer in found.items()
-        ]
-        shares = {name: shared for name, (_, shared) in agreement.ANSWERS.items()}
-        show_json({"format": 1, "failures": failures, "shares": shares, "scenes": answers})
-    else:
-        rows = tuple((name, *told) for name, told in agreement.ANSWERS.items())
-        common = Sheet("What the answers have in common", ("", "", ""), rows, texts=3)
-        both = (found[name].sheets(f"{name}: {loaded[name].title}") for name in found)
-        show(*chain.from_iterable(both), common)
-        click.echo("Errors and tolerances are relative where they have no unit.")
-        click.echo(f"{failures} outside the tolerance" if failures else "all within the tolerance")
+    answers = [
+        {
+            "scene": name,
+            "title": loaded[name].title,
+            "expectations": [{**plain(row), "holds": row.holds} for row in answer.findings],
+            "agreement": [
+                {**plain(row), "pair": row.pair.split(", "), "holds": row.holds}
+                for row in answer.agreements
+            ],
+            "skipped": answer.skipped,
+        }
+        for name, answer in found.items()
+    ]
+    shares = {name: shared for name, (_, shared) in agreement.ANSWERS.items()}
+    rows = tuple((name, *told) for name, told in agreement.ANSWERS.items())
+    common = Sheet("What the answers have in common", ("", "", ""), rows, texts=3)
+    both = (found[name].sheets(f"{name}: {loaded[name].title}") for name in found)
+    tell(
+        {"failures": failures, "shares": shares, "scenes": answers},
+        *chain.from_iterable(both),
+        common,
+        as_json=as_json,
+        wrote="Errors and tolerances are relative where they have no unit.\n"
+        + (f"{failures} outside the tolerance" if failures else "all within the tolerance"),
+    )
     if failures:
         click.get_current_context().exit(1)
 
@@ -110,11 +108,7 @@ def verify(scenes: tuple[str, ...], as_json: bool) -> None:
 @set_option
 @json_option()
 def stress(
-    scene: str,
-    engine: str | None,
-    dt: float | None,
-    overrides: tuple[str, ...],
-    as_json: bool,
+    scene: str, engine: str | None, dt: float | None, overrides: tuple[str, ...], as_json: bool
 ) -> None:
     """Run SCENE and judge the run by laws that it must keep, whatever the scene.
 
@@ -134,30 +128,26 @@ def stress(
         with progress("simulating") as update:
             recording = simulate(loaded, progress=update)
     except StalledError as stalled:
-        raise StuckError(str(stalled)) from stalled
+        raise click.ClickException(str(stalled)) from stalled
     run = Evidence(build(loaded), recording)
     found = judge(run)
     broken = sum(one.broken for one in found)
-    if as_json:
-        about = {"scene": scene, "title": recording.title, "engine": run.engine, "dt": run.dt}
-        laws = [{"law": one.law, **plain(one), "holds": one.holds} for one in found]
-        show_json({"format": 1, **about, "broken": broken, "laws": laws})
-    else:
-        rows = []
-        for one in found:
-            kept = "ok" if one.holds else "FAILED" if one.broken else "-"
-            said = "; not promised: ".join(filter(None, [one.detail, one.unpromised]))
-            figures = (f"{one.figure:.2g}", f"{one.bound:.2g}")
-            rows.append((kept, one.law, *figures, said))
-        steps = "" if run.dt is None else f", steps of {run.dt:.4g} s"
-        title = f"{recording.title}\nengine {run.engine}{steps}"
-        show(Sheet(title, ("", "law", "figure", "bound", ""), tuple(rows), texts=2, tail=1))
-        unpromised = sum(bool(one.unpromised) for one in found)
-        if broken:
-            click.echo(f"{broken} of {len(found)} laws broken")
-        elif unpromised:
-            click.echo(f"{len(found) - unpromised} laws kept, {unpromised} not promised")
-        else:
-            click.echo(f"all {len(found)} laws kept")
+    about = {"scene": scene, "title": recording.title, "engine": run.engine, "dt": run.dt}
+    laws = [{"law": one.law, **plain(one), "holds": one.holds} for one in found]
+    rows = []
+    for one in found:
+        kept = "ok" if one.holds else "FAILED" if one.broken else "-"
+        said = "; not promised: ".join(filter(None, [one.detail, one.unpromised]))
+        rows.append((kept, one.law, f"{one.figure:.2g}", f"{one.bound:.2g}", said))
+    steps = "" if run.dt is None else f", steps of {run.dt:.4g} s"
+    title = f"{recording.title}\nengine {run.engine}{steps}"
+    table = Sheet(title, ("", "law", "figure", "bound", ""), tuple(rows), texts=2, tail=1)
+    unpromised = sum(bool(one.unpromised) for one in found)
+    verdict = f"all {len(found)} laws kept"
+    if broken:
+        verdict = f"{broken} of {len(found)} laws broken"
+    elif unpromised:
+        verdict = f"{len(found) - unpromised} laws kept, {unpromised} not promised"
+    tell({**about, "broken": broken, "laws": laws}, table, as_json=as_json, wrote=verdict)
     if broken:
         click.get_current_context().exit(1)

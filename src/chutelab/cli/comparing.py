@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from chutelab.cli.console import progress, show, show_json
+from chutelab.cli.console import progress, tell
 from chutelab.cli.output import destination, write_json
 from chutelab.cli.parameters import json_option, out_option, scene_argument, set_option
 
@@ -100,6 +100,9 @@ def compare(
     s² (JᵀJ)⁻¹ from how the points respond to the parameters (J) and how much they scatter (s): they
     hold if errors are independent and the model is right. Needs pip install "chutelab[fit]".
     """  # noqa: D301 - click wants the backspace
+    from rich.console import RenderableType
+    from rich.text import Text
+
     from chutelab.scene import load
     from chutelab.studies import measured
     from chutelab.studies.measured.result import advice, as_dict, points_csv
@@ -122,17 +125,10 @@ def compare(
                 (place / "points.csv").write_text(points_csv(found), encoding="utf-8")
                 if fit is not None:
                     write_json(as_dict(found, fit), place / "fit.json")
-    if as_json:
-        show_json(as_dict(found, fit))
-        return
-    from rich.console import RenderableType
-    from rich.text import Text
-
     head = Text(found.recording.title, style="bold").append(f"\n{film.said()}", style="not bold")
     parts: list[RenderableType] = [head, found] if fit is None else [head, fit, found]
     if fit is None and (advised := advice(found)):
         parts.append(Text("\n" + "\n".join(wrapped(f"note: {advised}"))))
-    show(*parts)
-    if out is not None:
-        names = [name for name in FILES if fit is not None or name != "fit.json"]
-        click.echo(f"wrote into {out}: {', '.join(names)}")
+    names = [name for name in FILES if fit is not None or name != "fit.json"]
+    wrote = f"wrote into {out}: {', '.join(names)}" if out else ""
+    tell(as_dict(found, fit), *parts, as_json=as_json, wrote=wrote)

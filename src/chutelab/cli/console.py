@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from threading import Timer
 from typing import TYPE_CHECKING, Any
@@ -36,6 +36,22 @@ def show_json(value: Any) -> None:
     from chutelab.util.tables import plain
 
     click.echo(json.dumps(plain(value), allow_nan=False))
+
+
+def tell(
+    told: Mapping[str, Any],
+    *parts: RenderableType,
+    as_json: bool,
+    quiet: bool = False,
+    wrote: str = "",
+) -> None:
+    """Print a command's answer: one JSON object, or tables and texts and what was written."""
+    if as_json:
+        show_json({"format": 1, **told})
+    elif not quiet:
+        show(*parts)
+        if wrote:
+            click.echo(wrote)
 
 
 PATIENCE = 1.0

@@ -50,19 +50,16 @@ def lesson() -> None:
 def list_lessons(as_json: bool) -> None:
     """List the lessons: number, name, for whom, how long, and the question of each."""
     from chutelab.classroom.lessons.reading import shipped_lessons
-
-    found = shipped_lessons()
-    if as_json:
-        console.show_json({"format": 1, "lessons": [_plain(one) for one in found]})
-        return
     from chutelab.util.tables import Sheet
 
+    found = shipped_lessons()
     rows = [
         (str(one.number), one.name, one.level, str(one.minutes), f"{one.title}\n{one.question}")
         for one in found
     ]
     heads = ("", "lesson", "level", "minutes", "what it is about")
-    console.show(Sheet("", heads, tuple(rows), texts=5))
+    table = Sheet("", heads, tuple(rows), texts=5)
+    console.tell({"lessons": [_plain(one) for one in found]}, table, as_json=as_json)
 
 
 @lesson.command(short_help="Show one lesson, with its worksheet.")

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
@@ -109,31 +109,17 @@ def writing(what: str = "", instead: str = "") -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Output:
-    """What ``run`` and ``show`` leave of a recording, see `output_options`.
+    """What ``run`` and ``show`` leave of a recording, see `output_options`."""
 
-    Attributes
-    ----------
-    out : Path or None
-        Folder of the files; None writes nothing.
-    kinds : tuple of str
-        Which of `KINDS`.
-    as_json, quiet : bool
-        Whether the summary is JSON; whether there is none, and no bar.
-    """
-
-    out: Path | None
-    kinds: tuple[str, ...]
+    out: Path | None  # folder of the files; None writes nothing
+    kinds: tuple[str, ...]  # which of `KINDS`
     as_json: bool
-    quiet: bool
+    quiet: bool  # no bar, and no summary but as JSON
 
     @property
     def files(self) -> list[str]:
         """Names of the files."""
         return [name for kind in self.kinds for name in KINDS[kind]]
-
-    def destination(self) -> AbstractContextManager[Path | None]:
-        """Give an empty folder for the files, see `destination`."""
-        return destination(self.out, self.files)
 
     def write(self, recording: Recording, folder: Path, accuracy: Accuracy | None = None) -> None:
         """Write the files into an existing folder."""
@@ -200,6 +186,25 @@ def output_options(command: Callable[..., None]) -> Callable[..., None]:
     film, and a film that cannot be written here.
     """
 
+    @out_option("Write pictures, tables and the recording into this folder.")
+    @click.option(
+        "--only",
+        metavar="KINDS",
+        multiple=True,
+        callback=_kinds,
+        shell_complete=_complete_kinds,
+        help=f"With --out: only some of {','.join(KINDS)}; without, the first"
+        f" {len(USUAL)}. May be repeated.",
+    )
+    @click.option(
+        "--format",
+        "film",
+        type=click.Choice(FILMS),
+        help="With --out: the lesson picture as this instead of a GIF; mp4 and webm need the"
+        " extra chutelab[video].",
+    )
+    @json_option("Print one JSON object instead of tables.")
+    @click.option("--quiet", "-q", is_flag=True, help="Print no summary and no progress bar.")
     @wraps(command)
     def told(
         out: Path | None,
@@ -227,31 +232,7 @@ def output_options(command: Callable[..., None]) -> Callable[..., None]:
             need_video(kind)
         command(**others, output=Output(out, kinds, as_json, quiet))
 
-    options = (
-        out_option("Write pictures, tables and the recording into this folder."),
-        click.option(
-            "--only",
-            metavar="KINDS",
-            multiple=True,
-            callback=_kinds,
-            shell_complete=_complete_kinds,
-            help=f"With --out: only some of {','.join(KINDS)}; without, the first"
-            f" {len(USUAL)}. May be repeated.",
-        ),
-        click.option(
-            "--format",
-            "film",
-            type=click.Choice(FILMS),
-            help="With --out: the lesson picture as this instead of a GIF; mp4 and webm need the"
-            " extra chutelab[video].",
-        ),
-        json_option("Print one JSON object instead of tables."),
-        click.option("--quiet", "-q", is_flag=True, help="Print no summary and no progress bar."),
-    )
-    made: Callable[..., None] = told
-    for option in reversed(options):
-        made = option(made)
-    return made
+    return told
 
 
 def write_json(value: Any, path: Path) -> None:

@@ -48,6 +48,11 @@ def out_option(text: str, *names: str, required: bool = False) -> Decorator:
     )
 
 
+def file_option(*names: str, text: str) -> Decorator:
+    """Return an option that takes the name of a file to write."""
+    return click.option(*names, metavar="FILE", type=click.Path(path_type=Path), help=text)
+
+
 def json_option(text: str = "Print one JSON object.") -> Decorator:
     """Return ``--json``."""
     return click.option("--json", "as_json", is_flag=True, help=text)
@@ -72,7 +77,7 @@ dt_option = click.option("--dt", metavar="S", type=float, help="Same as --set ru
 
 
 def loaded_as_told(
-    name: str, overrides: Sequence[str], engine: str | None, dt: float | None
+    name: str, overrides: Sequence[str], engine: str | None = None, dt: float | None = None
 ) -> Scene:
     """Load a scene with what ``--set``, ``--engine`` and ``--dt`` change; its title says so."""
     from chutelab.scene import load

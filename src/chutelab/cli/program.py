@@ -25,12 +25,6 @@ class RefusedError(click.ClickException):
     exit_code = 2
 
 
-class StuckError(click.ClickException):
-    """A run got stuck; it is not the user's to mend."""
-
-    exit_code = 1
-
-
 class InOrder(click.Group):
     """A group of commands, listed in the order they were added."""
 
@@ -74,7 +68,15 @@ class Program(InOrder):
                 raise RefusedError(str(error)) from error
             if ctx.params["debug"]:
                 raise
-            click.echo(_failure(error), err=True)
+            said = str(error)
+            if isinstance(error, MemoryError):
+                said = f"not enough memory; fewer particles need less. ({error})"
+            elif not isinstance(error, OSError):
+                said = (
+                    f"{type(error).__name__}: {' '.join(said.split()) or 'no message'}; please"
+                    " report it, with what `chutelab --debug ...` prints for the same command"
+                )
+            click.echo(f"chutelab failed: {said}", err=True)
             ctx.exit(1)
 
 
@@ -85,18 +87,6 @@ def _was_interrupted(error: BaseException | None) -> bool:
             return True
         error = error.__cause__ or error.__context__
     return False
-
-
-def _failure(error: Exception) -> str:
-    if isinstance(error, MemoryError):
-        return f"chutelab failed: not enough memory; fewer particles need less. ({error})"
-    if isinstance(error, OSError):
-        return f"chutelab failed: {error}"
-    said = " ".join(str(error).split()) or "no message"
-    return (
-        f"chutelab failed: {type(error).__name__}: {said}; please report it, with what"
-        " `chutelab --debug ...` prints for the same command"
-    )
 
 
 def _version(ctx: click.Context, _parameter: click.Parameter, asked: bool) -> None:

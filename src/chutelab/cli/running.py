@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING
 import click
 
 from chutelab.cli.console import progress
-from chutelab.cli.output import KINDS, Output, output_options, writing
+from chutelab.cli.output import KINDS, Output, destination, output_options, writing
 from chutelab.cli.parameters import (
     dt_option,
     engine_option,
+    file_option,
     loaded_as_told,
     scene_argument,
     set_option,
 )
-from chutelab.cli.program import RefusedError, StuckError
+from chutelab.cli.program import RefusedError
 from chutelab.util.errors import InputError
 
 if TYPE_CHECKING:
@@ -72,8 +73,8 @@ def run(
         raise click.UsageError("--partial keeps files of --out DIR: give --out too.")
     loaded = loaded_as_told(scene, overrides, engine, dt)
     reached: Accuracy | None = None
-    stuck: StuckError | None = None
-    with output.destination() as folder:
+    stuck = ""
+    with destination(output.out, output.files) as folder:
         try:
             with progress("simulating", quiet=output.quiet) as update:
                 if accuracy is None:
@@ -83,27 +84,24 @@ def run(
 
                     recording, reached = reach(loaded, accuracy, update)
         except StalledError as stalled:
-            if not partial:
-                kept = "; add --out DIR --partial to keep what was recorded until then"
-                raise StuckError(f"{stalled}{kept}") from stalled
-            if stalled.recording is None:
-                raise StuckError(str(stalled)) from stalled
-            recording, stuck = (
-                stalled.recording,
-                StuckError(f"{stalled}; what is written ends there"),
+            kept = (
+                "" if partial else "; add --out DIR --partial to keep what was recorded until then"
             )
+            if kept or stalled.recording is None:
+                raise click.ClickException(f"{stalled}{kept}") from stalled
+            recording, stuck = stalled.recording, f"{stalled}; what is written ends there"
         if folder is not None:
             output.write(recording, folder, reached)
     output.tell(recording, reached)
-    if stuck is not None:
-        raise stuck
-    if accuracy is not None and reached is not None and not reached.met:
+    if reached is not None and not reached.met:
         from chutelab.studies.accuracy import written
 
         best = "how much was, cannot be told"
         if reached.reached is not None:
             best = f"{written(reached.reached, reached.unit)} was"
-        raise click.ClickException(f"the accuracy of {accuracy} was not reached; {best}")
+        stuck = f"the accuracy of {accuracy} was not reached; {best}"
+    if stuck:
+        raise click.ClickException(stuck)
 
 
 @click.command(short_help="Print the summary of a recording.npz; make its files again.")
@@ -125,7 +123,7 @@ def show(recording: Path, output: Output) -> None:
         elif recording.suffix == ".toml" or str(recording) in shipped():
             meant = f"; show takes a recording.npz; for a scene: chutelab run {recording}"
         raise RefusedError(f"{error}{meant}") from error
-    with output.destination() as folder:
+    with destination(output.out, output.files) as folder:
         if folder is not None:
             output.write(loaded, folder)
     output.tell(loaded)
@@ -142,15 +140,10 @@ def show(recording: Path, output: Output) -> None:
     " incoming.speed=1,2,4. May be given twice.",
 )
 @set_option
-@click.option(
-    "-o",
-    "--out",
-    "--output",
-    "output",
-    metavar="FILE",
-    type=click.Path(path_type=Path),
-    help="The file to write; default: the scene's name with .html, here.",
-)
+@file_option(
+    "-o", "--out", "--output", "output",
+    text="The file to write; default: the scene's name with .html, here.",
+)  # fmt: skip
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing, and no progress bar.")
 def page(
     scene: str,

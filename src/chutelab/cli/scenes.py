@@ -26,16 +26,12 @@ STANDARD_OUTPUT = Path("-")
 def scenes(as_json: bool) -> None:
     """List the shipped scenes; `run` takes their names."""
     from chutelab.scene import about
-
-    found = about()
-    if as_json:
-        listed = [{**asdict(scene), "path": str(scene.path)} for scene in found]
-        console.show_json({"format": 1, "scenes": listed})
-        return
     from chutelab.util.tables import Sheet
 
-    rows = [(s.name, f"{s.title}\n{s.look[0] if s.look else ''}") for s in found]
-    console.show(Sheet("", ("scene", "what it shows"), tuple(rows), texts=2))
+    listed = [{**asdict(scene), "path": str(scene.path)} for scene in about()]
+    rows = [(s.name, f"{s.title}\n{s.look[0] if s.look else ''}") for s in about()]
+    table = Sheet("", ("scene", "what it shows"), tuple(rows), texts=2)
+    console.tell({"scenes": listed}, table, as_json=as_json)
 
 
 @click.command(short_help="Print the JSON Schema of scene files, for editors.")
@@ -93,11 +89,8 @@ def tables(number: str | None, rebound: Literal["as-printed", "corrected"], as_j
     from chutelab.theory import table
 
     found = [table(n, rebound) for n in ([int(number)] if number else NUMBERS)]
-    if as_json:
-        told = [{**asdict(t), "cells": t.cells, "differing": t.differing} for t in found]
-        console.show_json({"format": 1, "tables": told})
-    else:
-        console.show(*found)
+    told = [{**asdict(t), "cells": t.cells, "differing": t.differing} for t in found]
+    console.tell({"tables": told}, *found, as_json=as_json)
 
 
 @click.command(short_help="Draw the paper's figures anew, printed beside corrected.")
@@ -129,15 +122,11 @@ def figure(number: int, out: Path | None, as_json: bool) -> None:
             paper_figure(found).write(place / picture)
             for name, text in files.items():
                 (place / name).write_text(text, encoding="utf-8")
-    if as_json:
-        told = {key: getattr(found, key) for key in ("title", "meaning", "missing", "columns")}
-        console.show_json({"format": 1, "figure": found.number, **told})
-        return
-    console.show(found)
-    if out is not None:
-        click.echo(f"\nwrote into {out}: {', '.join(sorted([picture, *files]))}")
-        if found.sweep:
-            click.echo(
-                "The corrected side with the engine, where landing.vx and landing.vy are -v3x and"
-                f" -v3y: {found.sweep}"
-            )
+    wrote = "" if out is None else f"\nwrote into {out}: {', '.join(sorted([picture, *files]))}"
+    if wrote and found.sweep:
+        wrote += (
+            "\nThe corrected side with the engine, where landing.vx and landing.vy are -v3x and"
+            f" -v3y: {found.sweep}"
+        )
+    told = {key: getattr(found, key) for key in ("title", "meaning", "missing", "columns")}
+    console.tell({"figure": found.number, **told}, found, as_json=as_json, wrote=wrote)

@@ -1,24 +1,15 @@
-"""``solve``: which value of a key makes a quantity what it should be, or least, or largest.
-
-What ``sweep --uncertainty`` does is here too: uncertain inputs in; words, numbers and a picture
-out.
-"""
+"""``solve``: which value of a key makes a quantity what it should be, or least, or largest."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
-from chutelab.cli.console import progress, show, show_json
-from chutelab.cli.output import PICTURES, check_file, destination, write_json, writing
+from chutelab.cli.console import progress, tell
+from chutelab.cli.output import destination, write_json
 from chutelab.cli.parameters import json_option, out_option, retitled, scene_argument, set_option
-
-if TYPE_CHECKING:
-    from chutelab.scene import Scene
 
 FILES = ("overlay.png", "scan.png", "solution.toml", "nearest.toml", "solve.json")
 """What ``--out`` may write: scan.png with one key, nearest.toml if there is no solution."""
@@ -98,6 +89,8 @@ def solve(
     is 1 if there is no solution; the nearest thing to one is shown then. It needs
     pip install "chutelab[design]".
     """  # noqa: D301 - click wants the backspace
+    from rich.text import Text
+
     from chutelab.engines.simulation import simulate
     from chutelab.scene import load, to_toml
     from chutelab.studies import design
@@ -133,54 +126,8 @@ def solve(
                     (place / name).write_text(text, encoding="utf-8")
                     overlay(simulate(at), path=place / "overlay.png")
             written = sorted(file.name for file in place.iterdir())
-    if as_json:
-        show_json(as_dict(found))
-    elif not quiet:
-        from rich.text import Text
-
-        show(Text(found.base.title, style="bold"), *found.sheets())
-        if out is not None:
-            click.echo(f"\nwrote into {out}: {', '.join(written)}")
+    title = Text(found.base.title, style="bold")
+    wrote = f"\nwrote into {out}: {', '.join(written)}" if out else ""
+    tell(as_dict(found), title, *found.sheets(), as_json=as_json, quiet=quiet, wrote=wrote)
     if not found.solved:
         click.get_current_context().exit(1)
-
-
-def propagate(
-    scene: Scene,
-    given: Sequence[str],
-    *,
-    samples: int | None,
-    seed: int,
-    out: Path | None,
-    plot: Path | None,
-    as_json: bool,
-    quiet: bool,
-) -> None:
-    """Propagate uncertain inputs, as ``--uncertainty`` has them; write what was asked for.
-
-    `samples` is the number of each set of points, None for the default; `out` and `plot` are a CSV
-    file for all samples, and a picture.
-    """
-    from chutelab.studies import design
-    from chutelab.studies.design.uncertainty import SAMPLES, as_dict
-    from chutelab.util.files import write_lines
-
-    check_file("--out", out, (".csv",))
-    check_file("--plot", plot, PICTURES)
-    count = SAMPLES if samples is None else samples
-    with progress("propagating", quiet=quiet) as meter:
-        found = design.uncertainty(scene, given, samples=count, seed=seed, progress=meter)
-    with writing():
-        if out is not None:
-            write_lines(out, [found.csv()])
-        if plot is not None:
-            from chutelab.pictures.plots.design import spread
-
-            spread(found).write(plot)
-    if as_json:
-        show_json(as_dict(found))
-    elif not quiet:
-        show(found)
-        for path in (out, plot):
-            if path is not None:
-                click.echo(f"wrote {path}")

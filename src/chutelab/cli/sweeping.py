@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from click.shell_completion import CompletionItem
 
 from chutelab.cli import console
 from chutelab.cli.output import PICTURES, check_file, writing
-from chutelab.cli.parameters import engine_option, json_option, scene_argument, set_option
+from chutelab.cli.parameters import (
+    engine_option,
+    file_option,
+    json_option,
+    scene_argument,
+    set_option,
+)
 from chutelab.cli.program import RefusedError
-from chutelab.cli.solving import propagate
+
+if TYPE_CHECKING:
+    from chutelab.scene import Scene
+    from chutelab.studies.design.uncertainty import Uncertainty
 
 
 def _complete_column(
@@ -61,21 +72,11 @@ def _complete_column(
 @click.option("--seed", type=int, default=0, help="Seed of the samples.", show_default=True)
 @engine_option
 @set_option
-@click.option(
-    "--out",
-    metavar="FILE",
-    type=click.Path(path_type=Path),
-    help="Write all rows into this file, .csv or .parquet.",
-)
+@file_option("--out", text="Write all rows into this file, .csv or .parquet.")
 @click.option(
     "--resume", is_flag=True, help="Go on with an interrupted sweep that was to write this file."
 )
-@click.option(
-    "--plot",
-    metavar="FILE",
-    type=click.Path(path_type=Path),
-    help="Draw one or two varied keys into this file: lines, or a heat map.",
-)
+@file_option("--plot", text="Draw one or two varied keys into this file: lines, or a heat map.")
 @click.option(
     "--of",
     "column",
@@ -131,15 +132,9 @@ def sweep(
     """
     from chutelab.scene import load
     from chutelab.scene.overrides import Override
-    from chutelab.studies.sweep import (
-        NUMBERS,
-        LostWorkersError,
-        crew,
-        planned,
-        sweep_to,
-        swept_by,
-    )
+    from chutelab.studies.sweep import NUMBERS, LostWorkersError, crew, planned, sweep_to, swept_by
 
+    wrote = "\n".join(f"wrote {path}" for path in (out, plot) if path is not None)
     if bool(varies) == bool(uncertain):
         raise click.UsageError("Give either --vary, what to vary, or --uncertainty.")
     if scheduler is not None and jobs != 1:
@@ -149,12 +144,12 @@ def sweep(
     if uncertain:
         if resume or scheduler is not None or jobs != 1:
             raise click.UsageError("--resume, --jobs and --scheduler go with --vary only.")
+        from chutelab.studies.design.uncertainty import as_dict
+
         engines = [Override("run.engine", engine, f"--engine {engine}")] if engine else []
         loaded = load(scene, [*overrides, *engines])
-        propagate(
-            loaded, uncertain, samples=sample, seed=seed, out=out, plot=plot,
-            as_json=as_json, quiet=quiet,
-        )  # fmt: skip
+        spread = _propagated(loaded, uncertain, sample, seed, out, plot, quiet)
+        console.tell(as_dict(spread), spread, as_json=as_json, quiet=quiet, wrote=wrote)
         return
     loaded = load(scene, overrides)
     if column not in NUMBERS:
@@ -185,14 +180,37 @@ def sweep(
         from chutelab.pictures.plots.design import sweep_figure
 
         sweep_figure(found, column).write(plot)
-    if as_json:
-        told = {"scene": found.title, "variants": len(found), "columns": found.columns}
-        console.show_json({"format": 1, **told})
-    elif not quiet:
-        console.show(found)
-        for path in (out, plot):
-            if path is not None:
-                click.echo(f"wrote {path}")
+    told = {"scene": found.title, "variants": len(found), "columns": found.columns}
+    console.tell(told, found, as_json=as_json, quiet=quiet, wrote=wrote)
+
+
+def _propagated(
+    scene: Scene,
+    given: Sequence[str],
+    samples: int | None,
+    seed: int,
+    out: Path | None,
+    plot: Path | None,
+    quiet: bool,
+) -> Uncertainty:
+    """Propagate uncertain inputs; write all samples as CSV, and a picture, where asked for."""
+    from chutelab.studies import design
+    from chutelab.studies.design.uncertainty import SAMPLES
+    from chutelab.util.files import write_lines
+
+    check_file("--out", out, (".csv",))
+    check_file("--plot", plot, PICTURES)
+    count = SAMPLES if samples is None else samples
+    with console.progress("propagating", quiet=quiet) as meter:
+        found = design.uncertainty(scene, given, samples=count, seed=seed, progress=meter)
+    with writing():
+        if out is not None:
+            write_lines(out, [found.csv()])
+        if plot is not None:
+            from chutelab.pictures.plots.design import spread
+
+            spread(found).write(plot)
+    return found
 
 
 def _kept(out: Path | None) -> str:

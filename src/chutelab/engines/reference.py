@@ -98,12 +98,12 @@ class _Surface:
 
 @dataclass(frozen=True)
 class _Lasting:
-    """A contact that lasts: with what, the sign of the slip (0: none), the surface's speed."""
+    """A contact that lasts: with what, the surface's speed, the sign of the slip (0: none)."""
 
     index: int
-    normal: Floats | None  # of a face; None round a circle
-    slip: int
+    normal: Floats  # where it begins
     belt: float
+    slip: int = 0
     carried: bool = False
 
 
@@ -153,7 +153,7 @@ class _Run:
         self.knot()
         lasting: _Lasting | None
         if self.machine.releases.carried[0]:
-            lasting = _Lasting(0, np.array([0.0, 1.0]), 0, self.things[0].speed, carried=True)
+            lasting = self.lasting(0, carried=True)
         else:
             lasting = self.contact()
         for _ in range(MOST_PHASES):
@@ -177,10 +177,11 @@ class _Run:
         side = thing.distance(self.base) >= 0.0 if self.r > 0.0 else self.sides.get(index, True)
         return thing.left if side else -thing.left
 
-    def belt(self, index: int, normal: Floats) -> float:
-        """Return the surface's speed along (n_y, -n_x), m/s."""
-        thing = self.things[index]
-        return thing.speed if normal @ thing.left >= 0.0 else -thing.speed
+    def lasting(self, index: int, *, carried: bool = False) -> _Lasting:
+        """Return the contact with a thing as it is now, without slip."""
+        thing, n = self.things[index], self.normal(index)
+        belt = thing.speed if n @ thing.left >= 0.0 else -thing.speed
+        return _Lasting(index, n, belt, carried=carried)
 
     def touching(self) -> dict[int, Floats]:
         """Return what the particle touches, with its normal; not the ends of what it touches."""
@@ -203,71 +204,58 @@ class _Run:
             hit = next((k for k, n in touched.items() if v @ n < -REST), None)
             if hit is None:
                 break
-            self.blow(hit, touched[hit])
+            self.blow(hit)
             if self.reason:
                 return None
         else:
             raise UnableError("it rattles in a corner")
         pressed = []
         for k, n in touched.items():
-            if v @ n < REST and self.load(k, n, v) > 0.0:
+            if v @ n < REST and self.load(self.lasting(k)) > 0.0:
                 v -= (v @ n) * n
                 pressed.append(k)
         if len(pressed) > 1:
             raise UnableError("it lies in a corner")
-        return self.law(pressed[0], touched, begins=True) if pressed else None
+        return self.law(pressed[0], begins=True) if pressed else None
 
-    def load(self, index: int, n: Floats, v: Floats) -> float:
-        """Return the normal force per mass, m/s²: the weight, less what bends the path."""
-        thing = self.things[index]
-        pressing = -float(self.g @ n)
-        if not thing.flat:
-            pressing -= float(v @ [n[1], -n[0]]) ** 2 / thing.reach
-        return pressing
-
-    def law(
-        self, index: int, touched: dict[int, Floats], *, begins: bool = False
-    ) -> _Lasting | None:
+    def law(self, index: int, *, begins: bool = False) -> _Lasting | None:
         """Choose between slip and none on what the particle lies on."""
-        thing, n, v = self.things[index], touched[index], self.state[V]
-        along = np.array([n[1], -n[0]])
-        belt, pull, load = self.belt(index, n), float(self.g @ along), self.load(index, n, v)
-        slip = float(v @ along) + self.r * self.state[OMEGA] - belt
-        need = -pull / (1.0 + self.lever)
+        thing, v, on = self.things[index], self.state[V], self.lasting(index)
+        n, load, _, slip, need = (part[..., 0] for part in self.forces(on, self.state[:, None]))
         sign = 0
-        if abs(slip) > SLIP and thing.friction == inf:
-            raise UnableError("a belt that grips drives it into something")
         if abs(slip) > SLIP:
+            if thing.friction == inf:
+                raise UnableError("a belt that grips drives it into something")
             sign = 1 if slip > 0.0 else -1
         else:
             if self.lever:
                 self.state[OMEGA] -= slip / self.r
             else:
-                v -= slip * along
+                v -= slip * np.array([n[1], -n[0]])
             if abs(need) > thing.friction * load:
                 sign = 1 if need < 0.0 else -1
         if sign == 0:
             if begins:
                 self.tell(Kind.STICK, thing.owner)
-            steady = (pull == 0.0 or not self.lever) and (thing.flat or not v.any())
-            rests = belt == 0.0 or thing.owner == self.machine.landing
+            steady = (need == 0.0 or not self.lever) and (thing.flat or not v.any())
+            rests = on.belt == 0.0 or thing.owner == self.machine.landing
             if self.machine.until == "settled" and steady and rests:
                 self.tell(Kind.SETTLE, thing.owner)
                 self.reason = "settled"
                 return None
-        found = _Lasting(index, n if thing.flat else None, sign, belt)
-        push = self.rates(found, self.state)[V]
-        for k, m in touched.items():
+        on = replace(on, slip=sign)
+        push = self.rates(on, self.state)[V]
+        for k, m in self.touching().items() if begins else ():
             if k != index and v @ m < REST and push @ m < -1e-9:
                 raise UnableError("it is held between two surfaces")
-        return found
+        return on
 
     # Forces, and what they do.
 
     def forces(self, on: _Lasting, y: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
         """Return normal, load, friction, slip and what would hold (per mass) at states (7, k)."""
         thing = self.things[on.index]
-        if on.normal is not None:
+        if thing.flat:
             n = on.normal[:, None] + np.zeros_like(y[X])
             bend = 0.0
         else:
@@ -280,6 +268,10 @@ class _Run:
         need = -pull / (1.0 + (0.0 if on.carried else self.lever))
         force = need if on.slip == 0 else -on.slip * thing.friction * load
         return n, load, force, slip, need
+
+    def load(self, on: _Lasting) -> float:
+        """Return the normal force per mass now, m/s²."""
+        return float(self.forces(on, self.state[:, None])[1][0])
 
     def rates(self, on: _Lasting | None, y: Floats) -> Floats:
         """Return the time derivative of a state (7,)."""
@@ -294,11 +286,12 @@ class _Run:
             out[HEAT] = -force * slip if on.slip else 0.0
         return out
 
-    def blow(self, index: int, n: Floats) -> None:
+    def blow(self, index: int) -> None:
         """Strike a thing: Newton's restitution, Coulomb's friction."""
         thing, mass, v = self.things[index], self.machine.particle.mass, self.state[V]
-        before, spin = v.copy(), float(self.state[OMEGA])
-        along, belt, closing = np.array([n[1], -n[0]]), self.belt(index, n), -float(v @ n)
+        before, spin, on = v.copy(), float(self.state[OMEGA]), self.lasting(index)
+        n, belt = on.normal, on.belt
+        along, closing = np.array([n[1], -n[0]]), -float(v @ n)
         slip = float(v @ along) + self.r * spin - belt
         normal = (1.0 + thing.restitution) * closing
         bound = inf if thing.friction == inf else thing.friction * normal
@@ -351,7 +344,7 @@ class _Run:
         if left <= 0.0:
             return "time", -1
         reach = PIECES * max(PIECE, self.r)
-        if on is not None and on.normal is None:
+        if on is not None and not self.things[on.index].flat:
             reach = min(reach, ARC * self.things[on.index].reach)
 
         def longest(y: Floats) -> float:
@@ -405,18 +398,12 @@ class _Run:
 
     def meetings(self, on: _Lasting | None) -> Iterator[tuple[str, int, Guard]]:
         """Yield the gaps to all but what the particle lies on, and what that goes over into."""
-        aside: set[int] = set()
-        if on is not None:
-            lies = self.things[on.index]
-            aside = {on.index}
-            aside |= {
-                k for k, thing in enumerate(self.things)
-                if on.index in [j for j, _, _ in thing.joined]
-                or (on.carried and thing.owner == lies.owner)
-            }  # fmt: skip
         for k, thing in enumerate(self.things):
-            if k in aside:
-                continue
+            if on is not None:
+                joined = on.index in [j for j, _, _ in thing.joined]
+                ridden = on.carried and thing.owner == self.things[on.index].owner
+                if k == on.index or joined or ridden:
+                    continue
             if thing.flat:
                 yield "left", k, self.to_line(thing, 1.0)
                 yield "right", k, self.to_line(thing, -1.0)
@@ -446,17 +433,14 @@ class _Run:
     def exits(self) -> Iterator[tuple[str, int, Guard]]:
         if self.machine.until == "time":
             return
-        left, right, bottom, top = (float(side) for side in self.machine.exit_box)
-        x, y0 = self.base
-        yield "exit", -1, lambda y: y0 + y[1] - bottom
-        yield "exit", -1, lambda y: top - y0 - y[1]
-        yield "exit", -1, lambda y: x + y[0] - left
-        yield "exit", -1, lambda y: right - x - y[0]
+        left, right, bottom, top = self.machine.exit_box
+        low, high = np.array([left, bottom]) - self.base, np.array([right, top]) - self.base
+        yield "exit", -1, lambda y: np.minimum(y[X].T - low, high - y[X].T).min(axis=1)
 
     def changes(self, on: _Lasting) -> Iterator[tuple[str, int, Guard]]:
         """Yield what ends a contact: no load, no slip, too little friction, the end of a face."""
         thing = self.things[on.index]
-        if on.normal is None or not on.carried:
+        if not thing.flat or not on.carried:
             yield "lifts", on.index, lambda y: self.forces(on, y)[1]
         if on.slip:
             yield "grips", on.index, lambda y: on.slip * self.forces(on, y)[3]
@@ -499,7 +483,7 @@ class _Run:
             if on is not None and on.carried:
                 raise UnableError("something is in the way of the ride")
             self.sides[k] = name != "right"
-            self.blow(k, self.normal(k))
+            self.blow(k)
             lasting = None if self.reason else self.contact()
             if on is not None and (lasting is None or lasting.index != on.index):
                 self.tell(Kind.SEPARATION, self.things[on.index].owner)
@@ -511,12 +495,12 @@ class _Run:
         if name == "ends":
             return self.round_the_end(on, k)
         if name in ("joins", "lasts"):
-            return self.law(k, {k: self.normal(k)})
-        normal, _, _, _, need = self.forces(on, self.state[:, None])
+            return self.law(k)
         if name == "slips":
             self.tell(Kind.SLIP, self.things[k].owner)
-            return _Lasting(k, on.normal, -1 if need[0] > 0.0 else 1, on.belt)
-        return self.law(k, {**self.touching(), k: normal[:, 0]}, begins=True)
+            need = self.forces(on, self.state[:, None])[4]
+            return replace(on, slip=-1 if need[0] > 0.0 else 1)
+        return self.law(k, begins=True)
 
     def round_the_end(self, on: _Lasting, end: int) -> _Lasting | None:
         """Go on at the end of a face: round the pulley, round the end, or in flight."""
@@ -526,14 +510,12 @@ class _Run:
             if any(
                 j == on.index and np.allclose(at, point, atol=TOUCH) for j, at, _ in thing.joined
             ):
-                n = self.normal(k)
                 if on.carried:
                     k = len(self.things)
                     self.things.append(replace(thing, reach=hypot(*self.base), joined=()))
-                if self.load(k, n, self.state[V]) > 0.0:
-                    if on.carried:
-                        return _Lasting(k, None, 0, on.belt, carried=True)
-                    return self.law(k, {k: n})
+                onward = self.lasting(k, carried=on.carried)
+                if self.load(onward) > 0.0:
+                    return onward if on.carried else self.law(k)
                 break
         self.tell(Kind.SEPARATION, face.owner)
         return None
@@ -557,38 +539,33 @@ class _Run:
 
 def _surfaces(machine: Machine) -> list[_Surface]:
     """Return segments, then the pulley, then free ends of segments."""
-    parts, r, pulley, nothing = (
-        machine.segments,
-        machine.particle.radius,
-        machine.pulley,
-        np.zeros(2),
-    )
-    lines: list[_Surface] = []
+    parts, r, wheel = machine.segments, machine.particle.radius, machine.pulley
+    radius, nothing = wheel.radius if wheel else 0.0, np.zeros(2)
+    things: list[_Surface] = []
     ends: list[tuple[int, Floats, Floats]] = []
     for k, tangent in enumerate(parts.tangent):
         left = np.array([-tangent[1], tangent[0]])
-        lines.append(
+        things.append(
             _Surface(
                 parts.start[k], tangent, left, float(parts.length[k]), 0.0, float(parts.speed[k]),
                 float(parts.restitution[k]), float(parts.friction[k]), int(parts.surface[k]),
             )
         )  # fmt: skip
         ends += [(k, parts.start[k], tangent), (k, parts.end[k], -tangent)]
-    circles: list[_Surface] = []
-    if pulley is not None:
-        circles.append(
+    if wheel is not None:
+        on_rim = tuple(end for end in ends if abs(hypot(*end[1]) - radius) <= TOUCH)
+        things.append(
             _Surface(
-                nothing, nothing, nothing, 0.0, pulley.radius + r, pulley.speed,
-                pulley.restitution, pulley.friction, pulley.surface,
-                tuple(end for end in ends if abs(hypot(*end[1]) - pulley.radius) <= TOUCH),
+                nothing, nothing, nothing, 0.0, radius + r, wheel.speed, wheel.restitution,
+                wheel.friction, wheel.surface, on_rim,
             )
         )  # fmt: skip
-        ends = [end for end in ends if hypot(*end[1]) > pulley.radius + TOUCH]
+        ends = [end for end in ends if hypot(*end[1]) > radius + TOUCH]
     for k, point, _ in ends if r > 0.0 else []:
-        line = lines[k]
         joined = tuple(end for end in ends if np.abs(end[1] - point).max() <= TOUCH)
         if joined[0][0] == k:  # of several that end here, the first
-            left = np.sum([lines[j].left for j, _, _ in joined if lines[j].owner == line.owner], 0)
+            line, those = things[k], [things[j] for j, _, _ in joined]
+            left = np.sum([thing.left for thing in those if thing.owner == line.owner], axis=0)
             circle = {"place": point, "tangent": nothing, "left": left, "length": 0.0, "reach": r}
-            circles.append(replace(line, joined=joined, **circle))
-    return lines + circles
+            things.append(replace(line, joined=joined, **circle))
+    return things

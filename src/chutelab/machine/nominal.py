@@ -12,7 +12,7 @@ import numpy as np
 
 from chutelab.machine.releases import on_belt, release_point, release_velocity
 from chutelab.mechanics.ballistics import descent
-from chutelab.mechanics.ride import Circle, Outcome, advance, grip_slip, normal_force
+from chutelab.mechanics.contact import Circle, Outcome, advance, grip_slip, normal_force
 from chutelab.scene import Scene
 from chutelab.util.arrays import Bools, Floats, Ints, Numbers
 

@@ -1,6 +1,5 @@
-"""Kinematics, impacts and rides: numbers or arrays in, the same out.
+"""Flight, impact and ride: numbers or arrays in, the same out.
 
 - `ballistics`: flight under gravity, and when it crosses a line.
-- `impact`: the impulses of a blow: Newton restitution and Coulomb friction.
-- `ride`: a ride round a circle under friction: grip, slip, when the contact opens.
+- `contact`: a blow's impulses; a ride round a circle: grip, slip, when the contact opens.
 """

@@ -1,7 +1,20 @@
 """What is looked at.
 
-- `colours`: the colours of all pictures, pages and notebooks.
 - `plots`: figures of recordings, sweeps, designs, fits and benchmarks, by matplotlib.
 - `animation`: the lesson picture, a film as GIF or video.
 - `live`: one HTML page with sliders, and the sliders of a notebook.
+
+Here are the colours of all pictures, pages and notebooks: those of Okabe and Ito (2008), "Color
+Universal Design", told apart by readers with any common colour blindness.
 """
+
+from typing import Final
+
+BLUE: Final = "#0072B2"
+SKY: Final = "#56B4E9"
+GREEN: Final = "#009E73"
+ORANGE: Final = "#E69F00"
+VERMILION: Final = "#D55E00"
+PURPLE: Final = "#CC79A7"
+GREY: Final = "#8C8C8C"
+"""Not theirs: seen on white and on black."""

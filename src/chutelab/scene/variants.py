@@ -1,4 +1,4 @@
-"""One scene, varied: what ``--vary`` takes, what the keys are, and every combination of values.
+"""One scene, varied: what ``--vary`` takes, and what the keys are.
 
 Scenes that differ in numbers only can be held as one, a family, whose varied keys hold arrays (N,).
 """
@@ -8,8 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import product
-from math import isfinite, nan, prod
+from math import inf, isfinite, nan, prod
 from typing import Any, Final
 
 import numpy as np
@@ -185,7 +184,7 @@ def quantity(scene: Scene, vary: Vary) -> Quantity:
         If the scene knows no such key, or it holds no number.
     """
     document = plain(to_dict(scene))
-    faults, _ = apply(document, [setting(vary.key, vary.values[0])])
+    faults, _ = apply(document, [Override(vary.key, plain_number(vary.values[0]))])
     if faults:
         raise InputError(faults[0].allowed, vary.typed)
     parts = parts_of(vary.key, [free.name for free in scene.surface])
@@ -235,68 +234,8 @@ def quantities(scene: Scene, varies: Sequence[Vary]) -> tuple[Quantity, ...]:
     return tuple(found)
 
 
-def setting(key: str, value: float) -> Override:
-    """Return an override of one key."""
-    return Override(key, plain_number(value))
-
-
-MOST_VARIED: Final = 2
-"""Keys varied at once: a slider each, or the two axes of a picture."""
-
-
-@dataclass(frozen=True)
-class Variant:
-    """One combination of values; without a scene, `fault` says why they make none."""
-
-    values: tuple[float, ...]
-    scene: Scene | None
-    fault: str = ""
-
-
-def variants(scene: Scene, varies: Sequence[Vary], most: int = 1_000) -> tuple[Variant, ...]:
-    """Lay every combination of values over a scene; the last key runs fastest.
-
-    Parameters
-    ----------
-    scene : Scene
-        From `chutelab.load`.
-    varies : sequence of Vary
-        Up to `MOST_VARIED`; none gives the scene itself.
-    most : int
-        Combinations allowed.
-
-    Returns
-    -------
-    tuple of Variant
-        A combination that makes no scene is there with its fault.
-
-    Raises
-    ------
-    InputError
-        If there are too many keys or combinations, or a key cannot be varied.
-    """
-    if len(varies) > MOST_VARIED:
-        raise InputError(f"at most {MOST_VARIED} keys can be varied", varies[MOST_VARIED].typed)
-    quantities(scene, varies)
-    count_of(varies, most)
-    found = []
-    for values in product(*(vary.values for vary in varies)):
-        settings = {vary.key: value for vary, value in zip(varies, values, strict=True)}
-        try:
-            found.append(Variant(values, scene.with_values(settings)))
-        except SceneError as error:
-            found.append(Variant(values, None, reason(error)))
-    return tuple(found)
-
-
-def count_of(varies: Sequence[Vary], most: int) -> int:
-    """Return how many combinations there are.
-
-    Raises
-    ------
-    InputError
-        If there are more than `most`.
-    """
+def count_of(varies: Sequence[Vary], most: float = inf) -> int:
+    """Return how many combinations there are; an `InputError` if there are more than `most`."""
     total = prod(len(vary.values) for vary in varies)
     if total > most:
         counts = "".join(f"{len(vary.values)} × " for vary in varies[:-1])
@@ -326,13 +265,13 @@ def accepted(path: str, values: Floats) -> Bools:
     return np.isfinite(values) & (low <= values) & (values <= high)
 
 
-def judged_by(mapping: Mapping[str, Any], overrides: Sequence[str | Override] = ()) -> set[str]:
+def judged_by(scene: Scene, values: Mapping[str, object]) -> set[str]:
     """Return the keys whose numbers decide whether a scene contradicts itself, others do not.
 
-    The arguments are as `chutelab.scene.from_dict` takes them; each key by itself must be right.
+    The scene is taken with some values, by full path; each key by itself must be right.
     """
-    document = plain(mapping)
-    apply(document, overrides)
+    document = plain(to_dict(scene))
+    apply(document, [Override(key, plain_number(value)) for key, value in values.items()])
     look = Look(document, Scene)
     list(conflicts(look))
     return look.asked

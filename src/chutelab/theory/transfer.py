@@ -1,12 +1,11 @@
 """The paper's equations (2) to (16) in closed form, vectorised, with their generalisations.
 
-Any plate angle, finite particles, friction and spin; the printed Eq. (9) beside the right one. A
-transfer has four stages, one method each: separate, fly, rebound, fall and be taken along.
+Any plate angle, finite particles, friction and spin; the printed Eq. (9) beside the right one.
+`transfer` is what others call, `stages` has the equations.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -16,38 +15,16 @@ from chutelab.theory.results import STAGES, Reason, Transfer
 from chutelab.theory.separation import separation
 from chutelab.util.arrays import Bools, Floats
 
-
-@dataclass(frozen=True, eq=False)
-class Given:
-    """The parameters of `transfer`, broadcast and flattened to (N,), and the shape to restore."""
-
-    shape: tuple[int, ...]
-    speed: Floats
-    pulley_radius: Floats
-    distance: Floats
-    angle: Floats
-    pivot_height: Floats
-    restitution: Floats
-    drop: Floats
-    belt_speed: Floats
-    particle_radius: Floats
-    mass: Floats
-    gravity: Floats
-    friction: Floats
-    spin: Bools
-    plate_friction: Floats
-    interval: Floats
+Rebound = Literal["corrected", "as-printed"]
 
 
-class Stages:
-    """Results as they come in, and why they stop coming, for each of N transfers."""
+class Answers:
+    """Results of N transfers as they come in, and why they stop coming."""
 
-    def __init__(self, given: Given, *, timed: bool) -> None:
-        self.given = given
-        self.timed = timed
+    def __init__(self, count: int) -> None:
         self.values: dict[str, Floats] = {}
-        self.reason = np.full(given.speed.shape, "", dtype=object)
-        self.fine = np.full(given.speed.shape, True)
+        self.reason = np.full(count, "", dtype=object)
+        self.fine = np.full(count, True)
 
     def fail(self, where: Bools, reason: str) -> None:
         """State a reason where there is none yet."""
@@ -61,154 +38,6 @@ class Stages:
     def keep(self, **values: Floats) -> None:
         """Store results of a stage where nothing has gone wrong up to now."""
         self.values |= {name: np.where(self.fine, v, np.nan) for name, v in values.items()}
-
-    def separate(self) -> None:
-        """Ride the belt and the pulley."""
-        p = self.given
-        self.require("0 < speed < inf", (p.speed > 0.0) & (p.speed < np.inf))
-        self.require(
-            "0 < pulley_radius < inf", (p.pulley_radius > 0.0) & (p.pulley_radius < np.inf)
-        )
-        self.require(
-            "0 <= particle_radius < inf", (p.particle_radius >= 0.0) & (p.particle_radius < np.inf)
-        )
-        self.require("particle_radius > 0 with spin", ~p.spin | (p.particle_radius > 0.0))
-        self.require("0 <= gravity < inf", (p.gravity >= 0.0) & (p.gravity < np.inf))
-        self.require("friction >= 0", p.friction >= 0.0)
-        self.ride_radius = p.pulley_radius + p.particle_radius
-        self.left = left = separation(
-            speed=p.speed,
-            ride_radius=self.ride_radius,
-            gravity=p.gravity,
-            friction=p.friction,
-            spin=p.spin,
-        )
-        self.keep(phi1=left.phi1, v1=left.v1, omega1=self._turning(left.rim))
-
-    def _turning(self, rim: Floats) -> Floats:
-        # Adding 0 turns -0 into 0.
-        return np.where(self.given.spin, rim / self.given.particle_radius, 0.0) + 0.0
-
-    def fly(self, *, unbounded_plate: bool) -> None:
-        """Fly to the plate: the gap between disk and plate's line is a quadratic in time."""
-        p, left = self.given, self.left
-        self.require("|angle| < π/2", np.abs(p.angle) < 0.5 * np.pi)
-        self.require("finite distance and pivot_height", np.isfinite(p.distance + p.pivot_height))
-        cos, sin = np.cos(p.angle), np.sin(p.angle)
-        to_pivot = (p.pulley_radius + p.distance) * cos + p.pivot_height * sin - p.particle_radius
-        # The gap on the pulley is least where the centre's radius is square to the plate.
-        closest = np.clip(0.5 * np.pi - p.angle, 0.0, left.phi1)
-        behind = to_pivot < self.ride_radius * np.sin(closest + p.angle)
-        behind &= self.fine
-        if unbounded_plate:
-            self.fail(behind, Reason.EARLY.because("plate: its line is reached during the ride"))
-            for name in STAGES["separation"]:
-                self.values[name] = np.where(behind, np.nan, self.values[name])
-        else:
-            self.fail(behind, Reason.NO_IMPACT.because("the ride passes the plate's line"))
-        gap = to_pivot - self.ride_radius * (left.sin * cos + left.cos * sin)
-        closing = left.v1 * (left.cos * cos - left.sin * sin)
-        discriminant = closing**2 - 2.0 * p.gravity * sin * gap
-        self.fail(closing <= 0.0, Reason.NO_IMPACT.because("the velocity points off the plate"))
-        self.fail(
-            discriminant <= 0.0,
-            Reason.NO_IMPACT.because("the flight turns away before it reaches the plate's line"),
-        )
-        self.normal = np.sqrt(discriminant)
-        t2 = 2.0 * gap / (closing + self.normal)  # Eq. (5)
-        x2 = left.v1 * t2 * left.cos  # Eq. (3)
-        y2 = 0.5 * p.gravity * t2**2 + left.v1 * t2 * left.sin  # Eq. (4)
-        v2x = left.v1 * left.cos
-        v2y = left.v1 * left.sin + p.gravity * t2
-        self.tangential = v2x * sin + v2y * cos
-        self.keep(
-            t2=t2,
-            x2=x2,
-            y2=y2,
-            v2x=v2x,
-            v2y=v2y,
-            v2=np.hypot(v2x, v2y),  # Eq. (6)
-            phi2=np.arctan2(self.normal, self.tangential),  # Eq. (7)
-        )
-
-    def rebound(self, *, as_printed: bool) -> None:
-        """Leave the plate: normal and tangential (down the plate) velocity, and the rim's."""
-        p = self.given
-        self.require("0 <= restitution <= 1", (p.restitution >= 0.0) & (p.restitution <= 1.0))
-        self.require("plate_friction >= 0", p.plate_friction >= 0.0)
-        if as_printed:
-            self.require(
-                "plate_friction = 0 and angle = 0 for Eq. (9) as printed",
-                (p.plate_friction == 0.0) & (p.angle == 0.0),
-            )
-            v2r = np.hypot(self.normal, p.restitution * self.tangential)  # Eq. (9) as printed
-            phi2r = np.arctan2(p.restitution * self.normal, self.tangential)  # Eq. (8)
-            self.away, self.down = v2r * np.sin(phi2r), v2r * np.cos(phi2r)
-            self.rim = self.left.rim
-        else:
-            # Coulomb: the impulse that stops the slip, or as much of it as friction can give.
-            slip = self.tangential - self.left.rim
-            limit = p.plate_friction * (1.0 + p.restitution) * self.normal
-            impulse = np.clip(slip * np.where(p.spin, 1.0 / 3.0, 1.0), -limit, limit)
-            self.down = self.tangential - impulse
-            self.rim = self.left.rim + np.where(p.spin, 2.0 * impulse, 0.0)
-            self.away = p.restitution * self.normal
-            v2r = np.hypot(self.away, self.down)  # Eq. (9) corrected
-            phi2r = np.arctan2(self.away, self.down)  # Eq. (8)
-        self.keep(phi2r=phi2r, v2r=v2r, omega2=self._turning(self.rim))
-
-    def fall(self, *, unbounded_plate: bool) -> None:
-        """Fall on the outgoing belt, and be taken along by it."""
-        p, left = self.given, self.left
-        self.require("0 <= drop < inf", (p.drop >= 0.0) & (p.drop < np.inf))
-        self.require("finite belt_speed", np.isfinite(p.belt_speed))
-        self.require("0 < mass < inf", (p.mass > 0.0) & (p.mass < np.inf))
-        if self.timed:
-            self.require("interval > 0", p.interval > 0.0)
-        cos, sin = np.cos(p.angle), np.sin(p.angle)
-        v3x = self.away * cos - self.down * sin
-        sinking = self.away * sin + self.down * cos
-        v3y = np.sqrt(sinking**2 + 2.0 * p.gravity * p.drop)
-        # Eq. (12), the root that does not cancel for either sign of b
-        t3 = np.where(sinking >= 0.0, 2.0 * p.drop / (sinking + v3y), (v3y - sinking) / p.gravity)
-        t3 = np.where((p.drop == 0.0) & (sinking >= 0.0), 0.0, t3)
-        self.fail(
-            ~np.isfinite(t3), Reason.MISSES.because("without gravity it never comes down to it")
-        )
-        if unbounded_plate:
-            pressing = -p.gravity * sin
-            self.fail(
-                (pressing > 0.0) & (2.0 * self.away < pressing * t3),
-                Reason.SECOND.because("plate: its line is met again before the landing"),
-            )
-        dEk = 0.5 * p.mass * (v3x**2 + p.belt_speed**2)  # noqa: N806 - Eq. (14)
-        slip = p.belt_speed + v3x - self.rim
-        carried = np.where(p.spin, p.mass / 3.0, p.mass)  # effective mass at the contact point
-        lost_height = left.sin**2 / (1.0 + left.cos)  # 1 - cos φ1
-        self.keep(
-            t3=t3,
-            x3=v3x * t3,  # Eq. (10)
-            y3=p.drop,  # Eq. (11), solved for t3
-            v3x=v3x,
-            v3y=v3y,
-            v3=np.hypot(v3x, v3y),  # Eq. (13)
-            d3=self.ride_radius * lost_height + self.values["y2"] + p.drop,  # Eq. (16)
-            dEk=dEk,
-            P=dEk / p.interval,  # Eq. (15)
-            belt_work=carried * p.belt_speed * slip,
-            slip_heat=0.5 * carried * slip**2,
-        )
-
-    def transfer(self) -> Transfer:
-        """Return the results in the parameters' shape."""
-        shape = self.given.shape
-        reason = self.reason.astype(np.str_).reshape(shape)
-        return Transfer(
-            reason=reason, **{name: value.reshape(shape) for name, value in self.values.items()}
-        )
-
-
-Rebound = Literal["corrected", "as-printed"]
 
 
 def transfer(
@@ -311,11 +140,152 @@ def transfer(
     arrays = [np.asarray(value, dtype=np.float64) for value in numbers.values()]
     turning, *whole = np.broadcast_arrays(np.asarray(spin, dtype=np.bool_), *arrays)
     flat = dict(zip(numbers, (array.ravel() for array in whole), strict=True))
-    given = Given(shape=turning.shape, spin=turning.ravel(), **flat)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        stages = Stages(given, timed=interval is not None)
-        stages.separate()
-        stages.fly(unbounded_plate=unbounded_plate)
-        stages.rebound(as_printed=rebound == "as-printed")
-        stages.fall(unbounded_plate=unbounded_plate)
-        return stages.transfer()
+        found = stages(
+            **flat,
+            spin=turning.ravel(),
+            timed=interval is not None,
+            as_printed=rebound == "as-printed",
+            unbounded_plate=unbounded_plate,
+        )
+    answers = {name: values.reshape(turning.shape) for name, values in found.values.items()}
+    return Transfer(reason=found.reason.astype(np.str_).reshape(turning.shape), **answers)
+
+
+def stages(
+    *,
+    speed: Floats,
+    pulley_radius: Floats,
+    distance: Floats,
+    angle: Floats,
+    pivot_height: Floats,
+    restitution: Floats,
+    drop: Floats,
+    belt_speed: Floats,
+    particle_radius: Floats,
+    mass: Floats,
+    gravity: Floats,
+    friction: Floats,
+    plate_friction: Floats,
+    interval: Floats,
+    spin: Bools,
+    timed: bool,
+    as_printed: bool,
+    unbounded_plate: bool,
+) -> Answers:
+    """Go through the stages of N transfers; the parameters are those of `transfer`, each (N,)."""
+    found = Answers(len(speed))
+
+    def turning(rim: Floats) -> Floats:
+        # Adding 0 turns -0 into 0.
+        return np.where(spin, rim / particle_radius, 0.0) + 0.0
+
+    # Ride the belt and the pulley.
+    found.require("0 < speed < inf", (speed > 0.0) & (speed < np.inf))
+    found.require("0 < pulley_radius < inf", (pulley_radius > 0.0) & (pulley_radius < np.inf))
+    found.require(
+        "0 <= particle_radius < inf", (particle_radius >= 0.0) & (particle_radius < np.inf)
+    )
+    found.require("particle_radius > 0 with spin", ~spin | (particle_radius > 0.0))
+    found.require("0 <= gravity < inf", (gravity >= 0.0) & (gravity < np.inf))
+    found.require("friction >= 0", friction >= 0.0)
+    ride_radius = pulley_radius + particle_radius
+    left = separation(
+        speed=speed, ride_radius=ride_radius, gravity=gravity, friction=friction, spin=spin
+    )
+    found.keep(phi1=left.phi1, v1=left.v1, omega1=turning(left.rim))
+
+    # Fly to the plate: the gap between disk and plate's line is a quadratic in time.
+    found.require("|angle| < π/2", np.abs(angle) < 0.5 * np.pi)
+    found.require("finite distance and pivot_height", np.isfinite(distance + pivot_height))
+    cos, sin = np.cos(angle), np.sin(angle)
+    to_pivot = (pulley_radius + distance) * cos + pivot_height * sin - particle_radius
+    # The gap on the pulley is least where the centre's radius is square to the plate.
+    closest = np.clip(0.5 * np.pi - angle, 0.0, left.phi1)
+    behind = to_pivot < ride_radius * np.sin(closest + angle)
+    behind &= found.fine
+    if unbounded_plate:
+        found.fail(behind, Reason.EARLY.because("plate: its line is reached during the ride"))
+        for name in STAGES["separation"]:
+            found.values[name] = np.where(behind, np.nan, found.values[name])
+    else:
+        found.fail(behind, Reason.NO_IMPACT.because("the ride passes the plate's line"))
+    gap = to_pivot - ride_radius * (left.sin * cos + left.cos * sin)
+    closing = left.v1 * (left.cos * cos - left.sin * sin)
+    discriminant = closing**2 - 2.0 * gravity * sin * gap
+    found.fail(closing <= 0.0, Reason.NO_IMPACT.because("the velocity points off the plate"))
+    found.fail(
+        discriminant <= 0.0,
+        Reason.NO_IMPACT.because("the flight turns away before it reaches the plate's line"),
+    )
+    normal = np.sqrt(discriminant)
+    t2 = 2.0 * gap / (closing + normal)  # Eq. (5)
+    x2 = left.v1 * t2 * left.cos  # Eq. (3)
+    y2 = 0.5 * gravity * t2**2 + left.v1 * t2 * left.sin  # Eq. (4)
+    v2x = left.v1 * left.cos
+    v2y = left.v1 * left.sin + gravity * t2
+    tangential = v2x * sin + v2y * cos
+    v2, phi2 = np.hypot(v2x, v2y), np.arctan2(normal, tangential)  # Eqs. (6), (7)
+    found.keep(t2=t2, x2=x2, y2=y2, v2x=v2x, v2y=v2y, v2=v2, phi2=phi2)
+
+    # Leave the plate: normal and tangential (down the plate) velocity, and the rim's.
+    found.require("0 <= restitution <= 1", (restitution >= 0.0) & (restitution <= 1.0))
+    found.require("plate_friction >= 0", plate_friction >= 0.0)
+    if as_printed:
+        found.require(
+            "plate_friction = 0 and angle = 0 for Eq. (9) as printed",
+            (plate_friction == 0.0) & (angle == 0.0),
+        )
+        v2r = np.hypot(normal, restitution * tangential)  # Eq. (9) as printed
+        phi2r = np.arctan2(restitution * normal, tangential)  # Eq. (8)
+        away, down = v2r * np.sin(phi2r), v2r * np.cos(phi2r)
+        rim = left.rim
+    else:
+        # Coulomb: the impulse that stops the slip, or as much of it as friction can give.
+        slip = tangential - left.rim
+        limit = plate_friction * (1.0 + restitution) * normal
+        impulse = np.clip(slip * np.where(spin, 1.0 / 3.0, 1.0), -limit, limit)
+        down = tangential - impulse
+        rim = left.rim + np.where(spin, 2.0 * impulse, 0.0)
+        away = restitution * normal
+        v2r = np.hypot(away, down)  # Eq. (9) corrected
+        phi2r = np.arctan2(away, down)  # Eq. (8)
+    found.keep(phi2r=phi2r, v2r=v2r, omega2=turning(rim))
+
+    # Fall on the outgoing belt, and be taken along by it.
+    found.require("0 <= drop < inf", (drop >= 0.0) & (drop < np.inf))
+    found.require("finite belt_speed", np.isfinite(belt_speed))
+    found.require("0 < mass < inf", (mass > 0.0) & (mass < np.inf))
+    if timed:
+        found.require("interval > 0", interval > 0.0)
+    v3x = away * cos - down * sin
+    sinking = away * sin + down * cos
+    v3y = np.sqrt(sinking**2 + 2.0 * gravity * drop)
+    # Eq. (12), the root that does not cancel for either sign of b
+    t3 = np.where(sinking >= 0.0, 2.0 * drop / (sinking + v3y), (v3y - sinking) / gravity)
+    t3 = np.where((drop == 0.0) & (sinking >= 0.0), 0.0, t3)
+    found.fail(~np.isfinite(t3), Reason.MISSES.because("without gravity it never comes down to it"))
+    if unbounded_plate:
+        pressing = -gravity * sin
+        found.fail(
+            (pressing > 0.0) & (2.0 * away < pressing * t3),
+            Reason.SECOND.because("plate: its line is met again before the landing"),
+        )
+    dEk = 0.5 * mass * (v3x**2 + belt_speed**2)  # noqa: N806 - Eq. (14)
+    slip = belt_speed + v3x - rim
+    carried = np.where(spin, mass / 3.0, mass)  # effective mass at the contact point
+    lost_height = left.sin**2 / (1.0 + left.cos)  # 1 - cos φ1
+    found.keep(
+        t3=t3,
+        x3=v3x * t3,  # Eq. (10)
+        y3=drop,  # Eq. (11), solved for t3
+        v3x=v3x,
+        v3y=v3y,
+        v3=np.hypot(v3x, v3y),  # Eq. (13)
+        d3=ride_radius * lost_height + found.values["y2"] + drop,  # Eq. (16)
+        dEk=dEk,
+        P=dEk / interval,  # Eq. (15)
+        belt_work=carried * belt_speed * slip,
+        slip_heat=0.5 * carried * slip**2,
+    )
+    return found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from math import isfinite
 from typing import Any
 
@@ -27,140 +27,86 @@ class Part:
 
 @dataclass(frozen=True)
 class Stepping:
-    """What finite steps mean for a scene.
+    """What finite steps mean for a scene."""
 
-    Attributes
-    ----------
-    dt : float
-        Longest step, s.
-    aligned : bool
-        Whether blows are met at their own instants; then nothing is passed through at any speed.
-    speed : float or None
-        Highest speed seen in the trial run, m/s; None if there was none.
-    way : float or None
-        What a particle covers in a step at that speed, m.
-    bound : float
-        What it must stay below if steps are not aligned: the radius, m.
-    longest : float or None
-        The longest step that would, s.
-    safe : bool
-        Whether no particle can pass through a surface unseen.
-    """
+    dt: float  # longest step, s
+    aligned: bool  # blows are met at their own instants: nothing is passed through at any speed
+    speed: float | None  # highest in the trial run, m/s; None if there was none
+    way: float | None  # of a particle in a step at that speed, m
+    bound: float  # what it must stay below if steps are not aligned: the radius, m
+    longest: float | None  # step with which it would, s
+    safe: bool  # no particle can pass through a surface unseen
 
-    dt: float
-    aligned: bool
-    speed: float | None
-    way: float | None
-    bound: float
-    longest: float | None
-    safe: bool
+    def rows(self) -> list[tuple[str, str]]:
+        """Return it in words, under headings."""
+        longest = write_size(self.dt, "s")
+        if self.aligned:
+            return [
+                ("steps", f"at most {longest} while contacts last"),
+                ("tunnelling", "none at any speed: blows have their own instants"),
+            ]
+        room = f"a surface catches it within {write_size(self.bound, 'm')}"
+        passing = f"nothing moved in the trial run; {room}"
+        if self.way is not None and self.longest is not None:
+            passing = (
+                f"{'none' if self.safe else 'POSSIBLE'}: at {self.speed:.3g} m/s a particle covers"
+                f" {write_size(self.way, 'm')} in a step, and {room}: safe below dt ="
+                f" {write_size(self.longest, 's')}"
+            )
+        return [("steps", f"all of {longest}"), ("tunnelling", passing)]
 
 
 @dataclass(frozen=True)
 class Effort:
-    """What a run is expected to cost.
+    """What a run is expected to cost."""
 
-    Attributes
-    ----------
-    contacts : int
-        Impacts and collisions, about.
-    seconds : float
-        Run time here and now, about.
-    at_least : bool
-        True if the trial run was cut off: both are lower bounds then.
-    how : str
-        What the estimate rests on.
-    """
-
-    contacts: int
-    seconds: float
-    at_least: bool
-    how: str
+    contacts: int  # impacts and collisions, about
+    seconds: float  # run time here and now, about
+    at_least: bool  # the trial run was cut off: both are lower bounds
+    how: str  # what the estimate rests on
 
 
 @dataclass(frozen=True)
 class Coverage:
-    """What the closed form has to say of a scene.
+    """What the closed form has to say of a scene."""
 
-    Attributes
-    ----------
-    covers, leaves_out : tuple of str
-        The paper's symbols that it gives, and that it does not.
-    reason : str
-        Why it stops, as `chutelab.theory` has it; "" if it does not.
-    words : str
-        The same for people.
-    """
-
-    covers: tuple[str, ...]
-    leaves_out: tuple[str, ...]
-    reason: str
-    words: str
+    covers: tuple[str, ...]  # the paper's symbols that it gives
+    leaves_out: tuple[str, ...]  # and those that it does not
+    reason: str  # why it stops, as `chutelab.theory` has it; "" if it does not
+    words: str  # the same for people
 
 
 @dataclass(frozen=True)
 class Advice:
-    """Something that works but may surprise, and what would change it.
-
-    Attributes
-    ----------
-    warning : str
-        What is the matter.
-    change : str
-        What to do, in words.
-    settings : dict
-        What of it is values of the scene's keys, to be changed together, see `Scene.with_values`;
-        empty where no setting is known to help.
-    """
+    """Something that works but may surprise, and what would change it."""
 
     warning: str
-    change: str
-    settings: Mapping[str, Any]
+    change: str  # what to do, in words
+    settings: Mapping[str, Any]  # the same for `Scene.with_values`; empty if none is known to help
 
 
 @dataclass(frozen=True, repr=False)
 class Preflight(Shown):
-    """All that `chutelab check` says of a scene.
-
-    Attributes
-    ----------
-    title : str
-        Of the scene.
-    built, skipped : tuple of Part
-        What the machine consists of, and what it does without.
-    engine, why : str
-        Which engine runs, and for what reason.
-    ends : str
-        When the run is over.
-    stepping : Stepping or None
-        None if the exact engine runs.
-    effort : Effort
-        Contacts and run time.
-    theory : Coverage
-        What the closed form answers.
-    advice : tuple of Advice
-        Warnings.
-    """
+    """All that `chutelab check` says of a scene."""
 
     title: str
     built: tuple[Part, ...]
     skipped: tuple[Part, ...]
     engine: str
-    why: str
-    ends: str
-    stepping: Stepping | None
+    why: str  # this engine runs
+    ends: str  # when the run is over
+    stepping: Stepping | None  # None if the exact engine runs
     effort: Effort
     theory: Coverage
     advice: tuple[Advice, ...]
 
     def sheet(self) -> Sheet:
         """Return all of it, under headings."""
-        rows: list[tuple[str, ...]] = [("built",)]
-        rows += [(part.name, part.what) for part in self.built]
-        rows += [("skipped",), *((part.name, part.what) for part in self.skipped)]
+        rows: list[tuple[str, ...]] = [("built",), *map(astuple, self.built)]
+        rows += [("skipped",), *map(astuple, self.skipped)]
         rows += [("how it runs",), ("engine", f"{self.engine}: {self.why}"), ("ends", self.ends)]
         if self.stepping is not None:
-            rows += _told(self.stepping)
+            rows += self.stepping.rows()
         about = "at least" if self.effort.at_least else "about"
         # Two digits of contacts and one of the time are known.
         contacts = int(float(f"{self.effort.contacts:.2g}"))
@@ -181,25 +127,6 @@ class Preflight(Shown):
         return Sheet(self.title, ("", ""), tuple(rows), texts=2)
 
 
-def _told(steps: Stepping) -> list[tuple[str, ...]]:
-    """Return the rows on finite steps."""
-    longest = write_size(steps.dt, "s")
-    if steps.aligned:
-        return [
-            ("steps", f"at most {longest} while contacts last"),
-            ("tunnelling", "none at any speed: blows have their own instants"),
-        ]
-    room = f"a surface catches it within {write_size(steps.bound, 'm')}"
-    passing = f"nothing moved in the trial run; {room}"
-    if steps.way is not None and steps.longest is not None:
-        passing = (
-            f"{'none' if steps.safe else 'POSSIBLE'}: at {steps.speed:.3g} m/s a particle covers"
-            f" {write_size(steps.way, 'm')} in a step, and {room}: safe below dt ="
-            f" {write_size(steps.longest, 's')}"
-        )
-    return [("steps", f"all of {longest}"), ("tunnelling", passing)]
-
-
 WORDS = {
     Reason.OUTSIDE: "The paper's equations are about another machine",
     Reason.EARLY: "The equations stop short of a contact they know nothing of",
@@ -212,29 +139,19 @@ WORDS = {
 
 def coverage(scene: Scene) -> Coverage:
     """Ask the theory about a scene; it speaks of particle 0."""
-    found = predict(scene)
-    given = [name for name in QUANTITIES if isfinite(float(getattr(found, name)))]
+    found, lone = predict(scene), scene.stream.count == 1
+    given = tuple(name for name in QUANTITIES if isfinite(float(getattr(found, name))))
     reason = str(found.reason)
     kind = Reason.of(reason)
-    if kind is None:
-        words = "All of the transfer, belt to belt"
-    else:
-        words = f"{WORDS[kind]}: {reason.partition(': ')[2]}"
-    notes = []
-    if given and scene.stream.count > 1:
-        notes.append("It speaks of particle 0 only.")
-    settled = scene.stream.count == 1 and scene.run.until == "settled"
-    if "belt_work" in given and not settled:
-        alone = " of one particle" if scene.stream.count > 1 else ""
-        notes.append(
-            f"A simulation has belt_work and slip_heat to compare in a run{alone} until settled."
-        )
-    return Coverage(
-        covers=tuple(given),
-        leaves_out=tuple(name for name in QUANTITIES if name not in given),
-        reason=reason,
-        words=" ".join([f"{words}.", *notes]),
-    )
+    words = "All of the transfer, belt to belt."
+    if kind is not None:
+        words = f"{WORDS[kind]}: {reason.partition(': ')[2]}."
+    if given and not lone:
+        words += " It speaks of particle 0 only."
+    if "belt_work" in given and not (lone and scene.run.until == "settled"):
+        words += " A simulation has belt_work and slip_heat to compare in a run"
+        words += " until settled." if lone else " of one particle until settled."
+    return Coverage(given, tuple(name for name in QUANTITIES if name not in given), reason, words)
 
 
 def built(machine: Machine) -> Iterator[Part]:

@@ -35,38 +35,20 @@ class _EnoughError(Exception):
 
 @dataclass(frozen=True)
 class Trial:
-    """A run of a stream's first particles.
+    """A run of a stream's first particles."""
 
-    Attributes
-    ----------
-    count : int
-        How many there were.
-    recording : Recording or None
-        None if it was cut off.
-    seconds : float
-        Time it took once warm, or had taken when it was cut off.
-    rounds : int
-        Rounds of the exact engine, if it was cut off.
-    warming : float
-        s that its first time took longer.
-    landed : bool
-        Whether it ended with the landings, though the scene goes on until all is at rest: coming to
-        rest takes a crowd of any size too long for a trial.
-    lone : Recording or None
-        Particle 0 by itself, to the end and not stepped where that can be had; None if it would
-        take too long, or the trial was not stepped either.
-    trouble : str
-        What stopped it, if the engine did not get on; "" otherwise.
-    """
-
-    count: int
-    recording: Recording | None
-    seconds: float
-    rounds: int = 0
-    warming: float = 0.0
+    count: int  # of the particles
+    recording: Recording | None  # None if it was cut off
+    seconds: float  # taken once warm, or until it was cut off
+    rounds: int = 0  # of the exact engine, if it was cut off
+    warming: float = 0.0  # s that its first time took longer
+    # It ended with the landings though the scene goes on until all is at rest, which takes a crowd
+    # of any size too long for a trial.
     landed: bool = False
+    # Particle 0 by itself, to the end and not stepped where that can be had; None if it would take
+    # too long, or the trial was not stepped either.
     lone: Recording | None = None
-    trouble: str = ""
+    trouble: str = ""  # what stopped it, if the engine did not get on
 
 
 def trial(scene: Scene, engine: str) -> Trial:

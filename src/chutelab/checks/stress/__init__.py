@@ -12,12 +12,4 @@ The scenes that are hard on an engine, and what each asks for besides, are in ``
 from chutelab.checks.stress.evidence import EPS, ROUNDINGS, Evidence, Verdict
 from chutelab.checks.stress.laws import A_CONTACT, LAWS, judge
 
-__all__ = [
-    "A_CONTACT",
-    "EPS",
-    "LAWS",
-    "ROUNDINGS",
-    "Evidence",
-    "Verdict",
-    "judge",
-]
+__all__ = ["A_CONTACT", "EPS", "LAWS", "ROUNDINGS", "Evidence", "Verdict", "judge"]

@@ -8,17 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.checks.stress.evidence import PIECES, PRESSED, Evidence, Verdict
+from chutelab.checks.stress.evidence import ON_ARCS, PIECES, PRESSED, Evidence, Verdict, worst
 from chutelab.machine import Machine
 from chutelab.results import REASONS, Kind
 from chutelab.util.arrays import Floats, Ints
 
 AT_SURFACES = (Kind.IMPACT, Kind.LANDING, Kind.STICK, Kind.SLIP, Kind.SETTLE)
 """What happens at a surface, if one is named."""
-
-ON_ARCS = 1e-9
-"""Share of its radius by which a cubic between two knots may leave a circle: the recording's
-contract."""
 
 ZOOMS = 12
 """Times that the place of a crossing is narrowed down to a `PIECES`-th: to rounding."""
@@ -36,7 +32,7 @@ def no_one_through(e: Evidence) -> Verdict | None:
     if not len(segments.length) or not len(s.t):
         return None
     clear = max(e.rounding, ON_ARCS * e.machine.particle.radius)
-    passages, where = 0, ""
+    passages = []
     for k in range(len(segments.length)):
         aside, _ = _beside(e, k, s.position)
         # Side on which it was last seen clearly, carried on through touches.
@@ -44,13 +40,12 @@ def no_one_through(e: Evidence) -> Verdict | None:
         last = np.maximum.accumulate(np.where(seen != 0.0, np.arange(len(seen)), 0))
         side = seen[last]
         flips = (side[1:] * side[:-1] < 0.0) & (s.particle[last[1:]] == s.particle[last[:-1]])
+        name = e.machine.surfaces[segments.surface[k]]
         for at in np.flatnonzero(flips).tolist():
-            foot = _crossing(e, k, at, side[at])
-            if clear < foot < segments.length[k] - clear:
-                passages += 1
-                name = e.machine.surfaces[segments.surface[k]]
-                where = where or f"particle {s.particle[at]} through {name} at t = {s.t[at]:.6g} s"
-    return Verdict(passages, 0.0, where or "passages")
+            where = f"particle {s.particle[at]} through {name} at t = {s.t[at]:.6g} s"
+            if clear < _crossing(e, k, at, side[at]) < segments.length[k] - clear:
+                passages.append(where)
+    return Verdict(len(passages), 0.0, passages[0] if passages else "passages")
 
 
 def _beside(e: Evidence, k: int, position: Floats) -> tuple[Floats, Floats]:
@@ -81,20 +76,16 @@ def depth(e: Evidence) -> Verdict | None:
     What overlapped at the release may go on doing so, no deeper.
     """
     s, m = e.samples, e.machine
-    r = m.particle.radius
     if not len(s.t) or not (len(m.segments.length) or m.pulley is not None):
         return None
     starts = np.flatnonzero(np.diff(s.particle, prepend=-1))
-    worst, where = 0.0, "m"
+    found = []
     for name, gap in gaps(m, s.position):
         first = np.minimum(gap[starts], 0.0)
         deeper = np.repeat(first, np.diff(starts, append=len(gap))) - gap
         at = int(np.argmax(deeper))
-        if deeper[at] > worst:
-            worst = float(deeper[at])
-            where = f"m, particle {s.particle[at]} in {name} at t = {s.t[at]:.6g} s"
-    arcs = ON_ARCS * (r + (m.pulley.radius if m.pulley is not None else 0.0))
-    return Verdict(worst, e.rounding + arcs + e.late, where)
+        found.append((deeper[at], f"particle {s.particle[at]} in {name} at t = {s.t[at]:.6g} s"))
+    return worst(found, e.rounding + e.arcs + e.late, "m")
 
 
 def gaps(machine: Machine, position: Floats) -> Iterator[tuple[str, Floats]]:
@@ -113,15 +104,13 @@ def overlap(e: Evidence) -> Verdict | None:
     """No two disks overlap by more than they approach in a step; the figure is in m."""
     if not e.crowd:
         return None
-    worst, where = 0.0, "m"
+    found = []
     for now in np.concatenate([_instants(e), _some(e, Kind.COLLISION)["t"]]):
         (position,), _ = e.recording.at([now])
         there = np.flatnonzero(np.isfinite(position[:, 0]))
         deep, i, j = closest(position[there], e.machine.particle.radius)
-        if deep > worst:
-            worst = deep
-            where = f"m, particles {there[i]} and {there[j]} at t = {now:.6g} s"
-    return Verdict(worst, e.rounding + 2.0 * e.late, where)
+        found.append((deep, f"particles {there[i]} and {there[j]} at t = {now:.6g} s"))
+    return worst(found, e.rounding + 2.0 * e.late, "m")
 
 
 def pressed(e: Evidence) -> Verdict | None:
@@ -133,14 +122,13 @@ def pressed(e: Evidence) -> Verdict | None:
     """
     if not e.crowd or e.dt is None:
         return None
-    worst, where, r = 0.0, "r", e.machine.particle.radius
-    for now, first, last, pairs in _pairs(e):
-        deep = 2.0 - np.maximum(*(_apart(place, pairs) for place in (first, last))) / r
+    r = e.machine.particle.radius
+    found = []
+    for now, (i, j), before, after in _pairs(e, e.dt):
+        deep = 2.0 - np.maximum(np.hypot(*before.T), np.hypot(*after.T)) / r
         at = int(np.argmax(deep))
-        if deep[at] > worst:
-            worst = float(deep[at])
-            where = f"r, particles {pairs[0][at]} and {pairs[1][at]} at t = {now:.6g} s"
-    return Verdict(worst, PRESSED if e.engine == "contact" else 2.0 * e.late / r, where)
+        found.append((deep[at], f"particles {i[at]} and {j[at]} at t = {now:.6g} s"))
+    return worst(found, PRESSED if e.engine == "contact" else 2.0 * e.late / r, "r")
 
 
 def no_one_through_another(e: Evidence) -> Verdict | None:
@@ -151,20 +139,17 @@ def no_one_through_another(e: Evidence) -> Verdict | None:
     """
     if not e.crowd or e.dt is None:
         return None
-    passed: set[tuple[int, int]] = set()
-    r, where = e.machine.particle.radius, ""
-    for now, first, last, (i, j) in _pairs(e):
-        start = first[j] - first[i]
-        along = last[j] - last[i] - start
+    passed: dict[tuple[int, int], str] = {}
+    r = e.machine.particle.radius
+    for now, pairs, before, after in _pairs(e, e.dt):
+        along = after - before
         way = np.hypot(*along.T)
         # Closest approach on the straight way of a step.
-        share = -(start * along).sum(axis=1) / np.where(way > 0.0, way, 1.0) ** 2
-        nearest = np.hypot(*(start + np.clip(share, 0.0, 1.0)[:, None] * along).T)
-        for k in np.flatnonzero((way < r) & (nearest < r)).tolist():
-            a, b = sorted((int(i[k]), int(j[k])))
-            passed.add((a, b))
-            where = where or f"pairs: {a} and {b} at t = {now:.6g} s"
-    return Verdict(len(passed), 0.0, where or "pairs")
+        share = -(before * along).sum(axis=1) / np.where(way > 0.0, way, 1.0) ** 2
+        nearest = np.hypot(*(before + np.clip(share, 0.0, 1.0)[:, None] * along).T)
+        for a, b in np.sort(pairs.T[(way < r) & (nearest < r)]).tolist():
+            passed.setdefault((a, b), f"pairs: {a} and {b} at t = {now:.6g} s")
+    return Verdict(len(passed), 0.0, next(iter(passed.values()), "pairs"))
 
 
 def _instants(e: Evidence) -> Floats:
@@ -176,23 +161,23 @@ def _instants(e: Evidence) -> Floats:
     return np.linspace(t.min(), t.max(), max(2, count))
 
 
-def _some(e: Evidence, *kinds: Kind) -> NDArray[Any]:
-    events = e.recording.select(*kinds)
+def _some(e: Evidence, kind: Kind) -> NDArray[Any]:
+    events = e.recording.select(kind)
     return events[:: 1 + len(events) // COLLISIONS]
 
 
-def _pairs(e: Evidence) -> Iterator[tuple[float, Floats, Floats, tuple[Ints, Ints]]]:
-    """Yield instants, places (N, 2) then and a step later, and pairs in touch at either time."""
-    assert e.dt is not None
+def _pairs(e: Evidence, dt: float) -> Iterator[tuple[float, Ints, Floats, Floats]]:
+    """Yield instants, pairs (2, k) in touch then or a step later, and b - a (k, 2) at both, m."""
     reach = 2.0 * e.machine.particle.radius
     for now in _instants(e):
-        (first, last), _ = e.recording.at([now, now + e.dt])
+        (first, last), _ = e.recording.at([now, now + dt])
         there = np.flatnonzero(np.isfinite(first[:, 0]) & np.isfinite(last[:, 0]))
         room = reach + 2.0 * np.abs(last[there] - first[there]).max(initial=0.0)
-        pairs = there[_neighbours(first[there, 0], room)]
-        i, j = pairs[:, np.minimum(_apart(first, pairs), _apart(last, pairs)) < reach]
-        if len(i):
-            yield float(now), first, last, (i, j)
+        i, j = pairs = there[_neighbours(first[there, 0], room)]
+        before, after = first[j] - first[i], last[j] - last[i]
+        touch = np.minimum(np.hypot(*before.T), np.hypot(*after.T)) < reach
+        if touch.any():
+            yield float(now), pairs[:, touch], before[touch], after[touch]
 
 
 def _neighbours(x: Floats, room: float) -> Ints:
@@ -205,9 +190,14 @@ def _neighbours(x: Floats, room: float) -> Ints:
     return order[np.stack([left, right])]
 
 
-def _apart(place: Floats, pairs: tuple[Ints, Ints] | Ints) -> Floats:
-    i, j = pairs
-    return np.asarray(np.hypot(*(place[j] - place[i]).T))
+def closest(position: Floats, radius: float) -> tuple[float, int, int]:
+    """Deepest overlap (m, negative if there is none) of places (n, 2), and of which two."""
+    i, j = _neighbours(position[:, 0], 2.0 * radius)
+    if not len(i):
+        return -np.inf, 0, 0
+    apart = np.hypot(*(position[j] - position[i]).T)
+    low = int(np.argmin(apart))
+    return 2.0 * radius - float(apart[low]), int(i[low]), int(j[low])
 
 
 def on_something(e: Evidence) -> Verdict | None:
@@ -215,58 +205,48 @@ def on_something(e: Evidence) -> Verdict | None:
 
     The figure is the largest distance of an event's place from what it names, less the radius, m.
     """
-    r, events = e.machine.particle.radius, e.recording.select(*AT_SURFACES)
-    worst, where = 0.0, "m"
-    off = np.full((len(e.machine.surfaces), len(events)), np.inf)
-    for name, gap in gaps(e.machine, events["position"]):
-        # The pulley is part of the incoming belt's surface.
-        row = 0 if name == "pulley" else e.machine.surfaces.index(name)
-        off[row] = np.minimum(off[row], np.abs(gap))
-    named = events["surface"]
-    on = np.flatnonzero(named < len(e.machine.surfaces))
-    on = on[named[on] >= 0]
-    if len(on):
-        far = off[named[on], on]
-        at = int(np.argmax(far))
-        if far[at] > worst:
-            hit = events[on[at]]
-            worst = float(far[at])
-            where = f"m, particle {hit['particle']} off {e.recording.surfaces[hit['surface']]}"
-            where += f" at t = {hit['t']:.6g} s"
+    surfaces, found = e.machine.surfaces, []
+    events = e.recording.select(*AT_SURFACES)
+    events = events[(events["surface"] >= 0) & (events["surface"] < len(surfaces))]
+    if len(events):
+        off = np.full((len(surfaces), len(events)), np.inf)
+        for name, gap in gaps(e.machine, events["position"]):
+            row = surfaces.index("incoming" if name == "pulley" else name)
+            off[row] = np.minimum(off[row], np.abs(gap))
+        far = off[events["surface"], np.arange(len(events))]
+        hit = events[np.argmax(far)]
+        place = f"particle {hit['particle']} off {surfaces[hit['surface']]}"
+        found.append((far.max(), f"{place} at t = {hit['t']:.6g} s"))
     for hit in _some(e, Kind.COLLISION):
         i, j = int(hit["particle"]), int(hit["other"])
         (place,), _ = e.recording.at([hit["t"]])
-        far = abs(float(np.hypot(*(place[j] - hit["position"]))) - 2.0 * r)
-        if not far <= worst:
-            worst, where = far, f"m, particles {i} and {j} at t = {hit['t']:.6g} s"
-    if not len(on) and not len(e.recording.select(Kind.COLLISION)):
+        far = abs(np.hypot(*(place[j] - hit["position"])) - 2.0 * e.machine.particle.radius)
+        # Of a partner that is not there it is no number.
+        far = np.nan_to_num(far, nan=np.inf)
+        found.append((far, f"particles {i} and {j} at t = {hit['t']:.6g} s"))
+    if not found:
         return None
-    arcs = ON_ARCS * (r + (e.machine.pulley.radius if e.machine.pulley is not None else 0.0))
-    return Verdict(worst, e.rounding + arcs + (2.0 if e.crowd else 1.0) * e.late, where)
+    return worst(found, e.rounding + e.arcs + (2.0 if e.crowd else 1.0) * e.late, "m")
 
 
 def released_free(e: Evidence) -> Verdict | None:
     """Nobody is released inside another or a surface; the figure is how deep, m."""
-    if not e.crowd and not len(e.machine.surfaces):
-        return None
-    worst, where, r = 0.0, "m", e.machine.particle.radius
     releases = e.recording.select(Kind.RELEASE)
-    if not len(releases):
+    if not (e.crowd or len(e.machine.surfaces)) or not len(releases):
         return None
+    found = []
     for name, gap in gaps(e.machine, releases["position"]):
         at = int(np.argmin(gap))
-        if -gap[at] > worst:
-            worst, where = -float(gap[at]), f"m, particle {releases['particle'][at]} in {name}"
+        found.append((-gap[at], f"particle {releases['particle'][at]} in {name}"))
     for event in _some(e, Kind.RELEASE) if e.crowd else ():
         (place,), _ = e.recording.at([event["t"]])
-        apart = np.hypot(*(place - event["position"]).T)
+        apart = np.nan_to_num(np.hypot(*(place - event["position"]).T), nan=np.inf)
         apart[event["particle"]] = np.inf
-        other = int(np.argmin(np.where(np.isfinite(apart), apart, np.inf)))
-        if 2.0 * r - apart[other] > worst:
-            worst = float(2.0 * r - apart[other])
-            where = f"m, particle {event['particle']} in {other} at t = {event['t']:.6g} s"
+        other = int(np.argmin(apart))
+        where = f"particle {event['particle']} in {other} at t = {event['t']:.6g} s"
+        found.append((2.0 * e.machine.particle.radius - apart[other], where))
     # One that is released just behind another, in touch, may be seen a rounding too near.
-    return Verdict(worst, e.rounding, where)
+    return worst(found, e.rounding, "m")
 
 
 def settled_to_stay(e: Evidence) -> Verdict | None:
@@ -280,23 +260,11 @@ def settled_to_stay(e: Evidence) -> Verdict | None:
     if not len(settled):
         return None
     last = e.recording.knots[e.recording.offsets[settled + 1] - 1]
-    near = e.rounding + ON_ARCS * e.machine.particle.radius + e.late
+    near = e.rounding + ON_ARCS * m.particle.radius + e.late
     throws = [*(m.segments.speed != 0.0) & (m.segments.surface != m.landing)]
     throws.append(m.pulley is not None and m.pulley.speed != 0.0)
-    thrown, where = np.zeros(len(settled), dtype=bool), ""
+    thrown: dict[int, str] = {}
     for moving, (name, gap) in zip(throws, gaps(m, last["position"]), strict=False):
-        lies = (gap < near) & moving
-        thrown |= lies
-        if lies.any() and not where:
-            where = f"particles: {settled[np.argmax(lies)]} on {name}"
-    return Verdict(int(np.count_nonzero(thrown)), 0.0, where or "particles")
-
-
-def closest(position: Floats, radius: float) -> tuple[float, int, int]:
-    """Deepest overlap (m, negative if there is none) of places (n, 2), and of which two."""
-    i, j = pairs = _neighbours(position[:, 0], 2.0 * radius)
-    if not len(i):
-        return -np.inf, 0, 0
-    apart = _apart(position, pairs)
-    low = int(np.argmin(apart))
-    return 2.0 * radius - float(apart[low]), int(i[low]), int(j[low])
+        for i in settled[(gap < near) & moving].tolist():
+            thrown.setdefault(i, f"particles: {i} on {name}")
+    return Verdict(len(thrown), 0.0, next(iter(thrown.values()), "particles"))

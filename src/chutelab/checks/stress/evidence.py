@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from operator import itemgetter
 
 import numpy as np
 
 from chutelab.machine import Machine
 from chutelab.results import Recording
+from chutelab.results.ledger import ledger
 from chutelab.results.recording import hermite
 from chutelab.util.arrays import Floats, Ints
 
@@ -25,6 +28,10 @@ ROUNDINGS = 500.0
 """Roundings that one number may have gone through between two contacts: some ten operations, each
 on numbers up to some ten times as large as what comes out."""
 
+ON_ARCS = 1e-9
+"""Share of its radius by which a cubic between two knots may leave a circle: the recording's
+contract."""
+
 PIECES = 16
 """Parts into which an interval between two knots is cut to look for what happens inside."""
 
@@ -34,38 +41,18 @@ MOST_SAMPLES = 2_000_000
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Places on all tracks, one after the other, each track in the order of time, arrays (M, ...).
-
-    Attributes
-    ----------
-    particle : ndarray, (M,)
-        Whose place.
-    t : ndarray, (M,)
-        s.
-    position : ndarray, (M, 2)
-        m.
-    left, share : ndarray, (M,)
-        Knot before it, and the part of the interval to the next one that has passed.
-    """
+    """Places on all tracks, one after the other, each in the order of time; arrays (M, ...)."""
 
     particle: Ints
-    t: Floats
-    position: Floats
-    left: Ints
-    share: Floats
+    t: Floats  # s
+    position: Floats  # (M, 2), m
+    left: Ints  # knot before it
+    share: Floats  # part of the interval to the next knot that has passed
 
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """One run.
-
-    Attributes
-    ----------
-    machine : Machine
-        The scene, resolved.
-    recording : Recording
-        What an engine made of it.
-    """
+    """One run: the scene, resolved, and what an engine made of it."""
 
     machine: Machine
     recording: Recording
@@ -79,11 +66,6 @@ class Evidence:
     def dt(self) -> float | None:
         """Its step, s; None for the exact engine."""
         return None if self.engine == "exact" else self.machine.dt
-
-    @property
-    def stepped(self) -> bool:
-        """Whether it was made in steps, at least where contacts last."""
-        return self.dt is not None
 
     @property
     def crowd(self) -> bool:
@@ -141,9 +123,12 @@ class Evidence:
 
     @cached_property
     def energy(self) -> float:
-        """Energy in play, J: what every particle had at most, and what was booked on it."""
-        if not len(self.recording.knots):
-            return 0.0
+        """Energy in play, J: what every particle had at most, and what was booked on it.
+
+        Of a crowd it is what was turned over.
+        """
+        if self.crowd or not len(self.recording.knots):
+            return ledger(self.recording).turned_over
         kinetic, potential = self.recording.energies(self.recording.knots)
         height = kinetic + np.abs(potential) + np.abs(self.recording.knots["entries"]).sum(axis=1)
         offsets = self.recording.offsets
@@ -156,15 +141,20 @@ class Evidence:
         return ROUNDINGS * EPS * self.length
 
     @property
+    def arcs(self) -> float:
+        """How far a cubic between two knots may leave the ride round the pulley or an end, m."""
+        pulley = self.machine.pulley
+        return ON_ARCS * (self.machine.particle.radius + (pulley.radius if pulley else 0.0))
+
+    @property
     def late(self) -> float:
         """How far beyond a surface a step may take a disk, m; 0 for the exact engine.
 
         Where steps are all alike a contact is seen up to a step late, so by the way of a step, and
-        Chipmunk leaves its slop. A
-        lone particle's blows are found at their own instants; where it stays in contact a step goes
-        straight on, off by less than a dt². On a straight surface a is the weight, on a rim it is
-        v²/ρ besides, which is no more than g where it does not lift off. In a crowd of the contact
-        engine disks are pressed, by what `PRESSED` says.
+        Chipmunk leaves its slop. A lone particle's blows are found at their own instants; where it
+        stays in contact a step goes straight on, off by less than a dt². On a straight surface a is
+        the weight, on a rim it is v²/ρ besides, which is no more than g where it does not lift off.
+        In a crowd of the contact engine disks are pressed, by what `PRESSED` says.
         """
         if self.dt is None:
             return 0.0
@@ -177,27 +167,13 @@ class Evidence:
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a law found.
+    """What a law found."""
 
-    Attributes
-    ----------
-    figure : float
-        The worst there was.
-    bound : float
-        What it must not exceed.
-    detail : str
-        Unit, and where it was.
-    law : str
-        The law's name.
-    unpromised : str
-        Why the engine does not promise the law in this run; empty if it does or if it is kept.
-    """
-
-    figure: float
-    bound: float
-    detail: str = ""
+    figure: float  # the worst there was
+    bound: float  # what it must not exceed
+    detail: str = ""  # unit, and where it was
     law: str = ""
-    unpromised: str = ""
+    unpromised: str = ""  # why the engine does not promise a law that is not kept; "" if it does
 
     @property
     def holds(self) -> bool:
@@ -208,3 +184,9 @@ class Verdict:
     def broken(self) -> bool:
         """Whether a promised law is not kept."""
         return not self.holds and not self.unpromised
+
+
+def worst(found: Iterable[tuple[float, str]], bound: float, unit: str) -> Verdict:
+    """Return the verdict on the largest of some figures, each with where it was; at least 0."""
+    figure, where = max([(0.0, ""), *found], key=itemgetter(0))
+    return Verdict(float(figure), bound, f"{unit}, {where}" if where else unit)

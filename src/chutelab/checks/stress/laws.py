@@ -25,7 +25,7 @@ from chutelab.checks.stress.barriers import (
     released_free,
     settled_to_stay,
 )
-from chutelab.checks.stress.evidence import EPS, ROUNDINGS, Evidence, Verdict
+from chutelab.checks.stress.evidence import EPS, ROUNDINGS, Evidence, Verdict, worst
 from chutelab.results.ledger import ledger
 
 Law = Callable[[Evidence], Verdict | None]
@@ -50,13 +50,8 @@ BALANCES = 2000
 def finite(e: Evidence) -> Verdict:
     """Every number of a recording is finite; the figure counts those that are not."""
     bad, where = 0, ""
-    for array, names in (
-        (e.recording.knots, ("t", "position", "velocity", "omega", "entries")),
-        (e.recording.events, ("t", "position", "velocity_before", "velocity_after",
-                              "omega_before", "omega_after", "normal_impulse",
-                              "tangential_impulse")),
-    ):  # fmt: skip
-        for name in names:
+    for array in (e.recording.knots, e.recording.events):
+        for name in array.dtype.names or ():
             found = int(np.count_nonzero(~np.isfinite(array[name])))
             bad, where = bad + found, where or (name if found else "")
     bad += int(np.count_nonzero(~np.isfinite(e.recording.by_surface)))
@@ -90,8 +85,7 @@ def lasting(e: Evidence) -> Verdict:
 def energy(e: Evidence) -> Verdict | None:
     """Kinetic and potential energy never rise but by a belt's work.
 
-    The figure is the largest rise above any earlier value, as a share of the energy in play (for a
-    crowd: turned over).
+    The figure is the largest rise above any earlier value, as a share of the energy in play.
     """
     if not e.energy:
         return None
@@ -99,18 +93,17 @@ def energy(e: Evidence) -> Verdict | None:
         return _energy_of_crowd(e)
     knots, offsets = e.recording.knots, e.recording.offsets
     total = np.sum(e.recording.energies(knots), axis=0) - knots["entries"][:, 0]
-    worst, where = 0.0, ""
+    rises = []
     for i in range(e.recording.count):
         own = total[offsets[i] : offsets[i + 1]]
         if len(own):
             rise = own - np.minimum.accumulate(own)
             at = int(np.argmax(rise))
-            if rise[at] > worst:
-                worst = float(rise[at])
-                where = f", particle {i} at t = {e.recording.track(i)['t'][at]:.6g} s"
+            t = knots["t"][offsets[i] + at]
+            rises.append((rise[at] / e.energy, f"particle {i} at t = {t:.6g} s"))
     # A knot in contact holds the mean velocity of a step, half a step's pull off its books.
     known = e.speed * e.machine.gravity * (e.dt or 0.0) * e.machine.particle.mass / e.energy
-    return Verdict(worst / e.energy, _energy_bound(e) + known, f"of {e.energy:.3g} J{where}")
+    return worst(rises, _energy_bound(e) + known, f"of {e.energy:.3g} J")
 
 
 def _energy_of_crowd(e: Evidence) -> Verdict:
@@ -133,8 +126,8 @@ def _energy_of_crowd(e: Evidence) -> Verdict:
     start = np.concatenate([[0.0], np.cumsum(brought)])[entered]
     gain = books["kinetic"] + books["potential"] - start - books["belt_work"]
     rise = gain - np.minimum.accumulate(gain)
-    at, scale = int(np.argmax(rise)), ledger(e.recording).turned_over
-    where = f"of {scale:.3g} J, at t = {times[at]:.6g} s"
+    at = int(np.argmax(rise))
+    where = f"of {e.energy:.3g} J, at t = {times[at]:.6g} s"
     # An overlap that is parted lifts a disk by no more than it was deep.
     p = e.machine.particle
     allowed = e.recording.count * p.mass * e.machine.gravity * e.late
@@ -142,25 +135,22 @@ def _energy_of_crowd(e: Evidence) -> Verdict:
         # The pymunk engine leaves out touches that move a track by less than `ROUGH` of the radius.
         # A cubic whose end velocity is off by w is off by 4/27 w τ in place, τ a step or more.
         allowed += 2.0 * p.mass * e.speed * 27.0 / 4.0 * ROUGH * p.radius / e.dt
-    allowed = _energy_bound(e) + allowed / scale
-    return Verdict(float(rise[at]) / scale, allowed, where)
+    return Verdict(float(rise[at]) / e.energy, _energy_bound(e) + allowed / e.energy, where)
 
 
 def residual(e: Evidence) -> Verdict | None:
-    """Ledgers close; the figure is a share of the energy in play (crowd: turned over)."""
-    books = ledger(e.recording)
-    scale = books.turned_over if e.crowd else e.energy
-    if not scale:
+    """Ledgers close; the figure is a share of the energy in play."""
+    if not e.energy:
         return None
-    return Verdict(abs(books.residual) / scale, _energy_bound(e), f"of {scale:.3g} J")
+    figure = abs(ledger(e.recording).residual) / e.energy
+    return Verdict(figure, _energy_bound(e), f"of {e.energy:.3g} J")
 
 
 def _energy_bound(e: Evidence) -> float:
     """Bound what numbers may do to the energy, as a share of the energy in play.
 
-    Contacts round it. In a stepped engine a lone particle's is moved, besides, where an overlap is
-    parted: each contact by the weight times `Evidence.late`, as impulses are booked to the last
-    bit.
+    Contacts round it. In a stepped engine each contact moves it, besides, by the weight times
+    `Evidence.late`, where an overlap is parted: impulses themselves are booked to the last bit.
     """
     rounding = EPS * (ROUNDINGS + A_CONTACT * e.recording.contacts)
     if e.dt is None:
@@ -169,10 +159,9 @@ def _energy_bound(e: Evidence) -> float:
         return BOOKED
     m, steps = e.machine, EPS * A_CONTACT * e.recording.steps
     touched = max(1, e.recording.contacts)
-    scale = ledger(e.recording).turned_over if e.crowd else e.energy
     if e.engine != "contact":
         steps += touched * HAIR
-    return rounding + steps + touched * m.particle.mass * m.gravity * e.late / scale
+    return rounding + steps + touched * m.particle.mass * m.gravity * e.late / e.energy
 
 
 def momentum(e: Evidence) -> Verdict | None:

@@ -5,17 +5,16 @@ from __future__ import annotations
 import difflib
 from collections import deque
 from dataclasses import replace
-from importlib.resources import files
+from pathlib import Path
 from typing import Final
 
 from chutelab.classroom.exercises import judging
-from chutelab.classroom.exercises.exercise import TOLERANCE, Exercise, draw, read, shown
+from chutelab.classroom.exercises.exercise import TOLERANCE, Case, Exercise, draw, read, shown
 from chutelab.classroom.exercises.judging import (
     Passage,
     Progress,
     Reply,
     Standing,
-    Unreadable,
     Verdict,
     number_of,
 )
@@ -29,40 +28,27 @@ UNNAMED: Final = "your name"
 
 
 class Task:
-    """One lesson's exercise with a student's own numbers.
+    """One lesson's exercise with a student's own numbers, made by `lesson`.
 
-    Made by `lesson`. None of its methods raises an error for what a student
-    hands over; they answer in words.
-
-    Parameters
-    ----------
-    exercise : Exercise
-        The lesson's.
-    student : str
-        Any name: the same name has the same numbers everywhere.
+    None of its methods raises an error for what a student hands over; they answer in words.
 
     Attributes
     ----------
     given : Values
         The student's parameters, as attributes.
-    answers : dict of float
-        Last number checked, by question.
     """
 
     def __init__(self, exercise: Exercise, student: str) -> None:
         self.exercise = exercise
         self.student = student
         self.given, self._cases = draw(exercise, student)
-        self._standings = [
-            Standing(number, case.question.title)
-            for number, case in enumerate(self._cases, start=1)
-        ]
+        self._standings = [Standing(case.number, case.question.title) for case in self._cases]
         OPENED.append(self)
 
     @property
     def questions(self) -> tuple[Passage, ...]:
         """All questions, with this student's numbers."""
-        return tuple(self._asked(index) for index in range(len(self._cases)))
+        return tuple(map(_asked, self._cases))
 
     @property
     def answers(self) -> dict[int, float]:
@@ -76,8 +62,8 @@ class Task:
 
     def question(self, number: object = None) -> Passage | Reply:
         """Show a question with this student's numbers."""
-        index = self._index(number)
-        return self._unknown if index is None else self._asked(index)
+        found = self._found(number)
+        return self._unknown if found is None else _asked(found[0])
 
     def check(self, number: object = None, answer: object = None) -> Reply:
         """Say what becomes of an answer.
@@ -89,64 +75,64 @@ class Task:
         answer : object
             The student's number, or whatever stands in its place.
         """
-        index = self._index(number)
-        if index is None:
+        found = self._found(number)
+        if found is None:
             return self._unknown
-        standing = self._standings[index]
-        try:
-            value = number_of(answer)
-        except Unreadable as problem:
-            reply = Reply(index + 1, Verdict.UNREAD, str(problem))
+        case, standing = found
+        value = number_of(answer)
+        if value is None:
+            text = "Put your number in place of None, and run the cell. Stuck?"
+            return Reply(case.number, Verdict.BLANK, f"{text} task.hint({case.number})")
+        if isinstance(value, str):
+            reply = Reply(case.number, Verdict.UNREAD, value)
         else:
-            if value is None:
-                text = "Put your number in place of None, and run the cell. Stuck?"
-                return Reply(index + 1, Verdict.BLANK, f"{text} task.hint({index + 1})")
             standing.answer = value
-            reply = judging.judge(index + 1, self._cases[index], value)
+            reply = judging.judge(case, value)
         standing.tries += 1
         standing.verdict = reply.verdict
         return reply
 
     def hint(self, number: object = None) -> Passage | Reply:
         """Give the next hint to a question; the last one again when there are no more."""
-        index = self._index(number)
-        if index is None:
+        found = self._found(number)
+        if found is None:
             return self._unknown
-        case, standing = self._cases[index], self._standings[index]
+        case, standing = found
         hints = case.question.hints
         standing.hints = min(standing.hints + 1, len(hints))
-        title = f"Hint {standing.hints} of {len(hints)} to question {index + 1}"
+        title = f"Hint {standing.hints} of {len(hints)} to question {case.number}"
         text = case.numbers.text(hints[standing.hints - 1])
         if standing.hints == len(hints):
-            text += f"\nThat was the last one. task.reveal({index + 1}) shows the working."
-        return Passage(index + 1, title, text)
+            text += f"\nThat was the last one. task.reveal({case.number}) shows the working."
+        return Passage(case.number, title, text)
 
     def reveal(self, number: object = None) -> Passage | Reply:
         """Show the working of a question, with the answer. It is noted that you asked."""
-        index = self._index(number)
-        if index is None:
+        found = self._found(number)
+        if found is None:
             return self._unknown
-        case = self._cases[index]
-        self._standings[index].revealed = True
-        right = f"{shown(case.right)} {case.question.unit}".strip()
-        text = f"{case.numbers.text(case.question.working)}\nAnswer: {right}"
-        text += f"\nSource: {case.question.source}"
-        return Passage(index + 1, f"Working of question {index + 1}", text, case.question.unit)
+        case, standing = found
+        standing.revealed = True
+        asked = case.question
+        lines = [case.numbers.text(line) for line in asked.working.splitlines()]
+        right = f"Answer: {shown(case.right)} {asked.unit}".strip()
+        text = "\n".join([*lines, right, f"Source: {asked.source}"])
+        return Passage(case.number, f"Working of question {case.number}", text, asked.unit)
 
     def progress(self) -> Progress:
         """Draw what is done."""
         rows = tuple(replace(standing) for standing in self._standings)
         return Progress(f"{self.exercise.title}, {self.student}", rows)
 
-    def _index(self, number: object) -> int | None:
-        """Return a question's index, None if there is no such question."""
-        try:
-            wanted = number_of(number)
-        except Unreadable:
-            wanted = float(number) if isinstance(number, str) and number.isdecimal() else None
-        if wanted is None or wanted != int(wanted) or not 1 <= wanted <= len(self._cases):
-            return None
-        return int(wanted) - 1
+    def _found(self, number: object) -> tuple[Case, Standing] | None:
+        """Return a question and how far the student got with it, None if there is no such one."""
+        if isinstance(number, str) and number.isdecimal():
+            number = float(number)
+        wanted = number_of(number)
+        for case, standing in zip(self._cases, self._standings, strict=True):
+            if case.number == wanted:
+                return case, standing
+        return None
 
     @property
     def _unknown(self) -> Reply:
@@ -155,14 +141,6 @@ class Task:
             " task.check(1, …)."
         )
         return Reply(0, Verdict.UNKNOWN, text)
-
-    def _asked(self, index: int) -> Passage:
-        case = self._cases[index]
-        question = case.question
-        unit = question.unit or "a pure number"
-        text = case.numbers.text(question.text)
-        text += f"\nAnswer in: {unit}, to within {100 * TOLERANCE:g} %."
-        return Passage(index + 1, f"Question {index + 1}: {question.title}", text, question.unit)
 
     @property
     def _story(self) -> str:
@@ -189,6 +167,13 @@ class Task:
         return f"{judging.box(head, self._story)}{judging.table(rows)}"
 
 
+def _asked(case: Case) -> Passage:
+    asked = case.question
+    needed = f"Answer in: {asked.unit or 'a pure number'}, to within {100 * TOLERANCE:g} %."
+    text = f"{case.numbers.text(asked.text)}\n{needed}"
+    return Passage(case.number, f"Question {case.number}: {asked.title}", text, asked.unit)
+
+
 def report() -> list[dict[str, object]]:
     """Return lesson, student, answers and shown workings of all tasks of this process, as JSON."""
     return [
@@ -203,11 +188,8 @@ def report() -> list[dict[str, object]]:
 
 
 EXERCISES: Final[dict[str, Exercise]] = {
-    exercise.name: exercise
-    for exercise in sorted(
-        (read(file) for file in files(__package__).iterdir() if file.name.endswith(".toml")),
-        key=lambda exercise: exercise.number,
-    )
+    one.name: one
+    for one in sorted(map(read, Path(__file__).parent.glob("*.toml")), key=lambda one: one.number)
 }
 """All exercises by name, in the order of the lessons."""
 

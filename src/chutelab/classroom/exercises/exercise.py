@@ -16,13 +16,13 @@ import math
 import re
 import tomllib
 import unicodedata
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from functools import cache, cached_property
 from hashlib import sha256
-from importlib.resources.abc import Traversable
 from itertools import combinations
 from math import degrees, isfinite, radians
+from pathlib import Path
 from types import CodeType, SimpleNamespace
 from typing import Any, Final
 
@@ -38,10 +38,7 @@ TOLERANCE: Final = 0.01
 class Values:
     """A student's numbers by name, read as attributes; SI units unless an exercise says otherwise.
 
-    Parameters
-    ----------
-    numbers : mapping of float
-        The numbers; they cannot be changed later.
+    They cannot be changed.
 
     Examples
     --------
@@ -50,35 +47,24 @@ class Values:
     (2.0, v0 = 2, h = 0.5)
     """
 
-    __slots__ = ("_numbers",)
-
-    _numbers: dict[str, float]
-
     def __init__(self, numbers: Mapping[str, float]) -> None:
-        object.__setattr__(self, "_numbers", {name: float(n) for name, n in numbers.items()})
+        vars(self).update({name: float(number) for name, number in numbers.items()})
 
     def __getattr__(self, name: str) -> float:
-        if not name.startswith("_"):
-            numbers = self._numbers
-            if name in numbers:
-                return numbers[name]
-            raise AttributeError(f"no number {name!r} here; there are {', '.join(numbers)}")
-        raise AttributeError(name)
+        # Python asks here for what is not among the numbers.
+        raise AttributeError(f"no number {name!r} here; there are {', '.join(self)}")
 
     def __setattr__(self, name: str, value: object) -> None:
         raise AttributeError("these numbers are given; keep your own in variables of your own")
 
     def __getitem__(self, name: str) -> float:
-        return self._numbers[name]
+        return float(vars(self)[name])
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._numbers)
-
-    def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *self._numbers]
+        return iter(vars(self))
 
     def __repr__(self) -> str:
-        return ", ".join(f"{name} = {shown(number)}" for name, number in self._numbers.items())
+        return ", ".join(f"{name} = {shown(self[name])}" for name in self)
 
 
 def shown(number: float) -> str:
@@ -117,14 +103,9 @@ def _compiled(formula: str) -> CodeType:
 
 
 class Numbers(dict[str, Any]):
-    """All numbers of one draw by name; a formula is computed when it is first asked for.
+    """The parameters of one draw and all that follows from them, by name.
 
-    Parameters
-    ----------
-    drawn : mapping of float
-        The parameters.
-    formulas : mapping of str
-        How the other numbers follow from them.
+    A formula is computed when its number is first asked for.
     """
 
     def __init__(self, drawn: Mapping[str, float], formulas: Mapping[str, str]) -> None:
@@ -141,167 +122,86 @@ class Numbers(dict[str, Any]):
         return eval(_compiled(formula), FUNCTIONS, self)
 
     def text(self, template: str) -> str:
-        """Return a template with every ``{name}`` replaced by its number."""
-        return re.sub(r"\{(\w+)\}", lambda match: shown(self[match[1]]), template)
+        """Return a template on one line, with every ``{name}`` replaced by its number."""
+        line = " ".join(template.split())
+        return re.sub(r"\{(\w+)\}", lambda match: shown(self[match[1]]), line)
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number that is drawn for a student.
+    """One number that is drawn for a student, from round `values`.
 
-    Attributes
-    ----------
-    name : str
-        By which templates and formulas call it; unique in its exercise.
-    symbol, unit, meaning : str
-        For the table of the student's numbers.
-    values : tuple of float
-        What is drawn from: round numbers.
+    Templates and formulas call it by its name; the student's table has symbol, unit and meaning.
     """
 
     name: str
     symbol: str
     unit: str
     meaning: str
-    values: tuple[float, ...]
+    values: Sequence[float]
 
 
 @dataclass(frozen=True)
 class Mistake:
     """A way to go wrong that is recognised by the number it leads to.
 
-    Attributes
-    ----------
-    name : str
-        A few words; that of a general mistake replaces it.
-    formula : str
-        The wrong answer.
-    says : str
-        What the student is told: what seems to have happened, and never the right number. A
-        template.
+    What the student is told is a template: what seems to have happened, never the right number.
     """
 
-    name: str
-    formula: str
+    name: str  # a few words; a general mistake of this name is left out
+    formula: str  # of the wrong answer
     says: str
 
 
 @dataclass(frozen=True)
 class Question:
-    """One question with one number for an answer. All texts are templates.
-
-    Attributes
-    ----------
-    title, text : str
-        A few words, and the question itself.
-    unit : str
-        Of the answer; empty for a pure number. Angles are asked for in ``degrees``.
-    answer : str
-        Formula of the right number.
-    mistakes : tuple of Mistake
-        Those of this question; the general ones come on top.
-    hints : tuple of str
-        Each says more than the one before.
-    working : str
-        The way to the answer, with the answer, line by line.
-    source : str
-        Equation or law behind it.
-    """
+    """One question with one number for an answer. All texts are templates."""
 
     title: str
     text: str
-    unit: str
-    answer: str
-    mistakes: tuple[Mistake, ...]
-    hints: tuple[str, ...]
-    working: str
-    source: str
+    unit: str  # of the answer; "" for a pure number, "degrees" for an angle
+    answer: str  # formula of the right number
+    mistakes: Sequence[Mistake]  # of this question; the general ones come on top
+    hints: Sequence[str]  # each says more than the one before
+    working: str  # the way to the answer, line by line
+    source: str  # equation or law behind it
 
 
 @dataclass(frozen=True)
 class Exercise:
-    """The exercise of one lesson.
+    """The exercise of one lesson."""
 
-    Attributes
-    ----------
-    number : int
-        Of the lesson.
-    name, title : str
-        As in ``the-bounce``; as a heading.
-    story : str
-        What all questions share, a template.
-    parameters : tuple of Parameter
-        What is drawn.
-    questions : tuple of Question
-        What is asked.
-    formulas : mapping of str
-        What texts and other formulas need besides.
-    tell : tuple of str
-        Formulas whose numbers are told to the student too.
-    fits : tuple of str
-        Conditions of a draw that the lesson is about.
-    """
-
-    number: int
-    name: str
+    number: int  # of the lesson
+    name: str  # such as the-bounce
     title: str
-    story: str
-    parameters: tuple[Parameter, ...]
-    questions: tuple[Question, ...]
-    formulas: Mapping[str, str]
-    tell: tuple[str, ...]
-    fits: tuple[str, ...]
+    story: str  # what all questions share, a template
+    parameters: Sequence[Parameter]
+    questions: Sequence[Question]
+    formulas: Mapping[str, str]  # what texts and other formulas need besides
+    tell: Sequence[str] = ()  # formulas whose numbers are told to the student too
+    fits: Sequence[str] = ()  # conditions of a draw that the lesson is about
 
 
-def read(file: Traversable) -> Exercise:
+def read(file: Path) -> Exercise:
     """Read the exercise in a TOML file."""
     found = tomllib.loads(file.read_text(encoding="utf-8"))
-    questions = tuple(
-        Question(
-            title=asked["title"],
-            text=_folded(asked["text"]),
-            unit=asked["unit"],
-            answer=asked["answer"],
-            mistakes=tuple(
-                Mistake(name, formula, _folded(says)) for name, formula, says in asked["mistakes"]
-            ),
-            hints=tuple(map(_folded, asked["hints"])),
-            working="\n".join(map(str.strip, asked["working"].splitlines())),
-            source=asked["source"],
-        )
-        for asked in found["questions"]
-    )
-    return Exercise(
-        number=found["number"],
-        name=file.name.removesuffix(".toml"),
-        title=found["title"],
-        story=_folded(found["story"]),
-        parameters=tuple(
-            Parameter(
-                name,
-                symbol,
-                unit,
-                meaning,
-                _steps(**values) if isinstance(values, dict) else tuple(map(float, values)),
-            )
-            for name, symbol, unit, meaning, values in found["parameters"]
-        ),
-        questions=questions,
-        formulas=found["formulas"],
-        tell=tuple(found.get("tell", ())),
-        fits=tuple(found.get("fits", ())),
-    )
+    for asked in found["questions"]:
+        asked["mistakes"] = [Mistake(*row) for row in asked["mistakes"]]
+    found["questions"] = [Question(**asked) for asked in found["questions"]]
+    found["parameters"] = [
+        Parameter(name, symbol, unit, meaning, _choices(values))
+        for name, symbol, unit, meaning, values in found["parameters"]
+    ]
+    return Exercise(name=file.stem, **found)
 
 
-def _folded(text: str) -> str:
-    return " ".join(text.split())
-
-
-def _steps(**ends: float) -> tuple[float, ...]:
-    """Return round numbers from first to last, both included."""
-    first, last, step = ends["from"], ends["to"], ends["step"]
+def _choices(values: list[float] | dict[str, float]) -> list[float]:
+    """Return a list as it is, or the round numbers of a range, its ends included."""
+    if isinstance(values, list):
+        return values
+    first, last, step = values["from"], values["to"], values["step"]
     count = round((last - first) / step) + 1
-    return tuple(round(float(first + i * step), 9) for i in range(count))
+    return [round(first + i * step, 9) for i in range(count)]
 
 
 @dataclass(frozen=True)
@@ -319,34 +219,45 @@ MOST_TENS: Final = 6
 _RAISED: Final = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def traces(right: float, unit: str) -> Iterator[Trace]:
-    """Yield what the general mistakes make of a right answer in a unit."""
-    yield Trace(
+def _powers_of_ten() -> Iterator[Trace]:
+    for power in range(1, MOST_TENS + 1):
+        times = f"{10**power:,}".replace(",", " ")
+        for way, factor in (("large", 10.0**power), ("small", 10.0**-power)):
+            says = (
+                f"The digits are right, but it is 10{str(power).translate(_RAISED)} = {times}"
+                f" times too {way}. Is it all in SI units: kg for g, m for mm, J for mJ?"
+            )
+            yield Trace("power of ten", says, factor)
+            also = f"{says} And the sign is the other way round."
+            yield Trace("power of ten", also, -factor)
+
+
+GENERAL: Final = (
+    Trace(
         "sign or direction",
         "The size is right, but the sign is not. Which way does it point, and which way counts"
         " as positive here?",
-        -right,
-    )
-    yield Trace("a missing ½", "Twice what it should be. Is a ½ missing?", 2.0 * right)
-    half = "Half of what it should be. Is there a ½ too many, or a 2 missing?"
-    yield Trace("a ½ too many", half, right / 2)
-    if unit == "degrees":
-        angle = "radians for degrees"
-        says = "That is the angle in radians; degrees are asked for."
-        yield Trace(angle, says, radians(right))
-        says = "An angle that was in degrees seems to have been turned into degrees once more."
-        yield Trace(angle, says, degrees(right))
-    for power in range(-MOST_TENS, MOST_TENS + 1):
-        if power != 0:
-            times = f"{10 ** abs(power):,}".replace(",", " ")
-            says = (
-                f"The digits are right, but it is 10{str(abs(power)).translate(_RAISED)} = {times}"
-                f" times too {'large' if power > 0 else 'small'}."
-                " Is it all in SI units: kg for g, m for mm, J for mJ?"
-            )
-            yield Trace("power of ten", says, right * 10.0**power)
-            also = f"{says} And the sign is the other way round."
-            yield Trace("power of ten", also, -right * 10.0**power)
+        -1.0,
+    ),
+    Trace("a missing ½", "Twice what it should be. Is a ½ missing?", 2.0),
+    Trace("a ½ too many", "Half of what it should be. Is there a ½ too many, or a 2 missing?", 0.5),
+    *_powers_of_ten(),
+)
+"""The general mistakes, with what each makes of a right answer of 1."""
+
+OF_ANGLES: Final = (
+    Trace(
+        "radians for degrees",
+        "That is the angle in radians; degrees are asked for.",
+        radians(1.0),
+    ),
+    Trace(
+        "radians for degrees",
+        "An angle that was in degrees seems to have been turned into degrees once more.",
+        degrees(1.0),
+    ),
+)
+"""Those of answers in degrees besides."""
 
 
 LEAST: Final = 1e-9
@@ -355,8 +266,9 @@ LEAST: Final = 1e-9
 
 @dataclass(frozen=True)
 class Case:
-    """One question for one student: the numbers behind it."""
+    """One question for one student: its number, and the numbers behind it."""
 
+    number: int
     question: Question
     numbers: Numbers
 
@@ -368,13 +280,14 @@ class Case:
     @cached_property
     def mistakes(self) -> tuple[Trace, ...]:
         """The question's own mistakes first, then the general ones that it does not replace."""
-        numbers = self.numbers
         own = [
-            Trace(known.name, numbers.text(known.says), float(numbers.of(known.formula)))
+            Trace(known.name, self.numbers.text(known.says), float(self.numbers.of(known.formula)))
             for known in self.question.mistakes
         ]
-        names = {trace.name for trace in own}
-        return (*own, *(t for t in traces(self.right, self.question.unit) if t.name not in names))
+        replaced = {trace.name for trace in own}
+        general = GENERAL + OF_ANGLES if self.question.unit == "degrees" else GENERAL
+        kept = [trace for trace in general if trace.name not in replaced]
+        return (*own, *(replace(trace, number=self.right * trace.number) for trace in kept))
 
     @property
     def clear(self) -> bool:
@@ -401,9 +314,9 @@ def attempt(exercise: Exercise, student: str, number: int) -> tuple[Case, ...] |
     for parameter in exercise.parameters:
         key = "\n".join((exercise.name, plain(student), parameter.name, str(number)))
         random = int.from_bytes(sha256(key.encode("utf-8", "replace")).digest()[:8])
-        drawn[parameter.name] = parameter.values[random % len(parameter.values)]
+        drawn[parameter.name] = float(parameter.values[random % len(parameter.values)])
     numbers = Numbers(drawn, exercise.formulas)
-    cases = tuple(Case(question, numbers) for question in exercise.questions)
+    cases = tuple(Case(n, asked, numbers) for n, asked in enumerate(exercise.questions, start=1))
     try:
         fits = all(map(numbers.of, exercise.fits)) and all(case.clear for case in cases)
     except ValueError:

@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 
 from chutelab.classroom.exercises.exercise import TOLERANCE, Case, shown
-from chutelab.pictures import colours
+from chutelab.pictures import GREEN, GREY, ORANGE, SKY, VERMILION
 from chutelab.util.tables import Sheet
 
 WIDTH: Final = 88
@@ -37,12 +37,12 @@ class Verdict(StrEnum):
 
 
 MARKS: Final = {
-    Verdict.RIGHT: ("✓", colours.GREEN),
-    Verdict.MISTAKE: ("✗", colours.VERMILION),
-    Verdict.OFF: ("✗", colours.VERMILION),
-    Verdict.UNREAD: ("?", colours.ORANGE),
-    Verdict.BLANK: ("○", colours.GREY),
-    Verdict.UNKNOWN: ("?", colours.ORANGE),
+    Verdict.RIGHT: ("✓", GREEN),
+    Verdict.MISTAKE: ("✗", VERMILION),
+    Verdict.OFF: ("✗", VERMILION),
+    Verdict.UNREAD: ("?", ORANGE),
+    Verdict.BLANK: ("○", GREY),
+    Verdict.UNKNOWN: ("?", ORANGE),
 }
 """Sign and colour of each verdict; the words always say it too."""
 
@@ -52,7 +52,7 @@ def filled(text: str) -> str:
     return "\n".join(textwrap.fill(line, WIDTH) for line in text.split("\n"))
 
 
-def box(heading: str, text: str, colour: str = colours.SKY) -> str:
+def box(heading: str, text: str, colour: str = SKY) -> str:
     """Return a heading and a text beside a coloured bar, as HTML."""
     body = escape(text).replace("\n", "<br>")
     return (
@@ -73,13 +73,11 @@ class Reply:
 
     Attributes
     ----------
-    question : int
-        Number of the question; 0 if there is no such one.
-    verdict : Verdict
-        What became of it.
-    text : str
-        What to tell the student.
-    mistake : str
+    question
+        Its number; 0 if there is no such one.
+    verdict, text
+        What became of the answer, and what to tell the student.
+    mistake
         Name of the known mistake that it looks like, or empty.
     """
 
@@ -111,12 +109,7 @@ class Reply:
 class Passage:
     """Something to read: a question, a hint, the working.
 
-    Attributes
-    ----------
-    number : int
-        Of the question.
-    title, text, unit : str
-        Heading, what it says, unit of the answer that is asked for.
+    `number` is that of the question, `unit` that of the answer which is asked for.
     """
 
     number: int
@@ -133,31 +126,15 @@ class Passage:
 
 @dataclass
 class Standing:
-    """How far a student got with one question.
-
-    Attributes
-    ----------
-    number, title
-        Of the question.
-    verdict : Verdict
-        Of the last answer.
-    answer : float or None
-        The last number that was checked.
-    tries : int
-        Answers given, blank ones not counted.
-    hints : int
-        Hints read.
-    revealed : bool
-        Whether the working was shown.
-    """
+    """How far a student got with one question."""
 
     number: int
     title: str
-    verdict: Verdict = Verdict.BLANK
-    answer: float | None = None
-    tries: int = 0
-    hints: int = 0
-    revealed: bool = False
+    verdict: Verdict = Verdict.BLANK  # of the last answer
+    answer: float | None = None  # the last number that was checked
+    tries: int = 0  # blank answers are not counted
+    hints: int = 0  # how many were read
+    revealed: bool = False  # whether the working was shown
 
     @property
     def remarks(self) -> str:
@@ -184,15 +161,7 @@ FAINT: Final = 0.35
 
 @dataclass(frozen=True, repr=False)
 class Progress:
-    """What is done of a task.
-
-    Attributes
-    ----------
-    title : str
-        Lesson and student.
-    rows : tuple of Standing
-        One per question.
-    """
+    """What is done of a task, a row for each question; the title says lesson and student."""
 
     title: str
     rows: tuple[Standing, ...]
@@ -228,10 +197,10 @@ class Progress:
             f'<svg role="img" aria-label="{summary}" width="{width}" height="{HEIGHT}"'
             f' viewBox="0 0 {width} {HEIGHT}" style="max-width:100%">{parts}</svg>'
         )
-        lines = [
-            (MARKS[row.verdict][0], f"{row.number} {row.title}", row.state) for row in self.rows
-        ]
-        return f'<div style="line-height:1.5"><b>{summary}</b><br>{bar}{table(lines)}</div>'
+        lines = table(
+            [(MARKS[row.verdict][0], f"{row.number} {row.title}", row.state) for row in self.rows]
+        )
+        return f'<div style="line-height:1.5"><b>{summary}</b><br>{bar}{lines}</div>'
 
 
 _NUMBER: Final = re.compile(r"\s*([-+−]?\d*[.,]?\d+(?:[eE][-+−]?\d+)?)\s*(.*)", re.DOTALL)
@@ -239,104 +208,74 @@ _LONGEST: Final = 40
 """Characters of a student's text that are shown back."""
 
 
-class Unreadable(Exception):  # noqa: N818 - nothing went wrong, it is only no number
-    """Something that is not one number; its text says what to do."""
+def number_of(answer: object) -> float | str | None:
+    """Return the number that an answer is, None if nothing was attempted, else what to do instead.
 
-
-def number_of(answer: object) -> float | None:
-    """Return the number that an answer is, None if nothing was attempted.
-
-    Raises
-    ------
-    Unreadable
-        If it is something else, with a kind text.
+    >>> number_of([2]), number_of("..."), number_of("2,5")
+    (2.0, None, 'That is text. Give the number without quotes: 2.5.')
     """
     try:
         return _read(answer)
-    except Unreadable:
-        raise
     except OverflowError:
-        raise Unreadable("That is infinite, or nearly so. Was something multiplied?") from None
+        return "That is infinite, or nearly so. Was something multiplied?"
     except Exception:  # a student's object may raise anything
-        kind = type(answer).__name__[:_LONGEST]
-        raise Unreadable(f"That is a {kind}, and one number is asked for.") from None
+        return f"That is a {type(answer).__name__[:_LONGEST]}, and one number is asked for."
 
 
-def _read(answer: Any) -> float | None:
+def _read(answer: Any) -> float | str | None:
     if answer is None or answer is Ellipsis:
         return None
     if isinstance(answer, (bool, np.bool_)):
-        raise Unreadable(
-            f"That is {bool(answer)}, the result of a comparison. A number is asked for."
-        )
+        return f"That is {bool(answer)}, the result of a comparison. A number is asked for."
     if isinstance(answer, (str, bytes)):
-        text = answer if isinstance(answer, str) else answer.decode("utf-8", "replace")
-        if text.strip(" \t\n.?…_-"):
-            raise _no_text(text)
-        return None
+        return _of_text(answer if isinstance(answer, str) else answer.decode("utf-8", "replace"))
     if isinstance(answer, (complex, np.complexfloating)) and not isinstance(answer, float):
-        raise Unreadable(
-            "That is a complex number. Was there the square root of something negative?"
-        )
+        return "That is a complex number. Was there the square root of something negative?"
     if isinstance(answer, (list, tuple, np.ndarray)):
-        items = answer.ravel().tolist() if isinstance(answer, np.ndarray) else list(answer)
+        items = answer.ravel().tolist() if isinstance(answer, np.ndarray) else answer
         if len(items) > 1:
-            raise Unreadable(
+            return (
                 f"Those are {len(items)} values, and one number is asked for. Pick it, with [0]"
                 " say."
             )
         return _read(items[0]) if items else None
     if callable(answer):
-        raise Unreadable(
-            "That is a function, not its result. Call it, with its numbers in parentheses."
-        )
+        return "That is a function, not its result. Call it, with its numbers in parentheses."
     value = float(answer)
     if isnan(value):
-        raise Unreadable(
+        return (
             "That is NaN, not a number: somewhere on the way something had no answer, such as the"
             " arccos of more than 1 or 0 / 0. Print the steps one by one."
         )
-    if isinf(value):
-        raise Unreadable("That is infinite. Was something divided by zero?")
-    return value
+    return "That is infinite. Was something divided by zero?" if isinf(value) else value
 
 
-def _no_text(text: str) -> Unreadable:
+def _of_text(text: str) -> str | None:
     """Say what to do about a text: a number in quotes, one with a unit, or words."""
+    if not text.strip(" \t\n.?…_-"):
+        return None
     found = _NUMBER.match(text)
     if found is None:
-        return Unreadable(
-            f"That is text (“{text.strip()[:_LONGEST]}”). Give a number, without quotes."
-        )
+        return f"That is text (“{text.strip()[:_LONGEST]}”). Give a number, without quotes."
     if found[2].strip():
-        return Unreadable(
+        return (
             "That is text with a unit in it. Give the number alone, without quotes and unit, in the"
             " unit that is asked for."
         )
     bare = found[1].replace(",", ".").replace("−", "-")[:_LONGEST]
-    return Unreadable(f"That is text. Give the number without quotes: {bare}.")
+    return f"That is text. Give the number without quotes: {bare}."
 
 
-def judge(number: int, case: Case, answer: float) -> Reply:
-    """Judge an answer: the right number first, then the question's mistakes, then the general ones.
-
-    Parameters
-    ----------
-    number : int
-        Of the question, for the reply.
-    case : Case
-        The question with the student's parameters.
-    answer : float
-        A finite number, in the unit that was asked for.
-    """
+def judge(case: Case, answer: float) -> Reply:
+    """Judge a finite answer: the right number first, then the known mistakes, then how far off."""
     if abs(answer - case.right) <= TOLERANCE * abs(case.right):
         found = f"{shown(answer)} {case.question.unit}".strip()
         text = f"{found} is within {100 * TOLERANCE:g} % of what the theory gives."
-        return Reply(number, Verdict.RIGHT, text)
+        return Reply(case.number, Verdict.RIGHT, text)
     for trace in case.mistakes:
         if abs(answer - trace.number) <= TOLERANCE * abs(trace.number):
-            return Reply(number, Verdict.MISTAKE, trace.says, trace.name)
-    return Reply(number, Verdict.OFF, _distance(number, answer, case.right))
+            return Reply(case.number, Verdict.MISTAKE, trace.says, trace.name)
+    return Reply(case.number, Verdict.OFF, _distance(case, answer))
 
 
 CLOSE: Final = 0.05
@@ -346,10 +285,10 @@ FAR: Final = 10.0
 """Ratio from which on a percentage says less than a factor."""
 
 
-def _distance(number: int, answer: float, right: float) -> str:
+def _distance(case: Case, answer: float) -> str:
     """Say how far off an answer is, without giving the right one away to all digits."""
-    more = f" Try task.hint({number})."
-    ratio = answer / right
+    more = f" Try task.hint({case.number})."
+    ratio = answer / case.right
     if ratio == 0.0:
         return f"It is not 0.{more}"
     if ratio < 0.0:

@@ -16,21 +16,21 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from errno import ENOTDIR
 from html import escape
-from importlib.resources import files
 from io import BytesIO
 from pathlib import Path
 from string import Template
 from typing import Final
 
 from markdown_it import MarkdownIt
-from markdown_it.token import Token
+from markdown_it.tree import SyntaxTreeNode
 from PIL import Image, UnidentifiedImageError
 
-from chutelab.classroom.lessons.reading import Lesson, LessonError, read, scene_of
+from chutelab.classroom.lessons.reading import Lesson, LessonError, read, scene_of, split, unusable
 from chutelab.engines.simulation import simulate
-from chutelab.scene import Fault, Scene, to_dict
+from chutelab.scene import Fault, to_dict
 from chutelab.util.versions import own_version, version_of
 
+_HERE: Final = Path(__file__).parent
 PICTURE: Final = "lesson.gif"
 LIBRARIES: Final = ("chutelab", "numpy", "pymunk", "matplotlib", "pillow")
 """What decides on the bytes of a picture, besides its inputs."""
@@ -58,13 +58,11 @@ def build(
 
     Parameters
     ----------
-    lesson : Lesson
-        From `chutelab.classroom.lessons.find`.
-    folder : Path, optional
+    folder
         Where to write it (made if need be); default: the lesson's own folder.
-    force : bool
+    force
         Make it even so.
-    progress : callable, optional
+    progress
         Called with the share of the simulation that is done, 0 to 1.
 
     Raises
@@ -75,58 +73,48 @@ def build(
         If the file cannot be written.
     """
     path = (lesson.folder if folder is None else folder) / PICTURE
-    scene = scene_of(lesson, lesson.picture.scene, lesson.picture.set)
-    wanted = stamp_of(lesson, scene)
-    if not force and path.is_file() and comment_of(path.read_bytes()) == wanted:
-        return Built(path, path.stat().st_size, made=False)
-    from chutelab.pictures.animation import animate
+    wanted = stamp_of(lesson)
+    made = force or comment_of(path) != wanted
+    if made:
+        from chutelab.pictures.animation import animate
 
-    settings = lesson.picture
-    path.parent.mkdir(parents=True, exist_ok=True)
-    animate(
-        simulate(scene, progress=progress),
-        path,
-        fps=settings.fps,
-        width=settings.width,
-        height=settings.height,
-        slow=settings.slow,
-        question=lesson.question,
-        comment=wanted,
-    )
-    return Built(path, path.stat().st_size, made=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        scene = scene_of(lesson, lesson.picture.scene, lesson.picture.set)
+        recording = simulate(scene, progress=progress)
+        settings = lesson.picture.model_dump(exclude={"scene", "set"})
+        animate(recording, path, question=lesson.question, comment=wanted, **settings)
+    return Built(path, path.stat().st_size, made)
 
 
 def is_current(lesson: Lesson) -> bool:
     """Tell whether a lesson's picture shows what the lesson says, with whatever versions made."""
-    path = lesson.folder / PICTURE
-    if not path.is_file():
-        return False
-    scene = scene_of(lesson, lesson.picture.scene, lesson.picture.set)
-    found = comment_of(path.read_bytes())
-    return found.split("; ")[:2] == stamp_of(lesson, scene).split("; ")[:2]
+    found, wanted = comment_of(lesson.folder / PICTURE), stamp_of(lesson)
+    return found.split("; ")[:2] == wanted.split("; ")[:2]
 
 
-def stamp_of(lesson: Lesson, scene: Scene) -> str:
+def stamp_of(lesson: Lesson) -> str:
     """Return what determines every byte of a lesson's picture, in one line.
 
     That is a hash of the scene that is filmed and of the picture's settings, then the versions of
     all that simulates and draws.
     """
-    # Defaults belong to the version, and what a scene promises does not show in its picture.
-    document = {key: value for key, value in to_dict(scene).items() if key != "expect"}
+    scene = to_dict(scene_of(lesson, lesson.picture.scene, lesson.picture.set))
+    scene.pop("expect", None)  # what a scene promises does not show in its picture
+    # Without defaults: they belong to the version.
     settings = lesson.picture.model_dump(exclude_unset=True, exclude={"scene", "set"})
-    inputs = {"scene": document, "picture": settings, "question": lesson.question}
+    inputs = {"scene": scene, "picture": settings, "question": lesson.question}
     text = json.dumps(inputs, sort_keys=True, ensure_ascii=True)
     digest = hashlib.sha256(text.encode("ascii")).hexdigest()[:32]
     versions = ", ".join(f"{name} {version_of(name) or 'unknown'}" for name in LIBRARIES)
     return f"chutelab lesson; inputs {digest}; {versions}"
 
 
-def comment_of(gif: bytes) -> str:
-    """Return the comment of a GIF; "" if it has none, or is not whole."""
+def comment_of(picture: Path) -> str:
+    """Return the comment of a GIF file; "" if there is none, or no whole GIF."""
+    gif = picture.read_bytes() if picture.is_file() else b""
     try:
-        with Image.open(BytesIO(gif)) as picture:
-            comment = picture.info.get("comment", b"")
+        with Image.open(BytesIO(gif)) as opened:
+            comment = opened.info.get("comment", b"")
     except UnidentifiedImageError:
         return ""
     # Every GIF ends with a semicolon.
@@ -143,21 +131,17 @@ def html_of(markdown: str) -> str:
     Raw HTML is shown, not obeyed. Links to worksheets become links to pages.
     """
     parser = MarkdownIt("commonmark", {"html": False}).enable("table")
-    tokens = parser.parse(markdown)
-    kept: list[Token] = []
-    while tokens:
-        token = tokens.pop(0)
-        alone = [one.type for one in tokens[0].children or ()] if tokens else []
-        picture = token.type == "paragraph_open" and alone == ["image"]
-        if token.level == 0 and (token.tag == "h1" or picture):
-            del tokens[:2]  # what is in it, and its end
-            continue
-        kept.append(token)
-        for inner in token.children or ():
-            target = inner.attrGet("href")
-            if isinstance(target, str):
-                inner.attrSet("href", _WORKSHEET.sub(rf"\g<1>{INDEX}", target))
-    made = str(parser.renderer.render(kept, parser.options, {}))
+    worksheet = SyntaxTreeNode(parser.parse(markdown))
+    kept = []
+    for part in worksheet.children:
+        inside = [one.type for one in part.children[0].children] if part.children else []
+        if part.tag != "h1" and (part.type, inside) != ("paragraph", ["image"]):
+            kept.append(part)
+    worksheet.children = kept
+    for link in worksheet.walk():
+        if link.type == "link":
+            link.attrs["href"] = _WORKSHEET.sub(rf"\g<1>{INDEX}", str(link.attrs["href"]))
+    made = str(parser.renderer.render(worksheet.to_tokens(), parser.options, {}))
     # What is too wide for a phone scrolls by itself, and with the keyboard.
     return re.sub("<(pre|table)>", r'<\1 tabindex="0">', made)
 
@@ -174,14 +158,12 @@ def plain_of(markdown: str) -> str:
 
 def words_for(picture: str, markdown: str) -> str | None:
     """Return the words that stand for a picture in a worksheet, None if it is not in there."""
-    for token in MarkdownIt("commonmark").parse(markdown):
-        for image in token.children or ():
-            if image.type == "image" and image.attrGet("src") == picture:
-                return image.content
+    for node in SyntaxTreeNode(MarkdownIt("commonmark").parse(markdown)).walk():
+        if node.type == "image" and node.attrs["src"] == picture:
+            return node.content
     return None
 
 
-_TEMPLATE: Final = ("lesson.toml", "README.md", "scene.toml")
 _NAME: Final = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
 _MOST: Final = 60
 
@@ -211,17 +193,17 @@ def start(path: str | Path, model: Lesson | None = None) -> Path:
         )
         raise LessonError(str(path), [Fault("name", path.name, text)])
     if path.exists() or path.is_symlink():
-        raise LessonError(str(path), [Fault("", None, "is there already; choose another name")])
+        raise unusable(path, "is there already; choose another name")
     path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f".{path.name}-", dir=path.parent) as made:
         unfinished = Path(made) / path.name
         unfinished.mkdir()
         if model is None:
-            title = re.sub(r"^\d+-", "", path.name).replace("-", " ").capitalize()
-            for name in _TEMPLATE:
-                text = _text("template", name)
-                said = json.dumps(title) if name.endswith(".toml") else title
-                (unfinished / name).write_text(text.replace("TITLE", said), encoding="utf-8")
+            title = split(path)[1].replace("-", " ").capitalize()
+            for file in (_HERE / "template").iterdir():
+                said = json.dumps(title) if file.suffix == ".toml" else title
+                text = file.read_text(encoding="utf-8").replace("TITLE", said)
+                (unfinished / file.name).write_text(text, encoding="utf-8")
         else:
             for file in files_of(model):
                 shutil.copyfile(file, unfinished / file.name)
@@ -246,17 +228,17 @@ def bundle(
     folder: str | Path,
     progress: Callable[[float], None] | None = None,
 ) -> list[Path]:
-    """Write pages of lessons into a folder: an index, and a folder with a page for each lesson.
+    """Write web pages into a folder: an index of the lessons, and a folder with a page for each.
 
     Everything is made aside first; files that are there already are replaced, others stay.
 
     Parameters
     ----------
-    lessons : sequence of Lesson
+    lessons
         In the order of the index.
-    folder : path
+    folder
         Made if need be.
-    progress : callable, optional
+    progress
         Called with the share that is done, 0 to 1.
 
     Returns
@@ -277,21 +259,20 @@ def bundle(
     folder.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".chutelab-", dir=folder.parent) as unfinished:
         made = Path(unfinished)
-        cards = []
+        cards = ""
         for i, lesson in enumerate(lessons):
 
             def part(share: float, done: int = i) -> None:
                 if progress is not None:
                     progress((done + share) / len(lessons))
 
-            around = (lessons[i - 1] if i else None, (*lessons, None)[i + 1])
-            size = _lesson(lesson, made / lesson.folder.name, around, part)
-            cards.append(_filled("card.html", lesson, size))
+            before = _link(lessons[i - 1], "prev", "← {}") if i > 0 else ""
+            after = _link(lessons[i + 1], "next", "{} →") if i + 1 < len(lessons) else ""
+            cards += _lesson(lesson, made / lesson.folder.name, before, after, part)
         many = "One lesson" if len(lessons) == 1 else f"{len(lessons)} lessons"
-        index = _page("index.html", cards="".join(cards), count=many)
-        (made / INDEX).write_text(index, encoding="utf-8")
+        (made / INDEX).write_text(_page("index.html", cards=cards, count=many), encoding="utf-8")
         for name in _SHARED:
-            (made / name).write_text(_text("assets", name), encoding="utf-8")
+            shutil.copyfile(_HERE / "assets" / name, made / name)
         written = []
         for file in sorted(path for path in made.rglob("*") if path.is_file()):
             target = folder / file.relative_to(made)
@@ -302,12 +283,9 @@ def bundle(
 
 
 def _lesson(
-    lesson: Lesson,
-    folder: Path,
-    around: tuple[Lesson | None, Lesson | None],
-    progress: Callable[[float], None],
-) -> tuple[int, int]:
-    """Make the folder of one lesson; return the size of its picture, pixels."""
+    lesson: Lesson, folder: Path, before: str, after: str, progress: Callable[[float], None]
+) -> str:
+    """Make the folder of one lesson, with links to its neighbours; return its card."""
     from PIL.GifImagePlugin import GifImageFile
 
     folder.mkdir()
@@ -319,7 +297,7 @@ def _lesson(
         # On the last frame everything has happened.
         film.seek(film.n_frames - 1)
         film.convert("RGB").quantize(255).save(folder / STILL, optimize=True)
-        size = film.size
+        width, height = film.size
     # What there is to play with, and to take along.
     doors = []
     if lesson.page is not None:
@@ -336,50 +314,37 @@ def _lesson(
             said = escape(name)
             doors.append(f'<li><a href="{said}" download>Scene {said}</a></li>')
     markdown = lesson.worksheet.read_text(encoding="utf-8") if lesson.worksheet.is_file() else ""
-    page = _filled(
+    facts = {
+        "folder": lesson.folder.name,
+        "title": _heading(lesson),
+        "question": escape(lesson.question),
+        "level": lesson.level,
+        "minutes": str(lesson.minutes),
+        "width": str(width),
+        "height": str(height),
+    }
+    page = _page(
         "lesson.html",
-        lesson,
-        size,
+        **facts,
         alt=escape(words_for(PICTURE, markdown) or lesson.title),
         worksheet=html_of(markdown),
         doors="\n".join(doors),
-        before=_link(around[0], "prev", "← {}"),
-        after=_link(around[1], "next", "{} →"),
+        before=before,
+        after=after,
     )
     (folder / INDEX).write_text(page, encoding="utf-8")
-    return size
+    return _page("card.html", **facts)
 
 
-def _link(lesson: Lesson | None, relation: str, form: str) -> str:
-    if lesson is None:
-        return ""
-    text = form.format(_numbered(lesson) + escape(lesson.title))
+def _heading(lesson: Lesson) -> str:
+    return escape(lesson.title if lesson.number is None else f"{lesson.number}. {lesson.title}")
+
+
+def _link(lesson: Lesson, relation: str, form: str) -> str:
+    text = form.format(_heading(lesson))
     return f'<a rel="{relation}" href="../{lesson.folder.name}/{INDEX}">{text}</a>'
 
 
-def _numbered(lesson: Lesson) -> str:
-    return "" if lesson.number is None else f"{lesson.number}. "
-
-
-def _filled(name: str, lesson: Lesson, size: tuple[int, int], **more: str) -> str:
-    """Fill an asset with what is known of a lesson."""
-    return _page(
-        name,
-        folder=lesson.folder.name,
-        number=_numbered(lesson),
-        title=escape(lesson.title),
-        question=escape(lesson.question),
-        level=lesson.level,
-        minutes=str(lesson.minutes),
-        width=str(size[0]),
-        height=str(size[1]),
-        **more,
-    )
-
-
 def _page(name: str, **values: str) -> str:
-    return Template(_text("assets", name)).substitute(version=escape(own_version()), **values)
-
-
-def _text(folder: str, name: str) -> str:
-    return (files(__package__) / folder / name).read_text(encoding="utf-8")
+    page = Template((_HERE / "assets" / name).read_text(encoding="utf-8"))
+    return page.substitute(values, version=escape(own_version()))

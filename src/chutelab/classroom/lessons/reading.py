@@ -21,7 +21,6 @@ from chutelab.scene.units import Number, Table, Text, Whole
 from chutelab.scene.variants import parse, quantity
 from chutelab.util.errors import InputError, did_you_mean
 
-LEVELS: Final = ("start", "core", "advanced")
 MOST: Final = 20
 """Entries of a list at most: a lesson that needs more is two lessons."""
 
@@ -83,7 +82,7 @@ class Lesson(Table):
 
     title: Said = key(..., "What the lesson is called", f"a text of 1 to {LONGEST} characters")
     level: Literal["start", "core", "advanced"] = key(
-        ..., "For whom", ", ".join(f'"{level}"' for level in LEVELS[:-1]) + f' or "{LEVELS[-1]}"'
+        ..., "For whom", '"start", "core" or "advanced"'
     )
     minutes: Whole = key(45, "Time it takes in class", "a whole number from 5 to 600", ge=5, le=600)
     question: Said = key(
@@ -113,13 +112,12 @@ class Lesson(Table):
     @property
     def name(self) -> str:
         """The name without its number: ``the-bounce`` of ``03-the-bounce``."""
-        return re.sub(r"^\d+-", "", self._folder.name)
+        return split(self._folder)[1]
 
     @property
     def number(self) -> int | None:
         """The number its folder begins with; None for one that has none."""
-        match = re.match(r"(\d+)-", self._folder.name)
-        return int(match[1]) if match else None
+        return split(self._folder)[0]
 
     @property
     def worksheet(self) -> Path:
@@ -127,18 +125,18 @@ class Lesson(Table):
         return self._folder / "README.md"
 
 
+def split(folder: Path) -> tuple[int | None, str]:
+    """Return number and name of a lesson's folder, None for one without a number."""
+    match = re.fullmatch(r"(\d+)-(.*)", folder.name)
+    return (int(match[1]), match[2]) if match else (None, folder.name)
+
+
 TABLES: Final[dict[str, type[Chosen]]] = {"picture": Picture, "page": Page}
 """Model of each table by its key."""
 
 
 def shipped_lessons() -> list[Lesson]:
-    """Return the shipped lessons in the order of their numbers.
-
-    Raises
-    ------
-    LessonError
-        With the faults of the first that is broken.
-    """
+    """Return the shipped lessons in the order of their numbers."""
     return [read(folder) for folder in _folders()]
 
 
@@ -147,6 +145,11 @@ PLAN: Final = "lesson.toml"
 
 class LessonError(SceneError):
     """A lesson that cannot be used; its text lists every fault."""
+
+
+def unusable(place: object, text: str) -> LessonError:
+    """Return the error that says what is wrong with a folder, a file or a name as a whole."""
+    return LessonError(str(place), [Fault("", None, text)])
 
 
 def read(folder: str | Path) -> Lesson:
@@ -158,19 +161,17 @@ def read(folder: str | Path) -> Lesson:
         With all faults of ``lesson.toml``, those of its scenes and settings included, or if it
         cannot be read.
     """
-    folder = Path(folder)
-    source = folder / PLAN
+    source = Path(folder) / PLAN
     try:
         document = tomllib.loads(source.read_text(encoding="utf-8"))
     except OSError as error:
-        reason = error.strerror or str(error)
-        raise LessonError(str(source), [Fault("", None, f"cannot be read: {reason}")]) from None
+        raise unusable(source, f"cannot be read: {error.strerror or error}") from None
     except UnicodeDecodeError:
-        fault = Fault("", None, "not UTF-8 text; save the file as UTF-8")
-        raise LessonError(str(source), [fault]) from None
+        raise unusable(source, "not UTF-8 text; save the file as UTF-8") from None
     except (ValueError, RecursionError) as error:
-        raise LessonError(str(source), [Fault("", None, f"not TOML: {error}")]) from None
+        raise unusable(source, f"not TOML: {error}") from None
     faults: list[Fault] = []
+    sound = document
     try:
         lesson = Lesson.model_validate(document)
     except ValidationError as error:
@@ -178,12 +179,10 @@ def read(folder: str | Path) -> Lesson:
         # What is sound is judged all the same, so that all faults are said at once.
         faulty = {detail["loc"][0] for detail in error.errors()}
         sound = {name: value for name, value in document.items() if name not in faulty}
-        needed = {"title": "-", "level": LEVELS[0], "question": "-", "scenes": ["-"]}
+        needed = {"title": "-", "level": "start", "question": "-", "scenes": ["-"]}
         lesson = Lesson.model_validate(needed | sound)
-        if "scenes" not in sound:
-            lesson = lesson.model_copy(update={"scenes": ()})
-    lesson._folder = folder.resolve()
-    if lesson.scenes:
+    lesson._folder = source.parent.resolve()
+    if "scenes" in sound:
         faults += _misfits(lesson)
     if faults:
         raise LessonError(str(source), faults)
@@ -234,8 +233,8 @@ def _misfits(lesson: Lesson) -> Iterator[Fault]:
             continue
         name = part.scene or lesson.scenes[0]
         if name not in lesson.scenes:
-            allowed = f"must be one of scenes: {', '.join(lesson.scenes)}"
-            yield Fault(f"{table}.scene", name, allowed)
+            listed = ", ".join(lesson.scenes)
+            yield Fault(f"{table}.scene", name, f"must be one of scenes: {listed}")
         if name not in scenes:
             continue
         try:
@@ -257,27 +256,26 @@ def unit_in(lesson: Lesson, quantity: str) -> str:
     return next((unit for unit in found if unit is not None), "")
 
 
-def _faults(error: ValidationError, document: Mapping[str, Any]) -> Iterator[Fault]:
-    """Yield each error of a validation in words, one fault a key."""
-    told = set()
+def _faults(error: ValidationError, document: Mapping[str, Any]) -> list[Fault]:
+    """Say every error of a validation in words, one fault a key."""
+    faults: dict[tuple[str | int, ...], Fault] = {}
     for detail in error.errors(include_url=False):
-        parts, missing = detail["loc"], detail["type"] == "missing"
-        inside = str(parts[0]) in TABLES and len(parts) > 1
-        table: type[Table] = TABLES[str(parts[0])] if inside else Lesson
-        path = parts[:2] if inside else parts[:1]  # without indices
+        table = TABLES.get(str(detail["loc"][0])) if len(detail["loc"]) > 1 else None
+        # The key, without the indices of what is in its value.
+        path = detail["loc"][: 2 if table else 1]
+        keys, missing = (table or Lesson).model_fields, detail["type"] == "missing"
         if detail["type"] == "extra_forbidden":
-            near = difflib.get_close_matches(str(parts[-1]), table.model_fields, n=1, cutoff=0.55)
-            known = ", ".join(table.model_fields)
-            text = "unknown key; " + (
-                f"did you mean {joined((*path[:-1], *near))}?" if near else f"known are {known}"
-            )
+            near = difflib.get_close_matches(str(path[-1]), keys, n=1, cutoff=0.55)
+            known = f"known are {', '.join(keys)}"
+            meant = f"did you mean {joined((*path[:-1], *near))}?" if near else known
+            text = f"unknown key; {meant}"
         else:
-            extra = table.model_fields[str(path[-1])].json_schema_extra
+            extra = keys[str(path[-1])].json_schema_extra
             allowed = extra["allowed"] if isinstance(extra, dict) else ""
             text = str(allowed) if missing else f"must be {allowed}"
-        if path not in told:
-            told.add(path)
-            yield Fault(joined(path), MISSING if missing else at_path(document, path), text)
+        value = MISSING if missing else at_path(document, path)
+        faults.setdefault(path, Fault(joined(path), value, text))
+    return list(faults.values())
 
 
 def find(wanted: str | int | Path) -> Lesson:
@@ -297,25 +295,24 @@ def find(wanted: str | int | Path) -> Lesson:
     said = str(wanted).strip().rstrip("/")
     folders = _folders()
     for folder in folders:
-        number, name = folder.name.split("-", 1)
-        same_number = said.isdecimal() and int(said) == int(number)
-        if same_number or said.lower() in (name, folder.name):
+        number, name = split(folder)
+        if said.lower() in (name, folder.name) or (said.isdecimal() and int(said) == number):
             return read(folder)
     path = Path(said)
     if (path / PLAN).is_file():
         return read(path)
     if path.name == PLAN and path.is_file():
         return read(path.parent)
-    names = [folder.name.split("-", 1)[1] for folder in folders]
+    names = [split(folder)[1] for folder in folders]
     listed = ", ".join(folder.name for folder in folders)
     advice = did_you_mean(said.lower(), names, f"there are {listed}", most=2)
     text = f"no lesson of this number or name, and no folder with a {PLAN}; {advice}"
-    raise LessonError(said or '""', [Fault("", None, text)])
+    raise unusable(said or '""', text)
 
 
 def _folders() -> list[Path]:
     """Return the folders of the shipped lessons, which lie beside those of the scenes."""
     scene = next(iter(shipped().values()), None)
-    found = scene.parent.parent.glob(f"lessons/*/{PLAN}") if scene else ()
-    numbered = [path.parent for path in found if re.match(r"\d+-.", path.parent.name)]
-    return sorted(numbered, key=lambda path: (int(path.name.split("-")[0]), path.name))
+    found = scene.parent.parent.glob(f"lessons/*-*/{PLAN}") if scene else ()
+    numbered = [plan.parent for plan in found if split(plan.parent)[0] is not None]
+    return sorted(numbered, key=lambda folder: (split(folder)[0] or 0, folder.name))

@@ -5,8 +5,7 @@ particles.
 
 - `obstacles`: a machine's surfaces as faces and circles to meet, and how they join.
 - `detect`: the next contact: of flight and slide, and of a ride round a circle.
-- `event_log`: what particles leave behind: knots, events, bookings.
-- `particle_state`: the state of a block of particles, and what all blocks share.
+- `particle_state`: the state of a block of particles, and what it leaves behind.
 - `contacts`: what a contact does: blows, rest, grip and slip.
 - `motion`: flight, slide, carriage and ride up to the next event.
 - `engine`: the rounds, block by block; which machines of a family can run together.

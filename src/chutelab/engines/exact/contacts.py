@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
-
 import numpy as np
 
 from chutelab.engines.exact.detect import bounds
 from chutelab.engines.exact.obstacles import NONE, bare, dot, length_of, pick
-from chutelab.engines.exact.particle_state import COLLAPSE, Contact, Mode, State, below
-from chutelab.mechanics.impact import impulses, limited
+from chutelab.engines.exact.particle_state import COLLAPSE, Contact, Mode, State
+from chutelab.mechanics.contact import grip_limit, impulses, limited
 from chutelab.results import Kind
 from chutelab.util.arrays import Bools, Floats, Ints
 
@@ -114,7 +112,7 @@ def settle_law(s: State, index: Ints) -> None:
         w = np.where(still, c.belt, w)
     s.v[:, index] = w * c.tangent
     pull, load = s.weight_along(index, c.normal), load_on(s, index, s.on[index], c)
-    grips = still & below(s.share * np.abs(pull), c.friction, load)
+    grips = still & (s.share * np.abs(pull) <= grip_limit(c.friction, load))
     begins = grips & (s.slip[index] != 0.0)
     s.slip[index] = np.where(grips, 0.0, np.where(still, np.sign(pull), np.sign(slip)))
     s.event(int(Kind.STICK), index[begins], c.surface[begins])
@@ -169,9 +167,8 @@ def strike(s: State, index: Ints, obstacle: Ints, side: Floats) -> None:
     carried = s.mode[index] == Mode.CARRIED
     if np.count_nonzero(carried):
         s.part(index[carried], 0)
-    place, normal = s.obstacles.snapped(index, obstacle, side, s.p, s.radius[index])
-    s.p[:, s.at(index)] = place
-    c = s.contact(index, obstacle, side, normal)
+    s.snap(index, obstacle, side)
+    c = s.contact(index, obstacle, side)
     before = s.v.take(index, axis=1)
     approach = np.maximum(-dot(before, c.normal), 0.0)
     soft = approach <= NEGLIGIBLE
@@ -282,30 +279,16 @@ def _blow(
         0.5 * mass * (approach - rebound) * (approach + rebound),
         -0.5 * mass * tangential * (slip + after),
     )
-    state = s.now(index)
-    s.log.knots(index, state)
+    s.knots(index)
     told = (approach > NEGLIGIBLE) | (tangential != 0.0)
     if landing is not None:
         told |= landing
-    surface, push, rub = c.surface, mass * normal, mass * tangential
-    count = int(np.count_nonzero(told))
-    s.log.contacts += count
-    if count < len(told):
-        index, surface, state = index[told], surface[told], state[:, told]
-        landing = None if landing is None else landing[told]
-        before, omega_before = before[:, told], omega_before[told]
-        push, rub = push[told], rub[told]
-    hit = int(Kind.IMPACT)
-    s.log.events(
-        hit if landing is None else np.where(landing, int(Kind.LANDING), hit),
-        index,
-        surface,
-        state,
-        velocity=before,
-        omega=omega_before,
-        normal=push,
-        tangential=rub,
-    )
+    kind: int | Ints = int(Kind.IMPACT)
+    if landing is not None:
+        kind = np.where(landing[told], int(Kind.LANDING), kind)
+    push, rub = (mass * normal)[told], (mass * tangential)[told]
+    s.contacts += len(push)
+    s.event(kind, index[told], c.surface[told], (before[:, told], omega_before[told], push, rub))
 
 
 def _slide_past(s: State, index: Ints, obstacle: Ints, side: Floats, rebound: Floats) -> None:
@@ -382,6 +365,4 @@ def _ride(s: State, index: Ints) -> None:
     s.side[index] = side
     phi = np.arctan2(normal[0], normal[1])
     rho = pick(o.rho, index, on - o.segments)
-    found = bounds(o, index, on - o.segments, side, rho, phi, s.radius[index])
-    for field in fields(found):
-        getattr(s.bounds, field.name)[:, index] = getattr(found, field.name)
+    s.bounds[:, index] = bounds(o, index, on - o.segments, side, rho, phi, s.radius[index])

@@ -7,9 +7,10 @@ round a circle is stopped by something else at an angle in closed form.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from chutelab.engines.exact.obstacles import NONE, Obstacles, bare, dot, length_of, pick, rows_of
 from chutelab.mechanics.ballistics import descent, first_descent
@@ -371,56 +372,22 @@ GRAZING = 1e-9
 
 
 WAYS = np.array([[-1.0], [1.0]])
-"""Backwards and forwards, as rows of `Bounds`."""
+"""Backwards and forwards, as rows of what `bounds` returns."""
 
 
-@dataclass(eq=False)
-class Bounds:
-    """Nearest angles (rad) backwards and forwards where a ride ends, and what is there; (2, k).
+BOUND = np.dtype([("angle", "f8"), ("obstacle", "i8"), ("side", "f8"), ("handover", "?")])
+"""Nearest angle (rad) in one direction where a ride ends, and what is there.
 
-    ∓inf and obstacle -1 where the way is free. `handover` marks where something takes over without
-    a blow: at an end of the circle a face of its segment, at the tip of a moving one, where the rim
-    changes its direction, the other half of the circle.
-    """
-
-    angle: Floats
-    obstacle: Ints
-    side: Floats
-    handover: Bools
-
-    @classmethod
-    def free(cls, count: int) -> Self:
-        """No obstacle in any direction."""
-        shape = (2, count)
-        return cls(
-            np.broadcast_to(WAYS * np.inf, shape).copy(),
-            np.full(shape, NONE),
-            np.zeros(shape),
-            np.zeros(shape, dtype=bool),
-        )
-
-    def narrow(
-        self, phi: Floats, angle: Floats, closing: Floats, met: Bools,
-        obstacle: Ints | int, side: Floats | int, handover: bool = False,
-    ) -> None:  # fmt: skip
-        """Take in one more obstacle, whose gap falls with φ at the rate `closing` at `angle`."""
-        ahead = np.maximum(np.mod(WAYS * (angle - phi) + NOW, 2.0 * np.pi) - NOW, 0.0)
-        there = phi + WAYS * ahead
-        nearer = met & (WAYS * closing > GRAZING) & (WAYS * (there - self.angle) < 0.0)
-        for array, value in (
-            (self.angle, there),
-            (self.obstacle, obstacle),
-            (self.side, side),
-            (self.handover, handover),
-        ):
-            np.copyto(array, value, where=nearer)
+∓inf and obstacle -1 where the way is free. `handover` marks where something takes over without a
+blow: at an end of the circle a face of its segment, at the tip of a moving one, where the rim
+changes its direction, the other half of the circle."""
 
 
 def bounds(
     obstacles: Obstacles, rows: Ints, circle: Ints, side: Floats, rho: Floats, phi: Floats,
     radius: Floats,
-) -> Bounds:  # fmt: skip
-    """Find what stops rides round circles in both directions.
+) -> NDArray[Any]:  # fmt: skip
+    """Return what stops rides round circles backwards and forwards, (2, k), dtype `BOUND`.
 
     Parameters
     ----------
@@ -435,7 +402,22 @@ def bounds(
     radius : ndarray, (k,)
         r, m.
     """
-    found = Bounds.free(len(rows))
+    found = np.zeros((2, len(rows)), dtype=BOUND)
+    found["angle"], found["obstacle"] = WAYS * np.inf, NONE
+
+    def narrow(
+        angle: Floats, closing: Floats, met: Bools, obstacle: Ints | int, side: Floats | int,
+        handover: bool = False,
+    ) -> None:  # fmt: skip
+        """Take in one more obstacle, whose gap falls with φ at the rate `closing` at `angle`."""
+        ahead = np.maximum(np.mod(WAYS * (angle - phi) + NOW, 2.0 * np.pi) - NOW, 0.0)
+        there = phi + WAYS * ahead
+        nearer = met & (WAYS * closing > GRAZING) & (WAYS * (there - found["angle"]) < 0.0)
+        np.copyto(found["angle"], there, where=nearer)
+        np.copyto(found["obstacle"], obstacle, where=nearer)
+        np.copyto(found["side"], side, where=nearer)
+        np.copyto(found["handover"], handover, where=nearer)
+
     center = pick(obstacles.center, rows, circle)
     on_pulley = circle + obstacles.segments == obstacles.pulley
     for segment in range(obstacles.segments):
@@ -453,19 +435,19 @@ def bounds(
             for angle in (tilt - half, tilt + half):
                 foot = dot(center + rho * _up(angle) - start, tangent)
                 there = met & (foot >= 0.0) & (foot <= length)
-                found.narrow(phi, angle, np.sin(angle - tilt), there, segment, face)
+                narrow(angle, np.sin(angle - tilt), there, segment, face)
         # The circle belongs to a segment on the outer side of that segment's end.
         middle = start + 0.5 * length * tangent
         outward = np.where(dot(center - middle, tangent) > 0.0, 1.0, -1.0) * tangent
         tilt = np.arctan2(outward[0], outward[1])
         for angle in (tilt - 0.5 * np.pi, tilt + 0.5 * np.pi):
             side_there = np.where(dot(_up(angle), normal) > 0.0, 1, -1)
-            found.narrow(phi, angle, np.sin(angle - tilt), owned, segment, side_there, True)
+            narrow(angle, np.sin(angle - tilt), owned, segment, side_there, True)
     crown, here = pick(obstacles.crown, rows, circle), circle + obstacles.segments
     tilt = np.arctan2(crown[0], crown[1])
     moves = ~on_pulley & (pick(obstacles.material, rows, here)[0] != 0.0)
     for angle in (tilt - 0.5 * np.pi, tilt + 0.5 * np.pi):
-        found.narrow(phi, angle, side * np.sin(angle - tilt), moves, here, -side, True)
+        narrow(angle, side * np.sin(angle - tilt), moves, here, -side, True)
     for other in range(obstacles.center.shape[1]):
         # The gap to a circle grows with -cos(φ - tilt).
         apart = rows_of(obstacles.center[:, other], rows) - center
@@ -478,7 +460,7 @@ def bounds(
         tilt = np.arctan2(apart[0], apart[1])
         for angle in (tilt - half, tilt + half):
             closing = -np.sin(angle - tilt)
-            found.narrow(phi, angle, closing, met, other + obstacles.segments, 0)
+            narrow(angle, closing, met, other + obstacles.segments, 0)
     return found
 
 

@@ -14,14 +14,13 @@ from chutelab.engines.exact.motion import carry, fly, ride, slide
 from chutelab.engines.exact.obstacles import (
     FOLDED,
     JOINT,
-    NONE,
     corners_of,
     obstacles,
     size_of,
     touch_of,
 )
 from chutelab.engines.exact.particle_state import Mode, State
-from chutelab.machine import Machine, origin
+from chutelab.machine import Machine, moved, origin
 from chutelab.results import Kind, Recording
 from chutelab.results.recorder import Recorder, StalledError
 from chutelab.util.arrays import Bools, Ints, Progress
@@ -135,26 +134,28 @@ def run(
     recorder = Recorder(machine, apart=apart)
     rounds, stalled = 0, None
     place = origin(machine)
-    surfaces = obstacles(machine, place)
+    near = moved(machine, -place[0], -place[1])
+    surfaces = obstacles(near, max(map(abs, place)))
     # What particles do does not depend on how many run together.
     size = max(FEWEST, min(MOST, CELLS // max(1, len(surfaces.surface))))
     # Roots that do not exist come out as inf or NaN, and are looked for as such.
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for first in range(0, machine.count, size):
-            s = State(machine, surfaces, place, first, min(first + size, machine.count))
+            s = State(near, surfaces, first, min(first + size, machine.count))
             try:
                 _to_the_end(s, progress)
             except StalledError as error:
                 stalled = error
             rounds = max(rounds, s.rounds)
-            recorder.ended[first : first + len(s.ended)] = s.ended
-            s.log.close(recorder)
+            s.close(recorder)
             if stalled is not None:
                 break
-    recording = recorder.finish(engine="exact", steps=rounds, seconds=perf_counter() - begin)
+    recording = recorder.finish(
+        engine="exact", steps=rounds, seconds=perf_counter() - begin, origin=place
+    )
     if stalled is not None:
-        stalled.recording = recording
-        raise stalled
+        (x, y), (dx, dy) = stalled.position, place
+        raise StalledError(stalled.particle, stalled.t, (x + dx, y + dy), stalled.reason, recording)
     return recording
 
 
@@ -189,9 +190,8 @@ def _release(s: State) -> None:
     index = (s.stop > 0.0).nonzero()[0]
     if len(index) < len(s.stop):
         s.finish((s.stop <= 0.0).nonzero()[0], "time")
-    state = s.now(index)
-    s.log.knots(index, state)
-    s.log.events(int(Kind.RELEASE), index, NONE, state)
+    s.knots(index)
+    s.event(int(Kind.RELEASE), index)
     if (
         s.machine.until == "settled"
         and s.machine.pulley

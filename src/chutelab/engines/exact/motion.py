@@ -13,7 +13,7 @@ from chutelab.engines.exact.detect import FEW, Motion, bounds, first_contact
 from chutelab.engines.exact.obstacles import NONE, bare, dot, pick, rows_of
 from chutelab.engines.exact.particle_state import Mode, State
 from chutelab.mechanics.ballistics import descent
-from chutelab.mechanics.ride import STEP_ANGLE, Circle, Outcome, advance, normal_force
+from chutelab.mechanics.contact import STEP_ANGLE, Circle, Outcome, advance, normal_force
 from chutelab.results import Kind
 from chutelab.util.arrays import Bools, Floats, Ints
 
@@ -54,9 +54,9 @@ def carry_round(s: State, index: Ints) -> None:
         end = np.arctan2(np.sqrt((1.0 - cosine) * (1.0 + cosine)), cosine)
         pulley = np.full(len(index), o.pulley - o.segments)
         top, clockwise = np.zeros(len(index)), np.ones(len(index))
-        found = bounds(o, index, pulley, clockwise, rho, top, s.radius[index])
-        struck = ~found.handover[1] & (found.angle[1] < end)
-        end = np.where(struck, found.angle[1], end)
+        found = bounds(o, index, pulley, clockwise, rho, top, s.radius[index])[1]
+        struck = ~found["handover"] & (found["angle"] < end)
+        end = np.where(struck, found["angle"], end)
         end = np.where(end * rho / v > left, left * v / rho, end)
         _ease_round(s, index, rho, v, end)
     over = s.age[index] >= s.stop[index]
@@ -65,7 +65,7 @@ def carry_round(s: State, index: Ints) -> None:
     s.part(index[free], 0)
     s.fly(index[free], o.pulley, 0, 2 + (end[free] > 0.0))
     if found is not None and np.count_nonzero(hit):
-        strike(s, index[hit], found.obstacle[1, hit], found.side[1, hit])
+        strike(s, index[hit], found["obstacle"][hit], found["side"][hit])
 
 
 def _ease_round(s: State, index: Ints, rho: Floats, v: Floats, end: Floats) -> None:
@@ -101,8 +101,8 @@ def ride(s: State, index: Ints) -> None:
         belt=c.belt,
         slip=s.slip[index],
         turns=np.full(len(index), s.spins),
-        low=s.bounds.angle[0, index],
-        high=s.bounds.angle[1, index],
+        low=s.bounds["angle"][0, index],
+        high=s.bounds["angle"][1, index],
     )
     lifted = normal_force(state) <= 0.0
     step = advance(state, s.stop[index] - s.age[index])
@@ -135,8 +135,9 @@ def ride(s: State, index: Ints) -> None:
     end_slip(s, index[grip])
     for way, code in enumerate((Outcome.LOW, Outcome.HIGH)):
         at = outcome == code
-        obstacle, side = s.bounds.obstacle[way, index], s.bounds.side[way, index]
-        joins = at & s.bounds.handover[way, index]
+        there = s.bounds[way, index]
+        obstacle, side = there["obstacle"], there["side"]
+        joins = at & there["handover"]
         rest_on(s, index[joins], obstacle[joins], side[joins], np.zeros(np.count_nonzero(joins)))
         hit = at & ~joins
         if hit.any():
@@ -220,7 +221,7 @@ def slide(s: State, index: Ints) -> None:
     mass = s.mass[index]
     s.book(index, c.surface, mass * force * c.belt * dt, 0.0, -mass * force * mean * dt)
     _move(s, motion, dt)
-    s.p[:, index], _ = s.obstacles.snapped(index, on, side, s.p, s.radius[index])
+    s.snap(index, on, side)
     if s.spins:
         s.z[index] += 2.0 * force * dt
     # What was left at the beginning is some way off now.

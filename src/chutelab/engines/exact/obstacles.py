@@ -192,28 +192,6 @@ class Obstacles:
         crown = pick(self.crown, rows, obstacle - self.segments)
         return np.where(dot(normal, crown) >= 0.0, 1.0, -1.0)
 
-    def snapped(
-        self, rows: Ints, obstacle: Ints, side: Floats, position: Floats, r: Floats
-    ) -> tuple[Floats, Floats]:
-        """Positions put exactly at contact distance, so that rounding cannot add up, and normals.
-
-        `position` (2, n) is that of all particles; of those that touch both are (2, k).
-        """
-        normal, _, start, _ = pick(self.faces[:, :, :, 0], rows, obstacle).swapaxes(0, 1)
-        normal = bare(side) * normal
-        out = position.take(rows, axis=1)
-        out = out - bare(dot(out - start, normal) - r) * normal
-        round_ = (obstacle >= self.segments).nonzero()[0]
-        if len(round_):
-            circle = obstacle[round_] - self.segments
-            center = pick(self.center, rows[round_], circle)
-            away = position[:, rows[round_]] - center
-            distance = np.hypot(away[0], away[1])
-            there = center + (pick(self.rho, rows[round_], circle) / distance) * away
-            away = there - center
-            out[:, round_], normal[:, round_] = there, away / np.hypot(away[0], away[1])
-        return out, normal
-
 
 def bare(values: Floats) -> Floats:
     """Values (k,) to meet vectors (2, k): a lone one without axes, which NumPy is quicker with."""
@@ -271,8 +249,8 @@ BOX_TOUCHES = 64.0
 """Width, in `Obstacles.touch`, by which the boxes of faces are larger than they need be."""
 
 
-def obstacles(machine: Machine, origin: tuple[float, float] = (0.0, 0.0)) -> Obstacles:
-    """Resolve a machine's surfaces into obstacles, in coordinates from an origin.
+def obstacles(machine: Machine, far: float = 0.0) -> Obstacles:
+    """Resolve the surfaces of a machine, moved here from that far away (m), into obstacles.
 
     How segments join, and whether particles are points, is read off the first row where each
     particle has its own: see `chutelab.engines.exact.kinds`. Of segments that
@@ -280,13 +258,8 @@ def obstacles(machine: Machine, origin: tuple[float, float] = (0.0, 0.0)) -> Obs
     """
     seg, r, wheel = machine.segments, machine.particle.radius, machine.pulley
     tangent, length = _vectors(seg.tangent), _scalars(seg.length)
-    far = max(map(abs, origin))
-    corners, places = corners_of(machine), machine.releases.position
-    if far > 0.0:
-        start = _vectors(seg.start) - np.reshape(origin, (2, 1, 1))
-        corners = np.concatenate([start, start + length * tangent], axis=1)
-        places = places - origin
-    size = size_of(corners, places)
+    corners = corners_of(machine)
+    size = size_of(corners, machine.releases.position)
     touch = touch_of(size, far)
     spots = spots_of(corners[..., 0], JOINT * size[0].item())
     seen: dict[frozenset[int], int] = {}
@@ -356,9 +329,8 @@ def obstacles(machine: Machine, origin: tuple[float, float] = (0.0, 0.0)) -> Obs
 
 def corners_of(machine: Machine) -> Floats:
     """Return all first ends of the segments, then all second ones, (2, 2 S, n), m."""
-    start = _vectors(machine.segments.start)
-    along = _scalars(machine.segments.length) * _vectors(machine.segments.tangent)
-    return np.concatenate([start, start + along], axis=1)
+    segments = machine.segments
+    return np.concatenate([_vectors(segments.start), _vectors(segments.end)], axis=1)
 
 
 def touch_of(size: Floats, far: float = 0.0) -> Floats:

@@ -1,4 +1,4 @@
-"""The state of a block of particles of an exact run."""
+"""The state of a block of particles of an exact run, and what the block leaves behind."""
 
 from __future__ import annotations
 
@@ -9,14 +9,34 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chutelab.engines.exact.detect import Bounds, Past
-from chutelab.engines.exact.event_log import STATE, EventLog
-from chutelab.engines.exact.obstacles import NONE, Obstacles, along, pick
+from chutelab.engines.exact.detect import BOUND, Past
+from chutelab.engines.exact.obstacles import NONE, Obstacles, along, bare, dot, pick
 from chutelab.machine import Machine
-from chutelab.mechanics.impact import DISK_SHARE
-from chutelab.results import REASONS, Kind
-from chutelab.results.recorder import StalledError
-from chutelab.util.arrays import Bools, Floats, Ints
+from chutelab.mechanics.contact import DISK_SHARE
+from chutelab.results import EVENT, KNOT, REASONS, Kind
+from chutelab.results.recorder import Recorder, StalledError
+from chutelab.util.arrays import Floats, Ints
+
+COLLAPSE = 200
+"""Contacts in a row that take no time after which a particle has come to rest in its corner. An
+elastic particle leaves a wedge of angle β after π/β of them."""
+
+ROUNDING = 4.0 * float_info.epsilon
+"""Share of its age that an event of a particle must take to count as progress."""
+
+NO_SLIP = 1e-13
+"""Share of the speeds involved below which a slip is rounding."""
+
+MANY = 1000
+"""Chunks of rows that are joined into one: a long run of one particle consists of small ones."""
+
+NUMBERS = np.dtype([("head", f"V{EVENT.itemsize - 80}"), ("numbers", "f8", 10)])
+"""What `EVENT` holds from the position on, in one piece: position, velocity before and after, ω
+before and after, normal and tangential impulse."""
+
+OF_STATE = np.array([0, 0, 0, 1, 2, 3, 4, 3, 4, 5, 5, 0, 0])
+"""Rows of a knot that kind, surface, time and these numbers are where nothing changes; kind,
+surface and impulses are put in afterwards."""
 
 
 class Mode:
@@ -30,74 +50,61 @@ class Mode:
 
 
 class Contact(NamedTuple):
-    """A contact seen from the particles, arrays (k,) and (2, k).
+    """A contact seen from the particles, arrays (k,) and (2, k)."""
 
-    Attributes
-    ----------
-    normal, tangent : ndarray, (2, k)
-        Unit vectors: from the obstacle to the particle, and (n_y, -n_x).
-    belt, friction, restitution : ndarray, (k,)
-        Speed of the surface along the tangent (m/s), pair values.
-    surface : ndarray, (k,)
-        Index of the surface.
-    """
-
-    normal: Floats
-    tangent: Floats
-    belt: Floats
+    normal: Floats  # unit vector from the obstacle to the particle
+    tangent: Floats  # (n_y, -n_x)
+    belt: Floats  # speed of the surface along the tangent, m/s
     friction: Floats
     restitution: Floats
     surface: Ints
 
 
-class State:
-    """State arrays of the particles from `first` up to `last`; age counts from their release.
+Blow = tuple[Floats, Floats, Floats, Floats]
+"""Velocity (2, k) and ω before a blow, normal and tangential impulse."""
 
-    Attributes
-    ----------
-    state : ndarray, (9, k)
-        Age (s), position (m), velocity and r ω (m/s), ledger entries (J): a knot, but for the time.
-    age, p, v, z, entries : ndarray, (k,), (2, k) or (3, k)
-        Views of it.
-    radius, mass, gravity : ndarray, (k,)
-        m, kg, m/s².
-    falls, spins, staggered : bool
-        Whether there is gravity, whether the particles are free disks, and whether they are
-        released at other times than 0.
-    past : Past or None
-        See `detect.Motion`.
-    mode : ndarray, (k,)
-        See `Mode`.
-    on, side, slip : ndarray, (k,)
-        Obstacle touched while sliding or riding and its face (±1; see `Obstacles.rim_side` for
-        circles), 0 in flight; sign of the slip, 0 without (and 1 in flight, where there is nothing
-        to grip).
-    left, left_side, order : ndarray, (k,)
-        See `detect.Motion`.
-    everyone : ndarray, (k,)
-        Their numbers.
-    stop : ndarray, (k,)
-        Age at which the run is over.
-    idle, crawls : ndarray, (k,)
-        Events in a row that took no time, and that went slowly to and fro between two obstacles.
-    rounds : int
-        Rounds so far.
-    ended : ndarray, (k,)
-        Why each ended, an index into `REASONS`.
+
+class Rows:
+    """Rows of numbers of particles, in the order in which they came."""
+
+    def __init__(self) -> None:
+        self._chunks: list[tuple[Ints, Floats]] = []
+        self._long: list[tuple[Ints, Floats]] = []
+
+    def add(self, index: Ints, rows: Floats) -> None:
+        """Add a row (n,) for each of the particles (k,); `rows` (n, k) is kept, not copied."""
+        self._chunks.append((index, rows))
+        if len(self._chunks) >= MANY:
+            self._long.append(_joined(self._chunks))
+            self._chunks.clear()
+
+    def __len__(self) -> int:
+        return len(self._long) + len(self._chunks)
+
+    def by_particle(self) -> tuple[Ints, Floats]:
+        """Return whose each row is, ascending, (K,), and the rows, (K, n)."""
+        owner, rows = _joined(self._long + self._chunks)
+        # 16-bit integers are sorted by radix, in linear time.
+        order = np.argsort(owner.astype(np.int16), kind="stable")
+        return owner[order], rows.T[order]
+
+
+def _joined(chunks: list[tuple[Ints, Floats]]) -> tuple[Ints, Floats]:
+    owner = np.concatenate([index for index, _ in chunks])
+    return owner, np.concatenate([rows.T for _, rows in chunks]).T
+
+
+class State:
+    """State of the particles from `first` up to `last` of a machine.
+
+    All arrays go by particle along their last axis, k of them, numbered from 0 here. Ages count
+    from a particle's release.
     """
 
-    def __init__(
-        self,
-        machine: Machine,
-        surfaces: Obstacles,
-        origin: tuple[float, float],
-        first: int,
-        last: int,
-    ) -> None:
+    def __init__(self, machine: Machine, surfaces: Obstacles, first: int, last: int) -> None:
         count = last - first
         self.machine, self.obstacles = machine, surfaces.of(first, last)
-        self.origin = np.reshape(origin, (2, 1)) if any(origin) else None
-        self.log = EventLog(first, count)
+        self.first, self.rounds = first, 0
         mine, particle = slice(first, last), machine.particle
         self.radius, self.mass, self.gravity, inertia, end = (
             np.broadcast_to(value, machine.count)[mine]
@@ -109,42 +116,46 @@ class State:
         self.falls, self.spins = bool(self.gravity[0] != 0.0), bool(inertia[0] > 0.0)
         self.share = DISK_SHARE if self.spins else 1.0
         start = machine.releases
-        self.released = start.t[first:last]
+        self.released = start.t[mine]
         self.staggered = np.count_nonzero(self.released) > 0
-        self.state = np.zeros((STATE, count))
+        self.stop = end - self.released  # age at which the run is over
+        self.everyone = np.arange(count)
+
+        # Rows of a knot: age (s), position (m), velocity and r ω (m/s), ledger entries (J).
+        self.state = np.zeros((9, count))
         self.age, self.p, self.v = self.state[0], self.state[1:3], self.state[3:5]
         self.z, self.entries = self.state[5], self.state[6:]
-        self.everyone = np.arange(count)
-        self.p[:], self.v[:] = start.position[first:last].T, start.velocity[first:last].T
-        if self.origin is not None:
-            self.p -= self.origin
+        self.p[:], self.v[:] = start.position[mine].T, start.velocity[mine].T
+        # How each moves, a `Mode`; why it ended, an index into `REASONS`.
         self.mode, self.ended = np.zeros((2, count), dtype=np.int8)
-        self.mode[:] = Mode.FLIGHT
-        self.mode[start.carried[first:last]] = Mode.CARRIED
-        integers = np.zeros((5, count), dtype=np.int64)
-        integers[3:] = NONE
-        self.order, self.idle, self.crawls, self.on, self.left = integers
-        self.side, self.left_side, self.slip = np.zeros((3, count))
-        self.slip[:] = 1.0
-        self.stop = end - self.released
+        self.mode[:] = np.where(start.carried[mine], Mode.CARRIED, Mode.FLIGHT)
         self.landed = np.zeros(count, dtype=bool)
+        # Obstacle touched while sliding or riding, and its face (±1; of a circle see
+        # `Obstacles.rim_side`), 0 in flight. Sign of the slip there, 0 without; 1 in flight, where
+        # there is nothing to grip.
+        self.on, self.side, self.slip = np.full(count, NONE), np.zeros(count), np.ones(count)
+        # What is being left, see `detect.Motion`.
+        self.left, self.left_side = np.full(count, NONE), np.zeros(count)
+        self.order = np.zeros(count, dtype=np.int64)
+        # Events in a row that took no time, and that went slowly to and fro between two obstacles;
+        # whether anybody has any.
+        self.idle, self.crawls = np.zeros((2, count), dtype=np.int64)
+        self.idling = self.crawling = False
+        # Where rides round circles end.
+        self.bounds = np.zeros((2, count), dtype=BOUND)
         self.past: Past | None = None
         if self.radius[0] <= self.obstacles.touch[0]:
             self.past = Past(np.full(count, NONE), np.zeros(count), self.p.copy())
-        self.idling = self.crawling = False
-        self.first, self.rounds = first, 0
+        # Knots; events: kind, surface, time and `NUMBERS`; ledger entries: surface, entries.
+        self.log, self.events, self.books = Rows(), Rows(), Rows()
+        self.contacts = 0
 
     @cached_property
     def exit_box(self) -> Floats:
         """Left, right, bottom and top beyond which each particle has left the scene, (4, k), m."""
         mine = slice(self.first, self.first + len(self.mode))
-        each = [np.broadcast_to(side, self.machine.count)[mine] for side in self.machine.exit_box]
-        return np.stack(each) - (0.0 if self.origin is None else np.repeat(self.origin, 2, axis=0))
-
-    @cached_property
-    def bounds(self) -> Bounds:
-        """Where rides round circles end."""
-        return Bounds.free(len(self.mode))
+        box = self.machine.exit_box
+        return np.stack([np.broadcast_to(side, self.machine.count)[mine] for side in box])
 
     def count_idle(self, index: Ints, dt: Floats) -> None:
         """Count events in a row that take no time, and raise rather than hang if they never end."""
@@ -183,11 +194,7 @@ class State:
         return self.z[index] / self.radius[index] if self.spins else np.zeros(len(index))
 
     def contact(
-        self,
-        index: Ints,
-        obstacle: Ints | None = None,
-        side: Floats | None = None,
-        normal: Floats | None = None,
+        self, index: Ints, obstacle: Ints | None = None, side: Floats | None = None
     ) -> Contact:
         """Return what a contact with an obstacle is like where the particles are now.
 
@@ -197,15 +204,29 @@ class State:
         o = self.obstacles
         obstacle = self.on[index] if obstacle is None else obstacle
         side = self.side[index] if side is None else side
-        if normal is None:
-            normal = o.normal_at(index, obstacle, side, self.p)
-        tangent, material = along(normal), pick(o.material, index, obstacle)
+        normal = o.normal_at(index, obstacle, side, self.p)
         open_ = (side == 0.0).nonzero()[0]
         if len(open_):
             side = side.copy()
             side[open_] = o.rim_side(index[open_], obstacle[open_], normal[:, open_])
-        speed, restitution, friction = material
-        return Contact(normal, tangent, side * speed, friction, restitution, o.surface[obstacle])
+        speed, restitution, friction = pick(o.material, index, obstacle)
+        surface = o.surface[obstacle]
+        return Contact(normal, along(normal), side * speed, friction, restitution, surface)
+
+    def snap(self, index: Ints, obstacle: Ints, side: Floats) -> None:
+        """Put particles exactly at contact distance, so that rounding cannot add up."""
+        o, place = self.obstacles, self.p.take(index, axis=1)
+        normal, _, start, _ = pick(o.faces[:, :, :, 0], index, obstacle).swapaxes(0, 1)
+        normal = bare(side) * normal
+        snapped = place - bare(dot(place - start, normal) - self.radius[index]) * normal
+        round_ = (obstacle >= o.segments).nonzero()[0]
+        if len(round_):
+            rows, circle = index[round_], obstacle[round_] - o.segments
+            center = pick(o.center, rows, circle)
+            away = place[:, round_] - center
+            distance = np.hypot(away[0], away[1])
+            snapped[:, round_] = center + (pick(o.rho, rows, circle) / distance) * away
+        self.p[:, self.at(index)] = snapped
 
     def at(self, index: Ints) -> Ints | slice:
         """Return what to assign by: a slice is several times as fast where it is everyone."""
@@ -217,8 +238,6 @@ class State:
         state = self.state.copy() if everyone else self.state.take(index, axis=1)
         if self.staggered:
             state[0] += self.released if everyone else self.released[index]
-        if self.origin is not None:
-            state[1:3] += self.origin
         if self.spins:
             state[5] /= self.radius if everyone else self.radius[index]
         return state
@@ -226,13 +245,21 @@ class State:
     def knots(self, index: Ints) -> None:
         """Write a knot for each of the particles as they are now."""
         if len(index):
-            self.log.knots(index, self.now(index))
+            self.log.add(index, self.now(index))
 
-    def event(self, kind: int | Ints, index: Ints, surface: int | Ints = NONE) -> None:
-        """Write an event for each of the particles as they are now, without an impulse."""
-        if len(index):
-            state = self.now(index)
-            self.log.events(kind, index, surface, state)
+    def event(
+        self, kind: int | Ints, index: Ints, surface: int | Ints = NONE, blow: Blow | None = None
+    ) -> None:
+        """Write an event for each of the particles as they are now; without a blow no change."""
+        if not len(index):
+            return
+        rows = self.now(index).take(OF_STATE, axis=0)
+        rows[0], rows[1] = kind, surface
+        if blow is None:
+            rows[11:] = 0.0
+        else:
+            rows[5:7], rows[9], rows[11], rows[12] = blow
+        self.events.add(index, rows)
 
     def book(
         self,
@@ -245,10 +272,33 @@ class State:
         """Book ledger entries (J) on particles (k,), each once, and on the surfaces they met."""
         if not len(index):
             return
-        rows = np.empty((3, len(index)))
-        rows[0], rows[1], rows[2] = belt_work, restitution_loss, friction_loss
-        self.entries[:, self.at(index)] += rows
-        self.log.book(index, surface, rows)
+        rows = np.empty((4, len(index)))
+        rows[0], rows[1], rows[2], rows[3] = surface, belt_work, restitution_loss, friction_loss
+        self.entries[:, self.at(index)] += rows[1:]
+        self.books.add(index, rows)
+
+    def close(self, recorder: Recorder) -> None:
+        """Hand over everything, in the order of the particles: blocks do not show."""
+        recorder.contacts += self.contacts
+        recorder.ended[self.first : self.first + len(self.ended)] = self.ended
+        if self.log:
+            owner, rows = self.log.by_particle()
+            sizes = np.bincount(owner, minlength=len(self.mode))
+            recorder.tracks(self.first, sizes, rows.view(KNOT)[:, 0])
+        if self.events:
+            owner, rows = self.events.by_particle()
+            events = np.empty(len(owner), dtype=EVENT)
+            events["particle"], events["other"] = owner + self.first, NONE
+            events["kind"], events["surface"], events["t"] = rows[:, 0], rows[:, 1], rows[:, 2]
+            events.view(NUMBERS)["numbers"] = rows[:, 3:]
+            recorder.tell(events)
+        if self.books:
+            owner, rows = self.books.by_particle()
+            surface = rows[:, 0].astype(np.int64)
+            place = (owner + self.first, surface) if recorder.apart else surface
+            for column in range(3):
+                # One after the other, not pairwise: the sum does not depend on the blocks.
+                np.add.at(recorder.by_surface[..., column], place, rows[:, 1 + column])
 
     def finish(self, index: Ints, reason: str) -> None:
         """End the tracks of the particles."""
@@ -287,20 +337,3 @@ class State:
             slip, scale = w + z - contact.belt, scale + np.abs(z)
         slip[np.abs(slip) <= NO_SLIP * scale] = 0.0
         return slip
-
-
-COLLAPSE = 200
-"""Contacts in a row that take no time after which a particle has come to rest in its corner. An
-elastic particle leaves a wedge of angle β after π/β of them."""
-
-ROUNDING = 4.0 * float_info.epsilon
-"""Share of its age that an event of a particle must take to count as progress."""
-
-NO_SLIP = 1e-13
-"""Share of the speeds involved below which a slip is rounding."""
-
-
-def below(limit: Floats, friction: Floats, load: Floats) -> Bools:
-    """Tell whether a force is within Coulomb's limit; friction may be inf."""
-    finite = np.where(np.isinf(friction), 0.0, friction)
-    return np.isinf(friction) | (limit <= finite * load)

@@ -1,35 +1,31 @@
 """What moves in the picture: particles, the arrow of a velocity, belts, pulley, energy bars.
 
-Each actor draws itself on axes, lists its `artists`, and `show`s one of the film's moments. The
-energy ledger is two stacked bars of equal height: what was put in, and where it is now.
+Each is a matplotlib artist that is made once, together with a function that sets it to the film's
+moment of an index. The energy ledger is two stacked bars of equal height: what was put in, and
+where it is now.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.font_manager import FontProperties, findfont
-from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from PIL import ImageDraw, ImageFont
 
 from chutelab.machine import Machine
-from chutelab.pictures.colours import tint
 from chutelab.pictures.plots import style
-from chutelab.pictures.plots.scenery import (
-    nominal,
-    spread,
-    strobe_step,
-    strobe_times,
-    subset,
-    track_times,
-)
+from chutelab.pictures.plots.scenery import nominal, spread, strobe_times, subset, track_times
 from chutelab.results import Recording
 from chutelab.util.arrays import Floats
 
-LONGEST = 0.10
-"""Share of the picture's width that the arrow of the highest speed is long."""
+Moving = tuple[Artist, Callable[[int], object]]
+"""What moves, and the function that sets it to the moment of an index."""
 
 SHAFT, HEAD = 1.3, 6.0
 """pt; width of an arrow's shaft, and length of its head."""
@@ -50,182 +46,18 @@ HOLES = 3
 """Holes in the pulley; they turn with it."""
 
 
-class Nominal:
-    """Particle 0 with a short trail, its strobe dots at round times, and its velocity.
-
-    Parameters
-    ----------
-    ax : Axes
-        With its final limits.
-    recording : Recording
-        What happened.
-    times : ndarray, shape (T,)
-        The film's, s.
-    trail : float
-        s of the recording that the trail reaches back; 0: there is none.
-    arrow : float
-        m that an arrow is long for 1 m/s; 0: there is none.
-    strobe : bool
-        Whether strobe dots are drawn.
-    """
-
-    def __init__(
-        self,
-        ax: Axes,
-        recording: Recording,
-        times: Floats,
-        *,
-        trail: float,
-        arrow: float,
-        strobe: bool,
-    ) -> None:
-        self.times = times
-        self.position, self.velocity = nominal(recording, times)
-        clock = recording.track(0)["t"]
-        filmed = times[(times >= clock[0]) & (times <= clock[-1])]
-        self.passed = np.union1d(filmed, track_times(recording))
-        self.path, _ = nominal(recording, self.passed)
-        self.step = strobe_step(recording)
-        self.round = strobe_times(recording)
-        self.stops, _ = nominal(recording, self.round)
-        self.reach = trail
-        (self.trail,) = ax.plot([], [], color=style.TRACK, linewidth=2.0, animated=True)
-        (self.strobe,) = ax.plot([], [], **style.RINGS, ms=4.5, animated=True)
-        self.arrow = arrow
-        # In m/s, `arrow` m long for each: two components and the whole, over them. Heads of short
-        # arrows shrink with them.
-        self.arrows = ax.quiver(
-            *np.zeros((4, 3)),
-            color=[*style.VELOCITY.values(), style.INK],
-            angles="xy",
-            scale_units="xy",
-            scale=1.0 / (arrow or 1.0),
-            units="dots",
-            width=SHAFT * ax.figure.dpi / 72.0,
-            minlength=0.0,
-            headwidth=0.8 * HEAD / SHAFT,
-            headlength=HEAD / SHAFT,
-            headaxislength=HEAD / SHAFT,
-            zorder=2.0,
-            animated=True,
-        )
-        self.least = SEEN * HEAD / _points(ax, 1.0)
-        self.dot = _dots(ax, recording.particle.radius, style.STRIKE, 0.4)
-        self._strobes = strobe
-
-    @property
-    def artists(self) -> list[Artist]:
-        """What moves, from back to front."""
-        artists: list[Artist] = [self.trail] if self.reach else []
-        artists += [self.strobe] if self._strobes else []
-        artists += [self.arrows] if self.arrow else []
-        return [*artists, self.dot]
-
-    def show(self, index: int) -> None:
-        """Show the particle at a time index, nothing of it before release and after the end."""
-        t, now = self.times[index], self.position[index]
-        self.dot.set_data(*now[:, None])
-        self.strobe.set_data(*self.stops[self.round <= t].T)
-        vx, vy = self.velocity[index]
-        # Components are drawn where there are two that can be told from the whole.
-        two = self.arrow * min(abs(vx), abs(vy)) > self.least
-        self.arrows.set_offsets([now] * 3)
-        self.arrows.set_UVC([vx * two, 0.0, vx], [0.0, vy * two, vy])
-        here = slice(*np.searchsorted(self.passed, [t - self.reach, t], side="right"))
-        self.trail.set_data(*self.path[here].T)
-
-    def legend(self, ax: Axes) -> list[Line2D]:
-        """Return handles for a legend."""
-        (dot,) = ax.plot([], [], "o", color=style.STRIKE, markersize=6.0, label="particle 0")
-        handles = [dot]
-        if self._strobes:
-            handles += ax.plot([], [], **style.RINGS, ms=4.5, label=f"every {self.step:g} s")
-        if self.arrow:
-            handles += ax.plot([], [], color=style.INK, linewidth=2.0, label="velocity")
-        return handles
+def line(ax: Axes, gid: str, points: Callable[[int], Floats], **look: Any) -> Moving:
+    """Return a line, or dots, through points (P, 2), m, that depend on the index."""
+    (drawn,) = ax.plot([], [], gid=gid, animated=True, **look)
+    return drawn, lambda index: drawn.set_data(*points(index).T)
 
 
-class Crowd:
-    """The other particles that are on stage during the film, evenly thinned out to `DRAWN`.
-
-    Parameters
-    ----------
-    ax, recording, times, trail
-        As of `Nominal`.
-    """
-
-    def __init__(self, ax: Axes, recording: Recording, times: Floats, *, trail: float) -> None:
-        self.count = recording.count
-        released = np.diff(recording.offsets) > 0
-        first, last = recording.ends()
-        during = released.nonzero()[0][(first["t"] <= times[-1]) & (last["t"] >= times[0])]
-        others = during[during != 0]
-        self.particles = others[spread(len(others), DRAWN - 1)]
-        self.thinned = len(others) > len(self.particles)
-        self.positions = subset(recording, self.particles).at(times)[0]
-        # A trail reaches back to the picture before at least.
-        back = np.minimum(np.searchsorted(times, times - trail), np.arange(len(times)) - 1)
-        self.since = np.maximum(back, 0) if trail else None
-        light = tint(style.STREAM, 0.5)
-        (self.trails,) = ax.plot([], [], color=light, linewidth=1.0, animated=True)
-        # Told apart where they overlap.
-        self.dots = _dots(ax, recording.particle.radius, style.STREAM, 0.8)
-
-    @property
-    def artists(self) -> list[Artist]:
-        """What moves, from back to front."""
-        if not len(self.particles):
-            return []
-        return [self.dots] if self.since is None else [self.trails, self.dots]
-
-    def show(self, index: int) -> None:
-        """Show the particles at a time index."""
-        self.dots.set_data(*self.positions[index].T)
-        if self.since is not None:
-            trails = self.positions[self.since[index] : index + 1]
-            # One line for all, that NaN breaks.
-            gaps = np.full((1, *trails.shape[1:]), np.nan)
-            self.trails.set_data(*np.concatenate([trails, gaps]).transpose(2, 1, 0).reshape(2, -1))
-
-    def legend(self, ax: Axes) -> list[Line2D]:
-        """Return a handle that says how many of the particles are drawn; none for a lone one."""
-        if self.count == 1:
-            return []
-        said = f"{self.count:,} particles"
-        if self.thinned:
-            said = f"{len(self.particles) + 1} of {self.count:,}"
-        return ax.plot([], [], "o", color=style.STREAM, markersize=6.0, label=said)
-
-
-class Drives:
-    """Marks that run with the belts, and holes that turn with the pulley, clockwise at v0/R."""
-
-    def __init__(self, ax: Axes, machine: Machine) -> None:
-        self.machine = machine
-        self.spacing = float(np.ptp(ax.get_xlim())) / MARKS
-        pulley = machine.pulley
-        size = 0.0 if pulley is None else min(_points(ax, 0.3 * pulley.radius), SMALLEST)
-        (self.marks,) = ax.plot([], [], "o", ms=3.2, mew=0.0, color="white", animated=True)
-        (self.holes,) = ax.plot([], [], "o", ms=size, mew=0.0, color=style.STEEL, animated=True)
-
-    @property
-    def artists(self) -> list[Artist]:
-        """What moves, from back to front."""
-        return [self.marks] if self.machine.pulley is None else [self.holes, self.marks]
-
-    def show(self, t: float) -> None:
-        """Show belts and pulley at time t, s."""
-        segments, marks = self.machine.segments, [np.empty((0, 2))]
-        for i in np.flatnonzero(segments.speed):
-            shift = (segments.speed[i] * t) % self.spacing
-            along = np.arange(shift, segments.length[i], self.spacing)
-            marks.append(segments.start[i] + along[:, None] * segments.tangent[i])
-        self.marks.set_data(*np.concatenate(marks).T)
-        pulley = self.machine.pulley
-        if pulley is not None:
-            angles = pulley.speed * t / pulley.radius + 2.0 * np.pi / HOLES * np.arange(HOLES)
-            rim = 0.6 * pulley.radius
-            self.holes.set_data(rim * np.sin(angles), rim * np.cos(angles))
+def disks(
+    ax: Axes, gid: str, points: Callable[[int], Floats], radius: float, color: str, edge: float
+) -> Moving:
+    """Return disks to scale (m), or of `SMALLEST` size, with a white edge (pt)."""
+    size = max(_points(ax, 2.0 * radius), SMALLEST)
+    return line(ax, gid, points, ls="none", marker="o", color=color, ms=size, mew=edge, mec="white")
 
 
 def _points(ax: Axes, length: float) -> float:
@@ -234,26 +66,118 @@ def _points(ax: Axes, length: float) -> float:
     return pixels * 72.0 / ax.figure.dpi
 
 
-def _dots(ax: Axes, radius: float, color: str, edge: float) -> Line2D:
-    """Return disks to scale (m), or of `SMALLEST` size, with a white edge (pt)."""
-    size = max(_points(ax, 2.0 * radius), SMALLEST)
-    (dots,) = ax.plot([], [], "o", color=color, ms=size, mew=edge, mec="white", animated=True)
-    return dots
+def trail(ax: Axes, recording: Recording, times: Floats, reach: float) -> Moving:
+    """Return the way that particle 0 came in the last `reach` seconds of the recording."""
+    clock = recording.track(0)["t"]
+    filmed = times[(times >= clock[0]) & (times <= clock[-1])]
+    passed = np.union1d(filmed, track_times(recording))
+    path, _ = nominal(recording, passed)
+
+    def behind(index: int) -> Floats:
+        ends = [times[index] - reach, times[index]]
+        return path[slice(*np.searchsorted(passed, ends, side="right"))]
+
+    return line(ax, "trail", behind, color=style.TRACK, lw=2.0)
 
 
-SIGNS = {
-    "start": 1,
-    "belt_work": 1,
-    "kinetic": -1,
-    "potential": -1,
-    "restitution_loss": -1,
-    "friction_loss": -1,
-    "residual": 1,
-}
-"""The ledger with everything on one side: start + belt work + residual - K - U - losses = 0."""
+def strobe(ax: Axes, recording: Recording, times: Floats) -> Moving:
+    """Return the dots where particle 0 was at round times."""
+    stops = strobe_times(recording)
+    dots, _ = nominal(recording, stops)
+    return line(ax, "strobe", lambda index: dots[stops <= times[index]], **style.RINGS, ms=4.5)
 
-BASE = 0.78
-"""Share of a row above the line that its text stands on."""
+
+def arrows(ax: Axes, position: Floats, velocity: Floats, length: float) -> Moving:
+    """Return particle 0's velocity as an arrow over its two components, `length` m for 1 m/s.
+
+    `position` and `velocity`, (T, 2), are those at the film's times.
+    """
+    drawn = ax.quiver(
+        *np.zeros((4, 3)),
+        color=[*style.VELOCITY.values(), style.INK],
+        angles="xy",
+        scale_units="xy",
+        scale=1.0 / length,
+        units="dots",
+        width=SHAFT * ax.figure.dpi / 72.0,
+        minlength=0.0,
+        # Heads of short arrows shrink with them.
+        headwidth=0.8 * HEAD / SHAFT,
+        headlength=HEAD / SHAFT,
+        headaxislength=HEAD / SHAFT,
+        zorder=2.0,
+        gid="arrows",
+        animated=True,
+    )
+    # Components are drawn where there are two that can be told from the whole.
+    two = length * np.abs(velocity).min(axis=1) > SEEN * HEAD / _points(ax, 1.0)
+
+    def show(index: int) -> None:
+        vx, vy = velocity[index]
+        drawn.set_offsets([position[index]] * 3)
+        drawn.set_UVC([vx * two[index], 0.0, vx], [0.0, vy * two[index], vy])
+
+    return drawn, show
+
+
+def crowd(ax: Axes, recording: Recording, times: Floats, reach: float) -> tuple[list[Moving], str]:
+    """Return the other particles, evenly thinned out to `DRAWN`, and how many they are, in words.
+
+    Trails reach back `reach` seconds of the recording, to the picture before at least; 0: there are
+    none.
+    """
+    released = np.diff(recording.offsets) > 0
+    first, last = recording.ends()
+    during = released.nonzero()[0][(first["t"] <= times[-1]) & (last["t"] >= times[0])]
+    others = during[during != 0]
+    particles = others[spread(len(others), DRAWN - 1)]
+    thinned = len(particles) < len(others)
+    of_all = f"{recording.count:,}"
+    said = f"{len(particles) + 1} of {of_all}" if thinned else f"{of_all} particles"
+    if not len(particles):
+        return [], said
+    positions = subset(recording, particles).at(times)[0]
+    since = np.searchsorted(times, times - reach)
+
+    def behind(index: int) -> Floats:
+        paths = positions[max(0, min(since[index], index - 1)) : index + 1]
+        # One line for all, that NaN breaks.
+        gaps = np.full((1, *paths.shape[1:]), np.nan)
+        return np.concatenate([paths, gaps]).swapaxes(0, 1).reshape(-1, 2)
+
+    # Their white edges tell disks apart where they overlap.
+    radius = recording.particle.radius
+    moving = [disks(ax, "crowd", lambda index: positions[index], radius, style.STREAM, 0.8)]
+    if reach:
+        light = style.tint(style.STREAM, 0.5)
+        moving.insert(0, line(ax, "trails", behind, color=light, lw=1.0))
+    return moving, said
+
+
+def drives(ax: Axes, machine: Machine, times: Floats) -> list[Moving]:
+    """Return marks that run with the belts, and holes that turn with the pulley at v0/R."""
+    segments, pulley = machine.segments, machine.pulley
+    spacing = float(np.ptp(ax.get_xlim())) / MARKS
+
+    def marks(index: int) -> Floats:
+        found = [np.empty((0, 2))]
+        for i in np.flatnonzero(segments.speed):
+            shift = (segments.speed[i] * times[index]) % spacing
+            along = np.arange(shift, segments.length[i], spacing)
+            found.append(segments.start[i] + along[:, None] * segments.tangent[i])
+        return np.concatenate(found)
+
+    dots: dict[str, Any] = {"ls": "none", "marker": "o", "mew": 0.0}
+    moving = [line(ax, "marks", marks, color="white", ms=3.2, **dots)]
+    if pulley is None:
+        return moving
+    turned = pulley.speed * times / pulley.radius
+    # Clockwise from the top.
+    angles = turned[:, None] + 2.0 * np.pi / HOLES * np.arange(HOLES)
+    holes = 0.6 * pulley.radius * np.stack([np.sin(angles), np.cos(angles)], axis=-1)
+    size = min(_points(ax, 0.3 * pulley.radius), SMALLEST)
+    turning = line(ax, "holes", lambda index: holes[index], color=style.STEEL, ms=size, **dots)
+    return [turning, *moving]
 
 
 class Writing:
@@ -270,21 +194,38 @@ class Writing:
         Its place, pixels from the left and the top.
     anchor : str
         What of it is there, as Pillow names it, such as "rs": the right end of the base line.
+    said : callable
+        Gives the text of the moment of an index.
     """
 
-    def __init__(self, size: float, dpi: float, x: float, y: float, anchor: str) -> None:
+    def __init__(
+        self, size: float, dpi: float, x: float, y: float, anchor: str, said: Callable[[int], str]
+    ) -> None:
         path = findfont(FontProperties())
         self.font = ImageFont.truetype(
             path, size * dpi / 72.0, layout_engine=ImageFont.Layout.BASIC
         )
-        self.place, self.anchor = (round(x), round(y)), anchor
-        self.text = ""
+        self.place, self.anchor, self.said = (round(x), round(y)), anchor, said
 
-    def paint(self, draw: ImageDraw.ImageDraw) -> None:
+    def paint(self, draw: ImageDraw.ImageDraw, index: int) -> None:
         """Write it onto a picture."""
-        draw.text(
-            self.place, self.text, style.INK, self.font, self.anchor, spacing=0.35 * self.font.size
-        )
+        gap = 0.35 * self.font.size
+        draw.text(self.place, self.said(index), style.INK, self.font, self.anchor, spacing=gap)
+
+
+SIGNS = {
+    "start": 1,
+    "belt_work": 1,
+    "kinetic": -1,
+    "potential": -1,
+    "restitution_loss": -1,
+    "friction_loss": -1,
+    "residual": 1,
+}
+"""The ledger with everything on one side: start + belt work + residual - K - U - losses = 0."""
+
+BASE = 0.78
+"""Share of a row above the line that its text stands on."""
 
 
 def stacks(books: dict[str, Floats]) -> tuple[dict[str, Floats], dict[str, Floats]]:
@@ -303,59 +244,50 @@ def stacks(books: dict[str, Floats]) -> tuple[dict[str, Floats], dict[str, Float
     return put_in, {name: np.maximum(-values, 0.0) for name, values in signed.items()}
 
 
-class Bars:
-    """Two bars with a column of figures beneath; `show` moves them to one time.
+def bars(ax: Axes, table: Axes, books: dict[str, Floats]) -> tuple[list[Moving], list[Writing]]:
+    """Return the blocks of two stacked bars on `ax`, and a column of figures on `table`.
 
     Parameters
     ----------
-    ax, table : Axes
-        For the bars, and for the list of names and values under them.
     books : dict of ndarray, shape (T,)
-        J, see `chutelab.pictures.plots.scenery.energies`; the highest bar sets the scale.
+        J, as for `stacks`; the highest bar sets the scale.
     """
+    sides = stacks(books)
+    highest = float(np.max(sum(sides[0].values())))
+    factor, unit = style.scaled(highest, "J")
+    style.dress(ax, title=f"Energy, {unit}")
+    ax.grid(visible=False, axis="x")
+    ax.set(xlim=(-0.6, 1.6), ylim=(0.0, 1.06 * factor * highest or 1.0))
+    ax.set_xticks([0, 1], ["put in", "is now"], fontsize=style.SMALL)
+    ax.tick_params(axis="x", length=0)
+    moving = []
+    for left, side in zip((-0.4, 0.6), sides, strict=True):
+        base = np.zeros_like(books["start"])
+        for name, values in side.items():
+            moving.append(_block(ax, name, left, base, factor * values))
+            base = base + factor * values
+    table.set_axis_off()
+    table.set(xlim=(0.0, 1.0), ylim=(len(SIGNS), 0.0))
 
-    def __init__(self, ax: Axes, table: Axes, books: dict[str, Floats]) -> None:
-        self.books = books
-        self.stacks = stacks(books)
-        highest = float(np.max(sum(self.stacks[0].values())))
-        self.factor, self.unit = style.scaled(highest, "J")
-        self.ax = style.dress(ax, title=f"Energy, {self.unit}")
-        ax.grid(visible=False, axis="x")
-        ax.set_xlim(-0.6, 1.6)
-        ax.set_ylim(0.0, 1.06 * self.factor * highest or 1.0)
-        ax.set_xticks([0, 1], ["put in", "is now"], fontsize=style.SMALL)
-        ax.tick_params(axis="x", length=0)
-        table.set_axis_off()
-        table.set_xlim(0.0, 1.0)
-        table.set_ylim(len(SIGNS), 0.0)
-        dpi, high = ax.figure.dpi, ax.figure.bbox.height
-        self.values = {}
-        for row, name in enumerate(SIGNS):
-            table.add_patch(Rectangle((0.0, row + 0.2), 0.05, 0.6, color=style.ENERGY[name]))
-            table.text(0.08, row + BASE, style.ENERGY_LABEL[name], fontsize=style.SMALL)
-            right, up = table.transData.transform((1.0, row + BASE))
-            self.values[name] = Writing(style.SMALL, dpi, right, high - up, "rs")
+    def figure(name: str, index: int) -> str:
+        value = float(books[name][index])
+        if name == "residual":
+            return style.scientific(value, "J")
+        return f"{round(factor * value, 1) + 0.0:.1f}".replace("-", "−")
 
-    def show(self, index: int) -> None:
-        """Set the bars and figures to the books at a time index."""
-        self.heights = [
-            {name: self.factor * float(values[index]) for name, values in side.items()}
-            for side in self.stacks
-        ]
-        for name, writing in self.values.items():
-            value = float(self.books[name][index])
-            shown = f"{round(self.factor * value, 1) + 0.0:.1f}".replace("-", "−")
-            writing.text = style.scientific(value, "J") if name == "residual" else shown
+    writings = []
+    for row, name in enumerate(SIGNS):
+        table.add_patch(Rectangle((0.0, row + 0.2), 0.05, 0.6, color=style.ENERGY[name]))
+        table.text(0.08, row + BASE, style.ENERGY_LABEL[name], fontsize=style.SMALL)
+        right, up = table.transData.transform((1.0, row + BASE))
+        place = right, ax.figure.bbox.height - up
+        writings.append(Writing(style.SMALL, ax.figure.dpi, *place, "rs", partial(figure, name)))
+    return moving, writings
 
-    def paint(self, draw: ImageDraw.ImageDraw, high: int) -> None:
-        """Paint the bars onto a picture that is so many pixels high, in whole pixels."""
-        for x, heights in zip((0.0, 1.0), self.heights, strict=True):
-            base = 0.0
-            for name, height in heights.items():
-                corners = self.ax.transData.transform([(x - 0.4, base), (x + 0.4, base + height)])
-                (left, bottom), (right, top) = np.rint(corners).astype(int).tolist()
-                base += height
-                if top > bottom:
-                    # Pillow paints the last pixel too.
-                    box = (left, high - top, right - 1, high - bottom - 1)
-                    draw.rectangle(box, fill=style.ENERGY[name])
+
+def _block(ax: Axes, name: str, left: float, base: Floats, height: Floats) -> Moving:
+    """Return an entry's block of a bar, 0.8 wide."""
+    block = Rectangle((left, 0.0), 0.8, 0.0, lw=0.0, color=style.ENERGY[name], gid=name)
+    block.set_animated(True)
+    ax.add_patch(block)
+    return block, lambda index: block.set_bounds(left, base[index], 0.8, height[index])

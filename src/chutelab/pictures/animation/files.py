@@ -15,7 +15,6 @@ from typing import Any, cast
 import numpy as np
 from PIL import Image
 
-from chutelab.pictures import colours
 from chutelab.pictures.animation.moments import film, frame_delay, slowness, span
 from chutelab.pictures.animation.stage import SHOWS, Stage, lay_out
 from chutelab.pictures.plots import style
@@ -43,9 +42,9 @@ def palette() -> tuple[str, ...]:
     White, the greys and the colours with a meaning, unmixed, and the mixtures at which anti-aliased
     edges between them are read as smooth. Every other colour is shown as the nearest of these.
     """
-    edges = [colours.tint(hue, share) for share in (0.5, 0.75, 0.25) for hue in HUES]
-    meeting = [colours.tint(one, 0.5, other) for one, other in combinations(HUES, 2)]
-    dark = [colours.tint(hue, 0.6, "#000000") for hue in HUES]
+    edges = [style.tint(hue, share) for share in (0.5, 0.75, 0.25) for hue in HUES]
+    meeting = [style.tint(one, 0.5, other) for one, other in combinations(HUES, 2)]
+    dark = [style.tint(hue, 0.6, "#000000") for hue in HUES]
     return tuple(
         dict.fromkeys(["#FFFFFF", "#000000", *GREYS, *BETWEEN, *HUES, *edges, *meeting, *dark])
     )

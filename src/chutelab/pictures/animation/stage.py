@@ -14,10 +14,26 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from PIL import Image, ImageDraw
 
-from chutelab.pictures.animation.actors import LONGEST, Bars, Crowd, Drives, Nominal, Writing
+from chutelab.pictures.animation.actors import (
+    Writing,
+    arrows,
+    bars,
+    crowd,
+    disks,
+    drives,
+    strobe,
+    trail,
+)
 from chutelab.pictures.animation.moments import Moment, span
 from chutelab.pictures.plots import Window, analytic_of, draw_analytic, draw_scene, style, window_of
-from chutelab.pictures.plots.scenery import around, energies, nominal, round_step, track_times
+from chutelab.pictures.plots.scenery import (
+    around,
+    energies,
+    nominal,
+    round_step,
+    strobe_step,
+    track_times,
+)
 from chutelab.results import Recording
 
 Box = tuple[float, float, float, float]
@@ -30,6 +46,9 @@ INCHES = (8.0, 4.5)
 
 LEAST = (320, 180)
 """Pixels below which text cannot be read."""
+
+LONGEST = 0.10
+"""Share of the picture's width that the arrow of the highest speed is long."""
 
 TRAIL = 0.07
 """Share of the window's width that the trail of the fastest particle is long."""
@@ -148,7 +167,7 @@ GAP = 0.015
 
 
 class Stage:
-    """Draws the moments of a film.
+    """Draws the moments of a film: the background once, and for each moment what moves on it.
 
     Parameters
     ----------
@@ -160,6 +179,15 @@ class Stage:
         The film.
     slow : float
         Seconds on the screen for one second of the recording.
+
+    Attributes
+    ----------
+    figure, view : Figure, Axes
+        The background, and where the scene is in it.
+    moving : list of Moving
+        What moves, from back to front.
+    writings : list of Writing
+        Texts that change.
     """
 
     def __init__(
@@ -170,119 +198,75 @@ class Stage:
         *,
         slow: float,
     ) -> None:
-        self.moments = moments
-        times = np.array([moment.t for moment in moments])
-        # The clock has no digits that change too fast to be read: they would cost as much as all
-        # particles.
-        self.digits = 2 if len(times) > 1 and np.median(np.diff(times)) >= 0.01 else 3
+        times, shows = np.array([moment.t for moment in moments]), layout.shows
         # A hundredth of a pixel more: the canvas rounds down.
         inches = (layout.width + 0.01) / layout.dpi, (layout.height + 0.01) / layout.dpi
         self.figure = Figure(figsize=inches, dpi=layout.dpi)
         self.canvas = cast(Any, FigureCanvasAgg(self.figure))  # its methods are not annotated
-        self.view = self.figure.add_axes(layout.view)
-        shows = layout.shows
-        draw_scene(self.view, recording.machine, layout.window)
-        self.view.set(xticks=[], yticks=[])
-        for spine in self.view.spines.values():
+        self.view = view = self.figure.add_axes(layout.view)
+        draw_scene(view, recording.machine, layout.window)
+        view.set(xticks=[], yticks=[])
+        for spine in view.spines.values():
             spine.set_color(style.STEEL_LIGHT)
-        _draw_scale(self.view)
-        if "parabola" in shows:
-            draw_analytic(self.view, analytic_of(recording, recording.prediction)[0])
-        trail = layout.reach(TRAIL, "trails")
-        self.drives = Drives(self.view, recording.machine)
-        self.crowd = Crowd(self.view, recording, times, trail=trail)
-        self.nominal = Nominal(
-            self.view,
-            recording,
-            times,
-            trail=trail,
-            arrow=layout.arrow,
-            strobe="strobe" in shows,
-        )
-        self.bars = None
+        _draw_scale(view)
+        parts = analytic_of(recording, recording.prediction)[0] if "parabola" in shows else ()
+        draw_analytic(view, parts)
+        position, velocity = nominal(recording, times)
+        reach = layout.reach(TRAIL, "trails")
+        others, how_many = crowd(view, recording, times, reach)
+        self.moving = [*drives(view, recording.machine, times), *others]
+        # The legend names what is drawn, the commonest first.
+        dot: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6.0}
+        handles = [Line2D([], [], **dot, color=style.STRIKE, label="particle 0")]
+        if recording.count > 1:
+            handles.append(Line2D([], [], **dot, color=style.STREAM, label=how_many))
+        if parts:
+            # Two dashes; the line's own would not fit.
+            dashes: Any = (0, (1.5, 0.85))
+            handles.append(
+                Line2D([], [], color=style.ANALYTIC, lw=3.0, ls=dashes, label="analytic")
+            )
+        if reach:
+            self.moving.append(trail(view, recording, times, reach))
+        if "strobe" in shows:
+            self.moving.append(strobe(view, recording, times))
+            said = f"every {strobe_step(recording):g} s"
+            handles.append(Line2D([], [], **style.RINGS, ms=4.5, label=said))
+        if layout.arrow:
+            self.moving.append(arrows(view, position, velocity, layout.arrow))
+            handles.append(Line2D([], [], color=style.INK, lw=2.0, label="velocity"))
+        _add_legend(view, handles, components=layout.arrow > 0.0)
+        radius, where = recording.particle.radius, position[:, None]
+        self.moving.append(disks(view, "disk", lambda i: where[i], radius, style.STRIKE, 0.4))
+        self.writings = self._add_text(layout, pace_words(slow), moments)
         if "energy" in shows:
             # Above the bars is room for their title, and the clock.
             top = layout.view[1] + layout.view[3] - 0.06
             axes = self.figure.add_axes((0.765, 0.43, 0.225, top - 0.43))
             table = self.figure.add_axes((0.73, 0.125, 0.26, 0.245))
-            self.bars = Bars(axes, table, energies(recording, times))
-        self._add_legend()
-        self._add_text(layout, pace_words(slow))
+            blocks, figures = bars(axes, table, energies(recording, times))
+            self.moving += blocks
+            self.writings += figures
         self.canvas.draw()
         self._background = self.canvas.copy_from_bbox(self.figure.bbox)
 
-    def show(self, index: int) -> None:
-        """Move everything to one moment."""
-        moment = self.moments[index]
-        self.drives.show(moment.t)
-        self.crowd.show(index)
-        self.nominal.show(index)
-        self.clock.text = f"t = {moment.t:.{self.digits}f} s"
-        self.words.text = moment.words
-        if self.bars is not None:
-            self.bars.show(index)
-
     def frame(self, index: int) -> Image.Image:
         """Return the picture of one moment, RGB."""
-        self.show(index)
         self.canvas.restore_region(self._background)
         renderer = self.canvas.get_renderer()
-        for actor in (self.drives, self.crowd, self.nominal):
-            for artist in actor.artists:
-                artist.draw(renderer)
+        for artist, show in self.moving:
+            show(index)
+            artist.draw(renderer)
         size = self.canvas.get_width_height()
         shown = Image.frombuffer("RGBA", size, self.canvas.buffer_rgba(), "raw", "RGBA", 0, 1)
         picture = shown.convert("RGB")
         draw = ImageDraw.Draw(picture)
-        if self.bars is not None:
-            self.bars.paint(draw, size[1])
         for writing in self.writings:
-            writing.paint(draw)
+            writing.paint(draw, index)
         return picture
 
-    @property
-    def writings(self) -> list[Writing]:
-        """Texts that change, with what they say now."""
-        figures = [] if self.bars is None else list(self.bars.values.values())
-        return [*figures, self.clock, self.words]
-
-    def _add_legend(self) -> None:
-        """Name what is drawn above the scene; the components of the velocity by their colours."""
-        first, *rest = self.nominal.legend(self.view)
-        parabola: list[Line2D] = []
-        if any(line.get_gid() == "analytic" for line in self.view.lines):
-            # Two dashes; the line's own would not fit.
-            parabola = self.view.plot([], [], color=style.ANALYTIC, label="analytic")
-            parabola[0].set(linewidth=3.0, linestyle=(0, (1.5, 0.85)))
-        legend = self.view.legend(
-            handles=[first, *self.crowd.legend(self.view), *parabola, *rest],
-            loc="lower left",
-            bbox_to_anchor=(0.0, 1.0),
-            ncols=6,
-            fontsize=style.SMALL,
-            frameon=False,
-            borderaxespad=0.1,
-            borderpad=0.3,
-            handlelength=1.5,
-            columnspacing=0.8,
-            handletextpad=0.3,
-        )
-        if self.nominal.arrow:
-            for place, (name, colour) in enumerate(style.VELOCITY.items()):
-                self.view.annotate(
-                    f"$v_{name[1]}$",
-                    (1.0, 0.5),
-                    xycoords=legend.get_texts()[-1],
-                    xytext=(4.0 + 16.0 * place, 0.0),
-                    textcoords="offset points",
-                    fontsize=style.NORMAL,
-                    color=colour,
-                    va="center",
-                    # Placed beside what the legend has placed before.
-                    zorder=legend.get_zorder() + 1.0,
-                )
-
-    def _add_text(self, layout: Layout, pace: str) -> None:
+    def _add_text(self, layout: Layout, pace: str, moments: tuple[Moment, ...]) -> list[Writing]:
+        """Write title, question and pace; return clock and caption, which change."""
         text = self.figure.text
         title = text(0.02, TITLE, layout.title, fontsize=style.LARGE, fontweight="bold")
         _shorten(title, RIGHT * layout.width)
@@ -293,9 +277,50 @@ class Stage:
         above = layout.view[1] + layout.view[3] + 0.02
         slowed = text(RIGHT, above, pace, fontsize=style.NORMAL, ha="right")
         right = slowed.get_window_extent().x0 - GAP * layout.width
-        self.clock = Writing(style.NORMAL, layout.dpi, right, layout.height * (1.0 - above), "rs")
-        place = 0.02 * layout.width, (1.0 - CAPTION) * layout.height
-        self.words = Writing(style.NORMAL, layout.dpi, *place, "lm")
+        # The clock has no digits that change too fast to be read: they would cost as much as all
+        # particles.
+        steps = np.diff([moment.t for moment in moments])
+        digits = 2 if len(steps) and np.median(steps) >= 0.01 else 3
+        return [
+            Writing(
+                style.NORMAL, layout.dpi, right, layout.height * (1.0 - above), "rs",
+                lambda index: f"t = {moments[index].t:.{digits}f} s",
+            ),
+            Writing(
+                style.NORMAL, layout.dpi, 0.02 * layout.width, (1.0 - CAPTION) * layout.height,
+                "lm", lambda index: moments[index].words,
+            ),
+        ]  # fmt: skip
+
+
+def _add_legend(ax: Axes, handles: list[Line2D], *, components: bool) -> None:
+    """Name what is drawn above the scene, and last the components of the velocity."""
+    legend = ax.legend(
+        handles=handles,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=6,
+        fontsize=style.SMALL,
+        frameon=False,
+        borderaxespad=0.1,
+        borderpad=0.3,
+        handlelength=1.5,
+        columnspacing=0.8,
+        handletextpad=0.3,
+    )
+    for place, (name, colour) in enumerate(style.VELOCITY.items() if components else ()):
+        ax.annotate(
+            f"$v_{name[1]}$",
+            (1.0, 0.5),
+            xycoords=legend.get_texts()[-1],
+            xytext=(4.0 + 16.0 * place, 0.0),
+            textcoords="offset points",
+            fontsize=style.NORMAL,
+            color=colour,
+            va="center",
+            # Placed beside what the legend has placed before.
+            zorder=legend.get_zorder() + 1.0,
+        )
 
 
 def _shorten(text: Text, right: float) -> None:

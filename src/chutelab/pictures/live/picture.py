@@ -12,13 +12,13 @@ from math import degrees, isfinite, nan
 import numpy as np
 
 from chutelab.machine import Machine
-from chutelab.pictures import colours
+from chutelab.pictures import BLUE, GREY, VERMILION
 from chutelab.results import Kind, Recording
 from chutelab.results.quantities import observed
 from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet
 
-TRACK, GHOST, STRIKE = colours.BLUE, colours.GREY, colours.VERMILION
+TRACK, GHOST, STRIKE = BLUE, GREY, VERMILION
 """The track, the one before, and places of impacts."""
 
 WIDTH, TALLEST = 660, 460

@@ -10,6 +10,7 @@ from base64 import b64encode
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import product
 from math import atan2, degrees, hypot, isfinite, nan
 from typing import Any, Final
 
@@ -26,12 +27,15 @@ from chutelab.scene import Scene, SceneError
 from chutelab.scene.overrides import value_at
 from chutelab.scene.rules import unit_of
 from chutelab.scene.units import symbol
-from chutelab.scene.variants import Quantity, Variant, Vary, parse, quantities, reason, variants
+from chutelab.scene.variants import Quantity, Vary, count_of, parse, quantities, reason
 from chutelab.util.arrays import Floats
 from chutelab.util.errors import InputError
 
 MOST_VARIANTS: Final = 1_000
 """Variants on one page: two sliders of some 30 positions each."""
+
+MOST_VARIED: Final = 2
+"""Keys varied at once: a slider each."""
 
 MOST_STEPPED: Final = 24
 """Variants on one page of a scene that is stepped, because each may take seconds."""
@@ -110,31 +114,43 @@ def study(
         If what is to be varied cannot be, there is too much for a page, or no variant runs.
     """
     varied = tuple(parse(vary) if isinstance(vary, str) else vary for vary in varies)
-    found = variants(scene, varied, MOST_VARIANTS)
-    _check(found)
+    if len(varied) > MOST_VARIED:
+        raise InputError(f"at most {MOST_VARIED} keys can be varied", varied[MOST_VARIED].typed)
+    about = quantities(scene, varied)
+    total = count_of(varied, MOST_VARIANTS)
+    keys, combinations = [v.key for v in varied], list(product(*(v.values for v in varied)))
+    found: list[Scene | SceneError] = []
+    for values in combinations:
+        try:
+            found.append(scene.with_values(dict(zip(keys, values, strict=True))))
+        except SceneError as error:
+            found.append(error)
+    _check([one for one in found if isinstance(one, Scene)])
     outcomes: list[Outcome] = []
     knots = 0
-    for number, variant in enumerate(found):
-        outcomes.append(_outcome(variant))
+    for number, (values, one) in enumerate(zip(combinations, found, strict=True)):
+        if isinstance(one, SceneError):
+            outcomes.append(Outcome(values, None, reason(one)))
+        else:
+            outcomes.append(_outcome(values, one))
         recording = outcomes[-1].recording
         knots += 0 if recording is None else len(recording.knots)
         if knots > MOST_KNOTS:
             raise InputError(
-                f"{number + 1} of {len(found)} variants have {knots} knots already, at most"
+                f"{number + 1} of {total} variants have {knots} knots already, at most"
                 f" {MOST_KNOTS} fit on a page: vary in fewer steps, or take fewer particles with"
                 " --set stream.count=..."
             )
         if progress is not None:
-            progress((number + 1) / len(found))
-    result = Study(scene, varied, quantities(scene, varied), tuple(outcomes))
+            progress((number + 1) / total)
+    result = Study(scene, varied, about, tuple(outcomes))
     if not result.sound:
         raise InputError(f"{scene.source}: no variant can be run; the first: {outcomes[0].fault}")
     return result
 
 
-def _check(found: Sequence[Variant]) -> None:
+def _check(scenes: Sequence[Scene]) -> None:
     """Refuse, before anything runs, what would be too much for a page or for the one who waits."""
-    scenes = [variant.scene for variant in found if variant.scene is not None]
     most = max((scene.stream.count for scene in scenes), default=0)
     if most > MOST_PARTICLES:
         raise InputError(
@@ -150,14 +166,11 @@ def _check(found: Sequence[Variant]) -> None:
         )
 
 
-def _outcome(variant: Variant) -> Outcome:
-    scene = variant.scene
-    if scene is None:
-        return Outcome(variant.values, None, variant.fault)
+def _outcome(values: tuple[float, ...], scene: Scene) -> Outcome:
     try:
-        return Outcome(variant.values, simulate(scene))
+        return Outcome(values, simulate(scene))
     except StalledError as error:
-        return Outcome(variant.values, None, f"the run got stuck: {error}")
+        return Outcome(values, None, f"the run got stuck: {error}")
     except SceneError as error:
         fault = reason(error)
     recording = None
@@ -166,7 +179,7 @@ def _outcome(variant: Variant) -> Outcome:
         with suppress(SceneError, StalledError):
             bare = scene.with_values(dict.fromkeys(("outgoing", "run", "expect")))
             recording = simulate(bare)
-    return Outcome(variant.values, recording, fault)
+    return Outcome(values, recording, fault)
 
 
 LABELS = {

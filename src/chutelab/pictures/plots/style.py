@@ -18,29 +18,29 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from chutelab.pictures import colours
+from chutelab.pictures import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
 from chutelab.util.files import whole
 
 INK = "#000000"
 MUTED = "#595959"
-STEEL = colours.GREY
+STEEL = GREY
 STEEL_LIGHT = "#E6E6E6"
 
-TRACK = colours.BLUE
-ANALYTIC = colours.ORANGE
-BELT = colours.GREEN
-STRIKE = colours.VERMILION
-STREAM = colours.SKY
+TRACK = BLUE
+ANALYTIC = ORANGE
+BELT = GREEN
+STRIKE = VERMILION
+STREAM = SKY
 
-VELOCITY = {"vx": colours.BLUE, "vy": colours.VERMILION}
+VELOCITY = {"vx": BLUE, "vy": VERMILION}
 
 ENERGY = {
     "start": "#BFBFBF",
-    "kinetic": colours.ORANGE,
-    "potential": colours.SKY,
-    "belt_work": colours.GREEN,
-    "restitution_loss": colours.VERMILION,
-    "friction_loss": colours.PURPLE,
+    "kinetic": ORANGE,
+    "potential": SKY,
+    "belt_work": GREEN,
+    "restitution_loss": VERMILION,
+    "friction_loss": PURPLE,
     "residual": "#000000",
 }
 ENERGY_LABEL = {
@@ -87,6 +87,17 @@ def quantity(value: float, unit: str) -> str:
     factor, name = scaled(float(f"{value:.2e}"), unit)
     shown = f"{factor * value:#.3g}".rstrip(".") if value else "0"
     return f"{shown} {name}".replace("-", "−")
+
+
+def tint(colour: str, share: float, ground: str = "#FFFFFF") -> str:
+    """Return a colour mixed with a ground.
+
+    >>> tint("#0072B2", 0.5), tint("#000000", 0.25)
+    ('#80B8D8', '#BFBFBF')
+    """
+    above, below = bytes.fromhex(colour[1:]), bytes.fromhex(ground[1:])
+    mixed = (round(share * a + (1.0 - share) * b) for a, b in zip(above, below, strict=True))
+    return "#" + bytes(mixed).hex().upper()
 
 
 def dress(ax: Axes, x: str = "", y: str = "", title: str = "") -> Axes:

@@ -12,7 +12,7 @@ from matplotlib.axis import Axis
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from chutelab.checks.workprecision import METHODS, Timing
-from chutelab.pictures import colours
+from chutelab.pictures import BLUE, GREEN, ORANGE, SKY
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.style import Picture
 from chutelab.util.versions import PACKAGES
@@ -30,10 +30,10 @@ CHARACTERS = 105
 """Characters of small text that go into a line."""
 
 LOOKS: dict[str, dict[str, Any]] = {
-    "fixed": {"color": colours.ORANGE, "marker": "s", "markersize": 9.0},
-    "pymunk": {"color": colours.GREEN, "marker": "o", "markersize": 6.5},
-    "contact": {"color": colours.SKY, "marker": "P", "markersize": 8.0},
-    "exact": {"color": colours.BLUE, "marker": "*", "markersize": 15.0},
+    "fixed": {"color": ORANGE, "marker": "s", "markersize": 9.0},
+    "pymunk": {"color": GREEN, "marker": "o", "markersize": 6.5},
+    "contact": {"color": SKY, "marker": "P", "markersize": 8.0},
+    "exact": {"color": BLUE, "marker": "*", "markersize": 15.0},
 }
 """Colour and marker of each method: two signs, for readers who tell colours apart
 badly. In the order of drawing: of two at one place, the upper is the smaller."""

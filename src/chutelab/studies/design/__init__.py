@@ -18,9 +18,9 @@
 
 from chutelab.studies.design.answers import Answer, Solution
 from chutelab.studies.design.evaluation import value
-from chutelab.studies.design.quantities import DesignError
 from chutelab.studies.design.solving import maximize, minimize, solve
 from chutelab.studies.design.uncertainty import Uncertainty, uncertainty
+from chutelab.util.errors import InputError as DesignError
 
 __all__ = [
     "Answer",

@@ -6,7 +6,7 @@ does.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import isfinite
 from typing import Any, Final, Literal
@@ -259,15 +259,6 @@ digits, and the slope there is what that leaves."""
 
 KINK: Final = 1e-4
 """Relative change of a quantity across a change of course that is no jump."""
-
-
-def asked(goal: str, what: str, ranges: Sequence[Span]) -> str:
-    """Return the question in words."""
-    spans = ", ".join(
-        f"{one.key} from {one.low:g} to {one.high:g} {one.unit}".rstrip() for one in ranges
-    )
-    verb = {"solve": "Solve", "minimize": "Minimise", "maximize": "Maximise"}[goal]
-    return f"{verb} {what}, {spans}"
 
 
 def remarks(solution: Solution) -> Iterator[str]:

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import partial
-from typing import Any, Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,12 +17,10 @@ from numpy.typing import ArrayLike
 from chutelab.engines.simulation import simulate
 from chutelab.results import ENTRIES, Recording
 from chutelab.results.recorder import StalledError
-from chutelab.scene import Scene, SceneError, rules, to_dict
+from chutelab.scene import Scene, SceneError, rules
 from chutelab.scene.overrides import value_at
 from chutelab.scene.variants import is_plain, parse_range, quantity, reason
 from chutelab.studies.design.quantities import (
-    DesignError,
-    Ending,
     Quantity,
     courses_of,
     each_once,
@@ -31,6 +28,7 @@ from chutelab.studies.design.quantities import (
 )
 from chutelab.studies.sweep.batch import Block, one_line, together
 from chutelab.util.arrays import Floats, Ints, Progress
+from chutelab.util.errors import InputError
 
 FORM: Final = "must be KEY=FROM:TO, such as plate.angle_deg=0:80"
 
@@ -45,24 +43,19 @@ INSIDE: Final = 0.3819660112501051
 
 @dataclass(frozen=True)
 class Span:
-    """A key of the scene and the range that is searched.
-
-    Attributes
-    ----------
-    key, unit, label : str
-        Its full path, free surfaces by index; its unit, "" for a pure number; what it is.
-    low, high : float
-        Ends of the range, low < high.
-    start : float or None
-        The scene's own value; None if it has none.
-    """
+    """A key of the scene and the range that is searched, low < high."""
 
     key: str
+    """Full path, free surfaces by index."""
+
     unit: str
+    """ "" for a pure number."""
+
     low: float
     high: float
+
     start: float | None
-    label: str
+    """The scene's own value; None if it has none."""
 
     @property
     def width(self) -> float:
@@ -71,26 +64,19 @@ class Span:
 
 
 def ranges(scene: Scene, texts: Sequence[str]) -> tuple[Span, ...]:
-    """Read what ``--vary`` takes, several times.
-
-    Raises
-    ------
-    InputError
-        If a range cannot be read, is empty, goes beyond what the scene allows, or is of a key that
-        is unknown, no continuous number, or given twice.
-    """
+    """Read what ``--vary`` takes, several times; each is tried on the scene."""
 
     def read(text: str) -> Span:
         if text.count(":") != 1:
-            raise DesignError(f"--vary {text}", FORM)
+            raise InputError(FORM, f"--vary {text}")
         given = parse_range(text)
         home = given.key.partition(".")[0]
         if home in Scene.tables() and getattr(scene, home) in (None, ()):
             named = "[[surface]]" if home == "surface" else f"[{home}]"
-            raise DesignError(given.typed, f"the scene has no {named}")
+            raise InputError(f"the scene has no {named}", given.typed)
         about = quantity(scene, given)
         if about.whole:
-            raise DesignError(given.typed, f"{about.path} is a whole number: it cannot be searched")
+            raise InputError(f"{about.path} is a whole number: it cannot be searched", given.typed)
         low, high = given.values
         refused = []
         for tried in (low, low + INSIDE * (high - low), high):
@@ -100,12 +86,12 @@ def ranges(scene: Scene, texts: Sequence[str]) -> tuple[Span, ...]:
                 refused.append(error)
                 # What only does not go with other keys may pass.
                 if own := [fault for fault in error.faults if fault.key == about.path]:
-                    raise DesignError(given.typed, str(own[0])) from None
+                    raise InputError(str(own[0]), given.typed) from None
         if len(refused) == 3:
-            raise DesignError(given.typed, reason(refused[0]))
+            raise InputError(reason(refused[0]), given.typed)
         value = value_at(scene, about.path)
         start = float(value) if isinstance(value, (int, float)) else None
-        return Span(about.path, about.unit, low, high, start, about.label)
+        return Span(about.path, about.unit, low, high, start)
 
     return each_once("--vary", texts, read, ASK, MOST)
 
@@ -146,47 +132,30 @@ NO_RUN: Final = "no run"
 """The course of a variant that makes no scene, or cannot be run."""
 
 
-@dataclass(frozen=True, eq=False)
-class Outcomes:
-    """What became of N variants.
-
-    Attributes
-    ----------
-    values : ndarray, shape (N, M)
-        The M quantities of each, NaN where they did not happen.
-    courses : list of str, length N
-        Surfaces touched by particle 0, such as ``plate, outgoing``; `NO_RUN` without a run.
-    faults : list of str, length N
-        Why there was no run; "" where there was one.
-    """
+class Outcomes(NamedTuple):
+    """What became of N variants."""
 
     values: Floats
+    """The M quantities of each, (N, M); NaN where they did not happen."""
+
     courses: list[str]
+    """Surfaces touched by particle 0, such as ``plate, outgoing``; `NO_RUN` without a run."""
+
     faults: list[str]
+    """Why there was no run; "" where there was one."""
 
 
 @dataclass
 class Evaluator:
-    """Runs variants of a scene, and counts them.
-
-    Attributes
-    ----------
-    scene : Scene
-        What is varied.
-    keys : sequence of str
-        Full paths of the keys that are.
-    quantities : sequence of Quantity
-        What is looked at.
-    progress : callable, optional
-        Called now and then with the share that is done of the `expected` variants.
-    runs : int
-        Variants run so far.
-    """
+    """Runs variants of a scene, whose `keys` (full paths) vary, and counts them."""
 
     scene: Scene
     keys: Sequence[str]
     quantities: Sequence[Quantity]
+
     progress: Progress | None = None
+    """Called now and then with the share that is done of the `expected` variants."""
+
     expected: int = 0
     runs: int = field(default=0, init=False)
     _done: float = field(default=0.0, init=False)
@@ -194,66 +163,69 @@ class Evaluator:
     def __call__(self, points: ArrayLike) -> Outcomes:
         """Run the variants at points, shape (N, K), K values of the keys each."""
         table = np.asarray(points, dtype=np.float64)
+        if len(table) > BLOCK:
+            parts = list(map(self, np.split(table, range(BLOCK, len(table), BLOCK))))
+            return Outcomes(
+                np.concatenate([part.values for part in parts]),
+                [course for part in parts for course in part.courses],
+                [fault for part in parts for fault in part.faults],
+            )
         values = np.full((len(table), len(self.quantities)), np.nan)
         courses, faults = np.full((2, len(table)), "", dtype=object)
-        wanted = [quantity.ending for quantity in self.quantities]
-        common: Ending = "scene" if "scene" in wanted or "settled" not in wanted else "settled"
-        endings: dict[Ending, list[int]] = {}
-        for column, ending in enumerate(wanted):
-            endings.setdefault(common if ending == "any" else ending, []).append(column)
+        # The run that ends as the scene says comes last: what both runs know is read off that.
+        wanted = {quantity.ending for quantity in self.quantities} - {"any"}
+        endings = sorted(wanted, reverse=True) or ["scene"]
 
-        def read(rows: Ints, columns: list[int], recording: Recording, some: Ints) -> None:
-            for column in columns:
-                values[rows[some], column] = self.quantities[column].of(recording)
-            courses[rows[some]] = courses_of(recording, len(some))
-
-        def ran(runs: float) -> None:
-            self._done += runs
-            if self.progress is not None and self.expected:
-                self.progress(min(self._done / self.expected, 1.0))
+        def read(ending: str, recording: Recording, rows: Ints) -> None:
+            for column, one in enumerate(self.quantities):
+                if one.ending in ("any", ending):
+                    values[rows, column] = one.of(recording)
+            courses[rows] = courses_of(recording)[: len(rows)]
 
         left = set(range(len(table)))
         if len(table) >= MANY and suits(self.scene, self.keys, self.quantities):
             left = set()
-            for rows in np.split(np.arange(len(table)), range(BLOCK, len(table), BLOCK)):
-                for ending, columns in endings.items():
-                    base, keys = self.scene.with_values(_until(ending)), tuple(self.keys)
-                    block = Block(to_dict(base), base.source, keys, keys, table[rows], None)
-                    refused, alone = together(block, partial(read, rows, columns))
-                    for row, fault in refused.items():
-                        faults[rows[row]] = one_line(fault)
-                    left |= set(rows[alone].tolist())
-                    ran(len(rows) / len(endings))
+            for ending in endings:
+                base = self.scene.with_values(_until(ending))
+                runs, refused, alone = together(Block(base, tuple(self.keys), table))
+                for recording, rows in runs:
+                    read(ending, recording, rows)
+                for row, fault in refused.items():
+                    faults[row] = one_line(fault)
+                left.update(alone)
+                self._ran(len(table) / len(endings))
         for row in sorted(left):
             given = dict(zip(self.keys, table[row].tolist(), strict=True))
             try:
-                for ending, columns in endings.items():
+                for ending in endings:
                     recording = simulate(self.scene.with_values(given | _until(ending)))
-                    read(np.array([row]), columns, recording, np.array([0]))
+                    read(ending, recording, np.array([row]))
             except (SceneError, StalledError) as error:
                 faults[row] = reason(error) if isinstance(error, SceneError) else str(error)
-            ran(1)
+            self._ran(1)
         values[faults != ""] = np.nan
         courses[faults != ""] = NO_RUN
         self.runs += len(table)
         return Outcomes(values, courses.tolist(), faults.tolist())
 
+    def _ran(self, variants: float) -> None:
+        self._done += variants
+        if self.progress is not None and self.expected:
+            self.progress(min(self._done / self.expected, 1.0))
 
-def _until(ending: str) -> dict[str, Any]:
+
+def _until(ending: str) -> dict[str, str]:
     return {"run.until": "settled"} if ending == "settled" else {}
 
 
 def value(scene: Scene, name: str) -> float:
     """Run a scene and return one of its quantities; NaN if it did not happen.
 
-    Parameters
-    ----------
-    name : str
-        See `chutelab.studies.design.quantities`.
+    Names are those of `chutelab.studies.design.quantities`.
 
     Raises
     ------
-    DesignError
+    InputError
         If the scene has no such quantity.
     SceneError
         If it cannot be run.

@@ -1,12 +1,11 @@
 """What can be aimed at: numbers of a run, keys of the scene and plain numbers, with their units.
 
 >>> from chutelab.scene import load
->>> wish = target(load("perpendicular"), "landing.vx = outgoing.speed")
->>> wish.left.unit, wish.right.name
+>>> left, right = target(load("perpendicular"), "landing.vx = outgoing.speed")
+>>> left.unit, right.name
 ('m/s', 'outgoing.speed')
 
-Also here: `DesignError`, the course of a particle (which surfaces it touches up to its landing),
-and a solved scene as TOML text.
+Also here: the course of a particle, which surfaces it touches up to its landing.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from itertools import groupby, pairwise
+from itertools import groupby
 from math import nan
 from typing import Any, Final, Literal, TypeVar
 
@@ -32,45 +31,25 @@ from chutelab.util.versions import library
 T = TypeVar("T")
 
 
-class DesignError(InputError):
-    """A question that makes no sense for the scene; says what was typed, and what is allowed."""
-
-    def __init__(self, typed: str, allowed: str) -> None:
-        super().__init__(allowed, typed)
-        self.args = typed, allowed
-
-
 def each_once(
     option: str, texts: Sequence[str], read: Callable[[str], T], ask: str, most: int
 ) -> tuple[T, ...]:
-    """Read what an option takes, given 1 to `most` times; each result has another `key`.
-
-    Raises
-    ------
-    DesignError
-        If it is not given, too often, or twice for one key; and what `read` raises.
-    """
+    """Read what an option takes, given 1 to `most` times; each result has another `key`."""
     if not texts:
-        raise DesignError(option, ask)
+        raise InputError(ask, option)
     if len(texts) > most:
-        raise DesignError(f"{option} {texts[most]}", f"at most {most} keys are allowed")
+        raise InputError(f"at most {most} keys are allowed", f"{option} {texts[most]}")
     found: dict[str, T] = {}
     for text in texts:
         one: Any = read(text)
         if one.key in found:
-            raise DesignError(f"{option} {text}", f"{one.key} is given already")
+            raise InputError(f"{one.key} is given already", f"{option} {text}")
         found[one.key] = one
     return tuple(found.values())
 
 
 def scipy(name: str) -> Any:
-    """Return a module of SciPy, such as ``optimize``.
-
-    Raises
-    ------
-    MissingLibraryError
-        Without SciPy; says what to install.
-    """
+    """Return a module of SciPy, such as ``optimize``; without SciPy say what to install."""
     return library(f"scipy.{name}", "SciPy is needed", "design")
 
 
@@ -82,35 +61,37 @@ LONGEST: Final = 6
 """Surfaces that are named: what is thrown to and fro longer goes by the same name."""
 
 
-def courses_of(recording: Recording, count: int | None = None) -> list[str]:
-    """Return the surfaces that each of the first `count` particles touches up to its landing.
+def courses_of(recording: Recording) -> list[str]:
+    """Return the surfaces that each particle touches up to its landing.
 
-    Such as ``plate, outgoing``, or ``plate, never lands (exit)``. Of all particles by default.
+    Such as ``plate, outgoing``, or ``plate, never lands (exit)``.
     """
-    count = recording.count if count is None else count
-    events = recording.events[np.isin(recording.events["kind"], (Kind.IMPACT, Kind.LANDING))]
-    events = events[np.argsort(events["particle"], kind="stable")]
-    bounds = np.searchsorted(events["particle"], np.arange(count + 1)).tolist()
-    surfaces, landed = events["surface"].tolist(), (events["kind"] == Kind.LANDING).tolist()
+    touched: list[list[int]] = [[] for _ in range(recording.count)]
+    landed = [False] * recording.count
+    events = recording.select(Kind.IMPACT, Kind.LANDING)
+    columns = (events[name].tolist() for name in ("particle", "surface", "kind"))
+    for particle, surface, kind in zip(*columns, strict=True):
+        if not landed[particle]:
+            touched[particle].append(surface)
+            landed[particle] = kind == Kind.LANDING
 
     @cache
-    def course(touched: tuple[int, ...], end: str) -> str:
+    def course(surfaces: tuple[int, ...], end: str) -> str:
         names = []
-        for surface, group in groupby(touched):
+        for surface, group in groupby(surfaces):
             times = len(list(group))
             often = {1: "", 2: " twice"}.get(times, f" {times} times")
             often = often if times < MANY else " many times"
             names.append(f"{recording.surfaces[surface]}{often}")
         if len(names) > LONGEST:
             names[LONGEST - 1 :] = ["and so on"]
-        return ", ".join([*names, *([f"never lands ({end})"] if end else [])])
+        return ", ".join([*names, end] if end else names)
 
-    found = []
-    for particle, (start, stop) in enumerate(pairwise(bounds)):
-        last = next((i for i in range(start, stop) if landed[i]), None)
-        touched = tuple(surfaces[start : stop if last is None else last + 1])
-        found.append(course(touched, REASONS[recording.ended[particle]] if last is None else ""))
-    return found
+    ends = [
+        "" if down else f"never lands ({REASONS[reason]})"
+        for down, reason in zip(landed, recording.ended.tolist(), strict=True)
+    ]
+    return [course(tuple(one), end) for one, end in zip(touched, ends, strict=True)]
 
 
 Ending = Literal["any", "scene", "settled"]
@@ -130,25 +111,16 @@ that work per particle times the stream's rate."""
 
 @dataclass(frozen=True)
 class Quantity:
-    """A number of a run, the value of a key of the scene, or a plain number.
-
-    Attributes
-    ----------
-    name, unit : str
-        As it was asked for, and its unit.
-    key : str
-        Of a run: its full name, see `chutelab.scene.rules`. Of the scene: the full path.
-    source : {"run", "scene", "number"}
-        Where it is read.
-    ending : {"any", "scene", "settled"}
-        How the run must end.
-    number : float
-        A plain number.
-    """
+    """A number of a run, the value of a key of the scene, or a plain number."""
 
     name: str
+    """As it was asked for."""
+
     unit: str
+
     key: str = ""
+    """Of a run: its full name, see `chutelab.scene.rules`. Of the scene: the full path."""
+
     source: Literal["run", "scene", "number"] = "run"
     ending: Ending = "any"
     number: float = 0.0
@@ -174,30 +146,12 @@ class Quantity:
         return value
 
 
-@dataclass(frozen=True)
-class Target:
-    """Two quantities that are to be equal."""
-
-    left: Quantity
-    right: Quantity
-
-    def __str__(self) -> str:
-        return f"{self.left.name} = {self.right.name}"
-
-
 def measured(scene: Scene, name: str, typed: str = "") -> Quantity:
-    """Return the quantity of a scene that has this name, short or full.
-
-    Parameters
-    ----------
-    name : str
-        Such as ``belt_work``, ``landing.x`` or ``ledger.by_surface.plate.restitution_loss``.
-    typed : str
-        What messages call it.
+    """Return the quantity of a scene that has this name, short or full; messages call it `typed`.
 
     Raises
     ------
-    DesignError
+    InputError
         If the scene has no such quantity.
     """
     # What comes before the landing, and the landing itself, is there however the run ends.
@@ -210,35 +164,35 @@ def measured(scene: Scene, name: str, typed: str = "") -> Quantity:
             advice += f"; short are {', '.join(SHORT)}"
         if name not in SHORT:
             advice = did_you_mean(name, SHORT, advice, cutoff=0.75)
-        raise DesignError(typed or name, f"no such quantity here; {advice}")
+        raise InputError(f"no such quantity here; {advice}", typed or name)
     return Quantity(name, "W" if name == "power" else unit, key, ending=ending)
 
 
-def target(scene: Scene, text: str) -> Target:
+def target(scene: Scene, text: str) -> tuple[Quantity, Quantity]:
     """Read ``QUANTITY=VALUE``: a quantity, and the number, key or quantity that it is to equal.
 
     Raises
     ------
-    DesignError
+    InputError
         If it is not of that form, one of them is unknown, or their units differ.
     """
     typed = f"--target {text}"
     name, equals, given = (part.strip() for part in text.partition("="))
     if not (name and equals and given):
-        raise DesignError(
-            typed, "must be QUANTITY=VALUE, such as landing.x=1.2 or landing.vx=outgoing.speed"
+        raise InputError(
+            "must be QUANTITY=VALUE, such as landing.x=1.2 or landing.vx=outgoing.speed", typed
         )
     left = measured(scene, name, typed)
     right = _right(scene, given, typed, left)
     if right.source == "number" and right.unit == "":
         right = replace(right, name=f"{right.name} {left.unit}".strip(), unit=left.unit)
     if right.unit != left.unit:
-        raise DesignError(
-            typed, f"{left.name} is {_in(left.unit)}, and {right.name} is {_in(right.unit)}"
+        raise InputError(
+            f"{left.name} is {_in(left.unit)}, and {right.name} is {_in(right.unit)}", typed
         )
     if right == left:
-        raise DesignError(typed, "both sides are the same")
-    return Target(left, right)
+        raise InputError("both sides are the same", typed)
+    return left, right
 
 
 def _in(unit: str) -> str:
@@ -248,22 +202,18 @@ def _in(unit: str) -> str:
 def _right(scene: Scene, text: str, typed: str, left: Quantity) -> Quantity:
     try:
         number, unit = read_size(text)
+        return Quantity(f"{number:.12g} {unit}".strip(), unit, source="number", number=number)
     except ValueError as error:
         if text[0].isdigit() or text[0] in "+-.":
-            raise DesignError(
-                typed, f"{text} is no number of a quantity {_in(left.unit)}; {error}"
-            ) from None
-    else:
-        return Quantity(f"{number:.12g} {unit}".strip(), unit, source="number", number=number)
+            allowed = f"{text} is no number of a quantity {_in(left.unit)}; {error}"
+            raise InputError(allowed, typed) from None
     if text in SHORT or rules.unit_of(text, scene.surfaces) is not None:
         return measured(scene, text, typed)
     try:
         found = quantity(scene, Vary(text, (0.0,), typed))
     except InputError as error:
-        allowed = error.allowed
-        raise DesignError(
-            typed, f"{text} is neither a number, nor a quantity, nor a key of the scene: {allowed}"
-        ) from None
+        allowed = f"{text} is neither a number, nor a quantity, nor a key of the scene"
+        raise InputError(f"{allowed}: {error.allowed}", typed) from None
     if not isinstance(value_at(scene, found.path), (int, float)):
-        raise DesignError(typed, f"{found.path} has no number as its value in this scene")
+        raise InputError(f"{found.path} has no number as its value in this scene", typed)
     return Quantity(found.path, found.unit, found.path, "scene")

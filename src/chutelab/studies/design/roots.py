@@ -24,15 +24,6 @@ from chutelab.util.arrays import Floats
 Function = Callable[[float], float]
 
 
-def bracketed(function: Function, low: float, high: float) -> float:
-    """Return a root between two values at which the function has different signs."""
-    # brentq takes no absolute width of 0, and no relative one below four roundings.
-    width = float(np.spacing(max(abs(low), abs(high))))
-    rtol = 4.0 * float(np.finfo(float).eps)
-    found = scipy("optimize").brentq(function, low, high, xtol=width, rtol=rtol, maxiter=300)
-    return float(found)
-
-
 def bounded(function: Function, low: float, high: float, sign: float = 1.0) -> tuple[float, float]:
     """Return where `sign` times a function is least between two values, and how much that is.
 
@@ -60,25 +51,19 @@ ROUNDS: Final = 60
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """Two values of the key, as close as numbers get, between which the course changes.
-
-    Attributes
-    ----------
-    low, high : float
-        The values.
-    values : ndarray, shape (2, M)
-        The quantities there; NaN where they have no value.
-    courses : tuple of str
-        The way of particle 0 before and after.
-    fault : str
-        Why there is no run on one of the sides, "" if there is.
-    """
+    """Two values of the key, as close as numbers get, between which the course changes."""
 
     low: float
     high: float
+
     values: Floats
+    """The M quantities on both sides, (2, M); NaN where they have no value."""
+
     courses: tuple[str, str]
+    """The way of particle 0 before and after."""
+
     fault: str = ""
+    """Why there is no run on one of the sides, "" if there is."""
 
     @property
     def at(self) -> float:
@@ -137,73 +122,34 @@ class _Point(NamedTuple):
 
 
 def scan(evaluate: Evaluator, low: float, high: float, points: int) -> Scan:
-    """Look at a range of the evaluator's only key, and close in on each change of course.
+    """Look at a grid over the range of the evaluator's only key, and close in on changes of course.
 
-    Parameters
-    ----------
-    evaluate : Evaluator
-        Of one key.
-    low, high : float
-        The range.
-    points : int
-        Of the grid, at least 3.
+    Each round halves the intervals in which the course changes. What is seen on the way is kept: it
+    crowds where the function may be steepest, on both sides of a change.
     """
-    found = _at(evaluate, np.linspace(low, high, points))
-    every = [found[0]]
-    changes, complete = 0, True
-    for point in found[1:]:
-        while every[-1].course != point.course:
-            if changes >= MOST_CHANGES:
-                complete = False
-                break
-            changes += 1
-            first, second, between = _closed(evaluate, every[-1], point)
-            every += [*between, first]
-            if second.x == point.x:
-                break
-            every.append(second)
-        every.append(point)
-    ascending = sorted({point.x: point for point in every}.values(), key=lambda point: point.x)
-    parts = [list(part) for _, part in groupby(ascending, lambda point: point.course)]
+    seen: list[_Point] = []
+    new, complete = np.linspace(low, high, points).tolist(), True
+    for _ in range(1 + ROUNDS):
+        found = evaluate(np.reshape(new, (-1, 1)))
+        seen += map(_Point, new, found.values, found.courses, found.faults)
+        seen.sort(key=lambda point: point.x)
+        around = [(a.x, b.x) for a, b in pairwise(seen) if a.course != b.course]
+        complete = len(around) <= MOST_CHANGES
+        new = [0.5 * (a + b) for a, b in around[:MOST_CHANGES] if a < 0.5 * (a + b) < b]
+        if not new:
+            break
+    parts = [list(part) for _, part in groupby(seen, lambda point: point.course)]
     wide = [part for part in parts if part[-1].x - part[0].x > SLIVER * (high - low)] or parts[:1]
     pieces = []
     for part in wide:
         x, values, courses, _ = zip(*part, strict=True)
         pieces.append(Piece(np.array(x), np.array(values), courses[0]))
-    seams = []
+    changes = []
     for (*_, a), (b, *_) in pairwise(wide):
         fault = a.fault if a.course == NO_RUN else b.fault
-        seams.append(Change(a.x, b.x, np.stack([a.values, b.values]), (a.course, b.course), fault))
-    return Scan(tuple(pieces), tuple(seams), complete)
-
-
-def _at(evaluate: Evaluator, x: Floats) -> list[_Point]:
-    found = evaluate(x[:, np.newaxis])
-    return list(map(_Point, x.tolist(), found.values, found.courses, found.faults))
-
-
-def _closed(
-    evaluate: Evaluator, first: _Point, second: _Point
-) -> tuple[_Point, _Point, list[_Point]]:
-    """Return the last point with the course of the first, the one after it, and those on the way.
-
-    The latter crowd where the function may be steepest, on both sides of the change.
-    """
-    goal, seen = second.course, []
-    for _ in range(ROUNDS):
-        x = 0.5 * (first.x + second.x)
-        if not first.x < x < second.x:
-            break
-        (middle,) = _at(evaluate, np.array([x]))
-        seen.append(middle)
-        if middle.course == first.course:
-            first = middle
-        else:
-            second = middle
-    if second.course != goal:
-        # A third course lies between: what is beyond it is looked at again.
-        seen = [point for point in seen if point.x <= first.x]
-    return first, second, [point for point in seen if point.course in (first.course, goal)]
+        sides = np.stack([a.values, b.values])
+        changes.append(Change(a.x, b.x, sides, (a.course, b.course), fault))
+    return Scan(tuple(pieces), tuple(changes), complete)
 
 
 CLOSE: Final = 1e-9
@@ -238,16 +184,8 @@ class Roots(NamedTuple):
 
 
 def roots(found: Scan, function: Function) -> Roots:
-    """Find where a function is 0.
-
-    Parameters
-    ----------
-    found : Scan
-        Of two quantities, whose difference the function is.
-    function : callable
-        The difference of the two at a value of the key.
-    """
-    zero = CLOSE * found.size
+    """Find where a function is 0: the difference of the two quantities of a scan."""
+    brentq, zero = scipy("optimize").brentq, CLOSE * found.size
     ends, width = (found.x[0], found.x[-1]), float(np.ptp(found.x))
     at: list[float] = []
     everywhere: list[tuple[float, float]] = []
@@ -273,7 +211,10 @@ def roots(found: Scan, function: Function) -> Roots:
             crossing = np.flatnonzero(signs[:-1] * signs[1:] < 0.0)
             lone[crossing] = lone[crossing + 1] = False
             met = x[(f == 0.0) | (size <= small) & lone].tolist()
-            met += [bracketed(function, x[i], x[i + 1]) for i in crossing.tolist()]
+            for low, high in zip(x[crossing].tolist(), x[crossing + 1].tolist(), strict=True):
+                # It takes no absolute width of 0, and no relative one below four roundings.
+                xtol, rtol = np.spacing(max(abs(low), abs(high))), 4.0 * np.finfo(float).eps
+                met.append(brentq(function, low, high, xtol=xtol, rtol=rtol, maxiter=300))
             for root in met:
                 if abs(function(root)) <= zero * (LIMIT if root in (first, last) else 1.0):
                     at.append(root)
@@ -348,16 +289,9 @@ class Least(NamedTuple):
 
 
 def minima(found: Scan, function: Function, sign: float = 1.0) -> tuple[Least, ...]:
-    """Return the local minima of a range, the least of all first.
+    """Return the local minima of the quantity of a scan, the least of all first.
 
-    Parameters
-    ----------
-    found : Scan
-        Of one quantity.
-    function : callable
-        The quantity at a value of the key.
-    sign : float
-        -1.0 for maxima, which then are negative.
+    With a sign of -1.0 its maxima, whose values then are negative.
     """
     low, high = found.x[0], found.x[-1]
     step = EVEN * found.size

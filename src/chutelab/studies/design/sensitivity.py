@@ -152,17 +152,7 @@ class Sensitivity:
 def sensitivities(
     evaluate: Evaluator, ranges: Sequence[Span], at: Floats, columns: Sequence[int]
 ) -> tuple[Sensitivity, ...]:
-    """Return what each key does to some quantities at a point.
-
-    Parameters
-    ----------
-    evaluate : Evaluator
-        Of the keys of `ranges`.
-    at : ndarray, shape (K,)
-        The point.
-    columns : sequence of int
-        Which of the evaluator's quantities.
-    """
+    """Return what each key does to some of the evaluator's quantities at a point, (K,)."""
     found = []
     for one, unit in zip(ranges, np.eye(len(at)), strict=True):
         derivative = _derivatives(evaluate, at, unit * one.width)
@@ -187,35 +177,27 @@ def _derivatives(evaluate: Evaluator, at: Floats, along: Floats) -> Floats:
     the two agree best, since next to a jump the function may bend within any step. `along` is the
     range of the key in its own direction, (K,).
     """
-    width = float(along.sum())
-    outcome = evaluate(at[np.newaxis])
-    here = outcome.values[0]
-    sides: dict[float, dict[float, Floats]] = {1.0: {}, -1.0: {}}
-    for share in STEPS:
-        for sign, found in sides.items():
-            near = evaluate([at + sign * share * part * along for part in (1.0, 0.5)])
-            if set(near.courses) == set(outcome.courses):
-                found[share] = near.values
-    slopes = []
-    for share in STEPS:
-        step = share * width
-        if all(share in found for found in sides.values()):
-            far, half = (sides[1.0][share] - sides[-1.0][share]) / (step * np.array([[2.0], [1.0]]))
-            rounding = ROUNDING * np.abs(here) / step
-            slopes.append(((4.0 * half - far) / 3.0, np.abs(half - far) + rounding))
-    if slopes:
-        values, apart = (np.array(part) for part in zip(*slopes, strict=True))
+    (here,), (course,), _ = evaluate(at[np.newaxis])
+    steps = np.multiply.outer(STEPS, (1.0, 0.5))
+    shares = np.multiply.outer((1.0, -1.0), steps)
+    found = evaluate(at + shares.reshape(-1, 1) * along)
+    # Both sides, all steps, whole and half: (2, S, 2), and for values the M quantities.
+    values = found.values.reshape(*shares.shape, -1)
+    usable = (np.array(found.courses) == course).reshape(shares.shape).all(axis=2)
+    steps = steps[..., np.newaxis] * along.sum()
+    both = usable.all(axis=0)
+    if both.any():
+        far, half = np.moveaxis((values[0] - values[1])[both] / (2.0 * steps[both]), 1, 0)
+        apart = np.abs(half - far) + ROUNDING * np.abs(here) / steps[both, 0]
         best = np.argmin(np.where(np.isfinite(apart), apart, np.inf), axis=0)
-        chosen: Floats = np.take_along_axis(values, best[np.newaxis], axis=0)[0]
+        chosen: Floats = np.take_along_axis((4.0 * half - far) / 3.0, best[np.newaxis], axis=0)[0]
         return chosen
-    for sign, found in sides.items():
-        for share in reversed(STEPS):
-            if share in found:
-                far, half = (found[share] - here) / (
-                    sign * share * width * np.array([[1.0], [0.5]])
-                )
-                # A slope that depends on the step is none: at a grazing blow it is infinite.
-                steady = np.abs(half - far) <= STEADY * np.abs(half)
-                slope: Floats = np.where(steady, 2.0 * half - far, np.nan)
-                return slope
+    for side, sign in enumerate((1.0, -1.0)):
+        if usable[side].any():
+            smallest = np.flatnonzero(usable[side])[-1]
+            far, half = (values[side, smallest] - here) / (sign * steps[smallest])
+            # A slope that depends on the step is none: at a grazing blow it is infinite.
+            steady = np.abs(half - far) <= STEADY * np.abs(half)
+            slope: Floats = np.where(steady, 2.0 * half - far, np.nan)
+            return slope
     return np.full(len(here), np.nan)

@@ -9,19 +9,20 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import isfinite
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from chutelab.scene import Scene
-from chutelab.studies.design.answers import Answer, Goal, Solution, asked
-from chutelab.studies.design.evaluation import Evaluator, ranges
-from chutelab.studies.design.quantities import DesignError, Quantity, measured, scipy
+from chutelab.studies.design.answers import Answer, Goal, Solution
+from chutelab.studies.design.evaluation import Evaluator, Span, ranges
+from chutelab.studies.design.quantities import Quantity, measured, scipy
 from chutelab.studies.design.quantities import target as wish
 from chutelab.studies.design.roots import CLOSE, Scan, level, minima, roots, scan
 from chutelab.studies.design.sensitivity import sensitivities
 from chutelab.util.arrays import Floats, Progress
+from chutelab.util.errors import InputError
 
 NOWHERE: Final = 1e30
 """Stands for a variant without the quantity: worse than any other, but a number still."""
@@ -36,60 +37,48 @@ SIMPLEX: Final = {"xatol": 1e-12, "fatol": 1e-15, "maxiter": 600, "adaptive": Tr
 
 
 def least(
-    batch: Callable[[Floats], Floats],
-    keys: int,
-    seed: int,
-    residuals: Callable[[Floats], Floats] | None = None,
+    function: Callable[[Floats], Floats], ranges: Sequence[Span], seed: int, *, squares: bool
 ) -> tuple[Floats, float]:
-    """Return where a function over the unit cube is least, shape (keys,), and how much it is.
+    """Return where a function of several keys is least, shape (K,), and how much it is.
 
-    Parameters
-    ----------
-    batch : callable
-        Points (N, keys) to values (N,); NaN where there is none.
-    keys : int
-        Dimensions.
-    seed : int
-        Of the random draws.
-    residuals : callable, optional
-        A point (keys,) to residuals whose squares the function is the sum of: the polish then is a
-        least-squares one, which gets to the last digits.
+    It takes points (N, K) and gives (N, 1), NaN where there is no value. With `squares` it gives
+    (N, R), and what is least is the sum of their squares: the polish then is a least-squares one,
+    which gets to the last digits.
     """
     optimize = scipy("optimize")
+    low, high = np.array([(one.low, one.high) for one in ranges]).T
 
-    def energies(columns: Floats) -> Floats:
-        values = batch(np.atleast_2d(columns.T))
-        return np.where(np.isfinite(values), values, NOWHERE)
+    def scaled(shares: Floats) -> Floats:
+        # low + share * width may pass the end by a rounding, which a scene would refuse.
+        return np.asarray(np.clip(low + shares * (high - low), low, high))
+
+    def values(columns: Floats) -> Floats:
+        found = function(scaled(np.atleast_2d(columns.T)))
+        found = np.sum(found**2, axis=1) if squares else found[:, 0]
+        return np.where(np.isfinite(found), found, NOWHERE)
 
     searched = optimize.differential_evolution(
-        energies,
-        [(0.0, 1.0)] * keys,
-        seed=seed,
-        popsize=POPULATION,
-        maxiter=GENERATIONS,
-        tol=1e-8,
-        atol=1e-12,
-        init="sobol",
-        polish=False,
-        vectorized=True,
-        updating="deferred",
-    )
+        values, [(0.0, 1.0)] * len(ranges), seed=seed, popsize=POPULATION, maxiter=GENERATIONS,
+        tol=1e-8, atol=1e-12, init="sobol", polish=False, vectorized=True, updating="deferred",
+    )  # fmt: skip
     if searched.fun >= NOWHERE:
         return searched.x, np.nan
-    if residuals is None:
-        polished = optimize.minimize(
-            lambda point: float(energies(point)[0]), searched.x, method="Nelder-Mead",
-            bounds=[(0.0, 1.0)] * keys, options=SIMPLEX,
+    if squares:
+        polished = optimize.least_squares(
+            lambda point: np.nan_to_num(function(scaled(point[np.newaxis]))[0], nan=1e6),
+            searched.x, bounds=(0.0, 1.0), xtol=1e-15, ftol=1e-15, gtol=1e-15, x_scale=1.0,
+            jac="3-point", diff_step=1e-6, max_nfev=60,
         )  # fmt: skip
     else:
-        polished = optimize.least_squares(
-            lambda point: np.nan_to_num(residuals(point), nan=1e6), searched.x, bounds=(0.0, 1.0),
-            xtol=1e-15, ftol=1e-15, gtol=1e-15, x_scale=1.0, jac="3-point", diff_step=1e-6,
-            max_nfev=60,
+        polished = optimize.minimize(
+            lambda point: float(values(point)[0]), searched.x, method="Nelder-Mead",
+            bounds=[(0.0, 1.0)] * len(ranges), options=SIMPLEX,
         )  # fmt: skip
-    at: Floats = np.clip(polished.x, 0.0, 1.0)
-    value = float(energies(at)[0])
-    return (at, value) if value < searched.fun else (searched.x, float(searched.fun))
+    at = np.clip(polished.x, 0.0, 1.0)
+    value = float(values(at)[0])
+    if value < searched.fun:
+        return scaled(at), value
+    return scaled(searched.x), float(searched.fun)
 
 
 POINTS: Final = 181
@@ -151,21 +140,22 @@ def solve(
     >>> round(found.answer.values[0], 6)
     47.254812
     """
-    search = _Search(scene, vary, points, seed, progress)
     texts = [target] if isinstance(target, str) else list(target)
     if not texts:
-        raise DesignError("--target", "name at least one, such as landing.vx=outgoing.speed")
+        raise InputError("name at least one, such as landing.vx=outgoing.speed", "--target")
     wishes = [wish(scene, text) for text in texts]
-    keys, count = len(search.ranges), len(wishes)
-    if count > keys:
-        raise DesignError(
-            f"--target {texts[-1]}", f"{count} targets need as many keys to vary, {keys} given"
+    if len({left.key for left, _ in wishes}) < len(wishes):
+        raise InputError("this quantity has a target already", f"--target {texts[-1]}")
+    what = ", ".join(f"{left.name} = {right.name}" for left, right in wishes)
+    sides = [side for wanted in wishes for side in wanted]
+    search = _Search("solve", what, sides, scene, vary, points, seed, progress)
+    keys = len(search.ranges)
+    if len(wishes) > keys:
+        raise InputError(
+            f"{len(wishes)} targets need as many keys to vary, {keys} given",
+            f"--target {texts[-1]}",
         )
-    if len({one.left.key for one in wishes}) < count:
-        raise DesignError(f"--target {texts[-1]}", "this quantity has a target already")
-    search.look_at([side for one in wishes for side in (one.left, one.right)])
-    found = search.roots() if keys == 1 else search.system(count)
-    return search.solution("solve", ", ".join(map(str, wishes)), **found)
+    return search.roots() if keys == 1 else search.system(len(wishes))
 
 
 def minimize(
@@ -182,7 +172,8 @@ def minimize(
     Parameters, result and errors are those of `solve`, with a quantity such as ``belt_work`` or
     ``landing.t`` for the target.
     """
-    return _extremum("minimize", quantity, _Search(scene, vary, points, seed, progress))
+    wanted = [measured(scene, quantity, f"--minimize {quantity}")]
+    return _Search("minimize", quantity, wanted, scene, vary, points, seed, progress).extremum()
 
 
 def maximize(
@@ -195,14 +186,8 @@ def maximize(
     progress: Progress | None = None,
 ) -> Solution:
     """Find the values of some keys for which a quantity is largest; see `minimize`."""
-    return _extremum("maximize", quantity, _Search(scene, vary, points, seed, progress))
-
-
-def _extremum(goal: Literal["minimize", "maximize"], name: str, search: _Search) -> Solution:
-    search.look_at([measured(search.scene, name, f"--{goal} {name}")])
-    sign = 1.0 if goal == "minimize" else -1.0
-    found = search.minima(name, sign) if len(search.ranges) == 1 else search.minimum(sign)
-    return search.solution(goal, name, **found)
+    wanted = [measured(scene, quantity, f"--maximize {quantity}")]
+    return _Search("maximize", quantity, wanted, scene, vary, points, seed, progress).extremum()
 
 
 class _Search:
@@ -210,6 +195,9 @@ class _Search:
 
     def __init__(
         self,
+        goal: Goal,
+        what: str,
+        quantities: Sequence[Quantity],
         scene: Scene,
         vary: str | Sequence[str],
         points: int,
@@ -217,27 +205,24 @@ class _Search:
         progress: Progress | None,
     ) -> None:
         if not FEWEST <= points <= MOST:
-            raise DesignError(f"--points {points}", f"must be from {FEWEST} to {MOST}")
+            raise InputError(f"must be from {FEWEST} to {MOST}", f"--points {points}")
         if seed < 0:
-            raise DesignError(f"--seed {seed}", "must be a whole number from 0")
-        self.scene = scene
+            raise InputError("must be a whole number from 0", f"--seed {seed}")
+        self.goal, self.what, self.points, self.seed = goal, what, points, seed
         self.ranges = ranges(scene, [vary] if isinstance(vary, str) else list(vary))
-        self.points, self.seed, self.progress = points, seed, progress
-
-    def look_at(self, quantities: Sequence[Quantity]) -> None:
-        """Choose the quantities; of targets both sides, one after the other."""
         scipy("optimize")
         keys = [one.key for one in self.ranges]
-        runs = self.points + MORE if len(keys) == 1 else 800 * len(keys)
-        self.evaluate = Evaluator(self.scene, keys, quantities, self.progress, runs)
+        runs = points + MORE if len(keys) == 1 else 800 * len(keys)
+        # Of targets both sides, one after the other.
+        self.evaluate = Evaluator(scene, keys, quantities, progress, runs)
 
     def scan(self) -> Scan:
         """Return the whole range of the only key."""
         (one,) = self.ranges
         return scan(self.evaluate, one.low, one.high, self.points)
 
-    def roots(self) -> dict[str, Any]:
-        """Return what a `Solution` holds for one key and one target."""
+    def roots(self) -> Solution:
+        """Solve for one key and one target."""
         (one,), seen = self.ranges, self.scan()
 
         def function(x: float) -> float:
@@ -255,29 +240,24 @@ class _Search:
         if not answers and found.everywhere:
             low, high = found.everywhere[0]
             answers = [self.answer([min(max(own, low), high)])]
-        return {
-            "answers": answers, "nearest": nearest, "everywhere": found.everywhere,
-            "jumps": found.jumps, "best": best, "scan": seen,
-        }  # fmt: skip
+        return self.solution(
+            answers, scan=seen, nearest=nearest, everywhere=found.everywhere, jumps=found.jumps,
+            best=best,
+        )  # fmt: skip
 
-    def system(self, targets: int) -> dict[str, Any]:
-        """Return what a `Solution` holds for several keys and some targets."""
+    def system(self, targets: int) -> Solution:
+        """Solve for several keys and some targets."""
 
-        def apart(shares: Floats) -> Floats:
-            sides = self.evaluate(self.scaled(shares)).values.reshape(-1, targets, 2)
-            return sides[:, :, 0] - sides[:, :, 1]
+        def apart(points: Floats) -> Floats:
+            sides = self.evaluate(points).values.reshape(-1, targets, 2)
+            return np.asarray((sides[:, :, 0] - sides[:, :, 1]) / sizes)
 
         keys = len(self.ranges)
-        middle = self.evaluate(self.scaled(np.full((1, keys), 0.5))).values[0]
+        middle = self.evaluate([[one.low + 0.5 * one.width for one in self.ranges]]).values[0]
         sizes = np.nanmax(np.abs(middle).reshape(targets, 2), axis=1, initial=0.0)
         sizes[sizes == 0.0] = 1.0
-        at, value = least(
-            lambda shares: np.sum((apart(shares) / sizes) ** 2, axis=1),
-            keys,
-            self.seed,
-            lambda share: apart(share[np.newaxis])[0] / sizes,
-        )
-        answer = self.answer(self.scaled(at)) if isfinite(value) else None
+        at, value = least(apart, self.ranges, self.seed, squares=True)
+        answer = self.answer(at) if isfinite(value) else None
         notes = []
         if targets < keys:
             notes.append(
@@ -285,43 +265,35 @@ class _Search:
                 " the one that the search came upon."
             )
         if answer and value**0.5 <= CLOSE:
-            return {"answers": [answer], "notes": notes}
-        return {"answers": [], "nearest": answer, "notes": notes}
+            return self.solution([answer], notes)
+        return self.solution([], notes, nearest=answer)
 
-    def minima(self, name: str, sign: float) -> dict[str, Any]:
-        """Return what a `Solution` holds for one key and the least (sign 1) or largest (-1)."""
+    def extremum(self) -> Solution:
+        """Minimise or maximise the quantity."""
+        sign = -1.0 if self.goal == "maximize" else 1.0
+        if len(self.ranges) > 1:
+            at, value = least(
+                lambda points: sign * self.evaluate(points).values, self.ranges, self.seed,
+                squares=False,
+            )  # fmt: skip
+            low, high = np.array([(one.low, one.high) for one in self.ranges]).T
+            at_end = np.minimum(at - low, high - at) <= 1e-9 * (high - low)
+            place = "end" if at_end.any() else "inside"
+            return self.solution([self.answer(at, place)] if isfinite(value) else [])
         seen = self.scan()
         lows = minima(seen, lambda x: float(self.evaluate([[x]]).values[0, 0]), sign)
         answers = [self.answer([low.at], low.place, slopes=low is lows[0]) for low in lows]
-        notes = []
-        if level(seen):
-            answers = [replace(answers[0], place="inside")]
-            notes.append(f"{name} is the same over the whole range: it does not depend on it.")
-        return {"answers": answers, "scan": seen, "notes": notes}
-
-    def minimum(self, sign: float) -> dict[str, Any]:
-        """Return the same for several keys."""
-        at, value = least(
-            lambda shares: sign * self.evaluate(self.scaled(shares)).values[:, 0],
-            len(self.ranges),
-            self.seed,
-        )
-        place = "end" if np.any((at <= 1e-9) | (at >= 1.0 - 1e-9)) else "inside"
-        return {"answers": [self.answer(self.scaled(at), place)] if isfinite(value) else []}
-
-    def scaled(self, shares: Floats) -> Floats:
-        """Return values of the keys, 0 to 1 each from one end of its range to the other."""
-        low, high = np.array([(one.low, one.high) for one in self.ranges]).T
-        # low + share * width may pass the end by a rounding, which a scene would refuse.
-        scaled: Floats = np.clip(low + shares * (high - low), low, high)
-        return scaled
+        if not level(seen):
+            return self.solution(answers, scan=seen)
+        note = f"{self.what} is the same over the whole range: it does not depend on it."
+        return self.solution([replace(answers[0], place="inside")], [note], scan=seen)
 
     def answer(self, at: ArrayLike, place: str = "inside", *, slopes: bool = True) -> Answer:
         """Return what is found at a point (K,)."""
         point = np.asarray(at, dtype=np.float64)
         outcome = self.evaluate(point[np.newaxis])
         values = outcome.values[0].tolist()
-        every = 2 if len(values) > 1 else 1
+        every = 2 if self.goal == "solve" else 1
         columns = range(0, len(values), every)
         return Answer(
             tuple(point.tolist()),
@@ -334,27 +306,29 @@ class _Search:
 
     def solution(
         self,
-        goal: Goal,
-        what: str,
-        *,
         answers: Sequence[Answer],
         notes: Sequence[str] = (),
         scan: Scan | None = None,
         **found: Any,
     ) -> Solution:
         """Return the result, with what holds for all questions."""
+        quantities = self.evaluate.quantities
         said = []
-        if any(quantity.ending == "settled" for quantity in self.evaluate.quantities):
+        if any(quantity.ending == "settled" for quantity in quantities):
             said.append("What the belt pays is counted until nothing slips on it any more.")
         if scan is not None and not scan.complete:
             said.append(
                 "The particle's way changes too often to find every place where it does: narrow"
                 " the range, or raise --points."
             )
-        wanted = self.evaluate.quantities[:: 2 if goal == "solve" else 1]
+        verb = {"solve": "Solve", "minimize": "Minimise", "maximize": "Maximise"}[self.goal]
+        spans = [
+            f"{one.key} from {one.low:g} to {one.high:g} {one.unit}".rstrip() for one in self.ranges
+        ]
+        wanted = quantities[:: 2 if self.goal == "solve" else 1]
         return Solution(
-            asked=asked(goal, what, self.ranges),
-            goal=goal,
+            asked=", ".join([f"{verb} {self.what}", *spans]),
+            goal=self.goal,
             ranges=self.ranges,
             quantities=tuple(one.name for one in wanted),
             units=tuple(one.unit for one in wanted),
@@ -362,7 +336,7 @@ class _Search:
             runs=self.evaluate.runs,
             seed=self.seed,
             notes=(*said, *notes),
-            base=self.scene,
+            base=self.evaluate.scene,
             scan=scan,
             **found,
         )

@@ -19,9 +19,10 @@ from chutelab.scene.overrides import limits_of, parts_of, rule_at, value_at
 from chutelab.scene.units import read_size, with_unit
 from chutelab.scene.variants import Vary, quantity, reason
 from chutelab.studies.design.evaluation import INSIDE, Evaluator
-from chutelab.studies.design.quantities import DesignError, each_once, measured, scipy
+from chutelab.studies.design.quantities import each_once, measured, scipy
 from chutelab.studies.design.sensitivity import Indices, crossed, design, indices
 from chutelab.util.arrays import Floats, Progress
+from chutelab.util.errors import InputError
 from chutelab.util.files import csv_text
 from chutelab.util.tables import Sheet, Shown, frame, plain
 
@@ -40,7 +41,9 @@ HOMES: Final = ("plate", "incoming", "outgoing", "particle", "stream")
 MOST: Final = 12
 """Uncertain inputs at once."""
 
-_SIGN: Final = re.compile(r"±|\+/-|\+-")
+_GIVEN: Final = re.compile(
+    r"(?P<key>[^=]+)=(?P<mean>[^:]*?)(?:±|\+/-|\+-)(?P<spread>[^:]*?)(?::(?P<law>.*))?"
+)
 
 
 @dataclass(frozen=True)
@@ -93,24 +96,17 @@ class Spread:
 
 
 def spreads(scene: Scene, texts: Sequence[str]) -> tuple[Spread, ...]:
-    """Read what ``--uncertainty`` takes, several times.
-
-    Raises
-    ------
-    InputError
-        If one cannot be read, or is of a key that is unknown, no continuous number, or given twice.
-    """
+    """Read what ``--uncertainty`` takes, several times; each is tried on the scene."""
 
     def read(text: str) -> Spread:
         typed = f"--uncertainty {text}"
-        key, equals, given = (part.strip() for part in text.partition("="))
-        given, _, law = (part.strip() for part in given.partition(":"))
-        parts = [part.strip() for part in _SIGN.split(given)]
-        if not (key and equals) or len(parts) != 2 or not parts[1]:
-            raise DesignError(typed, FORM)
+        match = _GIVEN.fullmatch(text)
+        if match is None:
+            raise InputError(FORM, typed)
+        key, middle, width, law = (part.strip() for part in match.groups(default=""))
         if law not in ("", *LAWS):
             known = " and ".join(LAWS)
-            raise DesignError(typed, f"{law} is no distribution here; there are {known}")
+            raise InputError(f"{law} is no distribution here; there are {known}", typed)
         if "." not in key and "[" not in key and key not in Scene.model_fields:
             homes = (home for home in HOMES if getattr(scene, home) is not None)
             known_in = (home for home in homes if key in Scene.tables()[home].model_fields)
@@ -121,31 +117,31 @@ def spreads(scene: Scene, texts: Sequence[str]) -> tuple[Spread, ...]:
             try:
                 value, found = read_size(text)
             except ValueError as error:
-                raise DesignError(typed, f"{text or 'nothing'}: {error}; it {FORM}") from None
+                raise InputError(f"{text or 'nothing'}: {error}; it {FORM}", typed) from None
             if found not in ("", unit):
                 allowed = f"it is in {unit}" if unit else "it is a pure number"
-                raise DesignError(typed, f"wrong unit in {text}: {allowed}")
+                raise InputError(f"wrong unit in {text}: {allowed}", typed)
             return value
 
         own = value_at(scene, about.path)
-        if parts[0]:
-            mean = number(parts[0], about.unit)
+        if middle:
+            mean = number(middle, about.unit)
         elif isinstance(own, (int, float)):
             mean = float(own)
         else:
-            raise DesignError(typed, f"{about.path} has no value in this scene: give the mean, too")
-        if parts[1].endswith("%"):
-            spread = abs(mean) * number(parts[1].removesuffix("%"), "") / 100.0
+            raise InputError(f"{about.path} has no value in this scene: give the mean, too", typed)
+        if width.endswith("%"):
+            spread = abs(mean) * number(width.removesuffix("%"), "") / 100.0
         else:
-            spread = number(parts[1], about.unit)
+            spread = number(width, about.unit)
         if not spread > 0.0:
-            raise DesignError(typed, f"the spread {parts[1]} must be more than 0; it {FORM}")
+            raise InputError(f"the spread {width} must be more than 0; it {FORM}", typed)
         low, high = limits_of(rule_at(parts_of(about.path)) or {}) or (-np.inf, np.inf)
         for value in (mean, float(np.clip(mean + INSIDE * spread, low, high))):
             try:
                 scene.with_values({about.path: value})
             except SceneError as error:
-                raise DesignError(typed, reason(error)) from None
+                raise InputError(reason(error), typed) from None
         kind: Literal["normal", "uniform"] = "uniform" if law == "uniform" else "normal"
         return Spread(about.path, about.unit, mean, spread, kind, low, high)
 
@@ -337,11 +333,11 @@ def uncertainty(
     names = list(dict.fromkeys(quantities))
     wanted = [measured(scene, name, f"quantity {name}") for name in names]
     if not wanted:
-        raise DesignError("quantities", "name at least one, such as landing.x")
+        raise InputError("name at least one, such as landing.x", "quantities")
     if not FEWEST <= samples <= MOST_SAMPLES:
-        raise DesignError(f"samples {samples}", f"must be from {FEWEST} to {MOST_SAMPLES}")
+        raise InputError(f"must be from {FEWEST} to {MOST_SAMPLES}", f"samples {samples}")
     if seed < 0:
-        raise DesignError(f"seed {seed}", "must be a whole number from 0")
+        raise InputError("must be a whole number from 0", f"seed {seed}")
     samples = 1 << (int(samples) - 1).bit_length()
     runs = samples * (len(inputs) + 2) + 1
     evaluate = Evaluator(scene, [one.key for one in inputs], wanted, progress, runs)

@@ -7,9 +7,7 @@ does not fit is left over, to be run alone: that is never wrong, only slower.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -18,37 +16,36 @@ from chutelab.engines.simulation import simulate
 from chutelab.machine import Machine, RefusedError, build, members
 from chutelab.results import Recording
 from chutelab.results.recorder import StalledError
-from chutelab.scene import Scene, SceneError, from_dict
-from chutelab.scene.variants import accepted, family, is_plain, judged_by, reason, setting
+from chutelab.scene import Scene, SceneError
+from chutelab.scene.variants import accepted, family, is_plain, judged_by, reason
 from chutelab.studies.sweep.rows import REASON, Columns, empty, rows
 from chutelab.util.arrays import Floats, Ints
 
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Variants to be simulated; plain data, so that it can be sent to another process.
+    """Variants to be simulated; can be sent to another process.
 
     Attributes
     ----------
-    document, source : dict, str
-        The scene, as `chutelab.scene.to_dict` has it, and what messages call it.
-    keys, paths : tuple of str
-        What is varied, as it was written, and full paths, with free surfaces by index.
+    scene : Scene
+        What is varied.
+    paths : tuple of str
+        Full paths of the K keys that are, free surfaces by index.
     values : ndarray, (n, K)
         The values of each variant.
     engine : str or None
         Overrides ``run.engine``.
     """
 
-    document: dict[str, Any]
-    source: str
-    keys: tuple[str, ...]
+    scene: Scene
     paths: tuple[str, ...]
     values: Floats
-    engine: str | None
+    engine: str | None = None
 
-
-Reader = Callable[[Recording, Ints], None]
+    def settings(self, row: int) -> dict[str, float]:
+        """Return the values of one variant by path."""
+        return dict(zip(self.paths, self.values[row].tolist(), strict=True))
 
 
 def screened(block: Block) -> tuple[Scene | None, Ints, dict[int, str]]:
@@ -74,8 +71,7 @@ def screened(block: Block) -> tuple[Scene | None, Ints, dict[int, str]]:
         )
         more = asked.copy()
         for row in first[sound[first]].tolist():
-            settings = map(setting, block.keys, values[row].tolist())
-            by = judged_by(block.document, [*settings])
+            by = judged_by(block.scene, block.settings(row))
             more |= [path in by for path in block.paths]
         if (more == asked).all():
             break
@@ -83,7 +79,7 @@ def screened(block: Block) -> tuple[Scene | None, Ints, dict[int, str]]:
     template, wrong = None, dict[int, str]()
     for number, row in enumerate(first.tolist()):
         try:
-            scene = _scene(block, row)
+            scene = block.scene.with_values(block.settings(row))
             template = template or scene
         except SceneError as error:
             wrong[number] = reason(error)
@@ -91,16 +87,10 @@ def screened(block: Block) -> tuple[Scene | None, Ints, dict[int, str]]:
     return template, np.delete(np.arange(len(values)), list(faults)), faults
 
 
-def _scene(block: Block, row: int) -> Scene:
-    """Return one variant of a block; a `SceneError` if its values make no scene."""
-    settings = map(setting, block.keys, block.values[row].tolist())
-    return from_dict(block.document, block.source, [*settings])
-
-
 def alone(block: Block, row: int) -> Columns:
     """Validate and simulate one variant of a block, and return its row."""
     try:
-        return row_of(_scene(block, row), block.engine)
+        return row_of(block.scene.with_values(block.settings(row)), block.engine)
     except SceneError as error:
         return because(reason(error))
 
@@ -128,25 +118,18 @@ def one_line(why: str) -> str:
     return " ".join(why.split())
 
 
-def together(block: Block, read: Reader) -> tuple[dict[int, str], list[int]]:
-    """Run what can be run at once of a block whose keys are plain numbers.
-
-    Parameters
-    ----------
-    block : Block
-        See `chutelab.scene.variants.is_plain`.
-    read : callable
-        Takes a recording with a particle for each of N variants, whose scene is a family, and their
-        rows in the block, (N,); called for each group of variants that went through.
+def together(block: Block) -> tuple[list[tuple[Recording, Ints]], dict[int, str], list[int]]:
+    """Run what can be run at once of a block whose keys are plain numbers, see `is_plain`.
 
     Returns
     -------
-    faults, left
-        Why there is no run, by row; and the rows that have to be run alone.
+    runs, faults, left
+        Recordings with a particle for each of N variants, whose scene is a family, and their rows
+        in the block, (N,); why there is no run, by row; and the rows that have to be run alone.
     """
     template, which, faults = screened(block)
-    if template is None or not _fits(template, block.paths, block.engine):
-        return faults, which.tolist()
+    if template is None or not _fits(template, block):
+        return [], faults, which.tolist()
 
     def scenes(some: Ints) -> Scene:
         return family(template, dict(zip(block.paths, block.values[some].T.copy(), strict=True)))
@@ -160,31 +143,30 @@ def together(block: Block, read: Reader) -> tuple[dict[int, str], list[int]]:
             which = np.delete(which, list(refused.members))
         else:
             groups = [(machine, which, alike) for alike in kinds(machine)]
+    runs: list[tuple[Recording, Ints]] = []
     left: list[int] = []
     while groups:
         machine, which, part = groups.pop()
         which = which[part]
         machine = replace(members(machine, part), scene=scenes(which))
         try:
-            recording = run(machine, apart=True)
+            runs.append((run(machine, apart=True), which))
         except (CornerError, StalledError):
             # Whoever does not get through is found by halving.
             halves = np.array_split(np.arange(len(which)), 2) if len(which) > 1 else []
             groups += [(machine, which, half) for half in halves]
             left += [] if halves else which.tolist()
-        else:
-            read(recording, which)
-    return faults, left
+    return runs, faults, left
 
 
-def _fits(scene: Scene, paths: tuple[str, ...], engine: str | None) -> bool:
+def _fits(scene: Scene, block: Block) -> bool:
     """Tell whether a scene and the like of it go through the exact engine, one particle each."""
-    wanted = scene.run.engine if engine is None else engine
+    wanted = block.engine or scene.run.engine
     if wanted in ("contact", "pymunk") or scene.stream.count > 1:
         return False
     # Whether such a release lies on the belt is a matter of the last digits.
     at_risk = {"particle.radius", "incoming.pulley_radius", "incoming.length"}
-    return scene.stream.at is None or at_risk.isdisjoint(paths)
+    return scene.stream.at is None or at_risk.isdisjoint(block.paths)
 
 
 def swept(block: Block) -> Columns:
@@ -195,12 +177,11 @@ def swept(block: Block) -> Columns:
         for name, values in columns.items():
             found[name][which] = values
 
-    def read(recording: Recording, which: Ints) -> None:
-        put(which, rows(recording, len(which)))
-
     left = list(range(len(block.values)))
-    if all(is_plain(path) for path in block.paths):
-        faults, left = together(block, read)
+    if all(map(is_plain, block.paths)):
+        runs, faults, left = together(block)
+        for recording, which in runs:
+            put(which, rows(recording, len(which)))
         for row, fault in faults.items():
             found[REASON][row] = one_line(fault)
     for row in left:

@@ -6,13 +6,13 @@ Values are grids, or samples of several ranges at once: Latin hypercube or Sobol
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 
 from chutelab.engines.simulation import ENGINES
-from chutelab.scene import Scene, to_dict
+from chutelab.scene import Scene
 from chutelab.scene.variants import (
     Quantity,
     Range,
@@ -22,6 +22,7 @@ from chutelab.scene.variants import (
     parse_range,
     quantities,
 )
+from chutelab.studies.sweep.batch import Block
 from chutelab.util.arrays import Floats
 from chutelab.util.errors import InputError
 from chutelab.util.versions import library
@@ -43,44 +44,45 @@ class Plan:
 
     Attributes
     ----------
-    document, source : dict, str
-        The scene, as `chutelab.scene.to_dict` has it, and what messages call it.
-    title : str
-        Of the scene.
+    scene : Scene
+        What is varied.
     varies : tuple of Vary
         Keys, and the values of each in a grid, or the ends of what samples are drawn from.
     quantities : tuple of Quantity
-        What the keys are.
+        What the K keys are.
     engine : str or None
         Overrides ``run.engine``.
     samples : ndarray, (N, K), or None
         Values of the keys; None for the grid, in which the last key runs fastest.
-    count : int
-        Number of variants N.
     """
 
-    document: dict[str, Any] = field(repr=False)
-    source: str
-    title: str
+    scene: Scene
     varies: tuple[Vary, ...]
     quantities: tuple[Quantity, ...]
     engine: str | None
     samples: Floats | None
-    count: int
 
     @property
     def keys(self) -> tuple[str, ...]:
         """The varied keys, as they were written."""
         return tuple(vary.key for vary in self.varies)
 
-    def values(self, first: int, last: int) -> Floats:
-        """Return the values of the variants from `first` up to `last`, (n, K)."""
+    @property
+    def count(self) -> int:
+        """Number of variants N."""
+        return count_of(self.varies) if self.samples is None else len(self.samples)
+
+    def block(self, first: int, last: int) -> Block:
+        """Return the variants from `first` up to `last`."""
         if self.samples is not None:
-            return self.samples[first:last] + 0.0
-        axes = [np.array(vary.values) for vary in self.varies]
-        places = np.unravel_index(np.arange(first, last), tuple(map(len, axes)))
+            values = self.samples[first:last]
+        else:
+            axes = [np.array(vary.values) for vary in self.varies]
+            places = np.unravel_index(np.arange(first, last), tuple(map(len, axes)))
+            values = np.stack([axis[at] for axis, at in zip(axes, places, strict=True)], axis=1)
+        paths = tuple(quantity.path for quantity in self.quantities)
         # + 0.0: there is one zero.
-        return np.stack([axis[at] for axis, at in zip(axes, places, strict=True)], axis=1) + 0.0
+        return Block(self.scene, paths, values + 0.0, self.engine)
 
 
 def planned(
@@ -135,19 +137,10 @@ def planned(
     for vary, one in zip(varied, about, strict=True):
         if one.whole and not all(value.is_integer() for value in vary.values):
             raise InputError(f"{one.path} takes whole numbers only", vary.typed)
-    samples = None
-    if sample is not None:
-        samples = _drawn(varied, about, sample, design, seed)
-    return Plan(
-        document=to_dict(scene),
-        source=scene.source,
-        title=scene.title,
-        varies=varied,
-        quantities=about,
-        engine=engine,
-        samples=samples,
-        count=count_of(varied, MOST_VARIANTS) if samples is None else len(samples),
-    )
+    if sample is None:
+        count_of(varied, MOST_VARIANTS)
+        return Plan(scene, varied, about, engine, None)
+    return Plan(scene, varied, about, engine, _drawn(varied, about, sample, design, seed))
 
 
 def _drawn(

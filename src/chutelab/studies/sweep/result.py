@@ -12,7 +12,7 @@ import json
 import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import chain
 from math import isnan
@@ -23,6 +23,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from chutelab.scene import to_dict
 from chutelab.scene.variants import Quantity
 from chutelab.studies.sweep.plan import Plan
 from chutelab.studies.sweep.rows import NUMBERS, REASON
@@ -187,7 +188,8 @@ class Sweep(Shown):
         )
 
 
-FORMAT: Final = 1
+FORMAT: Final = 2
+"""Of the file of finished rows."""
 
 INTERVAL: Final = 0.5
 """s between two times that the file is forced to the disk: what an interruption may cost."""
@@ -211,32 +213,26 @@ def part_of(out: Path) -> Path:
 @contextmanager
 def unfinished(
     out: Path, plan: Plan, *, resume: bool
-) -> Iterator[tuple[dict[int, str], Callable[[int, int, str], None]]]:
+) -> Iterator[tuple[dict[int, str], Callable[[int, str], None]]]:
     """Keep the rows of a sweep that are finished beside the file it is to write, until all are.
 
-    Gives the rows that are there already, as text, by where their block begins; and what appends a
-    block: its begin, how many rows it has, and their text.
+    The first line of the file is about the sweep; each other one has the number that a block begins
+    with, and its rows as text, in JSON.
 
-    Parameters
-    ----------
-    out : Path
-        The file that the sweep is to write.
-    plan : Plan
-        What is swept.
-    resume : bool
-        Whether to go on with a file that is there; without, there must be none.
+    Gives the texts that are there already, by the beginnings of their blocks; and a function that
+    adds a block.
 
     Raises
     ------
     InputError
-        If the file is of another sweep, there although it should not be, or cannot be written.
+        If the file is of another sweep, there although not to `resume`, or cannot be written.
     """
     samples = None if plan.samples is None else hashlib.sha256(plan.samples.tobytes()).hexdigest()
     head = {
         "format": FORMAT,
         "chutelab": version_of("chutelab"),
-        "scene": json.loads(json.dumps(plan.document)),
-        "vary": [[vary.key, list(vary.values)] for vary in plan.varies],
+        "scene": to_dict(plan.scene),
+        "vary": [[vary.key, vary.values] for vary in plan.varies],
         "samples": samples,
         "engine": plan.engine,
     }
@@ -250,10 +246,10 @@ def unfinished(
         os.fsync(file.fileno())
         last = monotonic()
 
-    def add(begin: int, count: int, text: str) -> None:
+    def add(begin: int, text: str) -> None:
         nonlocal added
         added = True
-        file.write(f"@{begin},{count}\n{text}".encode())
+        file.write(json.dumps([begin, text]).encode() + b"\n")
         if monotonic() - last >= INTERVAL:
             sync()
 
@@ -266,7 +262,19 @@ def unfinished(
                 f"{path} holds the finished rows of a sweep that was interrupted: go on"
                 " with --resume, or remove the file"
             )
-        length = 0 if new else _length(path, data, head, done)
+        length = 0
+        if not new:
+            first, *blocks = data.splitlines(keepends=True)
+            _check_same(path, first, line)
+            length = len(first)
+            # The last one may have been cut off; nothing counts from there on.
+            with suppress(ValueError):
+                for block in blocks:
+                    if not block.endswith(b"\n"):
+                        break
+                    begin, text = json.loads(block)
+                    done[begin] = text
+                    length += len(block)
         file = path.open("r+b" if data else "wb")
         file.truncate(length)
         file.seek(length)
@@ -286,31 +294,17 @@ def unfinished(
             path.unlink()
 
 
-def _length(path: Path, data: bytes, head: Mapping[str, Any], done: dict[int, str]) -> int:
-    """Read a file of finished rows into `done`; return the length of what is whole."""
-    first, newline, _ = data.partition(b"\n")
+def _check_same(path: Path, first: bytes, line: bytes) -> None:
+    """Refuse a file whose first line is not that of this sweep, and say in what it differs."""
     try:
-        found = json.loads(first) if newline else None
+        found = json.loads(first)
     except ValueError:
         found = None
     if not isinstance(found, dict):
         raise InputError(f"{path} holds no rows of a sweep: remove it, or choose --out")
+    head = json.loads(line)
     if other := [words for key, words in WORDS.items() if found.get(key) != head[key]]:
         raise InputError(
             f"{path} is of another sweep, with a difference in {', '.join(other)}: repeat"
             " that command, or remove the file and begin anew"
         )
-    length, lines, at = len(first) + 1, data.split(b"\n")[1:-1], 0
-    while at < len(lines) and lines[at].startswith(b"@"):
-        try:
-            begin, count = map(int, lines[at].removeprefix(b"@").split(b","))
-            rows = lines[at + 1 : at + 1 + count]
-            text = b"".join(row + b"\n" for row in rows).decode()
-        except ValueError:
-            break
-        if len(rows) < count:
-            break
-        done[begin] = text
-        length += sum(len(line) + 1 for line in [lines[at], *rows])
-        at += 1 + count
-    return length

@@ -23,6 +23,7 @@ from chutelab.results.quantities import (
     from_events,
     never,
 )
+from chutelab.scene.rules import NEEDED
 from chutelab.theory import unbounded
 from chutelab.util.arrays import Bools, Floats
 
@@ -64,22 +65,15 @@ def joined(parts: Sequence[Mapping[str, NDArray[Any]]]) -> Columns:
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
-WAY = ((Kind.SEPARATION, "incoming"), (Kind.IMPACT, "plate"), (Kind.LANDING, "outgoing"))
-"""The events that the equations describe, in this order."""
-
 OTHER = (Kind.COLLISION, Kind.STICK, Kind.SETTLE)
-"""Kinds of events that they do not know of, on the way or on another surface."""
+"""Events that the theory's equations do not know of, before the landing or on another surface."""
 
 
 def deviation(recording: Recording, shape: tuple[int, int]) -> Floats:
-    """Return the largest relative error, (V,), as `results.comparison` measures it; NaN for none.
+    """Return the largest relative error against the theory of V variants, (V,); NaN without one.
 
-    Parameters
-    ----------
-    recording : Recording
-        Of one variant, or a family of them.
-    shape : tuple of int
-        Variants V, and the particles M of each.
+    Measured as in `results.comparison`. `predict` takes one scene at a time; so of each variant,
+    of M particles, the events tell how far the equations hold. `shape` is (V, M).
     """
     (count, every), scene = shape, recording.scene
     if scene.incoming is None or scene.plate is None or (scene.stream.interact and every > 1):
@@ -91,53 +85,47 @@ def deviation(recording: Recording, shape: tuple[int, int]) -> Floats:
     (x, y), (vx, vy) = release["position"].T, release["velocity"].T
     begins = released & (y == belt.pulley_radius + scene.particle.radius) & (x <= 0.0)
     begins &= (-belt.length <= x) & (vx == belt.speed) & (vy == 0.0)
-    events = _way(recording, every, count)
-    for one in events:
-        one[~begins] = never(1)
-    simulated, theory = from_events(scene, *events), unbounded(scene)
+    simulated = from_events(scene, *_described(recording, begins))
     if every == 1 and "outgoing" in recording.surfaces:
         # What the outgoing belt paid is comparable where nothing slips on it any more.
         paid, over = _paid(recording, count), recording.ended == REASONS.index("settled")
         simulated["belt_work"] = np.where(over, paid["belt_work"], np.nan)
         simulated["slip_heat"] = np.where(over, paid["friction_loss"], np.nan)
+    theory = unbounded(scene)
     sizes = scales(scene, theory)
     worst = np.full(count, np.nan)
     for name, found in simulated.items():
-        expected = getattr(theory, name)
-        errors = relative_error(found, expected, sizes[QUANTITIES[name]])
+        errors = relative_error(found, getattr(theory, name), sizes[QUANTITIES[name]])
         worst = np.fmax(worst, np.where(np.isfinite(errors), errors, np.nan))
     return worst
 
 
-def _way(recording: Recording, every: int, count: int) -> list[NDArray[Any]]:
-    """Return leaving, blow and landing of particle 0 of each variant, NaN from where it strays."""
-    events = recording.events
-    kinds = [int(kind) for kind, _ in WAY] + [int(kind) for kind in OTHER]
-    incoming = recording.surface_index("incoming")
+def _described(recording: Recording, holds: Bools) -> list[NDArray[Any]]:
+    """Return separation, impact and landing of particle 0 of each of V variants.
+
+    The equations hold where these are its first three events, in this order. They did not happen
+    from the first event on that is another one, nor in variants whose `holds`, (V,), is false.
+    """
+    events, every = recording.events, recording.count // len(holds)
+    kinds = [int(kind) for kind in (Kind.SEPARATION, Kind.IMPACT, Kind.LANDING, *OTHER)]
     # Grip and slip on the belt and the pulley are in the equations.
-    known = (events["kind"] == Kind.STICK) & (events["surface"] == incoming)
-    mine = np.isin(events["kind"], kinds) & (events["particle"] % every == 0) & ~known
-    own = events[mine]
+    known = events["kind"] == Kind.STICK
+    known &= events["surface"] == recording.surface_index("incoming")
+    own = events[np.isin(events["kind"], kinds) & (events["particle"] % every == 0) & ~known]
     own = own[np.argsort(own["particle"], kind="stable")]
     variant = own["particle"] // every
-    rank = np.arange(len(own)) - np.searchsorted(variant, variant)
+    place = np.arange(len(own)) - np.searchsorted(variant, variant)
+    found = []
+    for n in range(len(NEEDED)):
+        at, one = place == n, never(len(holds))
+        one[variant[at]] = own[at]
+        found.append(one)
     # A carried particle leaves the belt with a blow that throws it off, too.
-    second = np.full(count, np.nan)
-    second[variant[rank == 1]] = own["t"][rank == 1]
-    found = [never(count) for _ in WAY]
-    astray = np.zeros(count, dtype=bool)
-    for n, ((kind, surface), into) in enumerate(zip(WAY, found, strict=True)):
-        at = rank == n
-        there, which = variant[at], own[at]
-        fits = (which["kind"] == kind) & (which["surface"] == recording.surface_index(surface))
-        here = np.zeros(count, dtype=bool)
-        here[there] = fits
-        here &= ~astray
-        into[there[here[there]]] = which[here[there]]
-        astray = ~here
-    early = found[0]["t"] >= second
-    for into in found:
-        into[early] = never(1)
+    holds = holds & ~(found[0]["t"] >= found[1]["t"])
+    for one, (event, surface) in zip(found, NEEDED.items(), strict=True):
+        holds = holds & (one["kind"] == Kind[event.upper()])
+        holds &= one["surface"] == recording.surface_index(surface)
+        one[~holds] = never(1)
     return found
 
 
@@ -160,53 +148,43 @@ def rows(recording: Recording, variants: int = 1) -> Columns:
     variants : int
         How many.
     """
-    found, scene = empty(variants), recording.scene
+    found, scene, released = empty(variants), recording.scene, recording.released
     shape = variants, recording.count // variants
-    released, began = recording.released, np.full(recording.count, np.nan)
-    began[released] = recording.ends()[0]["t"]
+    begin, end = recording.ends()
+    began = np.full(recording.count, np.nan)
+    began[released] = begin["t"]
     landings = first(recording, "landing")
-    landed = np.isfinite(landings["t"])
     values = {f"landing.{name}": column(landings, name) for name in ("x", "y", "vx", "vy")}
-    values["landing.t"] = landings["t"] - began
+    values |= {"landing.t": landings["t"] - began, "time": end_times(recording) - began}
     for name, value in values.items():
-        found[name], spread = _mean_and_spread(value.reshape(shape), landed.reshape(shape))
+        found[name], spread = _mean_and_spread(value.reshape(shape))
         if f"{name}_spread" in found:
             found[f"{name}_spread"] = spread
-    found["time"], _ = _mean_and_spread(
-        (end_times(recording) - began).reshape(shape), released.reshape(shape)
-    )
-    _balance(found, recording, shape)
+    (kinetic_first, potential_first), (kinetic, potential) = map(recording.energies, (begin, end))
+    change = (kinetic - kinetic_first) + (potential - potential_first)
+    whole = np.zeros((2, recording.count))
+    whole[0, released] = change - balance(end["entries"])
+    whole[1, released] = end["entries"][:, ENTRIES.index("restitution_loss")]
+    found["residual"], found["restitution_loss"] = whole.reshape(2, *shape).sum(axis=2)
     if scene.outgoing is not None:
-        found["misses"] = (shape[1] - landed.reshape(shape).sum(axis=1)).astype(np.float64)
-        _tell(found[REASON], recording, ~landed.reshape(shape))
+        paid = _paid(recording, variants)
+        found["belt_work"], found["slip_heat"] = paid["belt_work"], paid["friction_loss"]
+        found["power"] = np.asarray(found["belt_work"] / shape[1] * scene.stream.rate)
+        missed = np.isnan(landings["t"]).reshape(shape)
+        found["misses"] = missed.sum(axis=1).astype(np.float64)
+        _tell(found[REASON], recording, missed)
     found["error"] = deviation(recording, shape)
     return found
 
 
-def _mean_and_spread(values: Floats, counted: Bools) -> tuple[Floats, Floats]:
-    """Return mean and standard deviation over the particles that count, (V,) of (V, M)."""
-    count = counted.sum(axis=1)
+def _mean_and_spread(values: Floats) -> tuple[Floats, Floats]:
+    """Return mean and standard deviation over the particles that have a value, (V,) of (V, M)."""
+    has = np.isfinite(values)
+    count = has.sum(axis=1)
     some = np.maximum(count, 1)
-    mean = np.where(counted, values, 0.0).sum(axis=1) / some
-    square = np.where(counted, (values - mean[:, None]) ** 2, 0.0).sum(axis=1) / some
+    mean = np.where(has, values, 0.0).sum(axis=1) / some
+    square = np.where(has, (values - mean[:, None]) ** 2, 0.0).sum(axis=1) / some
     return np.where(count > 0, mean, np.nan), np.where(count > 0, np.sqrt(square), np.nan)
-
-
-def _balance(found: Columns, recording: Recording, shape: tuple[int, int]) -> None:
-    """Fill in the energies."""
-    ends = recording.ends()
-    (kinetic_first, potential_first), (kinetic_last, potential_last) = map(recording.energies, ends)
-    change = (kinetic_last - kinetic_first) + (potential_last - potential_first)
-    whole = np.zeros((2, recording.count))
-    released, entries = recording.released, ends[1]["entries"]
-    whole[0, released] = change - balance(entries)
-    whole[1, released] = entries[:, ENTRIES.index("restitution_loss")]
-    found["residual"], found["restitution_loss"] = whole.reshape(2, *shape).sum(axis=2)
-    if "outgoing" in recording.surfaces:
-        paid = _paid(recording, shape[0])
-        found["belt_work"], found["slip_heat"] = paid["belt_work"], paid["friction_loss"]
-        rate = recording.scene.stream.rate
-        found["power"] = np.asarray(found["belt_work"] / shape[1] * rate)
 
 
 def _paid(recording: Recording, count: int) -> dict[str, Floats]:

@@ -26,7 +26,7 @@ from typing import Any, Final
 
 from chutelab.scene import Scene
 from chutelab.scene.variants import Vary, is_plain
-from chutelab.studies.sweep.batch import Block, swept
+from chutelab.studies.sweep.batch import swept
 from chutelab.studies.sweep.plan import Plan, planned
 from chutelab.studies.sweep.result import (
     Sweep,
@@ -303,7 +303,7 @@ def sweep_to(
         for begin, columns in _work(plan, team, texts, progress):
             blocks[begin] = columns
             texts[begin] = text_of(columns)
-            add(begin, len(columns[REASON]), texts[begin])
+            add(begin, texts[begin])
         order = sorted(texts)
         result = _gathered(plan, [blocks[begin] for begin in order])
         if form == "csv":
@@ -322,27 +322,23 @@ def _work(
     """Yield where blocks begin, and their rows, but for those that are done."""
     size = _size(plan)
     begins = [begin for begin in range(0, plan.count, size) if begin not in done]
-    paths = tuple(quantity.path for quantity in plan.quantities)
-
-    def block(begin: int) -> Block:
-        values = plan.values(begin, min(begin + size, plan.count))
-        return Block(plan.document, plan.source, plan.keys, paths, values, plan.engine)
-
+    jobs = ((begin, plan.block(begin, min(begin + size, plan.count))) for begin in begins)
     over = plan.count - sum(min(size, plan.count - begin) for begin in begins)
-    for begin, columns in team.results(swept, ((begin, block(begin)) for begin in begins)):
-        over += len(columns[REASON])
+    for begin, columns in team.results(swept, jobs):
+        count = len(columns[REASON])
+        over += count
         if progress is not None:
             progress(over / plan.count)
-        values = plan.values(begin, begin + len(columns[REASON]))
-        yield begin, {**dict(zip(plan.keys, values.T.copy(), strict=True)), **columns}
+        varied = plan.block(begin, begin + count).values.T.copy()
+        yield begin, {**dict(zip(plan.keys, varied, strict=True)), **columns}
 
 
 def _size(plan: Plan) -> int:
     """Return how many variants make a block; it depends on the plan only, so that it can resume."""
-    stream, run = plan.document.get("stream", {}), plan.document.get("run", {})
-    one = stream.get("count", 1) == 1 and "stream.count" not in plan.keys
-    wanted = plan.engine or run.get("engine", "auto")
-    if wanted in ("contact", "pymunk") or (stream.get("interact", False) and not one):
+    stream = plan.scene.stream
+    one = stream.count == 1 and "stream.count" not in plan.keys
+    wanted = plan.engine or plan.scene.run.engine
+    if wanted in ("contact", "pymunk") or (stream.interact and not one):
         return STEPPED
     plain = all(is_plain(quantity.path) for quantity in plan.quantities)
     return TOGETHER if one and plain else EXACT
@@ -350,9 +346,9 @@ def _size(plan: Plan) -> int:
 
 def _gathered(plan: Plan, blocks: Sequence[Columns]) -> Sweep:
     return Sweep(
-        title=plan.title,
+        title=plan.scene.title,
         quantities=dict(zip(plan.keys, plan.quantities, strict=True)),
         columns=joined(blocks),
         shape=None if plan.samples is not None else tuple(len(v.values) for v in plan.varies),
-        settled=plan.document.get("run", {}).get("until") == "settled",
+        settled=plan.scene.run.until == "settled",
     )

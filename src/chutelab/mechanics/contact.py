@@ -1,7 +1,10 @@
-"""Contact with a turning circle: rolling, gripping or slipping round a pulley or a surface's end.
+"""What a contact does to a particle: a blow, and a ride round a pulley or a surface's end.
 
-The centre of the particle moves on a circle of radius ρ; φ is measured from the top, clockwise.
-With w the speed along the circle, z = r ω, N the normal and F the tangential force per mass,
+A blow follows Newton restitution with Coulomb friction (`impulses`).
+
+On a ride the centre of the particle moves on a circle of radius ρ; φ is measured from the top,
+clockwise. With w the speed along the circle, z = r ω, N the normal and F the tangential force per
+mass,
 
     φ' = w/ρ,   w' = g sin φ + F,   z' = 2 F (free disk) or 0,   N = g cos φ - w²/ρ,
 
@@ -17,10 +20,55 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from chutelab.mechanics.ballistics import polynomial
 from chutelab.util.arrays import Bools, Floats
+
+DISK_SHARE = 1.0 / 3.0
+"""m*/m of a free disk: at its rim, with I = m r²/2, an impulse moves the contact point 3 times as
+much as it would a particle that does not turn."""
+
+
+def impulses(
+    approach: ArrayLike, slip: ArrayLike, restitution: ArrayLike, friction: ArrayLike, share: float
+) -> tuple[Floats, Floats]:
+    """Return the normal and tangential impulse per mass (m/s) of an impact.
+
+    J_n = (1 + ε) |v_n| and J_t = -m*/m · u clipped to ±µ J_n (design, section 5).
+
+    Parameters
+    ----------
+    approach, slip : array_like
+        Normal speed towards the surface (>= 0) and slip of the contact point before, m/s.
+    restitution, friction : array_like
+        ε and µ of the pair; µ may be inf.
+    share : float
+        m*/m: 1 for a particle that does not turn, `DISK_SHARE` for a free disk.
+
+    Examples
+    --------
+    >>> n, t = impulses(2.0, 0.5, 0.5, 0.1, 1.0)
+    >>> float(n), round(float(t), 12)
+    (3.0, -0.3)
+    """
+    normal = np.asarray((1.0 + np.asarray(restitution)) * np.asarray(approach))
+    return normal, limited(slip, normal, np.asarray(friction, dtype=np.float64), share)
+
+
+def limited(slip: ArrayLike, normal: Floats, friction: Floats, share: float) -> Floats:
+    """Return the impulse per mass that stops the slip, or the most that friction allows."""
+    most = grip_limit(friction, normal)
+    return np.minimum(np.maximum(-share * np.asarray(slip), -most), most)
+
+
+def grip_limit(friction: Floats, normal: Floats) -> Floats:
+    """Return µ N, the most that friction can give; inf where µ is, also without a normal force."""
+    sticks = np.isinf(friction)
+    if np.count_nonzero(sticks):
+        return np.where(sticks, np.inf, np.where(sticks, 0.0, friction) * normal)
+    return np.asarray(friction * normal)
+
 
 ORDER = 14
 """Degree of the series: with the steps below the first term left out is under 1e-16."""
@@ -51,50 +99,32 @@ class Outcome(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class Circle:
-    """Particles in contact with circles; every array has shape (k,).
+    """Particles that ride round circles; every array has shape (k,)."""
 
-    Attributes
-    ----------
-    phi, w, z : ndarray
-        Angle from the top, clockwise (rad); speed along the circle, r ω (m/s).
-    rho, gravity, friction, belt : ndarray
-        Radius of the centre's path (m), g (m/s²), µ, speed of the circle's surface (m/s).
-    slip : ndarray
-        Sign σ of the slip; 0 while gripping or rolling.
-    turns : ndarray of bool
-        Whether the particle is a free disk.
-    low, high : ndarray
-        Angles where the circle ends or something is met, rad.
-    """
-
-    phi: Floats
-    w: Floats
-    z: Floats
-    rho: Floats
-    gravity: Floats
-    friction: Floats
-    belt: Floats
-    slip: Floats
-    turns: Bools
-    low: Floats
+    phi: Floats  # angle from the top, clockwise, rad
+    w: Floats  # speed along the circle, m/s
+    z: Floats  # r ω, m/s
+    rho: Floats  # radius of the centre's path, m
+    gravity: Floats  # m/s²
+    friction: Floats  # µ, may be inf
+    belt: Floats  # speed of the circle's surface, m/s
+    slip: Floats  # sign σ of the slip; 0 while gripping or rolling
+    turns: Bools  # whether the particle is a free disk
+    low: Floats  # angles where the circle ends or something is met, rad
     high: Floats
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """State at the end of a step, and what the contact did; arrays (k,).
-
-    `work` is ∫F dt (m/s): times mass and belt speed it is the belt's work. `heat` is -∫F u dt
-    (m²/s²): times mass it is the friction loss.
-    """
+    """State at the end of a step, and what the contact did; arrays (k,)."""
 
     dt: Floats
     outcome: NDArray[np.int8]
     phi: Floats
     w: Floats
     z: Floats
-    work: Floats
-    heat: Floats
+    work: Floats  # ∫F dt, m/s: times mass and belt speed it is the belt's work
+    heat: Floats  # -∫F u dt, m²/s²: times mass it is the friction loss
 
 
 def normal_force(circle: Circle) -> Floats:
@@ -107,11 +137,9 @@ def grip_slip(circle: Circle) -> Floats:
 
     Otherwise the particle starts to slip the way gravity pulls.
     """
-    share = np.where(circle.turns, 1.0 / 3.0, 1.0)
     pull = circle.gravity * np.sin(circle.phi)
-    with np.errstate(invalid="ignore"):
-        limit = np.where(np.isinf(circle.friction), np.inf, circle.friction * normal_force(circle))
-    return np.where(share * np.abs(pull) <= limit, 0.0, np.sign(pull))
+    force = np.where(circle.turns, DISK_SHARE, 1.0) * np.abs(pull)
+    return np.where(force <= grip_limit(circle.friction, normal_force(circle)), 0.0, np.sign(pull))
 
 
 def advance(circle: Circle, longest: Floats) -> Step:
@@ -167,7 +195,7 @@ def _series(c: Circle) -> Floats:
     sine[0], cosine[0] = np.sin(c.phi), np.cos(c.phi)
     slip[0] = c.w + c.z - c.belt
     gripping = c.slip == 0.0
-    stick = np.where(gripping, np.where(c.turns, -1.0 / 3.0, -1.0), 0.0)
+    stick = np.where(gripping, np.where(c.turns, -DISK_SHARE, -1.0), 0.0)
     load = np.where(gripping, 0.0, -c.slip * np.where(gripping, 0.0, c.friction))
     slip[0] = np.where(gripping, 0.0, slip[0])
     spin = np.where(c.turns, 2.0, 0.0)

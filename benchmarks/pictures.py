@@ -65,7 +65,7 @@ def usual(recording, slow, layout, moments):
             for _, show in stage.moving:
                 show(index)
             for text, one in zip(texts, stage.writings, strict=True):
-                text.set_text(one.said(index))
+                text.set_text(one.said[index])
             return []
 
         animation = FuncAnimation(figure, update, init_func=list, frames=len(moments))

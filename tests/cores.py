@@ -24,7 +24,6 @@ class Core:
         self.module = module.Module()
         self.job = engine.Job(self.module, machine)
         for name, size in (rooms or {}).items():
-            self.job.rooms[name] = size
             setattr(self.module.world, f"{name}_room", size)
 
     def _array(self, name, struct, count):
@@ -84,21 +83,11 @@ class Core:
 
     def step(self, steps=1):
         """Run on for some steps, making room where it is full; True at the end of the run."""
-        full = {"FULL_NEAR": "near", "FULL_CONTACTS": "contact"}
         while True:
-            status = self.module.run(steps)
-            drained = self.job.drain()
-            if status is module.Status.DONE:
-                return True
-            if status is module.Status.PAUSED:
-                return False
+            status = self.job.proceed(steps)
             assert status is not module.Status.STALLED
-            if status.name in full:
-                self.job.enlarge(full[status.name])
-            else:
-                what = "knot" if status is module.Status.FULL_KNOTS else "event"
-                if drained[what] < self.job.rooms[what] // 2:
-                    self.job.enlarge(what)
+            if status in (module.Status.DONE, module.Status.PAUSED):
+                return status is module.Status.DONE
 
 
 def modes(core):

@@ -99,12 +99,12 @@ def bar_axes(stage: Stage) -> Any:
 
 
 def clock(stage: Stage, index: int) -> str:
-    return stage.writings[0].said(index)
+    return stage.writings[0].said[index]
 
 
 def figures(stage: Stage, index: int) -> dict[str, str]:
     """Return what is written beneath the bars; clock and caption are written before."""
-    return {name: one.said(index) for name, one in zip(SIGNS, stage.writings[2:], strict=True)}
+    return {name: one.said[index] for name, one in zip(SIGNS, stage.writings[2:], strict=True)}
 
 
 @pytest.fixture(scope="module")
@@ -209,7 +209,7 @@ def test_loops_take_five_to_ten_seconds(runs: dict[str, Recording]) -> None:
 
 def test_film_begins_as_the_particle_comes_into_view(runs: dict[str, Recording]) -> None:
     recording = runs["perpendicular"]
-    window = window_of(recording, recording.machine)
+    window = window_of(recording)
     begin, end = span(recording, window)
     x = -1.0 + 2.0 * begin
     inset = moments.EDGE * max(window.width, window.height)
@@ -430,7 +430,7 @@ def test_everything_that_moves_and_its_arrow_is_in_the_window(runs: dict[str, Re
         position, velocity = (values[:, 0] for values in recording.at(times))
         aspect = layout.view[2] * WIDTH / (layout.view[3] * HEIGHT)
         # What leaves the window for good takes its arrow with it.
-        inside = window_of(recording, recording.machine).fitted(aspect).holds(position)
+        inside = window_of(recording).fitted(aspect).holds(position)
         tips = position + layout.arrow * velocity
         assert layout.window.holds(tips[inside]).all(), name
         fastest = np.hypot(*(layout.arrow * velocity[inside]).T).max()
@@ -633,7 +633,7 @@ def boxes_of(stage: Stage, index: int) -> list[tuple[str, Bbox]]:
         assert text.get_fontsize() >= 9.0, text
     draw = ImageDraw.Draw(Image.new("RGB", (WIDTH, HEIGHT)))
     for one in stage.writings:
-        text = one.said(index)
+        text = one.said[index]
         left, top, right, bottom = draw.textbbox(one.place, text, one.font, one.anchor)
         found.append((text, Bbox.from_extents(left, HEIGHT - bottom, right, HEIGHT - top)))
     return found
@@ -681,7 +681,7 @@ def test_what_changes_is_set_as_matplotlib_would(text: str) -> None:
     figure.text(0.05, 0.3, text, fontsize=10.5)
     canvas.draw()
     picture = Image.new("RGB", size, "white")
-    writing = Writing(10.5, 100.0, 0.05 * size[0], 0.7 * size[1], "ls", lambda _: text)
+    writing = Writing(10.5, 100.0, 0.05 * size[0], 0.7 * size[1], "ls", [text])
     writing.paint(ImageDraw.Draw(picture), 0)
     theirs, ours = (255.0 - np.asarray(shown)[..., 0] for shown in (canvas.buffer_rgba(), picture))
     assert ours.sum() == pytest.approx(theirs.sum(), rel=0.15)

@@ -9,9 +9,8 @@ from html.parser import HTMLParser
 import pytest
 from click.testing import CliRunner
 
-from chutelab.classroom.lessons import find
+from chutelab.classroom.lessons import find, shipped_lessons
 from chutelab.classroom.lessons.building import bundle, html_of
-from chutelab.classroom.lessons.reading import shipped_lessons
 from chutelab.cli import main
 
 

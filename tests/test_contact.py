@@ -482,8 +482,8 @@ def test_rooms_that_have_to_grow_change_nothing():
     small = {"knot": least + 1, "event": 4 * machine.count + 64, "contact": 1, "near": 1}
     core = Core(machine, small)
     assert same(core.run(), whole)
-    assert core.job.rooms["contact"] > 1
-    assert core.job.rooms["near"] > 1
+    assert core.world.contact_room > 1
+    assert core.world.near_room > 1
 
 
 # The scene `stream`

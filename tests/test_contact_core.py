@@ -491,8 +491,8 @@ def test_in_node_it_does_the_same_to_the_bit(tmp_path, crowded):
         machine = build(load("perpendicular", ["incoming.friction=0.5", 'run.until="settled"']))
     core = Core(machine)
     if crowded:
-        for what in core.job.rooms:
-            core.job.enlarge(what)
+        for what in ("knot", "event", "contact", "near"):
+            core.job.make_room(what, 2 * getattr(core.world, f"{what}_room"))
     # All of the memory: the core's own data are as `_initialize` left them in both.
     (tmp_path / "memory").write_bytes(memory_of(core.module))
     here = files("chutelab.engines.contact") / "core"

@@ -19,8 +19,8 @@ import chutelab
 from chutelab import design, scene
 from chutelab.cli import main
 from chutelab.pictures.plots.design import draw_scan, scan, spread
-from chutelab.studies.design import sensitivity
-from chutelab.studies.design.evaluation import Evaluator, suits
+from chutelab.studies.design import roots, sensitivity
+from chutelab.studies.design.evaluation import Evaluator, Outcomes, suits
 from chutelab.studies.design.quantities import SHORT, measured, target
 from chutelab.studies.design.uncertainty import spreads
 from chutelab.util.errors import InputError
@@ -191,6 +191,19 @@ def test_a_jump_over_the_target_is_no_root():
     assert jump.high - jump.low < 1e-14
     assert jump.courses == ("plate, incoming, outgoing", "plate, outgoing")
     assert "jumps over" in repr(found)
+
+
+def test_a_course_between_two_equal_ones_is_not_lost():
+    def evaluate(points):
+        x = points[:, 0]
+        courses = np.select([x < 0.6, x < 0.601, x < 0.9], ["a", "c", "b"], "c").tolist()
+        return Outcomes(points, courses, [""] * len(x))
+
+    found = roots.scan(evaluate, 0.0, 1.0, 3)
+    assert found.complete
+    assert [piece.course for piece in found.pieces] == ["a", "c", "b", "c"]
+    np.testing.assert_allclose([change.at for change in found.changes], [0.6, 0.601, 0.9])
+    assert all(change.high - change.low < 1e-15 for change in found.changes)
 
 
 def test_where_the_plate_is_missed_every_angle_is_a_solution():
@@ -511,8 +524,8 @@ def test_sobol_indices_of_ishigamis_function():
     # Ishigami and Homma (1990): V1 = ½ (1 + b π⁴/5)², V2 = a²/8, V13 = 8 b² π⁸/225.
     v1, v2, v13 = 0.5 * (1.0 + b * pi**4 / 5.0) ** 2, a**2 / 8.0, 8.0 * b**2 * pi**8 / 225.0
     variance = v1 + v2 + v13
-    one, other = (pi * (2.0 * shares - 1.0) for shares in sensitivity.design(3, 4096, seed=0))
-    found = sensitivity.indices(f(one), f(other), f(sensitivity.crossed(one, other)), seed=0)
+    points = pi * (2.0 * sensitivity.sampled(3, 4096, seed=0) - 1.0)
+    found = sensitivity.indices(f(points), seed=0)
     np.testing.assert_allclose(found.first, np.array([v1, v2, 0.0]) / variance, atol=0.01)
     np.testing.assert_allclose(found.total, np.array([v1 + v13, v2, v13]) / variance, atol=0.01)
     assert (found.first_interval[:, 0] < found.first + 1e-12).all()

@@ -499,6 +499,9 @@ def test_the_students_numbers_can_be_read_and_not_changed():
         _ = given.vx
     with pytest.raises(AttributeError, match="are given"):
         given.v0 = 3.0
+    with pytest.raises(AttributeError, match="are given"):
+        del given.v0
+    assert next(iter(given)) == "v0"
 
 
 def notebook(name):

@@ -132,8 +132,7 @@ def test_words_carry_the_numbers(found):
 @pytest.mark.parametrize("number", NUMBERS)
 def test_picture_has_both_forms_on_the_same_axes(found, number):
     drawn = paper_figure(found[number])
-    panels = [panel for pair in found[number].panels for panel in pair]
-    assert len(drawn.axes) == len(panels)
+    assert len(drawn.axes) == len(found[number].panels)
     for left, right in zip(drawn.axes[::2], drawn.axes[1::2], strict=True):
         assert left.get_ylim() == right.get_ylim()
         assert left.get_xlim() == right.get_xlim()

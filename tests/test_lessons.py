@@ -12,9 +12,8 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
-from chutelab.classroom.lessons import LessonError, find, read
+from chutelab.classroom.lessons import LessonError, find, read, shipped_lessons
 from chutelab.classroom.lessons.building import build, comment_of, is_current, start
-from chutelab.classroom.lessons.reading import shipped_lessons
 from chutelab.cli import main
 
 NAMES = [

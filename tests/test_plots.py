@@ -323,8 +323,7 @@ def test_round_times_are_multiples_within_the_bounds() -> None:
 
 def test_window_is_cropped_to_the_action_but_holds_it() -> None:
     recording = by_hand()
-    machine = recording.machine
-    window = plots.window_of(recording, machine)
+    window = plots.window_of(recording)
     path = expected(np.linspace(0.0, t_landing(), 100))[0]
     for x, y in [*path, (-R, -R), (R, R), (R + DISTANCE, R + 0.3)]:
         assert window.left < x < window.right
@@ -336,7 +335,7 @@ def test_window_is_cropped_to_the_action_but_holds_it() -> None:
 
 def test_a_long_slide_does_not_make_all_else_small(runs: dict[str, Recording]) -> None:
     recording = runs["belt-landing"]
-    window = plots.window_of(recording, recording.machine)
+    window = plots.window_of(recording)
     assert window.width < 4.0
     assert window.right > 1.2
 

@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from chutelab.classroom.lessons import find, scene_of
-from chutelab.classroom.lessons.reading import shipped_lessons
+from chutelab.classroom.lessons import find, scene_of, shipped_lessons
 from chutelab.cli import main
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind

@@ -20,11 +20,11 @@ from chutelab.machine import build
 from chutelab.results import Recording
 from chutelab.results.comparison import compare, relative_error, scales
 from chutelab.results.ledger import ledger
-from chutelab.results.quantities import measure
+from chutelab.results.quantities import KINDS, measure
 from chutelab.scene import Scene, SceneError
 from chutelab.scene.rules import SYMBOLS, unit_of
 from chutelab.scene.units import with_unit, write_size
-from chutelab.studies.accuracy import UNABLE, answer, because, distance, stirred
+from chutelab.studies.accuracy import STIR, UNABLE, answer, because, distance, stirred
 from chutelab.theory import predict
 from chutelab.util.tables import Sheet
 
@@ -50,9 +50,6 @@ REFINED: Final = 4.0
 CHANCE: Final = {"contact": 0.5, "pymunk": 0.5}
 """By how much the observed order may fall short of `ORDERS`: an error depends on where within a
 step things happen. Over two ratios of 4, half an order is a factor of 4 between the errors."""
-
-STIR: Final = 1e-9
-"""Share by which inputs are changed to see by how much a scene magnifies a change."""
 
 
 @dataclass(frozen=True)
@@ -82,13 +79,10 @@ class Agreement:
     @property
     def holds(self) -> bool:
         """Whether the promise, if there is one, is kept."""
-        if self.tolerance is None:
-            return True
-        if self.difference is None:
-            return False
-        return (
-            self.difference >= self.tolerance if self.least else self.difference <= self.tolerance
-        )
+        if self.tolerance is None or self.difference is None:
+            return self.tolerance is None
+        beyond = self.difference - self.tolerance
+        return beyond >= 0.0 if self.least else beyond <= 0.0
 
 
 def agreement(scene: Scene) -> tuple[Agreement, ...]:
@@ -182,11 +176,6 @@ ENGINES = ("exact", "contact", "pymunk")
 
 MOST_ALONE = 50
 """Particles that do not meet get a pymunk space each; beyond this many it takes minutes."""
-
-KINDS = {
-    "m": "length", "m/s": "speed", "s": "time", "degrees": "angle", "J": "energy", "W": "power",
-}  # fmt: skip
-"""Kind of quantity, as `chutelab.results.comparison.scales` has them, by unit."""
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@
 - `builder`: `build`, from a validated scene to a machine.
 """
 
-from chutelab.machine.builder import RefusedError, build, members
+from chutelab.machine.builder import RefusedError, build
 from chutelab.machine.parts import (
     DRIVE_PULLEY,
     Caution,
@@ -27,7 +27,6 @@ __all__ = [
     "RefusedError",
     "Segments",
     "build",
-    "members",
     "moved",
     "origin",
 ]

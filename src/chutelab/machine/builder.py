@@ -23,7 +23,7 @@ from chutelab.machine.parts import Caution, Machine, Particle, Pulley, Segments
 from chutelab.machine.releases import Releases, draw, release_point
 from chutelab.scene import Fault, Scene, SceneError
 from chutelab.scene.rules import ON_BELT
-from chutelab.util.arrays import Floats, Ints, Numbers
+from chutelab.util.arrays import Floats, Numbers
 
 
 class RefusedError(SceneError):
@@ -40,28 +40,6 @@ class RefusedError(SceneError):
     def __init__(self, source: str, members: Mapping[int, Fault]) -> None:
         super().__init__(source, [members[min(members)]])
         self.members = dict(members)
-
-
-def members(machine: Machine, places: Ints) -> Machine:
-    """Return some members of a family of machines, as a family."""
-
-    def own(part: object, *names: str, axes: int = 0) -> dict[str, Any]:
-        values = {name: getattr(part, name) for name in names}
-        return {name: value[places] for name, value in values.items() if np.ndim(value) > axes}
-
-    segments, wheel = machine.segments, machine.pulley
-    lines = own(segments, "start", "tangent", axes=2)
-    lines |= own(segments, "length", "speed", "restitution", "friction", axes=1)
-    if wheel is not None:
-        wheel = replace(wheel, **own(wheel, "radius", "speed", "friction", "restitution"))
-    return replace(
-        machine,
-        **own(machine, "gravity", "end_time"),
-        particle=replace(machine.particle, **own(machine.particle, "radius", "mass", "inertia")),
-        segments=replace(segments, **lines),
-        pulley=wheel,
-        releases=replace(machine.releases, **own(machine.releases, *vars(machine.releases))),
-    )
 
 
 ROUNDING = 64.0 * float_info.epsilon

@@ -26,21 +26,11 @@ DRIVE_PULLEY = "the drive pulley"
 
 @dataclass(frozen=True)
 class Caution:
-    """Something about a machine that works, but may surprise.
+    """Something about a machine that works, but may surprise."""
 
-    Attributes
-    ----------
-    surface : str
-        The surface it is about.
-    crosses : str
-        What that crosses, another surface or `DRIVE_PULLEY`; "" if the nominal particle misses it.
-    hit : float
-        Where the nominal particle meets the plate's line, m above the pivot; NaN if it never does.
-    """
-
-    surface: str
-    crosses: str = ""
-    hit: float = nan
+    surface: str  # the surface it is about
+    crosses: str = ""  # another surface or `DRIVE_PULLEY`; "" if the nominal particle misses it
+    hit: float = nan  # where that meets the plate's line, m above the pivot; NaN if it never does
 
     @property
     def text(self) -> str:
@@ -190,60 +180,25 @@ class Machine:
 
     A family of machines, one for each particle, is one machine in which segments, gravity, radius
     and mass of the particle, the pulley's numbers and the end time have a value for each, (N,).
-
-    Attributes
-    ----------
-    scene : Scene
-        What it was built from; a family of scenes for a family of machines.
-    surfaces : tuple of str
-        Names; several segments, or a segment and the pulley, may share one.
-    gravity : float
-        m/s², pointing down.
-    particle : Particle
-        Radius, mass, inertia (0 unless it may spin).
-    segments : Segments
-        All straight surfaces; the incoming belt is the first if there is one.
-    pulley : Pulley or None
-        None without an incoming conveyor.
-    releases : Releases
-        Where, when and how fast each particle starts; which of them ride by adhesion.
-    landing : int
-        Surface index of the outgoing belt, -1 without one.
-    until : {"landed", "settled", "time"}
-        When a particle's track ends.
-    end_time : float
-        s; no track goes on after it.
-    dt : float
-        s; step of lasting contacts (contact), longest step (pymunk).
-    align : bool
-        Whether the pymunk engine's steps of a lone particle end at contacts.
-    interact : bool
-        Whether particles meet each other.
-    pair_restitution, pair_friction : float
-        Of two particles.
-    engine : {"auto", "exact", "contact", "pymunk"}
-        What the scene asks for.
-    plate_warnings : tuple of Caution
-        What is to be said of a nominal particle that misses the plate.
     """
 
-    scene: Scene
-    surfaces: tuple[str, ...]
-    gravity: float
+    scene: Scene  # what it was built from; a family of scenes for a family of machines
+    surfaces: tuple[str, ...]  # names; several segments, or one and the pulley, may share one
+    gravity: float  # m/s², pointing down
     particle: Particle
-    segments: Segments
-    pulley: Pulley | None
+    segments: Segments  # all straight surfaces; the incoming belt is the first if there is one
+    pulley: Pulley | None  # None without an incoming conveyor
     releases: Releases
-    landing: int
-    until: Literal["landed", "settled", "time"]
-    end_time: float
-    dt: float
-    align: bool
-    interact: bool
-    pair_restitution: float
+    landing: int  # surface index of the outgoing belt, -1 without one
+    until: Literal["landed", "settled", "time"]  # when a particle's track ends
+    end_time: float  # s; no track goes on after it
+    dt: float  # s; step of lasting contacts (contact), longest step (pymunk)
+    align: bool  # whether the pymunk engine's steps of a lone particle end at contacts
+    interact: bool  # whether particles meet each other
+    pair_restitution: float  # of two particles
     pair_friction: float
-    engine: str
-    plate_warnings: tuple[Caution, ...]
+    engine: str  # what the scene asks for: "auto", "exact", "contact" or "pymunk"
+    plate_warnings: tuple[Caution, ...]  # of a nominal particle that misses the plate
 
     @property
     def count(self) -> int:

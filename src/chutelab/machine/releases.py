@@ -87,20 +87,11 @@ class Squeeze:
 
     All layers of a bed have the belt's speed, the lower ones on smaller circles: where the pulley
     does not throw them off at its top, they turn ahead, into what rides above them.
-
-    Attributes
-    ----------
-    particles : int
-        How many are in another by more than `DEEP`.
-    deepest : float
-        Overlap of the worst two, m.
-    grip : float
-        v²/(g ρ) of the highest rider: it stays on the pulley until cos φ is this.
     """
 
-    particles: int
-    deepest: float
-    grip: float
+    particles: int  # how many are in another by more than `DEEP`
+    deepest: float  # overlap of the worst two, m
+    grip: float  # v²/(g ρ) of the highest rider: it stays on the pulley until cos φ is this
 
     def __str__(self) -> str:
         return (

@@ -20,13 +20,4 @@ from chutelab.results.recording import (
     balance,
 )
 
-__all__ = [
-    "ENTRIES",
-    "EVENT",
-    "KNOT",
-    "PARTICLES",
-    "REASONS",
-    "Kind",
-    "Recording",
-    "balance",
-]
+__all__ = ["ENTRIES", "EVENT", "KNOT", "PARTICLES", "REASONS", "Kind", "Recording", "balance"]

@@ -14,16 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chutelab.results.quantities import KINDS, QUANTITIES, observed
+from chutelab.results.quantities import QUANTITIES, observed
 from chutelab.results.recording import Recording
 from chutelab.scene import Scene
-from chutelab.scene.units import symbol
+from chutelab.scene.rules import SYMBOLS
+from chutelab.scene.units import with_unit
 from chutelab.theory import Transfer
 from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet, Shown, number
-
-UNITS = {kind: symbol(unit) for unit, kind in KINDS.items()}
-"""What each kind is shown in."""
 
 MEANINGS = {
     "phi1": "angle of separation",
@@ -75,14 +73,13 @@ class Comparison(Shown):
     def sheet(self) -> Sheet:
         """Return every quantity that one of the two has, and the largest error."""
         rows = []
-        for name, kind in QUANTITIES.items():
-            simulated, theory = (
-                degrees(values[name]) if kind == "angle" else values[name]
-                for values in (self.simulated, self.theory)
-            )
+        for name, unit in zip(QUANTITIES, SYMBOLS.values(), strict=True):
+            simulated, theory = self.simulated[name], self.theory[name]
+            if unit == "degrees":
+                simulated, theory = degrees(simulated), degrees(theory)
             if isfinite(simulated) or isfinite(theory):
                 error = f"{self.errors[name]:.1e}" if name in self.errors else ""
-                what = f"{MEANINGS[name]}, {UNITS[kind]}"
+                what = with_unit(MEANINGS[name], unit)
                 rows.append((name, what, number(simulated), number(theory), error))
         foot: list[tuple[str, ...]] = []
         if self.max is not None:

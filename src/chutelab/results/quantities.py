@@ -38,30 +38,16 @@ ALONG = 1e-14
 CARRIED = 1e-3
 """m/s from the belt's speed, up to which a particle rides with it: the slip that counts as none."""
 
-_NEVER = np.array(tuple(np.full(EVENT[name].shape, nan) if EVENT[name].base.kind == "f" else 0
-                        for name in EVENT.names or ()), dtype=EVENT)  # fmt: skip
-
 _STATISTICS: dict[str, Callable[[Floats], Any]] = {
     "mean": np.mean, "spread": np.std, "min": np.min, "max": np.max,
 }  # fmt: skip
 
 
 def first(recording: Recording, event: str, surface: str | None = None) -> NDArray[Any]:
-    """Return the first event of a kind of each particle, (N,), dtype `EVENT`.
+    """Return the first "separation", "impact" or "landing" of each particle, (N,), dtype `EVENT`.
 
-    Parameters
-    ----------
-    recording : Recording
-        The run.
-    event : {"separation", "impact", "landing"}
-        From the incoming belt, on the plate and on the outgoing belt.
-    surface : str, optional
-        Another surface.
-
-    Returns
-    -------
-    ndarray
-        NaN throughout where it did not happen.
+    From the incoming belt, on the plate and on the outgoing belt, unless another surface is given.
+    NaN throughout where it did not happen.
     """
     found = recording.first(recording.select(Kind[event.upper()], surface=surface or NEEDED[event]))
     events = never(recording.count)
@@ -71,7 +57,11 @@ def first(recording: Recording, event: str, surface: str | None = None) -> NDArr
 
 def never(count: int) -> NDArray[Any]:
     """Return events (count,) that did not happen: NaN throughout."""
-    return np.full(count, _NEVER, dtype=EVENT)
+    events = np.zeros(count, dtype=EVENT)
+    for name in EVENT.names or ():
+        if EVENT[name].base.kind == "f":
+            events[name] = nan
+    return events
 
 
 def column(events: NDArray[Any], name: str) -> Floats:
@@ -94,15 +84,9 @@ def end_times(recording: Recording) -> Floats:
 def each(recording: Recording, name: str) -> Floats:
     """Return a quantity of each particle, (N,), in the unit its name has; NaN without one.
 
-    Of a family of scenes, each particle is a scene of its own.
-
-    Parameters
-    ----------
-    recording : Recording
-        The run.
-    name : str
-        Such as ``x2``, ``landing.x``, ``impact.hood.t``, ``ended.t`` or ``ledger.belt_work``.
-        ``ledger.by_surface`` has particles apart in the recording of a family only.
+    Names are such as ``x2``, ``landing.x``, ``impact.hood.t``, ``ended.t`` or ``ledger.belt_work``.
+    Of a family of scenes, each particle is a scene of its own; only its recording has
+    ``ledger.by_surface`` of each particle.
 
     Raises
     ------
@@ -132,13 +116,8 @@ def each(recording: Recording, name: str) -> Floats:
 def measure(recording: Recording, name: str) -> float:
     """Return a quantity of a recording, in the unit its name has; NaN if it did not happen.
 
-    Parameters
-    ----------
-    recording : Recording
-        The run.
-    name : str
-        Such as ``x2``, ``landing.x.mean`` or ``ledger.by_surface.plate.restitution_loss``. A
-        name without statistic is particle 0's; ``spread`` is the standard deviation.
+    Names are such as ``x2``, ``landing.x.mean`` or ``ledger.by_surface.plate.restitution_loss``.
+    One without statistic is particle 0's; ``spread`` is the standard deviation.
 
     Raises
     ------
@@ -195,14 +174,8 @@ def from_events(
 ) -> dict[str, Floats]:
     """Return what separation, impact and landing tell of the `QUANTITIES`, in the paper's frame.
 
-    x2, y2 are counted from the separation point, y down; x3 and v3x back from the plate.
-
-    Parameters
-    ----------
-    scene : Scene
-        One, or a family of N, see `chutelab.scene.variants`.
-    left, hit, down : ndarray, (N,), dtype `EVENT`
-        NaN, as `never` has it, where one did not happen.
+    x2, y2 are counted from the separation point, y down; x3 and v3x back from the plate. The events
+    are (N,), of one scene or a family of N, and NaN, as `never` has it, where one did not happen.
     """
     plate = scene.plate
     top = nan if scene.incoming is None else scene.incoming.pulley_radius
@@ -241,14 +214,8 @@ def from_events(
 class Waits:
     """Particles that were released late because their place was taken.
 
-    Attributes
-    ----------
-    particles : int
-        How many waited and were released.
-    longest, mean : float
-        How long these waited, s; 0 if none did.
-    never : int
-        How many were due, and found no place until the end of the run.
+    How many waited and were released, and how long these did at most and on average, s (0 if none
+    did); `never` is how many were due and found no place until the end of the run.
     """
 
     particles: int
@@ -299,14 +266,8 @@ class Rolling:
     be far from the belt's speed v_b: it rolls, and the belt pays no more. Belt work so far and
     m v_b (v_b - v_x) together are what loads that are carried take.
 
-    Attributes
-    ----------
-    particles : int
-        How many roll.
-    belt_work : float
-        What the outgoing belt has paid for all particles, J.
-    belt_work_carried : float
-        What it would have paid if those that roll were carried, J.
+    `particles` is how many roll, `belt_work` what the outgoing belt has paid for all particles, J,
+    and `belt_work_carried` what it would have paid if those that roll were carried, J.
     """
 
     particles: int

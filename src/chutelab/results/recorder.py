@@ -19,19 +19,9 @@ from chutelab.util.arrays import Ints
 class StalledError(RuntimeError):
     """A loop reached its bound: a particle goes on without getting on.
 
-    Parameters
-    ----------
-    particle : int
-        Which one.
-    t : float
-        When, s.
-    position : tuple of float
-        Where its centre is, m.
-    reason : str
-        What happened too often, and what to do about it; a half-sentence.
-    recording : Recording, optional
-        What was recorded until then. Tracks that were under way end at their last knots, with
-        reason ``"time"``.
+    It says which one, when (s) and where its centre is (m); the reason is a half-sentence: what
+    happened too often, and what to do about it. The recording is of what went before: tracks that
+    were under way end at their last knots, with reason ``"time"``.
     """
 
     def __init__(
@@ -56,14 +46,9 @@ class StalledError(RuntimeError):
 
 
 class Recorder:
-    """Grows by chunks; `finish` turns it into a frozen `Recording`.
+    """Grows by chunks; `finish` turns it into a frozen `Recording` of the machine's run.
 
-    Parameters
-    ----------
-    machine : Machine
-        What is run; its N particles and its surfaces are what is recorded.
-    apart : bool
-        Whether the books of each particle are kept apart: `by_surface` is (N, S, 3) then.
+    With `apart` the books of each particle are kept apart: `by_surface` is (N, S, 3) then.
     """
 
     def __init__(self, machine: Machine, *, apart: bool = False) -> None:
@@ -73,7 +58,6 @@ class Recorder:
         self.by_surface = np.zeros((*((count,) if apart else ()), owners, 3))
         self.ended = np.zeros(count, dtype=np.int8)
         self.contacts = 0
-        self.sizes = np.zeros(count, dtype=np.int64)
         self._knots: list[NDArray[Any]] = []
         self._owners: list[Ints] = []
         self._events: list[NDArray[Any]] = []
@@ -148,14 +132,6 @@ class Recorder:
         """Add finished events."""
         self._events.append(events)
 
-    def tracks(self, first: int, sizes: Ints, knots: NDArray[Any]) -> None:
-        """Add the whole tracks of the particles from `first` on, in their order.
-
-        Tracks have that many knots each; an engine that adds them so adds no others.
-        """
-        self.sizes[first : first + len(sizes)] = sizes
-        self._knots.append(knots)
-
     def finish(
         self,
         *,
@@ -166,12 +142,12 @@ class Recorder:
     ) -> Recording:
         """Sort what was collected, counted from `origin` (m), and freeze it."""
         count = len(self.ended)
-        knots, sizes = _joined(self._knots, KNOT), self.sizes
-        if self._owners:
-            owners = np.concatenate(self._owners)
-            self._owners.clear()
+        knots = _joined(self._knots, KNOT)
+        owners = np.concatenate([np.empty(0, dtype=np.int64), *self._owners])
+        self._owners.clear()
+        if np.any(owners[1:] < owners[:-1]):
             knots = knots.take(np.argsort(owners, kind="stable"))
-            sizes = np.bincount(owners, minlength=count)
+        sizes = np.bincount(owners, minlength=count)
         offsets = np.zeros(count + 1, dtype=np.int64)
         sizes.cumsum(out=offsets[1:])
         lonely = (sizes == 1).nonzero()[0]

@@ -96,16 +96,9 @@ where a track ends with an impact."""
 
 
 def blocks(knots: NDArray[Any], offsets: Ints, times: Floats) -> Iterator[Cells]:
-    """Find the interval of every cell, block by block in the order of `times`.
+    """Find the interval of every cell, block by block in the order of `times` (s, any order).
 
-    Parameters
-    ----------
-    knots : ndarray, (K,), dtype `KNOT`
-        All tracks, one after the other.
-    offsets : ndarray, (N + 1,)
-        Particle i owns ``knots[offsets[i]:offsets[i + 1]]``.
-    times : ndarray, (T,)
-        s, in any order.
+    Knots and offsets are those of a `Recording`.
     """
     t = knots["t"]
     released = np.flatnonzero(offsets[1:] > offsets[:-1])

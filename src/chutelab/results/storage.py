@@ -65,14 +65,8 @@ def load(path: str | Path) -> Recording:
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
             about: dict[str, Any] = json.loads(str(data["about"]))
-            version = about.get("format")
-            arrays = {name: data[name] for name in ARRAYS} if version == FORMAT else {}
-        recording = None
-        if arrays:
-            scene = from_dict(json.loads(about["scene"]), about["title"])
-            told = {name: about[name] for name in ("engine", "steps", "contacts", "seconds")}
-            recording = Recording(machine=build(scene), **told, **arrays)
-            _check(recording, about)
+            if about.get("format") == FORMAT:
+                return _recording(about, {name: data[name] for name in ARRAYS})
     except FileNotFoundError:
         raise RecordingError(f"{path}: no such file") from None
     except OSError as error:
@@ -84,11 +78,7 @@ def load(path: str | Path) -> Recording:
         raise RecordingError(
             f"{path}: not a recording as `chutelab run --out` writes it (recording.npz)"
         ) from error
-    if recording is None:
-        raise RecordingError(
-            f"{path}: a recording of another version of chutelab; run its scene again"
-        )
-    return recording
+    raise RecordingError(f"{path}: a recording of another version of chutelab; run its scene again")
 
 
 def _about(recording: Recording) -> dict[str, Any]:
@@ -107,11 +97,14 @@ def _about(recording: Recording) -> dict[str, Any]:
     }
 
 
-def _check(recording: Recording, about: dict[str, Any]) -> None:
-    """Raise a ValueError if header and arrays contradict each other, or the scene.
+def _recording(about: dict[str, Any], arrays: dict[str, Any]) -> Recording:
+    """Return what header and arrays hold; a ValueError if they contradict each other or the scene.
 
     Every index has to lead somewhere. The scene's text may be an older one, without later keys.
     """
+    scene = from_dict(json.loads(about["scene"]), about["title"])
+    told = {name: about[name] for name in ("engine", "steps", "contacts", "seconds")}
+    recording = Recording(machine=build(scene), **told, **arrays)
     if _about(recording) | {"scene": about["scene"]} != about:
         raise ValueError("the header is of another scene")
     offsets, events = recording.offsets, recording.events
@@ -131,6 +124,7 @@ def _check(recording: Recording, about: dict[str, Any]) -> None:
     )
     if not sound:
         raise ValueError("the arrays do not fit together")
+    return recording
 
 
 def to_csv(
@@ -161,14 +155,17 @@ def to_csv(
     if step is not None and not 0.0 < step < inf:
         raise ValueError(f"step = {step!r}: a finite number above 0 s")
     written = []
-    for name, rows in (("events", _events), ("trajectory", _trajectory)):
+    for name, rows in (
+        ("events", _events(recording)),
+        ("trajectory", _trajectory(recording, step)),
+    ):
         if name in only:
             path = Path(folder) / f"{name}.csv"
-            written.append(write_lines(path, csv_lines(rows(recording, step))))
+            written.append(write_lines(path, csv_lines(rows)))
     return written
 
 
-def _events(recording: Recording, _step: float | None) -> Iterator[Sequence[object]]:
+def _events(recording: Recording) -> Iterator[Sequence[object]]:
     places = ("x", "y", "vx_before", "vy_before", "vx_after", "vy_after")
     vectors = ("position", "velocity_before", "velocity_after")
     scalars = ("omega_before", "omega_after", "normal_impulse", "tangential_impulse")

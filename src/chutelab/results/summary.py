@@ -10,7 +10,6 @@ from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import column, end_times, first, rolling, squeezed, waits
 from chutelab.results.recording import REASONS, Recording
-from chutelab.scene import Scene
 from chutelab.scene.rules import SYMBOLS
 from chutelab.theory import Transfer, predict
 from chutelab.util.arrays import Floats
@@ -31,7 +30,11 @@ def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> 
     ``waited`` unless particles found their place taken (see `results.quantities.Waits`), and
     ``squeezed`` unless riders by adhesion got into each other (see `machine.releases.Squeeze`).
     """
-    error = compare(recording)
+    error, scene = compare(recording), recording.scene
+    as_printed = None
+    if scene.plate is not None and scene.plate.friction == scene.plate.angle_deg == 0.0:
+        # The printed Eq. (9) is for a frictionless upright plate.
+        as_printed = _theory(predict(scene, rebound="as-printed"))
 
     def events(event: str, *names: str) -> dict[str, Floats]:
         found = first(recording, event)
@@ -54,7 +57,7 @@ def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> 
         "squeezed": squeezed(recording),
         "ledger": ledger(recording),
         "theory": _theory(recording.prediction),
-        "theory_as_printed": _as_printed(recording.scene),
+        "theory_as_printed": as_printed,
         "error": {**error.errors, "max": error.max},
         "accuracy": accuracy,
     })  # fmt: skip
@@ -67,10 +70,3 @@ def _theory(prediction: Transfer) -> dict[str, Any]:
         value = float(getattr(prediction, name.removesuffix("_deg")))
         out[name] = degrees(value) if name.endswith("_deg") else value
     return {**out, "reason": str(prediction.reason) or None}
-
-
-def _as_printed(scene: Scene) -> dict[str, Any] | None:
-    """Return the theory with the printed Eq. (9), which only a frictionless upright plate has."""
-    if scene.plate is None or scene.plate.friction != 0.0 or scene.plate.angle_deg != 0.0:
-        return None
-    return _theory(predict(scene, rebound="as-printed"))

@@ -61,14 +61,9 @@ _BARE_KEY: Final = re.compile(r"[\w-]+")
 
 
 def parts_of(path: str, surfaces: Sequence[object] = ()) -> list[str | int]:
-    """Return the keys and indices of a full path.
+    """Return the keys and indices of a full path, such as ``stream.at[0]``.
 
-    Parameters
-    ----------
-    path
-        Such as ``stream.at[0]``, ``surface[0].speed`` or ``surface.hood.speed``.
-    surfaces
-        Names of the free surfaces; the name of one of them becomes its index.
+    A free surface goes by index or, if it is one of the names given, by name.
 
     Raises
     ------
@@ -169,17 +164,10 @@ def _referred(rule: Mapping[str, Any]) -> Mapping[str, Any]:
 
 @dataclass(frozen=True)
 class Override:
-    """A value to be laid over a scene.
+    """A value to be laid over a scene, at the full path of its key.
 
-    Attributes
-    ----------
-    key : str
-        Full path; a free surface goes by index or by name, ``surface[0].speed`` or
-        ``surface.hood.speed``.
-    value : object
-        As `tomllib` would have read it; None takes the key away, so that it has its default.
-    typed : str
-        The option that it came from, for messages; "" for none.
+    The value is as `tomllib` would have read it; None takes the key away, so that it has its
+    default. `typed` is the option that it came from, for messages; "" for none.
     """
 
     key: str
@@ -198,18 +186,8 @@ def apply(
 ) -> tuple[list[Fault], dict[str, str]]:
     """Lay overrides over a scene's tables, in place and in order; the last one wins.
 
-    Parameters
-    ----------
-    document
-        The tables of a scene, as `tomllib` reads them.
-    overrides
-        Texts are as `read` takes them. A missing table is made.
-
-    Returns
-    -------
-    faults, given
-        Overrides that could not be laid over, and what was typed for each of the others by the full
-        path that it set.
+    Texts are as `read` takes them; a missing table is made. Returns the faults of those that could
+    not be laid over, and what was typed for each of the others by the full path that it set.
     """
     faults: list[Fault] = []
     given: dict[str, str] = {}

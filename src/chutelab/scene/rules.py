@@ -18,7 +18,16 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field
 
-from chutelab.scene.units import LARGEST, Number, Table, Text, described, read_size, write_size
+from chutelab.scene.units import (
+    LARGEST,
+    Number,
+    Share,
+    Table,
+    Text,
+    described,
+    read_size,
+    write_size,
+)
 from chutelab.util.errors import MISSING, Fault, did_you_mean
 
 SYMBOLS: Final = {
@@ -41,21 +50,12 @@ NEEDED: Final = {"separation": "incoming", "impact": "plate", "landing": "outgoi
 """Events, and the table without which there are none; impacts on free surfaces go by name."""
 
 
-_NEAR: Final = 0.6
-"""Likeness of a misspelt quantity and the one that was meant: phi1 is taken for phi1_deg."""
-
-
 def unit_of(name: str, surfaces: Iterable[str]) -> str | None:
     """Return the unit of a quantity, "" for a number of things; None if the scene has none such.
 
-    Parameters
-    ----------
-    name
-        Such as ``x2``, ``landing.x``, ``landing.x.mean``, ``impact.ramp.t``, ``landing.count``,
-        ``ended.settled``, ``ledger.belt_work``, ``ledger.kinetic.end`` or
-        ``ledger.by_surface.outgoing.belt_work``.
-    surfaces
-        Names of the scene's surfaces: incoming, plate, outgoing and free ones, as far as there.
+    Names are such as ``x2``, ``landing.x``, ``landing.x.mean``, ``impact.ramp.t``,
+    ``landing.count``, ``ended.settled``, ``ledger.belt_work``, ``ledger.kinetic.end`` or
+    ``ledger.by_surface.outgoing.belt_work``; the surfaces are all that the scene has.
 
     Examples
     --------
@@ -98,14 +98,13 @@ def suggestion(name: str, surfaces: Iterable[str]) -> str:
     theirs = "phi1_deg to slip_heat, " if {"incoming", "plate"} <= set(known) else ""
     there_are = f"there are {theirs}{keys} and other keys of `chutelab run --json`"
     # Of a thousand surfaces some will do: looking for likeness takes long.
-    return did_you_mean(name, _units(tuple(known[:50])), there_are, cutoff=_NEAR)
+    return did_you_mean(name, _units(tuple(known[:50])), there_are)
 
 
 THEORY: Final = "theory"
 UNPROMISED: Final = "none"
 
 Value = Annotated[Number, Field(ge=-(LARGEST**2), le=LARGEST**2)]
-Tolerance = Annotated[Number, Field(ge=0.0, le=1.0)]
 Words = Annotated[Text, Field(max_length=40)]
 
 
@@ -123,15 +122,15 @@ class Expect(Table):
         'What it should be, in its unit (SI; degrees for names in _deg), or "theory": what the '
         "closed form gives",
     )
-    tolerance: Tolerance | Words = described(
+    tolerance: Share | Words = described(
         ...,
         "What it may be off: a number is relative (0.01 is 1 %; of the value, or of what such "
         'quantities are measured by in the scene if that is more), a string absolute ("0.5 mm")',
     )
-    tolerance_contact: Tolerance | Words | None = described(
+    tolerance_contact: Share | Words | None = described(
         None, 'The same for the contact engine, or "none"; default: tolerance'
     )
-    tolerance_pymunk: Tolerance | Words | None = described(
+    tolerance_pymunk: Share | Words | None = described(
         None, 'The same for the pymunk engine, or "none"; default: tolerance'
     )
     source: Text = described(
@@ -163,21 +162,11 @@ class ConflictError(ValueError):
 
 
 class Look:
-    """Read-only look at a scene as nested mappings, sound or not.
+    """Read-only look at a scene's tables, as its file has them or as it dumps them, sound or not.
 
-    Parameters
-    ----------
-    document
-        The tables as the file has them, or as a scene dumps them.
-    model
-        The scene's Pydantic model, for the defaults.
-    faulty
-        Full paths that are already known to be at fault.
-
-    Attributes
-    ----------
-    asked : set of str
-        Keys whose values were asked for: the rules can depend on no others.
+    The defaults come from `model`, which is `Scene`; `faulty` holds the full paths that are already
+    known to be at fault, `asked` the keys whose values were asked for: the rules can depend on no
+    others.
     """
 
     def __init__(self, document: Mapping[str, Any], model: Any, faulty: Collection[str] = ()):

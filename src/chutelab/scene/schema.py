@@ -12,17 +12,17 @@ from pydantic import ConfigDict, Field, PrivateAttr, model_validator
 
 from chutelab.scene.rules import ConflictError, Expect, Look, conflicts, surface_conflicts
 from chutelab.scene.units import (
-    LARGEST,
     MOST_EXPECTATIONS,
     MOST_PARTICLES,
     MOST_SURFACES,
+    Amount,
     Coordinate,
-    Duration,
-    Friction,
     Name,
     Number,
     Point,
     Polyline,
+    Positive,
+    Share,
     Switch,
     Table,
     Text,
@@ -30,36 +30,37 @@ from chutelab.scene.units import (
     described,
     pair_friction,
     pair_restitution,
-    size,
 )
 
 
 class Particle(Table):
     """The particles, all alike: disks, or mass points with radius 0."""
 
-    radius: Number = described(0.004, "Radius r; 0 is a mass point", "m", ge=0.0, le=LARGEST)
-    mass: Number = described(0.008, "Mass m", "kg", gt=0.0, le=LARGEST)
+    radius: Amount = described(0.004, "Radius r; 0 is a mass point", "m")
+    mass: Positive = described(0.008, "Mass m", "kg")
     spin: Switch = described(False, "true: a free disk, I = m r²/2; false: never turns")
 
 
 class Incoming(Table):
     """The incoming conveyor and its drive pulley, whose axis is the origin."""
 
-    speed: Number = described(..., "Belt speed v0", "m/s", ge=0.0, le=LARGEST)
-    pulley_radius: Number = size(..., "Radius R of the drive pulley, with the belt")
-    length: Number = size(1.0, "Length of belt before the pulley's axis")
-    friction: Literal["adhesion"] | Friction = described(
+    speed: Amount = described(..., "Belt speed v0", "m/s")
+    pulley_radius: Positive = described(..., "Radius R of the drive pulley, with the belt", "m")
+    length: Positive = described(1.0, "Length of belt before the pulley's axis", "m")
+    friction: Literal["adhesion"] | Amount = described(
         "adhesion",
         'Grip of belt and pulley on a particle: "adhesion" (no slip until separation) or a Coulomb '
         "coefficient µ",
     )
-    restitution: Number = pair_restitution(0.0, "particle-belt")
+    restitution: Share = pair_restitution(0.0, "particle-belt")
 
 
 class Plate(Table):
     """The damping plate."""
 
-    distance: Number = size(..., "d_okr, from the pulley's leading edge x = R to the pivot")
+    distance: Positive = described(
+        ..., "d_okr, from the pulley's leading edge x = R to the pivot", "m"
+    )
     angle_deg: Number = described(
         0.0,
         "Angle α from the vertical; positive leans the top back toward the incoming conveyor",
@@ -67,44 +68,36 @@ class Plate(Table):
         gt=-90.0,
         lt=90.0,
     )
-    pivot_height: Number = described(
-        None, "Height y of the pivot; default: the pulley's radius", "m", ge=-LARGEST, le=LARGEST
+    pivot_height: Coordinate = described(
+        None, "Height y of the pivot; default: the pulley's radius", "m"
     )
-    above: Number = described(
-        0.3, "Length of plate above the pivot, along the plate", "m", ge=0.0, le=LARGEST
-    )
-    below: Number | None = described(
+    above: Amount = described(0.3, "Length of plate above the pivot, along the plate", "m")
+    below: Amount | None = described(
         None,
         "Length of plate below the pivot; default: down to max(0.05 m, 3 r) above the outgoing "
         "belt, 2.0 m without [outgoing]",
         "m",
-        ge=0.0,
-        le=LARGEST,
     )
-    restitution: Number = pair_restitution(0.5, "particle-plate")
-    friction: Friction = pair_friction(0.0, "particle-plate")
+    restitution: Share = pair_restitution(0.5, "particle-plate")
+    friction: Amount = pair_friction(0.0, "particle-plate")
 
 
 class Outgoing(Table):
     """The outgoing conveyor's belt."""
 
-    speed: Number = described(
-        None,
-        "Belt speed v_dop, may be negative; default: the incoming belt's",
-        "m/s",
-        ge=-LARGEST,
-        le=LARGEST,
+    speed: Coordinate = described(
+        None, "Belt speed v_dop, may be negative; default: the incoming belt's", "m/s"
     )
-    drop: Number = size(..., "Fall to the belt, measured as drop_from says")
+    drop: Positive = described(..., "Fall to the belt, measured as drop_from says", "m")
     drop_from: Literal["impact", "top"] = described(
         "impact",
         '"impact": drop is d2, the fall of a particle\'s centre from plate impact to landing; '
         '"top": drop is d3, from the top of the pulley (y = R) down to the belt surface',
     )
     start: Coordinate = described(-2.0, "World x where the belt begins; it reaches forward", "m")
-    length: Number = size(6.0, "Length of the belt")
-    restitution: Number = pair_restitution(0.0, "particle-belt")
-    friction: Friction = pair_friction(0.5, "particle-belt")
+    length: Positive = described(6.0, "Length of the belt", "m")
+    restitution: Share = pair_restitution(0.0, "particle-belt")
+    friction: Amount = pair_friction(0.5, "particle-belt")
 
 
 class Surface(Table):
@@ -124,15 +117,9 @@ class Surface(Table):
     )
     to: Point | None = described(None, "Second end [x, y]", "m")
     points: Polyline = described(None, "Instead of from and to: a polyline [[x, y], ...]", "m")
-    restitution: Number = pair_restitution(0.3, "particle-surface")
-    friction: Friction = pair_friction(0.4, "particle-surface")
-    speed: Number = described(
-        0.0,
-        "Speed along from -> to; a belt when not 0",
-        "m/s",
-        ge=-LARGEST,
-        le=LARGEST,
-    )
+    restitution: Share = pair_restitution(0.3, "particle-surface")
+    friction: Amount = pair_friction(0.4, "particle-surface")
+    speed: Coordinate = described(0.0, "Speed along from -> to; a belt when not 0", "m/s")
 
     @model_validator(mode="after")
     def _ends_become_points(self) -> Self:
@@ -155,28 +142,20 @@ class Stream(Table):
     rate: Number = described(
         200.0, "Particles per second; particle i is released at i / rate", "1/s", ge=1e-6, le=1e9
     )
-    bed_height: Number = described(
-        0.0,
-        "Centres spread uniformly over this height above the lowest layer",
-        "m",
-        ge=0.0,
-        le=LARGEST,
+    bed_height: Amount = described(
+        0.0, "Centres spread uniformly over this height above the lowest layer", "m"
     )
-    speed_spread: Number = described(
-        0.0, "Uniform half-width around the release speed", "m/s", ge=0.0, le=LARGEST
-    )
+    speed_spread: Amount = described(0.0, "Uniform half-width around the release speed", "m/s")
     seed: Whole = described(0, "Seed of the random draws", ge=0, le=2**63 - 1)
     at: Point | None = described(
-        None,
-        "Release point [x, y] of the lowest layer; default: on the incoming belt's start",
-        "m",
+        None, "Release point [x, y] of the lowest layer; default: on the incoming belt's start", "m"
     )
     velocity: Point | None = described(
         None, "Release velocity [vx, vy]; default: the incoming belt's", "m/s"
     )
     interact: Switch = described(False, "Particle-particle contacts")
-    restitution: Number = pair_restitution(0.5, "particle-particle")
-    friction: Friction = pair_friction(0.3, "particle-particle")
+    restitution: Share = pair_restitution(0.5, "particle-particle")
+    friction: Amount = pair_friction(0.3, "particle-particle")
 
     @property
     def crowded(self) -> bool:
@@ -190,13 +169,13 @@ class Run(Table):
     engine: Literal["auto", "exact", "contact", "pymunk"] = described(
         "auto", '"auto" takes exact where particles do not interact, else contact'
     )
-    until: Literal["landed", "settled"] | Duration = described(
+    until: Literal["landed", "settled"] | Positive = described(
         None,
         'Ending: "landed", "settled" or a number of seconds; default: "landed" with [outgoing], '
         'else "settled"',
         "s",
     )
-    max_time: Duration = described(
+    max_time: Positive = described(
         30.0, "Bound on every ending, counted from the last release", "s"
     )
     dt: Number = described(
@@ -207,8 +186,7 @@ class Run(Table):
         le=0.1,
     )
     align: bool = described(
-        True,
-        "Whether the pymunk engine's steps of a lone particle end at contacts, or all last dt",
+        True, "Whether the pymunk engine's steps of a lone particle end at contacts, or all last dt"
     )
 
 
@@ -222,7 +200,7 @@ class Scene(Table):
     """
 
     title: Text = described("Untitled scene", "What the scene is called", max_length=200)
-    gravity: Number = described(9.81, "Gravity g, downward", "m/s²", ge=0.0, le=LARGEST)
+    gravity: Amount = described(9.81, "Gravity g, downward", "m/s²")
     particle: Particle = Field(default_factory=Particle)
     incoming: Incoming | None = None
     plate: Plate | None = None
@@ -238,16 +216,17 @@ class Scene(Table):
     @classmethod
     def tables(cls) -> dict[str, type[Table]]:
         """Model of each table by its key."""
-        return {
-            "particle": Particle,
-            "incoming": Incoming,
-            "plate": Plate,
-            "outgoing": Outgoing,
-            "surface": Surface,
-            "stream": Stream,
-            "run": Run,
-            "expect": Expect,
-        }
+        tables: tuple[type[Table], ...] = (
+            Particle,
+            Incoming,
+            Plate,
+            Outgoing,
+            Surface,
+            Stream,
+            Run,
+            Expect,
+        )
+        return {table.__name__.lower(): table for table in tables}
 
     @property
     def source(self) -> str:

@@ -140,12 +140,15 @@ Switch = Annotated[bool, Field(strict=True)]
 Text = Annotated[str, Field(strict=True)]
 Name = Annotated[Text, AfterValidator(_free), WithJsonSchema({"type": "string", "pattern": NAME})]
 Coordinate = Annotated[Number, Field(ge=-LARGEST, le=LARGEST)]
+"""Any number of a sane size, negative ones too."""
+
+Amount = Annotated[Number, Field(ge=0.0, le=LARGEST)]
 Point = tuple[Coordinate, Coordinate]
 Polyline = Annotated[
     tuple[Point, ...], Field(min_length=2, max_length=MOST_POINTS), AfterValidator(_distinct)
 ]
-Friction = Annotated[Number, Field(ge=0.0, le=LARGEST)]
-Duration = Annotated[Number, Field(gt=0.0, le=LARGEST)]
+Positive = Annotated[Number, Field(gt=0.0, le=LARGEST)]
+Share = Annotated[Number, Field(ge=0.0, le=1.0)]
 
 
 def described(default: Any, what: str, unit: str = "", **limits: Any) -> Any:
@@ -158,14 +161,9 @@ def described(default: Any, what: str, unit: str = "", **limits: Any) -> Any:
     )
 
 
-def size(default: Any, what: str) -> Any:
-    """Describe a length that cannot be 0."""
-    return described(default, what, "m", gt=0.0, le=LARGEST)
-
-
 def pair_restitution(default: float, pair: str) -> Any:
     """Describe the restitution of a pair, such as particle-plate."""
-    return described(default, f"Coefficient of restitution of the pair {pair}", ge=0.0, le=1.0)
+    return described(default, f"Coefficient of restitution of the pair {pair}")
 
 
 def pair_friction(default: float, pair: str) -> Any:

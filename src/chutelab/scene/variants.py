@@ -73,13 +73,7 @@ class Range(Vary):
 
 
 def parse(text: str) -> Vary:
-    """Read what ``--vary`` takes; numbers may have a unit, such as 0.5mm.
-
-    Raises
-    ------
-    InputError
-        If it is not of the form, no number, an empty range, or too many values.
-    """
+    """Read what ``--vary`` takes, or raise an `InputError`; numbers may have units (0.5mm)."""
     typed, key, given = _parted_key(text, FORM)
     if ":" not in given:
         parts = given.split(",")
@@ -110,13 +104,7 @@ def parse(text: str) -> Vary:
 
 
 def parse_range(text: str) -> Range:
-    """Read what ``--vary`` takes where samples are drawn: ``KEY=FROM:TO``.
-
-    Raises
-    ------
-    InputError
-        If it is not of the form, no number, or an empty range.
-    """
+    """Read what ``--vary`` takes where samples are drawn, ``KEY=FROM:TO``; raises as `parse`."""
     typed, key, given = _parted_key(text, RANGE_FORM)
     parts = given.split(":")
     if len(parts) != 2:
@@ -176,13 +164,7 @@ class Quantity:
 
 
 def quantity(scene: Scene, vary: Vary) -> Quantity:
-    """Return what a varied key of a scene is.
-
-    Raises
-    ------
-    InputError
-        If the scene knows no such key, or it holds no number.
-    """
+    """Return what a varied key of a scene is; an `InputError` if none, or one without a number."""
     document = plain(to_dict(scene))
     faults, _ = apply(document, [Override(vary.key, plain_number(vary.values[0]))])
     if faults:
@@ -218,13 +200,7 @@ def quantity(scene: Scene, vary: Vary) -> Quantity:
 
 
 def quantities(scene: Scene, varies: Sequence[Vary]) -> tuple[Quantity, ...]:
-    """Return what each of the varied keys is.
-
-    Raises
-    ------
-    InputError
-        If a key cannot be varied, or two are the same.
-    """
+    """Return what each of the varied keys is; an `InputError` also if two are the same."""
     found: list[Quantity] = []
     for vary in varies:
         one = quantity(scene, vary)
@@ -278,20 +254,10 @@ def judged_by(scene: Scene, values: Mapping[str, object]) -> set[str]:
 
 
 def family(scene: Scene, columns: Mapping[str, Floats]) -> Scene:
-    """Return scenes that differ in plain numbers; they are not validated.
+    """Return N scenes that differ in plain numbers as one, of shape (N,); it is not validated.
 
-    Parameters
-    ----------
-    scene : Scene
-        What they share, defaults included.
-    columns : mapping of ndarray, (N,)
-        Values of each varied key by its full path, such as ``plate.angle_deg``.
-
-    Returns
-    -------
-    Scene
-        With arrays under these keys, and under those whose defaults they are; its `shape` is
-        (N,).
+    `columns` has the values of each varied key, (N,), by its full path. They stand under these
+    keys, and under those whose defaults they are; the rest is that of `scene`.
     """
     changes: dict[str, Any] = {}
     for path, values in columns.items():

@@ -94,20 +94,13 @@ def parse(text: str) -> Wanted:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """One answer of a run.
+    """One answer of a run: its name, what kind of quantity it is, and its values.
 
-    Attributes
-    ----------
-    name : str
-        What it is.
-    kind : {"place", "time", "speed", "energy", "number"}
-        What kind of quantity.
-    values : ndarray, (N,) or (N, 2)
-        One a particle, or one for all, SI; NaN where it did not happen.
+    Values are (N,) or (N, 2), one a particle or one for all, SI; NaN where it did not happen.
     """
 
     name: str
-    kind: str
+    kind: Literal["place", "time", "speed", "energy", "number"]
     values: Floats
 
 
@@ -126,25 +119,19 @@ def each(recording: Recording) -> Iterator[Answer]:
                 pushed = np.stack([found["normal_impulse"], found["tangential_impulse"]], axis=1)
                 what = f"impulse per mass of the {where}"
                 yield Answer(what, "speed", pushed / recording.particle.mass)
-    yield Answer("place of the end", "place", _ends(recording))
-    yield Answer("number of particles that end so", "number", recording.ended.astype(np.float64))
-    yield from _booked(recording)
-
-
-def _ends(recording: Recording) -> Floats:
-    """Return where particles are at the end of a run of given length, or lie at rest, (N, 2).
-
-    Others end where they do because a run has to stop somewhere.
-    """
+    # Others than those at rest, or at the end of a run of given length, end where they do because a
+    # run has to stop somewhere.
     segments = recording.machine.segments
     still = segments.surface[segments.speed == 0.0]
     settled = recording.select(Kind.SETTLE)
     told = recording.ended == REASONS.index("time")
     told[settled["particle"][np.isin(settled["surface"], still)]] = True
     told &= recording.released
-    out = np.full((recording.count, 2), np.nan)
-    out[told] = recording.knots["position"][recording.offsets[1:][told] - 1]
-    return out
+    places = np.full((recording.count, 2), np.nan)
+    places[told] = recording.knots["position"][recording.offsets[1:][told] - 1]
+    yield Answer("place of the end", "place", places)
+    yield Answer("number of particles that end so", "number", recording.ended.astype(np.float64))
+    yield from _booked(recording)
 
 
 def _booked(recording: Recording) -> Iterator[Answer]:
@@ -171,64 +158,46 @@ def sizes(recording: Recording) -> dict[str, float]:
     energy that was turned over.
     """
     known, knots = scales(recording.scene, recording.prediction), recording.knots
-    extent = lasted = fastest = 0.0
+    own = {"length": 0.0, "time": 0.0, "speed": 0.0}
     if len(knots):
-        extent = float(np.hypot(*np.ptp(knots["position"], axis=0)))
-        lasted = float(np.ptp(knots["t"]))
-        fastest = float(np.hypot(*knots["velocity"].T).max())
-    return {
-        "place": known["length"] if isfinite(known["length"]) else extent,
-        "time": known["time"] if isfinite(known["time"]) else lasted,
-        "speed": known["speed"] if isfinite(known["speed"]) else fastest,
-        "energy": ledger(recording).turned_over,
-        "number": 1.0,
-    }
+        own["length"] = float(np.hypot(*np.ptp(knots["position"], axis=0)))
+        own["time"] = float(np.ptp(knots["t"]))
+        own["speed"] = float(np.hypot(*knots["velocity"].T).max())
+    place, time, speed = (known[k] if isfinite(known[k]) else own[k] for k in own)
+    energy = ledger(recording).turned_over
+    return {"place": place, "time": time, "speed": speed, "energy": energy, "number": 1.0}
 
 
 def apart(
     one: Sequence[Answer], other: Sequence[Answer], measured: dict[str, float], unit: str
 ) -> tuple[float, str]:
-    """Return how far the answers of two runs are apart at most, and which one is.
+    """Return how far the answers of two runs are apart at most, and which answer that is.
 
-    Parameters
-    ----------
-    one, other : sequence of Answer
-        Of two runs.
-    measured : dict of float
-        From `sizes`; relative differences are to these, or to the value where that is larger.
-    unit : {"relative", "m"}
-        "m": places only, m.
-
-    Returns
-    -------
-    float, str
-        inf if not the same things happen in both.
+    In the unit "m" places only count, m. Else differences are relative to `measured`, from `sizes`,
+    or to the value where that is larger. inf if not the same things happen in both.
     """
     if [a.name for a in one] != [a.name for a in other]:
         return inf, "what happens at all"
     worst, which = 0.0, "every answer"
-    for mine, its in zip(one, other, strict=True):
-        if not np.array_equal(np.isnan(mine.values), np.isnan(its.values)):
-            return inf, mine.name
-        difference, value = (
-            np.linalg.norm(values.reshape(len(values), -1), axis=1)
-            for values in (mine.values - its.values, its.values)
-        )
-        if mine.kind == "number":
-            if np.any(difference > 0.0):
-                return inf, mine.name
+    for a, b in zip(one, other, strict=True):
+        if not np.array_equal(np.isnan(a.values), np.isnan(b.values)):
+            return inf, a.name
+        if a.kind == "number":
+            if not np.array_equal(a.values, b.values):
+                return inf, a.name
             continue
-        if unit == "m":
-            if mine.kind != "place":
-                continue
-            size: Floats | float = 1.0
-        else:
-            scale = measured[mine.kind]
-            size = np.maximum(value, scale) if scale > 0.0 else np.where(value > 0.0, value, 1.0)
-        with np.errstate(invalid="ignore"):
-            largest = float(np.nanmax(difference / size, initial=0.0))
+        if unit == "m" and a.kind != "place":
+            continue
+        error, value = (
+            np.linalg.norm(values.reshape(len(values), -1), axis=1)
+            for values in (a.values - b.values, b.values)
+        )
+        if unit != "m":
+            size = np.fmax(value, measured[a.kind])
+            error = error / np.where(size > 0.0, size, 1.0)
+        largest = float(np.nanmax(error, initial=0.0))
         if largest > worst:
-            worst, which = largest, mine.name
+            worst, which = largest, a.name
     return worst, which
 
 
@@ -277,8 +246,8 @@ MOST_STEPS = 50_000
 """Steps of one run; those before it take as many together."""
 
 STALE, PATIENCE = 0.9, 3
-"""Halving the step does not help where the error falls by less than that factor; so many times in a
-row, and the search is given up."""
+"""A halved step helps only where the error falls below this share of the least before; after so
+many that do not help, the search ends."""
 
 
 @dataclass(frozen=True)
@@ -373,19 +342,18 @@ class Search:
 
     def result(self) -> tuple[Recording, Accuracy]:
         """Return what `reach` does: halve the steps until run and witness are near enough."""
-        found, dt, least, stale = self.run(self.scene), self.scene.run.dt, inf, 0
+        found, dt, stale = self.run(self.scene), self.scene.run.dt, 0
         best: tuple[Recording, Accuracy] | None = None
         while True:
             now = self.judged(found)
             other = self.witnesses.get(found.engine, (None, ""))[0]
-            by_theory = now.against == "theory"
-            no_witness = other is None and not by_theory
-            if now.met or now.chaotic or no_witness or (by_theory and found.engine == "exact"):
+            final = now.met or now.chaotic or now.against is None
+            if final or (now.against == "theory" and found.engine == "exact"):
                 return found, now
-            if best is None or now.size <= best[1].size:
-                best = found, now
+            least = inf if best is None else best[1].size
             stale = 0 if now.size < STALE * least else stale + 1
-            least = min(least, now.size)
+            if best is None or now.size <= least:
+                best = found, now
             moving = [one for one in (found, other) if one is not None and one.engine in STEPPED]
             why = ""
             if not moving:

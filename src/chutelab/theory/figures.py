@@ -21,8 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.scene import Scene, from_dict
-from chutelab.theory.paper import BALL_MASS, DISTANCES, FALL, PLATE_AHEAD, RADII
-from chutelab.theory.results import Transfer
+from chutelab.theory.paper import BALL_MASS, DISTANCES, FALL, PLATE_AHEAD, RADII, at_radii
 from chutelab.theory.transfer import Rebound, transfer
 from chutelab.util.arrays import Floats
 from chutelab.util.errors import InputError
@@ -42,18 +41,10 @@ SAID: Final = {"as-printed": "Eq. (9) as printed", "corrected": "Eq. (9) correct
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """One line of a panel.
+    """One line of a panel: its points, and those (M, 2) that are marked on it.
 
-    Attributes
-    ----------
-    label : str
-        For the legend; "" for none.
-    x, y : ndarray
-        Points, SI units.
-    role : {"first", "second", "third", "fourth", "plate", "belt"}
-        What it is drawn like.
-    marks : ndarray or None
-        Points (M, 2) that are marked on it.
+    The label is for the legend, "" for none. The role says what it is drawn like: "first" to
+    "fourth", "plate" or "belt".
     """
 
     label: str
@@ -84,8 +75,8 @@ class PaperFigure(Shown):
         As in the paper.
     title : str
         What it shows.
-    panels : tuple of tuple of Panel
-        Rows of two: as printed, corrected.
+    panels : tuple of Panel
+        By twos: as printed, corrected.
     meaning : tuple of str
         What the misprint does to the figure's conclusion.
     missing : tuple of str
@@ -102,7 +93,7 @@ class PaperFigure(Shown):
 
     number: int
     title: str
-    panels: tuple[tuple[Panel, ...], ...]
+    panels: tuple[Panel, ...]
     meaning: tuple[str, ...]
     missing: tuple[str, ...]
     columns: dict[str, NDArray[Any]]
@@ -205,13 +196,6 @@ SWEEP: Final = "chutelab sweep figure-{}.toml --vary incoming.pulley_radius=0.05
 """The same radii with the engine."""
 
 
-def _over_the_grid(speed: float, distance: float, form: Rebound) -> Transfer:
-    return transfer(
-        speed=speed, pulley_radius=GRID, distance=distance, restitution=RESTITUTION, drop=FALL,
-        mass=MASS, gravity=GRAVITY, rebound=form,
-    )  # fmt: skip
-
-
 def _against_the_radius(
     number: int,
     title: str,
@@ -238,7 +222,7 @@ def _against_the_radius(
         MASS, speed, float(GRID[0]), {"distance": NEAR},
     )  # fmt: skip
     return PaperFigure(
-        number, title, (panels,), meaning, missing, {"R, m": GRID, **columns}, SHOWN,
+        number, title, panels, meaning, missing, {"R, m": GRID, **columns}, SHOWN,
         {f"figure-{number}": scene}, SWEEP.format(number),
     )  # fmt: skip
 
@@ -247,7 +231,7 @@ def _energies(number: int) -> PaperFigure:
     """Figures 6 and 7: energy of Eq. (14)."""
     speed = SPEEDS[number]
     curves: dict[Rebound, dict[str, Floats]] = {
-        form: {f"d_okr = {d:g} m": 1000.0 * _over_the_grid(speed, d, form).dEk for d in (NEAR, FAR)}
+        form: {f"d_okr = {d:g} m": 1000.0 * at_radii(GRID, speed, d, form).dEk for d in (NEAR, FAR)}
         for form in FORMS
     }
     printed, right = (curves[form][f"d_okr = {NEAR:g} m"] for form in FORMS)
@@ -291,7 +275,7 @@ def _energies(number: int) -> PaperFigure:
 def _velocities(number: int) -> PaperFigure:
     """Figures 8 and 9: velocities of the three phases."""
     speed = SPEEDS[number]
-    found = {form: _over_the_grid(speed, NEAR, form) for form in FORMS}
+    found = {form: at_radii(GRID, speed, NEAR, form) for form in FORMS}
     printed, right = found.values()
     columns = {"v1, m/s": right.v1, "v2, m/s": right.v2}
     curves: dict[Rebound, dict[str, Floats]] = {}
@@ -441,12 +425,8 @@ def _trajectories(number: int) -> PaperFigure:
     # The first and the last point of each flight to the belt.
     rows = [2 * POINTS * n + row for n in range(len(paths)) for row in (POINTS, 2 * POINTS - 1)]
     panels = tuple(
-        tuple(
-            Panel(f"{case}, {SAID[form]}", "x, m", "y, m", _lines(case, found), to_scale=True)
-            for (one, form), found in paths.items()
-            if one == case
-        )
-        for case in cases
+        Panel(f"{case}, {SAID[form]}", "x, m", "y, m", _lines(case, found), to_scale=True)
+        for (case, form), found in paths.items()
     )
     scenes = {
         case.name: _scene(

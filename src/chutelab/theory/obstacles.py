@@ -82,30 +82,6 @@ class Flight:
         return reach / pace if pace > 0.0 else 0.0
 
 
-def face_times(flight: Flight, segments: Segments, radius: float, horizon: float) -> Floats:
-    """Return when the disk first touches each segment between its ends, (S,); inf if not."""
-    tangent, normal, length = segments.frames()
-    height = np.sum((flight.position - segments.start) * normal, axis=1)
-    speed = normal @ flight.velocity
-    bend = -0.5 * flight.gravity * normal[:, 1]
-    first = np.full(len(length), np.inf)
-    for side in (1.0, -1.0):
-        t = _falling_root(side * height - radius, side * speed, side * bend)
-        t[~((t >= 0.0) & (t <= horizon))] = np.inf
-        foot = np.full(len(t), -1.0)
-        real = np.isfinite(t)
-        foot[real] = np.sum((flight.at(t[real]) - segments.start[real]) * tangent[real], axis=1)
-        first = np.where((foot >= 0.0) & (foot <= length), np.minimum(first, t), first)
-    return first
-
-
-def _falling_root(c: Floats, b: Floats, a: Floats) -> Floats:
-    """Return where c + b t + a t² falls through 0, NaN if nowhere; without cancellation."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        root = np.sqrt(b**2 - 4.0 * a * c)
-        return np.where(b > 0.0, -(b + root) / (2.0 * a), 2.0 * c / (root - b))
-
-
 def corner_times(flight: Flight, points: Floats, radius: float, horizon: float) -> Floats:
     """Return when the centre first comes as close as `radius` to each point, (P,); inf if not.
 
@@ -150,31 +126,31 @@ def first_in_flight(
     flight: Flight, segments: Segments, radius: float, horizon: float
 ) -> tuple[float, int]:
     """Return when and with which segment the disk first collides up to `horizon`; (inf, -1)."""
-    times = np.concatenate(
-        [
-            face_times(flight, segments, radius, horizon),
-            corner_times(flight, segments.points, radius, horizon),
-        ]
-    )
-    return _earliest(times, len(segments.names))
+    tangent, normal, length = segments.frames()
+    height = np.sum((flight.position - segments.start) * normal, axis=1)
+    speed = normal @ flight.velocity
+    bend = -0.5 * flight.gravity * normal[:, 1]
+    faces = np.full(len(length), np.inf)
+    for side in (1.0, -1.0):
+        # Where c + b t + a t² falls through 0, without cancellation; NaN if nowhere.
+        c, b, a = side * height - radius, side * speed, side * bend
+        with np.errstate(invalid="ignore", divide="ignore"):
+            root = np.sqrt(b**2 - 4.0 * a * c)
+            t = np.where(b > 0.0, -(b + root) / (2.0 * a), 2.0 * c / (root - b))
+        met = (t >= 0.0) & (t <= horizon)
+        foot = np.full(len(t), -1.0)
+        foot[met] = np.sum((flight.at(t[met]) - segments.start[met]) * tangent[met], axis=1)
+        faces = np.minimum(faces, np.where((foot >= 0.0) & (foot <= length), t, np.inf))
+    corners = corner_times(flight, segments.points, radius, horizon)
+    return _earliest(np.concatenate([faces, corners]), len(segments.names))
 
 
 def first_on_arc(
     ride_radius: float, last: float, segments: Segments, radius: float
 ) -> tuple[float, int]:
-    """Return angle from the top and segment of the first collision of the ride round the pulley.
+    """Return angle from the top and segment of the first collision of the ride; (inf, -1) if none.
 
-    Parameters
-    ----------
-    ride_radius, last : float
-        Rc (m) of the centre's path round the origin, and φ (rad) where it ends.
-    segments, radius : Segments, float
-        What may be in the way, and the disk's radius (m).
-
-    Returns
-    -------
-    float, int
-        (inf, -1) if the way is free.
+    The centre's path has radius Rc (m) round the origin and ends at the angle `last` (rad).
     """
     tangent, normal, length = segments.frames()
     level = np.sum(segments.start * normal, axis=1)

@@ -2,85 +2,27 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Decimal
+from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from chutelab.theory.results import Transfer
 from chutelab.theory.transfer import Rebound, transfer
+from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet, Shown
 
-RADII = (
-    "0.0500", "0.0625", "0.0800", "0.1000", "0.1250", "0.1575",
-    "0.2000", "0.2500", "0.3150", "0.4000", "0.5000",
-)  # fmt: skip
-"""Pulley radii R, m: the rows of Tables 1, 4 and 5."""
+PRINTED: dict[str, Any] = tomllib.loads(
+    (Path(__file__).parent / "paper.toml").read_text(encoding="utf-8")
+)
+"""The paper's numbers as texts, with all their digits; the file says what they are."""
 
-DISTANCES = ("0.5", "0.6", "0.7", "0.8", "0.9", "1")
-"""Distances d_okr, m: the columns of Tables 4 and 5."""
-
-IMPACTS = {
-    "2": (
-        ("0.550", "0.371", "0.137", "0.5"),
-        ("0.563", "0.388", "0.134", "0.5"),
-        ("0.580", "0.413", "0.131", "0.5"),
-        ("0.600", "0.441", "0.127", "0.5"),
-        ("0.625", "0.479", "0.123", "0.5"),
-        ("0.658", "0.530", "0.118", "0.5"),
-        ("0.700", "0.601", "0.112", "0.5"),
-        ("0.750", "0.690", "0.106", "0.5"),
-        ("0.815", "0.815", "0.099", "0.5"),
-        ("0.900", "0.993", "0.092", "0.5"),
-        ("0.711", "1.435", "0.062", "0.5"),
-    ),
-    "4": (
-        ("0.550", "0.093", "0.548", "0.5"),
-        ("0.563", "0.097", "0.539", "0.5"),
-        ("0.580", "0.103", "0.528", "0.5"),
-        ("0.600", "0.110", "0.515", "0.5"),
-        ("0.625", "0.120", "0.500", "0.5"),
-        ("0.658", "0.133", "0.481", "0.5"),
-        ("0.700", "0.150", "0.458", "0.5"),
-        ("0.750", "0.172", "0.434", "0.5"),
-        ("0.815", "0.204", "0.405", "0.5"),
-        ("0.900", "0.248", "0.373", "0.5"),
-        ("1.000", "0.307", "0.341", "0.5"),
-    ),
-}
-"""Table 1 by belt speed (m/s): x2, y2, x3, y3, m, a row per radius."""
-
-ENERGIES = {"2": ("17675.36", "19997.61"), "4": ("34846.60", "93569.14")}
-"""Table 3 by speed (m/s): kinetic energy at the plate and at the outgoing support, N mm = mJ."""
-
-HEIGHTS = {
-    "2": (
-        ("0.87", "1.02", "1.19", "1.39", "1.61", "1.85"),
-        ("0.89", "1.04", "1.21", "1.41", "1.64", "1.88"),
-        ("0.91", "1.07", "1.25", "1.45", "1.68", "1.93"),
-        ("0.94", "1.10", "1.28", "1.49", "1.73", "1.98"),
-        ("0.98", "1.14", "1.33", "1.55", "1.79", "2.05"),
-        ("1.03", "1.20", "1.40", "1.62", "1.87", "2.14"),
-        ("1.10", "1.28", "1.49", "1.73", "1.98", "2.27"),
-        ("1.19", "1.39", "1.61", "1.85", "2.12", "2.42"),
-        ("1.31", "1.53", "1.76", "2.02", "2.31", "2.62"),
-        ("1.49", "1.73", "1.98", "2.27", "2.57", "2.90"),
-        ("2.03", "2.38", "2.77", "3.19", "3.65", "4.15"),
-    ),
-    "4": (
-        ("0.59", "0.63", "0.67", "0.72", "0.78", "0.84"),
-        ("0.60", "0.63", "0.68", "0.73", "0.78", "0.85"),
-        ("0.60", "0.64", "0.69", "0.74", "0.79", "0.86"),
-        ("0.61", "0.65", "0.70", "0.75", "0.81", "0.87"),
-        ("0.62", "0.66", "0.71", "0.76", "0.82", "0.89"),
-        ("0.63", "0.68", "0.73", "0.78", "0.84", "0.91"),
-        ("0.65", "0.70", "0.75", "0.81", "0.87", "0.94"),
-        ("0.67", "0.72", "0.78", "0.84", "0.91", "0.98"),
-        ("0.70", "0.76", "0.82", "0.88", "0.95", "1.03"),
-        ("0.75", "0.81", "0.87", "0.94", "1.02", "1.10"),
-        ("0.81", "0.87", "0.94", "1.02", "1.10", "1.19"),
-    ),
-}
-"""Tables 4 (2 m/s) and 5 (4 m/s): d3, m, a row per radius, a column per distance."""
+RADII: list[str] = PRINTED["radii"]
+DISTANCES: list[str] = PRINTED["distances"]
 
 TABLES = (1, 3, 4, 5)
 """Numbers of the tables that hold results (Table 2 lists the simulated model's dimensions)."""
@@ -100,18 +42,10 @@ FALL = 0.5
 
 @dataclass(frozen=True)
 class Cell:
-    """One number of a table.
+    """One number of a table, as the paper has it and as the equations give it, in the same unit.
 
-    Attributes
-    ----------
-    printed : str
-        As the paper has it.
-    computed : float
-        What the equations give, in the same unit.
-    rounded : str
-        `computed` with the printed number of decimals, halves away from zero.
-    differs : bool
-        Whether the two are more than half a unit of the last printed digit apart; ties agree.
+    `rounded` is the computed one with the printed number of decimals, halves away from zero. It
+    differs if the two are more than half a unit of the last printed digit apart; ties agree.
     """
 
     printed: str
@@ -218,33 +152,29 @@ def table(number: int, rebound: Rebound = "as-printed") -> Table:
     raise ValueError(f"no table {number}: the paper's results are in tables 1, 3, 4 and 5")
 
 
-def _cell(printed: str, computed: float) -> Cell:
-    claim, found = Decimal(printed), Decimal(repr(float(computed)))
-    unit = Decimal(1).scaleb(int(claim.as_tuple().exponent))
-    nearest = found.quantize(unit * SLACK, ROUND_HALF_UP).quantize(unit, ROUND_HALF_UP)
-    differs = abs(found - claim) > unit * (Decimal("0.5") + SLACK)
-    return Cell(printed, float(computed), f"{nearest:f}", differs)
-
-
 def _row(label: str, printed: Sequence[str], computed: Sequence[float]) -> Row:
-    return Row(label, tuple(_cell(*pair) for pair in zip(printed, computed, strict=True)))
+    cells = []
+    for text, value in zip(printed, map(float, computed), strict=True):
+        claim, found = Decimal(text), Decimal(repr(value))
+        unit = Decimal(1).scaleb(int(claim.as_tuple().exponent))
+        nearest = found.quantize(unit * SLACK, ROUND_HALF_UP).quantize(unit, ROUND_HALF_UP)
+        differs = abs(found - claim) > unit * (Decimal("0.5") + SLACK)
+        cells.append(Cell(text, value, f"{nearest:f}", differs))
+    return Row(label, tuple(cells))
 
 
-def _paper(speed: str, distance: str, rebound: Rebound) -> Transfer:
-    """Mass point, perpendicular plate, ε = 0.5: one entry per radius."""
+def at_radii(radii: Floats, speed: float, distance: float, rebound: Rebound) -> Transfer:
+    """Carry a point of 8 g over an upright plate with ε = 0.5, from pulleys of these radii (m)."""
     return transfer(
-        speed=float(speed),
-        pulley_radius=[float(radius) for radius in RADII],
-        distance=float(distance),
-        drop=FALL,
-        rebound=rebound,
-    )
+        speed=speed, pulley_radius=radii, distance=distance, restitution=0.5, drop=FALL,
+        mass=0.008, gravity=9.81, rebound=rebound,
+    )  # fmt: skip
 
 
 def _impacts(rebound: Rebound) -> Table:
     rows = []
-    for speed, printed in IMPACTS.items():
-        found = _paper(speed, "0.5", rebound)
+    for speed, printed in PRINTED["impacts"].items():
+        found = at_radii(np.array(RADII, dtype=float), float(speed), 0.5, rebound)
         computed = zip(found.x2, found.y2, found.x3, found.y3, strict=True)
         rows += [
             _row(f"v0 = {speed} m/s, R = {radius} m", *pair)
@@ -268,7 +198,8 @@ def _impacts(rebound: Rebound) -> Table:
 
 def _heights(number: int, rebound: Rebound) -> Table:
     speed = "2" if number == 4 else "4"
-    columns = [_paper(speed, distance, rebound).d3 for distance in DISTANCES]
+    radii, v0 = np.array(RADII, dtype=float), float(speed)
+    columns = [at_radii(radii, v0, float(distance), rebound).d3 for distance in DISTANCES]
     computed = zip(*columns, strict=True)
     return Table(
         number,
@@ -277,7 +208,7 @@ def _heights(number: int, rebound: Rebound) -> Table:
         ("radius", *(f"d_okr = {distance} m" for distance in DISTANCES)),
         tuple(
             _row(f"R = {radius} m", *pair)
-            for radius, *pair in zip(RADII, HEIGHTS[speed], computed, strict=True)
+            for radius, *pair in zip(RADII, PRINTED["heights"][speed], computed, strict=True)
         ),
     )
 
@@ -285,7 +216,7 @@ def _heights(number: int, rebound: Rebound) -> Table:
 def _energies(rebound: Rebound) -> Table:
     """Table 3 for the paper's own simulated model: flat supports, so that φ1 = 0 and d1 = 0.5 m."""
     rows = []
-    for speed, printed in ENERGIES.items():
+    for speed, printed in PRINTED["energies"].items():
         radius = 0.1  # any pulley that is left at the top will do
         found = transfer(
             speed=float(speed),

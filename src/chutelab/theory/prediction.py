@@ -33,22 +33,8 @@ REACH_WITHOUT_BELT = 2.0
 class Course:
     """Particle 0 on its way through one scene that has an incoming belt and a plate.
 
-    Attributes
-    ----------
-    found : Transfer
-        What the equations say about unbounded plate and belt, 0-d.
-    up, normal, pivot : ndarray, (2,)
-        Unit vectors up along the plate and out of its struck face; where it is hung, m.
-    separation, rebounded : Flight
-        The flights from the pulley and from the plate.
-    impact : ndarray, (2,)
-        World position of the centre on the plate's line, m; NaN if it never gets there.
-    belt_height : float or None
-        World y of the outgoing belt, m; None if there is none or nothing to measure it from.
-    plate_reach : tuple of float
-        Ends of the plate, measured upwards from the pivot along it, m.
-    lines : list of (name, first end, second end)
-        Plate, outgoing belt and free surfaces, in this order.
+    `found` is what the equations say about unbounded plate and belt, 0-d. Places and lengths are
+    world coordinates, m.
     """
 
     def __init__(self, scene: Scene, found: Transfer) -> None:
@@ -59,6 +45,7 @@ class Course:
         self.radius = scene.particle.radius
         self.ride_radius = self.belt.pulley_radius + self.radius
         self.angle = np.radians(plate.angle_deg)
+        # Up along the plate, and out of its struck face.
         self.up = np.array([-np.sin(self.angle), np.cos(self.angle)])
         self.normal = np.array([-np.cos(self.angle), -np.sin(self.angle)])
         ahead = self.belt.pulley_radius + plate.distance
@@ -67,10 +54,12 @@ class Course:
         cos, sin = np.cos(found.phi1), np.sin(found.phi1)
         left = self.ride_radius * np.array([sin, cos])
         self.separation = Flight(left, found.v1 * np.array([cos, -sin]), scene.gravity)
+        # The centre on the plate's line; NaN if it never gets there.
         self.impact = np.array([left[0] + found.x2, left[1] - found.y2])
         away, down = found.v2r * np.sin(found.phi2r), found.v2r * np.cos(found.phi2r)
         self.rebounded = Flight(self.impact, away * self.normal - down * self.up, scene.gravity)
 
+        # None if there is no outgoing belt, or nothing to measure its height from.
         self.belt_height: float | None = None
         if out is not None and out.drop_from == "top":
             self.belt_height = self.belt.pulley_radius - out.drop
@@ -82,7 +71,9 @@ class Course:
             if self.belt_height is not None:
                 lowest = self.belt_height + max(LEAST_CLEARANCE, RADII_CLEARANCE * self.radius)
                 below = max((self.pivot[1] - lowest) / np.cos(self.angle), 0.0)
+        # From the pivot upwards along the plate.
         self.plate_reach = -below, plate.above
+        # Plate, outgoing belt and free surfaces, in this order.
         self.lines: list[tuple[str, Any, Any]] = [
             ("plate", self.pivot - below * self.up, self.pivot + plate.above * self.up)
         ]
@@ -124,7 +115,7 @@ def predict(scene: Scene, rebound: Rebound = "corrected") -> Transfer:
     fault = _outside(scene)
     if fault:
         return cut(unanswered(), "separation", Reason.OUTSIDE.because(fault))
-    found = _unbounded(scene, rebound)
+    found = unbounded(scene, rebound)
     if np.isnan(found.phi1):
         return found
     course = Course(scene, found)
@@ -142,26 +133,13 @@ def predict(scene: Scene, rebound: Rebound = "corrected") -> Transfer:
     return found if trouble is None else cut(found, *trouble)
 
 
-def unbounded(scene: Scene) -> Transfer:
+def unbounded(scene: Scene, rebound: Rebound = "corrected") -> Transfer:
     """Return what the equations say of a scene if nothing else were in the way.
 
     Plate and outgoing belt are without ends, the pulley is met no more, and what the scene says of
-    releases is not looked at.
-
-    Parameters
-    ----------
-    scene : Scene
-        With an incoming conveyor and a plate; or a family of such, see `chutelab.scene.variants`.
-
-    Returns
-    -------
-    Transfer
-        0-d arrays; of a family, (N,).
+    releases is not looked at. The scene has an incoming conveyor and a plate; the arrays are 0-d,
+    those of a family of such scenes (see `chutelab.scene.variants`) are (N,).
     """
-    return _unbounded(scene, "corrected")
-
-
-def _unbounded(scene: Scene, rebound: Rebound) -> Transfer:
     belt, plate, out = scene.incoming, scene.plate, scene.outgoing
     assert belt is not None
     assert plate is not None

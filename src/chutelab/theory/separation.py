@@ -30,16 +30,9 @@ at low belt speed; 12 nodes on each give 1e-16 even for a singularity at the ons
 class Separation:
     """State of the centre where the pulley is left, arrays of one shape.
 
-    Attributes
-    ----------
-    phi1 : ndarray
-        φ1, angle from the top of the pulley, rad.
-    cos, sin : ndarray
-        Of φ1, each to full relative precision.
-    v1 : ndarray
-        Speed, m/s.
-    rim : ndarray
-        r ω, m/s, ω counter-clockwise: velocity of the lowest point relative to the centre.
+    φ1 is the angle from the top of the pulley, rad, its cosine and sine are each to full relative
+    precision; v1 is the speed, m/s, and `rim` is r ω, m/s, ω counter-clockwise: the velocity of the
+    lowest point relative to the centre.
     """
 
     phi1: Floats
@@ -54,21 +47,9 @@ def separation(
 ) -> Separation:
     """Separate from the pulley after a ride that starts at its top with the belt's speed, no spin.
 
-    Parameters
-    ----------
-    speed, ride_radius, gravity, friction : ndarray, shape (N,)
-        v0 (m/s), Rc (m), g (m/s²), µ of belt and pulley; infinite µ is adhesion: carried at v0, not
-        turning, Eq. (2).
-    spin : ndarray of bool, shape (N,)
-        A free disk, which first rolls; ignored with adhesion.
+    All are (N,): v0 (m/s), Rc (m), g (m/s²), µ of belt and pulley, and whether it is a free disk,
+    which first rolls. Infinite µ is adhesion: carried at v0, not turning, Eq. (2).
 
-    Returns
-    -------
-    Separation
-        Arrays of shape (N,).
-
-    Notes
-    -----
     Adhesion and the onset of slip are closed forms, the separation after slip is Newton's to the
     last bit or two. The spin of a slipping disk is a quadrature, to about 1e-14.
     """

@@ -31,15 +31,10 @@ def version_of(package: str) -> str | None:
 def library(module: str, what: str, extra: str) -> Any:
     """Return a module of a package that only one of Chutelab's extras brings.
 
-    Parameters
-    ----------
-    what : str
-        What to say without it, such as "a fit needs SciPy".
-
     Raises
     ------
     MissingLibraryError
-        Without it; says what to install.
+        Without it; says `what`, such as "a fit needs SciPy", and what to install.
     """
     try:
         return import_module(module)

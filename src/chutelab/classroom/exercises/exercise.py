@@ -54,8 +54,10 @@ class Values:
         # Python asks here for what is not among the numbers.
         raise AttributeError(f"no number {name!r} here; there are {', '.join(self)}")
 
-    def __setattr__(self, name: str, value: object) -> None:
+    def __setattr__(self, name: str, value: object = None) -> None:
         raise AttributeError("these numbers are given; keep your own in variables of your own")
+
+    __delattr__ = __setattr__
 
     def __getitem__(self, name: str) -> float:
         return float(vars(self)[name])
@@ -258,7 +260,6 @@ OF_ANGLES: Final = (
     ),
 )
 """Those of answers in degrees besides."""
-
 
 LEAST: Final = 1e-9
 """An answer smaller than that in its unit has no digits to judge."""

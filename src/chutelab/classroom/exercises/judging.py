@@ -209,7 +209,7 @@ _LONGEST: Final = 40
 
 
 def number_of(answer: object) -> float | str | None:
-    """Return the number that an answer is, None if nothing was attempted, else what to do instead.
+    """Return the number that an answer is, None for no attempt, or else words: what to do instead.
 
     >>> number_of([2]), number_of("..."), number_of("2,5")
     (2.0, None, 'That is text. Give the number without quotes: 2.5.')

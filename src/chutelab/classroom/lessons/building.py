@@ -134,7 +134,7 @@ def html_of(markdown: str) -> str:
     worksheet = SyntaxTreeNode(parser.parse(markdown))
     kept = []
     for part in worksheet.children:
-        inside = [one.type for one in part.children[0].children] if part.children else []
+        inside = [one.type for line in part.children for one in line.children]
         if part.tag != "h1" and (part.type, inside) != ("paragraph", ["image"]):
             kept.append(part)
     worksheet.children = kept

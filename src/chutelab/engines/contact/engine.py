@@ -18,6 +18,23 @@ from chutelab.util.arrays import Progress
 GREATEST = 1e300
 """Friction without a bound, as a number that can be multiplied by zero."""
 
+INTEGER, REAL = np.dtype("<i4"), np.dtype("<f8")
+
+GROWING = {
+    "knot": (("knots", dtype("Knot"), 1),),
+    "event": (("events", dtype("Event"), 1),),
+    "contact": (
+        ("contacts", dtype("Contact"), 1), ("earlier", dtype("Contact"), 1), ("links", INTEGER, 2)
+    ),
+    "near": (("near", INTEGER, 2),),
+}  # fmt: skip
+"""Arrays that may become full: name, type, rows for each knot, event, contact or pair near."""
+
+FULL = {
+    Status.FULL_KNOTS: "knot", Status.FULL_EVENTS: "event",
+    Status.FULL_CONTACTS: "contact", Status.FULL_NEAR: "near",
+}  # fmt: skip
+
 SLICE = 0.05
 """s of wall time between two looks at Ctrl-C and reports of progress."""
 
@@ -76,48 +93,26 @@ class Job:
         n = machine.count
         count = self.surface_count = len(machine.segments.length) + (machine.pulley is not None)
         self.owners = len(machine.surfaces)
-        self.rooms = {
-            "knot": (100 if machine.releases.carried.any() else 30) * n + 200,
-            "event": 40 * n + 1200,
-            "contact": 8 * n + 16,
-            "near": 16 * n + 16 if machine.interact else 1,
-        }
-        integer, real = np.dtype("<i4"), np.dtype("<f8")
         buckets = 1 << (4 * n + 16).bit_length() if machine.interact else 1
         cells = 12 * n + 64 if machine.interact else 1
         module.place(
             ("disks", dtype("Disk"), n), ("tracks", dtype("Track"), n),
             ("surfaces", dtype("Surface"), count), ("pairs", dtype("Pair"), 1 + count),
-            ("books", real, 3 * (self.owners + 1)), ("cells", dtype("Cell"), cells),
-            ("heads", integer, buckets), ("heap", integer, n), ("queue", integer, n + 1),
-            ("moved", integer, n), ("found", integer, 2 * n),
-            *(arrays for what in self.rooms for arrays in self.arrays(what)),
+            ("books", REAL, 3 * (self.owners + 1)), ("cells", dtype("Cell"), cells),
+            ("heads", INTEGER, buckets), ("heap", INTEGER, n), ("queue", INTEGER, n + 1),
+            ("moved", INTEGER, n), ("found", INTEGER, 2 * n),
         )  # fmt: skip
-        for what, size in self.rooms.items():
-            setattr(module.world, f"{what}_room", size)
+        self.make_room("knot", (100 if machine.releases.carried.any() else 30) * n + 200)
+        self.make_room("event", 40 * n + 1200)
+        self.make_room("contact", 8 * n + 16)
+        self.make_room("near", 16 * n + 16 if machine.interact else 1)
         self.settings(buckets, cells)
         self.fill()
 
-    def arrays(self, what: str) -> tuple[tuple[str, np.dtype[Any], int], ...]:
-        """Return the arrays whose size `rooms` tells."""
-        size, integer = self.rooms[what], np.dtype("<i4")
-        if what == "near":
-            return (("near", integer, 2 * size),)
-        if what != "contact":
-            return ((f"{what}s", dtype(what.title()), size),)
-        kind = dtype("Contact")
-        return (("contacts", kind, size), ("earlier", kind, size), ("links", integer, 2 * size))
-
-    def enlarge(self, what: str) -> None:
-        """Make twice as much room; of what was there only contacts of the step before are kept."""
-        world, kept = self.module.world, None
-        if what == "contact":
-            kept = self.module.array("earlier", dtype("Contact"), world.earlier_count).copy()
-        self.rooms[what] *= 2
-        self.module.place(*self.arrays(what))
-        setattr(self.module.world, f"{what}_room", self.rooms[what])
-        if kept is not None:
-            self.module.array("earlier", dtype("Contact"), len(kept))[:] = kept
+    def make_room(self, what: str, room: int) -> None:
+        """Make room for so many, in the arrays of `GROWING`."""
+        self.module.place(*((name, kind, rows * room) for name, kind, rows in GROWING[what]))
+        setattr(self.module.world, f"{what}_room", room)
 
     def settings(self, buckets: int, cells: int) -> None:
         """Fill in the numbers of the world."""
@@ -186,8 +181,7 @@ class Job:
         steps, module = 64, self.module
         while True:
             begin = perf_counter()
-            status = module.run(steps)
-            drained = self.drain()
+            status = self.proceed(steps)
             if status is Status.DONE:
                 if progress is not None:
                     progress(1.0)
@@ -196,18 +190,31 @@ class Job:
                 i = module.world.stalled
                 disk = module.array("disks", dtype("Disk"), self.machine.count)[i]
                 return i, module.world.now, (float(disk["x"]), float(disk["y"]))
-            if status is Status.FULL_NEAR:
-                self.enlarge("near")
-            elif status is Status.FULL_CONTACTS:
-                self.enlarge("contact")
-            elif status in (Status.FULL_KNOTS, Status.FULL_EVENTS):
-                what = "knot" if status is Status.FULL_KNOTS else "event"
-                if drained[what] < self.rooms[what] // 2:
-                    self.enlarge(what)
-            elif status is Status.PAUSED and perf_counter() - begin < SLICE:
+            if status is Status.PAUSED and perf_counter() - begin < SLICE:
                 steps *= 2
             if progress is not None:
                 progress(self.share())
+
+    def proceed(self, steps: int) -> Status:
+        """Run on for at most so many steps, take what was written, make room where it is full."""
+        module = self.module
+        status, counts = module.run(steps), {}
+        for what, kept in (("knot", self.knots), ("event", self.events)):
+            counts[what] = count = getattr(module.world, f"{what}_count")
+            if count:
+                kept.append(module.array(f"{what}s", dtype(what.title()), count).copy())
+                setattr(module.world, f"{what}_count", 0)
+        if status in FULL:
+            what = FULL[status]
+            room = getattr(module.world, f"{what}_room")
+            # Taking many knots or events has made room.
+            if counts.get(what, 0) <= room // 2:
+                # Of what was there, only contacts of the step before are needed.
+                count = module.world.earlier_count if what == "contact" else 0
+                earlier = module.array("earlier", dtype("Contact"), count).copy()
+                self.make_room(what, 2 * room)
+                module.array("earlier", dtype("Contact"), count)[:] = earlier
+        return status
 
     def share(self) -> float:
         """Return the share of the run that is done."""
@@ -217,16 +224,6 @@ class Job:
             return ended
         passed: float = world.t / self.machine.end_time if self.machine.end_time > 0 else 1.0
         return min(1.0, max(ended, passed))
-
-    def drain(self) -> dict[str, int]:
-        """Take what was written; return how much it was."""
-        counts = {}
-        for what, kept in (("knot", self.knots), ("event", self.events)):
-            counts[what] = count = getattr(self.module.world, f"{what}_count")
-            if count:
-                kept.append(self.module.array(f"{what}s", dtype(what.title()), count).copy())
-                setattr(self.module.world, f"{what}_count", 0)
-        return counts
 
     def recording(self, machine: Machine, place: tuple[float, float], seconds: float) -> Recording:
         """Return what was recorded."""
@@ -249,7 +246,7 @@ class Job:
             recorder.tell(events)
         disks = module.array("disks", dtype("Disk"), machine.count)
         recorder.ended[:] = disks["reason"]
-        books = module.array("books", np.dtype("<f8"), 3 * (self.owners + 1))
+        books = module.array("books", REAL, 3 * (self.owners + 1))
         recorder.by_surface[:] = books.reshape(-1, 3)
         recorder.contacts = world.impact_count
         return recorder.finish(

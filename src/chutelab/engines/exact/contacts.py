@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from chutelab.engines.exact.detect import bounds
-from chutelab.engines.exact.obstacles import NONE, bare, dot, length_of, pick
+from chutelab.engines.exact.obstacles import NONE, dot, length_of, pick
 from chutelab.engines.exact.particle_state import COLLAPSE, Contact, Mode, State
 from chutelab.mechanics.contact import grip_limit, impulses, limited
 from chutelab.results import Kind
@@ -268,7 +268,7 @@ def _blow(
     slip = s.slip_of(index, c, along)
     normal, tangential = impulses(approach, slip, c.restitution, c.friction, s.share)
     # The normal speed is set, not added to: ε |v_n| to the last bit.
-    s.v[:, s.at(index)] = bare(rebound) * c.normal + bare(along + tangential) * c.tangent
+    s.v[:, s.at(index)] = rebound * c.normal + (along + tangential) * c.tangent
     if s.spins:
         s.z[index] += 2.0 * tangential
     after, mass = slip + tangential / s.share, s.mass[index]

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.engines.exact.obstacles import NONE, Obstacles, bare, dot, length_of, pick, rows_of
+from chutelab.engines.exact.obstacles import NONE, Obstacles, dot, length_of, pick, rows_of
 from chutelab.mechanics.ballistics import descent, first_descent
 from chutelab.util.arrays import Bools, Floats, Ints
 
@@ -22,69 +22,37 @@ PARALLEL = 1e-14
 
 @dataclass(slots=True, eq=False)
 class Past:
-    """What tells the side of a segment that points touch; arrays (k,) and (2, k).
+    """What tells the side of a segment that points touch, of all particles of a block.
 
-    Attributes
-    ----------
-    obstacle, side : ndarray, (k,)
-        What they touched before what they touch or leave now, and its face; -1 for nothing.
-    place : ndarray, (2, k)
-        Where they were when they last were away from what they touch now, m.
+    A disk that touches a face cannot be on its other side, a point could.
     """
 
-    obstacle: Ints
-    side: Floats
-    place: Floats
-
-    def of(self, index: Ints) -> Past:
-        """Return that of some particles."""
-        return Past(self.obstacle[index], self.side[index], self.place.take(index, axis=1))
+    obstacle: Ints  # what they touched before what they touch or leave now; -1 for nothing
+    side: Floats  # its face
+    place: Floats  # (2, n), where they last were away from what they touch now, m
 
 
 @dataclass(slots=True, eq=False)
 class Motion:
-    """Particles that move with constant acceleration until something happens, arrays (k, ...).
+    """Particles (k,) that move with constant acceleration until something happens."""
 
-    Attributes
-    ----------
-    rows : ndarray, (k,)
-        Which particles they are.
-    position, velocity : ndarray, (2, k)
-        SI units.
-    acceleration : ndarray, (2, k) or (2, 1)
-        m/s².
-    left, left_side, order : ndarray, (k,)
-        Obstacle (and face of it) in contact now that is being left, or -1; how many of the leading
-        coefficients of the gap to it are zero: 1 after a rebound, 2 when leaving tangentially, 3
-        when lifting off a circle. They are exactly zero, so they are divided out.
-    on : ndarray, (k,), or None
-        Segment the particles slide on, which they cannot meet.
-    never : ndarray of bool, (S + C,), or None
-        Obstacles that none of them can meet.
-    past : Past or None
-        Of points: on which side of what they touch they are. A disk that touches a face cannot be
-        on its other side, a point could.
-    """
-
-    rows: Ints
-    position: Floats
-    velocity: Floats
-    acceleration: Floats
+    rows: Ints  # which particles they are
+    position: Floats  # (2, k), m
+    velocity: Floats  # (2, k), m/s
+    acceleration: Floats  # (2, k) or (2, 1), m/s²
+    # Obstacle (and face of it) in contact now that is being left, or -1; how many of the leading
+    # coefficients of the gap to it are zero: 1 after a rebound, 2 when leaving tangentially, 3 when
+    # lifting off a circle. They are exactly zero, so they are divided out.
     left: Ints
     left_side: Floats
     order: Ints
-    on: Ints | None = None
-    never: Bools | None = None
-    past: Past | None = None
-    _known: tuple[Floats, Floats] | None = None
+    past: Past | None = None  # of points
+    on: Ints | None = None  # segment they slide on, which they cannot meet
+    never: Bools | None = None  # (S + C,), obstacles that none of them can meet
 
     def after(self, t: Floats) -> Floats:
-        """Return where they are after times (k,), (2, k), m; of the same array it is known."""
-        if self._known is None or self._known[0] is not t:
-            mean = self.velocity + bare(0.5 * t) * self.acceleration
-            place = self.position + bare(t) * mean
-            self._known = t, place
-        return self._known[1]
+        """Return where they are after times (k,), (2, k), m."""
+        return self.position + t * (self.velocity + 0.5 * t * self.acceleration)
 
 
 GLANCING = 1e-3
@@ -208,22 +176,9 @@ def first_contact(
     Finds: faces within a segment's length, ends of segments (for a disk), the pulley. Misses, by
     design: a point against the end of a segment, and anything the particle overlaps already.
 
-    Parameters
-    ----------
-    motion : Motion
-        k particles.
-    obstacles : Obstacles
-        What they can meet.
-    radius : ndarray, (k,)
-        r, m.
-    until : ndarray, (k,)
-        Finite time after which nothing matters, s.
-
-    Returns
-    -------
-    time, hits, obstacle, side
-        Time from now, not longer than `until`: a contact at that very time comes first. The last
-        two are any numbers where there is none; side is +1 or -1 for a face, 0 for a circle.
+    Times count from now, and are not longer than `until` (s, finite, after which nothing matters):
+    a contact at that very time comes first. Number and side are anything where there is no contact;
+    the side is +1 or -1 for a face, 0 for a circle.
     """
     segments, count = obstacles.segments, len(until)
     held = motion.never is not None or motion.on is not None
@@ -277,7 +232,7 @@ def _reached(
     `places` are the boxes of the paths; without them all may.
     """
     if places is None:
-        return obstacles.numbers
+        return np.arange(obstacles.segments), np.arange(len(obstacles.rho))
     low, high = places
     if low.shape[1] > 1:
         low = np.minimum.reduce(low, axis=1, keepdims=True)
@@ -339,9 +294,10 @@ def _faces(
 
     if motion.past is not None and np.count_nonzero(touching):
         past = motion.past
-        height_then = dot(past.place[:, None, None] - faces[:, 2], frame[:, 0])
-        known = past.obstacle == segments[:, None, None]
-        behind = sides * np.where(known, past.side, height_then) < 0.0
+        place, segment = past.place.take(motion.rows, axis=1), segments[:, None, None]
+        height_then = dot(place[:, None, None] - faces[:, 2], frame[:, 0])
+        known = past.obstacle[motion.rows] == segment
+        behind = sides * np.where(known, past.side[motion.rows], height_then) < 0.0
         valid &= ~(touching & ~same & behind & (time == 0.0))
 
     # How far along the segment the contact is.
@@ -389,18 +345,9 @@ def bounds(
 ) -> NDArray[Any]:  # fmt: skip
     """Return what stops rides round circles backwards and forwards, (2, k), dtype `BOUND`.
 
-    Parameters
-    ----------
-    obstacles : Obstacles
-        All of them.
-    rows, circle : ndarray, (k,)
-        Particles, and the circles (obstacle number less S) they ride.
-    side : ndarray, (k,)
-        On which half of it, see `Obstacles.rim_side`.
-    rho, phi : ndarray, (k,)
-        Radius of the centre's path (m) and angle now, from the top, clockwise (rad).
-    radius : ndarray, (k,)
-        r, m.
+    Of particles `rows` on circles (obstacle number less S), on the half that `side` tells (see
+    `Obstacles.rim_side`), whose centres move at a radius `rho` (m) and are now at `phi` (rad, from
+    the top, clockwise).
     """
     found = np.zeros((2, len(rows)), dtype=BOUND)
     found["angle"], found["obstacle"] = WAYS * np.inf, NONE

@@ -10,7 +10,7 @@ import numpy as np
 
 from chutelab.engines.exact.contacts import end_slip, face_force, rest_on, settle_law, strike
 from chutelab.engines.exact.detect import FEW, Motion, bounds, first_contact
-from chutelab.engines.exact.obstacles import NONE, bare, dot, pick, rows_of
+from chutelab.engines.exact.obstacles import NONE, dot, pick, rows_of
 from chutelab.engines.exact.particle_state import Mode, State
 from chutelab.mechanics.ballistics import descent
 from chutelab.mechanics.contact import STEP_ANGLE, Circle, Outcome, advance, normal_force
@@ -170,7 +170,9 @@ def fly(s: State, index: Ints) -> None:
     # What falls meets surfaces before it leaves the scene: when that is matters to few.
     if not s.falls or s.obstacles.segments > FEW:
         leaves = _exit(s, motion)
-    dt, hits, meeting = _next(s, motion, stops if leaves is None else np.minimum(leaves, stops))
+    dt, hits, obstacle, side = _next(
+        s, motion, stops if leaves is None else np.minimum(leaves, stops)
+    )
     free = ~hits
     goes_on = np.count_nonzero(free) > 0
     if goes_on and leaves is None:
@@ -183,7 +185,7 @@ def fly(s: State, index: Ints) -> None:
         s.event(int(Kind.EXIT), out)
         s.finish(out, "exit")
         _stop(s, index[free & (s.mode[index] != Mode.DONE)])
-    _strike(s, index, hits, *meeting)
+    _strike(s, index, hits, obstacle, side)
 
 
 def carry(s: State, index: Ints) -> None:
@@ -193,19 +195,19 @@ def carry(s: State, index: Ints) -> None:
     v = motion.velocity[0]
     ends, stops = -motion.position[0] / v, s.stop[index] - s.age[index]
     ends[~(v > 0.0)] = np.inf
-    dt, hits, meeting = _next(s, motion, np.minimum(ends, stops))
+    dt, hits, obstacle, side = _next(s, motion, np.minimum(ends, stops))
     _move(s, motion, dt)
     s.knots(index)
     free = ~hits
     _stop(s, index[free & (stops < ends)])
     carry_round(s, index[free & (ends <= stops)])
-    _strike(s, index, hits, *meeting)
+    _strike(s, index, hits, obstacle, side)
 
 
 def slide(s: State, index: Ints) -> None:
     """Move particles on a face on to their next event and resolve it."""
-    on, side = s.on[index], s.side[index]
-    c = s.contact(index, on, side)
+    on, face = s.on[index], s.side[index]
+    c = s.contact(index, on, face)
     pull, force = face_force(s, index, c)
     motion = _motion(s, index, pull)
     motion.on = on
@@ -216,12 +218,12 @@ def slide(s: State, index: Ints) -> None:
     grips = np.where(fading, np.maximum(-slip / np.where(fading, rate, 1.0), 0.0), np.inf)
     ends = _end(s, motion)
     stops = s.stop[index] - s.age[index]
-    dt, hits, meeting = _next(s, motion, np.minimum(np.minimum(grips, ends), stops))
+    dt, hits, obstacle, side = _next(s, motion, np.minimum(np.minimum(grips, ends), stops))
     mean = np.where(s.slip[index] == 0.0, 0.0, slip + 0.5 * rate * dt)
     mass = s.mass[index]
     s.book(index, c.surface, mass * force * c.belt * dt, 0.0, -mass * force * mean * dt)
     _move(s, motion, dt)
-    s.snap(index, on, side)
+    s.snap(index, on, face)
     if s.spins:
         s.z[index] += 2.0 * force * dt
     # What was left at the beginning is some way off now.
@@ -231,7 +233,7 @@ def slide(s: State, index: Ints) -> None:
     _stop(s, index[free & (stops < grips) & (stops < ends)])
     _leave_face(s, index[free & (ends < grips) & (ends <= stops)])
     end_slip(s, index[free & (grips <= ends) & (grips <= stops)])
-    _strike(s, index, hits, *meeting)
+    _strike(s, index, hits, obstacle, side)
 
 
 def _motion(s: State, index: Ints, acceleration: Floats) -> Motion:
@@ -243,19 +245,15 @@ def _motion(s: State, index: Ints, acceleration: Floats) -> Motion:
         s.left[index],
         s.left_side[index],
         s.order[index],
-        past=None if s.past is None else s.past.of(index),
+        s.past,
     )
 
 
-def _next(s: State, motion: Motion, until: Floats) -> tuple[Floats, Bools, tuple[Ints, Floats]]:
-    """Return how long the particles go on, who meets something then, and what (and its side).
-
-    Not longer than `until`; a contact at that very time comes first.
-    """
-    radius = s.radius[motion.rows]
-    dt, hits, obstacle, side = first_contact(motion, s.obstacles, radius, until)
-    s.count_idle(motion.rows, dt)
-    return dt, hits, (obstacle, side)
+def _next(s: State, motion: Motion, until: Floats) -> tuple[Floats, Bools, Ints, Floats]:
+    """Return what `first_contact` does, and count who does not get on."""
+    found = first_contact(motion, s.obstacles, s.radius[motion.rows], until)
+    s.count_idle(motion.rows, found[0])
+    return found
 
 
 def _move(s: State, motion: Motion, dt: Floats) -> None:
@@ -268,7 +266,7 @@ def _move(s: State, motion: Motion, dt: Floats) -> None:
         touch = rows_of(s.obstacles.touch, motion.rows)
         away = (np.abs(place - middle) > CLEAR * touch).any(axis=0)
         s.past.place[:, motion.rows[away]] = middle[:, away]
-    s.v[:, at] = motion.velocity + bare(dt) * motion.acceleration
+    s.v[:, at] = motion.velocity + dt * motion.acceleration
 
 
 def _strike(s: State, index: Ints, hits: Bools, obstacle: Ints, side: Floats) -> None:

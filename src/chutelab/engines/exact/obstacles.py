@@ -32,48 +32,24 @@ PER_PARTICLE = (
 
 @dataclass(frozen=True, eq=False)
 class Obstacles:
-    """Faces, shape (S, n), and circles, (C, n), where n is 1 or the number of particles.
+    """S segments and C circles; n is 1 or the number of particles."""
 
-    Attributes
-    ----------
-    faces : ndarray, (2, 4, S, 1, n)
-        Of the segments, components first: unit normal, unit tangent to the right of it, first end
-        (m), and from where to where along a segment a place counts as beside it (m).
-    length : ndarray, (S, n)
-        m.
-    center : ndarray, (2, C, n)
-        Centres of the circles: segment ends, then the pulley.
-    rho : ndarray, (C, n)
-        Distance of a particle's centre from the circle's at contact, m.
-    material : ndarray, (3, S + C, n)
-        Speed of the surface, of segments and their ends along the segment, of the pulley clockwise
-        (m/s), and the pair values: restitution, friction.
-    low, high : ndarray, (2, S + C, n)
-        Box that a particle's centre is in when it touches, m.
-    surface : ndarray, (S + C,)
-        Index into `Machine.surfaces`.
-    spots : tuple of (int, int), (S,)
-        Numbers of the places where a segment begins and ends; the same where they are joined.
-    end_circle : ndarray, (S, 2)
-        Obstacle number of the circle at a segment's first and second end, or -1 for a point.
-    pulley : int
-        Obstacle number of the pulley, or -1.
-    touch : ndarray, (n,)
-        m; gaps smaller than this are rounding.
-    """
-
+    # Of the segments, (2, 4, S, 1, n), components first: unit normal, unit tangent to the right of
+    # it, first end (m), and from where to where along a segment a place counts as beside it (m).
     faces: Floats
-    length: Floats
-    center: Floats
-    rho: Floats
+    length: Floats  # (S, n), m
+    center: Floats  # (2, C, n), of the circles: segment ends, then the pulley, m
+    rho: Floats  # (C, n), distance of a particle's centre from the circle's at contact, m
+    # (3, S + C, n): speed of the surface (m/s), of segments and their ends along the segment, of
+    # the pulley clockwise; restitution and friction of the pair.
     material: Floats
-    low: Floats
+    low: Floats  # (2, S + C, n), box that a particle's centre is in when it touches, m
     high: Floats
-    surface: Ints
-    spots: tuple[tuple[int, int], ...]
-    end_circle: Ints
-    pulley: int
-    touch: Floats
+    surface: Ints  # (S + C,), index into `Machine.surfaces`
+    spots: tuple[tuple[int, int], ...]  # (S,), places where segments begin and end, by number
+    end_circle: Ints  # (S, 2), obstacle number of the circle at each end, or -1 for a point
+    pulley: int  # obstacle number of the pulley, or -1
+    touch: Floats  # (n,), m; gaps smaller than this are rounding
 
     @property
     def segments(self) -> int:
@@ -107,11 +83,6 @@ class Obstacles:
     def bound(self) -> tuple[Floats, Floats]:
         """Lower and upper sides of boxes that hold those of all particles, (2, S + C) each, m."""
         return self.low.min(axis=-1), self.high.max(axis=-1)
-
-    @cached_property
-    def numbers(self) -> tuple[Ints, Ints]:
-        """Return the numbers of all segments, (S,), and of all circles, (C,), from 0 each."""
-        return np.arange(self.segments), np.arange(len(self.rho))
 
     @cached_property
     def under_belt(self) -> Bools:
@@ -175,7 +146,7 @@ class Obstacles:
 
         `position` (2, n) is that of all particles.
         """
-        normal = bare(side) * pick(self.normal, rows, obstacle)
+        normal = side * pick(self.normal, rows, obstacle)
         round_ = (obstacle >= self.segments).nonzero()[0]
         if len(round_):
             circle = obstacle[round_] - self.segments
@@ -191,11 +162,6 @@ class Obstacles:
         """
         crown = pick(self.crown, rows, obstacle - self.segments)
         return np.where(dot(normal, crown) >= 0.0, 1.0, -1.0)
-
-
-def bare(values: Floats) -> Floats:
-    """Values (k,) to meet vectors (2, k): a lone one without axes, which NumPy is quicker with."""
-    return values.reshape(()) if values.shape == (1,) else values
 
 
 def dot(a: Floats, b: Floats) -> Floats:

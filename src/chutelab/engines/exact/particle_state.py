@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chutelab.engines.exact.detect import BOUND, Past
-from chutelab.engines.exact.obstacles import NONE, Obstacles, along, bare, dot, pick
+from chutelab.engines.exact.obstacles import NONE, Obstacles, along, dot, pick
 from chutelab.machine import Machine
 from chutelab.mechanics.contact import DISK_SHARE
 from chutelab.results import EVENT, KNOT, REASONS, Kind
 from chutelab.results.recorder import Recorder, StalledError
-from chutelab.util.arrays import Floats, Ints
+from chutelab.util.arrays import Floats, Ints, Numbers
 
 COLLAPSE = 200
 """Contacts in a row that take no time after which a particle has come to rest in its corner. An
@@ -65,33 +65,39 @@ Blow = tuple[Floats, Floats, Floats, Floats]
 
 
 class Rows:
-    """Rows of numbers of particles, in the order in which they came."""
+    """Rows of n numbers of particles, in the order in which they came."""
 
     def __init__(self) -> None:
         self._chunks: list[tuple[Ints, Floats]] = []
         self._long: list[tuple[Ints, Floats]] = []
 
     def add(self, index: Ints, rows: Floats) -> None:
-        """Add a row (n,) for each of the particles (k,); `rows` (n, k) is kept, not copied."""
-        self._chunks.append((index, rows))
-        if len(self._chunks) >= MANY:
+        """Add a row for each of the particles (k,); `rows` (n, k) is kept, not copied."""
+        self._chunks.append((index, rows.T))
+        if len(self._chunks) == MANY:
             self._long.append(_joined(self._chunks))
             self._chunks.clear()
 
-    def __len__(self) -> int:
-        return len(self._long) + len(self._chunks)
+    def __bool__(self) -> bool:
+        return bool(self._long or self._chunks)
+
+    def all(self) -> tuple[Ints, Floats]:
+        """Return whose each row is, (K,), and the rows, (K, n)."""
+        return _joined(self._long + self._chunks)
 
     def by_particle(self) -> tuple[Ints, Floats]:
-        """Return whose each row is, ascending, (K,), and the rows, (K, n)."""
-        owner, rows = _joined(self._long + self._chunks)
+        """Return the same, particle by particle."""
+        owner, rows = self.all()
+        if not np.count_nonzero(owner):
+            return owner, rows  # all of particle 0
         # 16-bit integers are sorted by radix, in linear time.
         order = np.argsort(owner.astype(np.int16), kind="stable")
-        return owner[order], rows.T[order]
+        return owner[order], rows.take(order, axis=0)
 
 
 def _joined(chunks: list[tuple[Ints, Floats]]) -> tuple[Ints, Floats]:
-    owner = np.concatenate([index for index, _ in chunks])
-    return owner, np.concatenate([rows.T for _, rows in chunks]).T
+    owners, rows = zip(*chunks, strict=True)
+    return np.concatenate(owners), np.concatenate(rows)
 
 
 class State:
@@ -102,23 +108,19 @@ class State:
     """
 
     def __init__(self, machine: Machine, surfaces: Obstacles, first: int, last: int) -> None:
-        count = last - first
+        count = self.count = last - first
         self.machine, self.obstacles = machine, surfaces.of(first, last)
         self.first, self.rounds = first, 0
         mine, particle = slice(first, last), machine.particle
-        self.radius, self.mass, self.gravity, inertia, end = (
-            np.broadcast_to(value, machine.count)[mine]
-            for value in (
-                particle.radius, particle.mass, machine.gravity, particle.inertia, machine.end_time,
-            )
-        )  # fmt: skip
+        self.radius, self.mass = self.each(particle.radius), self.each(particle.mass)
+        self.gravity, inertia = self.each(machine.gravity), self.each(particle.inertia)
         self.fall = np.stack([np.zeros(count), -self.gravity])
         self.falls, self.spins = bool(self.gravity[0] != 0.0), bool(inertia[0] > 0.0)
         self.share = DISK_SHARE if self.spins else 1.0
         start = machine.releases
         self.released = start.t[mine]
         self.staggered = np.count_nonzero(self.released) > 0
-        self.stop = end - self.released  # age at which the run is over
+        self.stop = self.each(machine.end_time) - self.released  # age at which the run is over
         self.everyone = np.arange(count)
 
         # Rows of a knot: age (s), position (m), velocity and r ω (m/s), ledger entries (J).
@@ -150,12 +152,16 @@ class State:
         self.log, self.events, self.books = Rows(), Rows(), Rows()
         self.contacts = 0
 
+    def each(self, value: Numbers) -> Floats:
+        """Return a number of the machine for each of the particles, (k,)."""
+        if np.ndim(value):
+            return np.asarray(value)[self.first : self.first + self.count]
+        return np.full(self.count, value)
+
     @cached_property
     def exit_box(self) -> Floats:
         """Left, right, bottom and top beyond which each particle has left the scene, (4, k), m."""
-        mine = slice(self.first, self.first + len(self.mode))
-        box = self.machine.exit_box
-        return np.stack([np.broadcast_to(side, self.machine.count)[mine] for side in box])
+        return np.stack([self.each(side) for side in self.machine.exit_box])
 
     def count_idle(self, index: Ints, dt: Floats) -> None:
         """Count events in a row that take no time, and raise rather than hang if they never end."""
@@ -179,8 +185,8 @@ class State:
 
     def parties(self) -> list[tuple[int, Ints]]:
         """Return the modes (but `DONE`) that particles are in now, and who is in each."""
-        count, mode = len(self.mode), int(self.mode[0])
-        if count == 1 or np.count_nonzero(self.mode == mode) == count:
+        mode = int(self.mode[0])
+        if self.count == 1 or np.count_nonzero(self.mode == mode) == self.count:
             return [(mode, self.everyone)] if mode != Mode.DONE else []
         counts = np.bincount(self.mode).tolist()
         return [
@@ -217,8 +223,8 @@ class State:
         """Put particles exactly at contact distance, so that rounding cannot add up."""
         o, place = self.obstacles, self.p.take(index, axis=1)
         normal, _, start, _ = pick(o.faces[:, :, :, 0], index, obstacle).swapaxes(0, 1)
-        normal = bare(side) * normal
-        snapped = place - bare(dot(place - start, normal) - self.radius[index]) * normal
+        normal = side * normal
+        snapped = place - (dot(place - start, normal) - self.radius[index]) * normal
         round_ = (obstacle >= o.segments).nonzero()[0]
         if len(round_):
             rows, circle = index[round_], obstacle[round_] - o.segments
@@ -230,11 +236,11 @@ class State:
 
     def at(self, index: Ints) -> Ints | slice:
         """Return what to assign by: a slice is several times as fast where it is everyone."""
-        return slice(None) if len(index) == len(self.mode) else index
+        return slice(None) if len(index) == self.count else index
 
     def now(self, index: Ints) -> Floats:
         """Return the particles as rows of a knot, (9, k)."""
-        everyone = len(index) == len(self.mode)
+        everyone = len(index) == self.count
         state = self.state.copy() if everyone else self.state.take(index, axis=1)
         if self.staggered:
             state[0] += self.released if everyone else self.released[index]
@@ -283,13 +289,12 @@ class State:
         recorder.ended[self.first : self.first + len(self.ended)] = self.ended
         if self.log:
             owner, rows = self.log.by_particle()
-            sizes = np.bincount(owner, minlength=len(self.mode))
-            recorder.tracks(self.first, sizes, rows.view(KNOT)[:, 0])
+            recorder.add(self.first + owner, rows.view(KNOT)[:, 0])
         if self.events:
-            owner, rows = self.events.by_particle()
+            owner, rows = self.events.all()
             events = np.empty(len(owner), dtype=EVENT)
             events["particle"], events["other"] = owner + self.first, NONE
-            events["kind"], events["surface"], events["t"] = rows[:, 0], rows[:, 1], rows[:, 2]
+            events["kind"], events["surface"], events["t"] = rows[:, :3].T
             events.view(NUMBERS)["numbers"] = rows[:, 3:]
             recorder.tell(events)
         if self.books:

@@ -135,7 +135,7 @@ class Lone:
         """Run to the end."""
         if self.t >= self.machine.end_time:
             return
-        self.tracks.knot(0, self.t, self.x, self.v, self.omega)
+        self._knot()
         self._tell(Kind.RELEASE)
         # A carried particle is let go where no surface holds it.
         released = bool(self.machine.releases.carried[self.particle])
@@ -196,14 +196,11 @@ class Lone:
     def _fly(self, touching: dict[Face, Vec2d]) -> None:
         """Fly to the next contact, the exit or the end."""
         if self.on >= 0:
-            self.tracks.knot(0, self.t, self.x, self.v, self.omega)
+            self._knot()
             self._tell(Kind.SEPARATION, self.on)
         self.on, self.slipping = -1, None
-        path, span, reason = (
-            Flight(self.x, self.v, self.pull),
-            self.machine.end_time - self.t,
-            "time",
-        )
+        path = Flight(self.x, self.v, self.pull)
+        span, reason = self.machine.end_time - self.t, "time"
         if self.machine.until != "time" and (out := path.leaves(self.machine.exit_box)) < span:
             span, reason = out, "exit"
         for face in self.world.faces:
@@ -219,18 +216,16 @@ class Lone:
             self.steps += count - 1
             self.t += span
             self.x, self.v = self.body.position, self.v + span * self.pull
-        if reason == "exit":
-            self._tell(Kind.EXIT)
         if reason:
-            self._end(reason)
+            self._end(reason, Kind.EXIT if reason == "exit" else None)
         else:
-            self.tracks.knot(0, self.t, self.x, self.v, self.omega)
+            self._knot()
 
     def _blow(self, touching: dict[Face, Vec2d]) -> None:
         """Have Chipmunk resolve the blow from the surface that the particle moves into fastest."""
         before = self.v, self.omega
         if self.on >= 0:
-            self.tracks.knot(0, self.t, self.x, self.v, self.omega)
+            self._knot()
         struck = min(touching, key=lambda face: self.v.dot(touching[face]))
         gap, normal = struck.gap(self.x)
         self.x -= gap * normal
@@ -246,9 +241,9 @@ class Lone:
             lands = contact.face.surface == self.machine.landing and not self.landed
             self.landed |= lands
             kind = Kind.LANDING if lands else Kind.IMPACT
-            self._tell(kind, contact.face.surface, before, contact)
+            self._tell(kind, contact.face.surface, before, contact.push, contact.rub)
             self.recorder.contacts += 1
-        self.tracks.knot(0, self.t, self.x, self.v, self.omega)
+        self._knot()
         if self.landed and self.machine.until == "landed":
             self._end("landed")
         elif self.blows > WINDOW:
@@ -317,8 +312,7 @@ class Lone:
         if self.machine.until == "settled" and self._lies(end, h):
             if self.slipping != 0:
                 self._tell(Kind.STICK, surface)
-            self._tell(Kind.SETTLE, surface)
-            self._end("settled")
+            self._end("settled", Kind.SETTLE, surface)
         else:
             self._take(end, h, surface)
         return True
@@ -391,8 +385,7 @@ class Lone:
         belt = self.machine.pulley
         assert belt is not None
         if self.v.x == 0.0 and self.machine.until == "settled":
-            self._tell(Kind.SETTLE, belt.surface)
-            self._end("settled")
+            self._end("settled", Kind.SETTLE, belt.surface)
             return
         ride = Carriage(self.machine, self.world, self.particle, self.t)
         self.x, self.v = ride.at(ride.until - ride.t)
@@ -405,21 +398,26 @@ class Lone:
 
     # What is written down
 
-    def _end(self, reason: str) -> None:
-        self.ended = True
+    def _knot(self) -> None:
         self.tracks.knot(0, self.t, self.x, self.v, self.omega)
+
+    def _end(self, reason: str, kind: Kind | None = None, surface: int = -1) -> None:
+        """End the track, with an event of some kinds."""
+        if kind is not None:
+            self._tell(kind, surface)
+        self.ended = True
+        self._knot()
         self.recorder.ended[self.particle] = REASONS.index(reason)
 
     def _tell(
         self, kind: Kind, surface: int = -1, before: tuple[Vec2d, float] | None = None,
-        contact: Contact | None = None,
+        push: float = 0.0, rub: float = 0.0,
     ) -> None:  # fmt: skip
         """Write an event; of a blow with its impulses."""
         v, omega = before or (self.v, self.omega)
         self.recorder.events(
             kind, self.particle, self.t, self.x, self.v, self.omega, velocity_before=v,
-            omega_before=omega, surface=surface, normal_impulse=contact.push if contact else 0.0,
-            tangential_impulse=contact.rub if contact else 0.0,
+            omega_before=omega, surface=surface, normal_impulse=push, tangential_impulse=rub,
         )  # fmt: skip
 
     def _book(self, contact: Contact, before: tuple[Vec2d, float]) -> None:

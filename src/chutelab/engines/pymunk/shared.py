@@ -20,15 +20,13 @@ from typing import Any
 
 import numpy as np
 import pymunk
-from numpy.typing import NDArray
 from pymunk import Vec2d, batch
 
 from chutelab.engines.pymunk.world import PARTICLE, Carriage, Flight, Tracks, World
 from chutelab.machine import Machine
 from chutelab.results import REASONS, Kind
 from chutelab.results.recorder import Recorder
-
-Floats = NDArray[np.float64]
+from chutelab.util.arrays import Floats, Ints
 
 SLOP, BIAS = 1e-3, 1e-97
 """Overlap that Chipmunk leaves alone, as a share of the radius, and the share of what is beyond it
@@ -104,13 +102,10 @@ class Shared:
         # The last surface that pushed a particle, how often in a row, the time and the state then.
         self.on, self.pushes = np.full(count, -1), np.zeros(count, dtype=np.int64)
         self.left = np.zeros((6, count))
-        nobody = [0.0] * count
-        self.surface = np.array([len(machine.surfaces)] * count + [face.surface for face in faces])
-        self.speed = np.array(nobody + [face.speed for face in faces])
-        self.tx, self.ty = (
-            np.array(nobody + [face.tangent[k] if face.tangent else 0.0 for face in faces])
-            for k in (0, 1)
-        )
+        about = [(len(machine.surfaces), 0.0, 0.0, 0.0)] * count
+        about += [(face.surface, face.speed, *(face.tangent or (0.0, 0.0))) for face in faces]
+        surface, self.speed, self.tx, self.ty = np.array(about).T
+        self.surface = surface.astype(np.int64)
         self.throws = (self.speed != 0.0) & (self.surface != machine.landing)
         self._fill()
 
@@ -253,30 +248,25 @@ class Shared:
 
     def _step(self) -> None:
         """Step all, book what happened, and end who has ended."""
+        space = self.world.space
         if self.rides:
             self._ride()
-        self.world.space.step(self.h)
+        space.step(self.h)
         self.steps += 1
         self.clock += 1
         t, self.t = self.t, self.begin + self.clock * self.h
         entries = self.entries[:, : self.count].copy()
-        self._states()
-        self._contacts()
-        self.tracks.step(self.free, (t, self.t), self.state[..., : self.count], entries)
-        self._endings(t, entries)
-
-    def _states(self) -> None:
-        """Read the state of all bodies."""
         self.buffer.clear()
-        batch.get_space_bodies(self.world.space, _BODY, self.buffer)
-        rows = self._rows(np.frombuffer(self.buffer.int_buf(), dtype=np.uintp))
+        batch.get_space_bodies(space, _BODY, self.buffer)
+        ids = np.frombuffer(self.buffer.int_buf(), dtype=np.uintp)
         self.state[0], after = self.state[1], self.state[1]
+        rows = self.row[self.ids.searchsorted(ids)]
         after[:, rows] = np.frombuffer(self.buffer.float_buf()).reshape(-1, 5).T
         after[:2] += (0.5 * self.h) * after[2:4]
         after[:, self.count :] = 0.0
-
-    def _rows(self, ids: NDArray[np.uintp]) -> NDArray[np.int64]:
-        return self.row[self.ids.searchsorted(ids)]
+        self._contacts()
+        self.tracks.step(self.free, (t, self.t), self.state[..., : self.count], entries)
+        self._endings(t, entries)
 
     def _contacts(self) -> None:
         """Book what pushes, and tell blows, landings and who rides what."""
@@ -288,7 +278,7 @@ class Shared:
         push = -values[0] * values[2] - values[1] * values[3]
         pushing = push > 0.0
         push, values, ids = push[pushing], values[:, pushing], ids[:, pushing]
-        a, b = self._rows(ids[:2])
+        a, b = self.row[self.ids.searchsorted(ids[:2])]
         one, other = np.minimum(a, b), np.maximum(a, b)
         # They come in the order of a hash of addresses, on which no sum may depend.
         order = np.lexsort((push, other, one))
@@ -343,7 +333,7 @@ class Shared:
                 normal_impulse=push[told], tangential_impulse=rub[told],
             )  # fmt: skip
 
-    def _riding(self, who: NDArray[np.int64], surface: NDArray[np.int64]) -> None:
+    def _riding(self, who: Ints, surface: Ints) -> None:
         """Count pushes of surfaces in a row; tell separations at the last one's time."""
         over = self.left[0] < self.t - HOP * self.h
         over[who[self.on[who] != surface]] = True

@@ -49,29 +49,15 @@ ARC = 0.025
 
 @dataclass(frozen=True, eq=False)
 class Face:
-    """One straight surface, or the pulley.
+    """A straight surface, as a segment without thickness, or the pulley, as a circle."""
 
-    Attributes
-    ----------
-    shape : pymunk.Shape
-        A segment without thickness, or the pulley's circle, on a body of its own.
-    radius : float
-        Of the particles, m.
-    surface : int
-        Index into `Machine.surfaces`.
-    tangent : Vec2d or None
-        Direction of a segment, None for the pulley.
-    speed, restitution, friction : float
-        Of the surface (m/s), pair values with a particle; friction is finite.
-    """
-
-    shape: pymunk.Shape
-    radius: float
-    surface: int
-    tangent: Vec2d | None
-    speed: float
-    restitution: float
-    friction: float
+    shape: pymunk.Shape  # on a body of its own
+    surface: int  # index into `Machine.surfaces`
+    tangent: Vec2d | None  # direction of a segment
+    speed: float  # m/s
+    restitution: float  # of the pair with a particle, and so is friction
+    friction: float  # finite
+    radius: float  # of the particles, m
 
     @cached_property
     def ends(self) -> tuple[Vec2d, ...]:
@@ -115,64 +101,56 @@ class Flight(NamedTuple):
     def leaves(self, box: tuple[float, float, float, float]) -> float:
         """Return the time (s) after which it leaves the exit box, inf if never."""
         left, right, bottom, top = box
-        if self.g.y < 0.0:
-            rise = -self.v.y / self.g.y
-            fall = -2.0 * (self.x.y - bottom) / self.g.y
-            return rise + sqrt(max(rise**2 + fall, 0.0))
-        out = inf
-        for x, v, low, high in (
-            (self.x.x, self.v.x, left, right),
-            (self.x.y, self.v.y, bottom, top),
-        ):
-            if v != 0.0:
-                out = min(out, max(((high if v > 0.0 else low) - x) / v, 0.0))
-        return out
+        (x, y), (vx, vy), g = self.x, self.v, self.g.y
+        return min(
+            falls(x - left, vx, 0.0), falls(right - x, -vx, 0.0),
+            falls(y - bottom, vy, g), falls(top - y, -vy, -g),
+        )  # fmt: skip
+
+
+def falls(gap: float, rate: float, pull: float) -> float:
+    """Return the first time (s) at which gap + rate τ + pull τ²/2 falls to 0, inf if never."""
+    ahead = max(gap, 0.0)
+    square = rate * rate - 2.0 * pull * ahead
+    if square >= 0.0 and rate < 0.0:
+        return 2.0 * ahead / (sqrt(square) - rate)
+    return (rate + sqrt(square)) / -pull if pull < 0.0 else inf
 
 
 class World:
-    """A Space with all surfaces of a machine.
+    """A Space with all surfaces of a machine, counted from near its place (`machine.origin`).
 
-    Parameters
-    ----------
-    machine : Machine
-        Counted from near its own place, see `chutelab.machine.origin`.
-
-    Attributes
-    ----------
-    faces : list of Face
-        In the order of the segments, the pulley last.
-    hair : float
-        m; gaps up to this one are contact.
-    tiny : float
-        Share of speeds below which one into a surface is rounding, which tilts normals.
+    `faces` are its segments, in their order, and the pulley. Gaps up to `hair` (m) are contact, and
+    gaps of `rounding` (m) are none. `tiny` is the share of speeds below which one into a surface is
+    rounding, which tilts normals.
     """
 
     def __init__(self, machine: Machine) -> None:
         self.machine = machine
         self.space = pymunk.Space()
-        parts, r = machine.segments, machine.particle.radius
+        parts, r, wheel = machine.segments, machine.particle.radius, machine.pulley
         size = float(np.abs([*parts.start.ravel(), *parts.end.ravel(), r]).max())
         self.rounding = DIGITS * size
         self.hair = max(HAIR * r, 4.0 * self.rounding)
         self.tiny = max(TINY, self.rounding / r)
-        self.faces: list[Face] = []
+        self.by_shape: dict[pymunk.Shape, Face] = {}
         for n, (start, end) in enumerate(
             zip(parts.start.tolist(), parts.end.tolist(), strict=True)
         ):
-            body = pymunk.Body(body_type=pymunk.Body.STATIC)
+            still = pymunk.Body(body_type=pymunk.Body.STATIC)
             self._add(
-                pymunk.Segment(body, start, end, 0.0), int(parts.surface[n]),
+                pymunk.Segment(still, start, end, 0.0), int(parts.surface[n]),
                 Vec2d(*parts.tangent[n].tolist()), float(parts.speed[n]),
                 float(parts.restitution[n]), float(parts.friction[n]),
             )  # fmt: skip
-        if (wheel := machine.pulley) is not None:
-            body = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
-            body.angular_velocity = -wheel.speed / wheel.radius
+        if wheel is not None:
+            turning = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+            turning.angular_velocity = -wheel.speed / wheel.radius
             self._add(
-                pymunk.Circle(body, wheel.radius), wheel.surface, None, wheel.speed,
+                pymunk.Circle(turning, wheel.radius), wheel.surface, None, wheel.speed,
                 wheel.restitution, wheel.friction,
             )  # fmt: skip
-        self.by_shape = {face.shape: face for face in self.faces}
+        self.faces = list(self.by_shape.values())
 
     def _add(
         self, shape: pymunk.Shape, surface: int, tangent: Vec2d | None, speed: float,
@@ -181,8 +159,8 @@ class World:
         assert shape.body is not None
         shape.collision_type = SURFACE
         self.space.add(shape.body, shape)
-        radius, friction = self.machine.particle.radius, min(friction, GRIP)
-        self.faces.append(Face(shape, radius, surface, tangent, speed, restitution, friction))
+        r, friction = self.machine.particle.radius, min(friction, GRIP)
+        self.by_shape[shape] = Face(shape, surface, tangent, speed, restitution, friction, r)
 
     def disk(self) -> tuple[pymunk.Body, pymunk.Circle]:
         """Return a new body with its shape, not yet in the Space."""
@@ -215,7 +193,7 @@ class World:
         while True:
             x, v = path.at(t)
             gap, normal = face.gap(x)
-            rate, pull, ahead = v.dot(normal), path.pull(normal), max(gap, 0.0)
+            rate = v.dot(normal)
             slow = self.tiny * (1.0 + v.length)
             if leaving:
                 if gap < -hair and t > 0.0:
@@ -227,12 +205,7 @@ class World:
                 if rate < -slow and (rate < -graze or not self.curved(face, x)):
                     return t
                 leaving = True
-            square = rate * rate - 2.0 * pull * ahead
-            tau = inf
-            if square >= 0.0 and rate < 0.0:
-                tau = 2.0 * ahead / (sqrt(square) - rate)
-            elif pull < 0.0:
-                tau = (rate + sqrt(square)) / -pull
+            tau = falls(gap, rate, path.pull(normal))
             if leaving and (speed := v.length + g * self.machine.dt) > 0.0:
                 tau = max(tau, min(0.5 * t + FIRST * self.machine.dt, r / speed))
             if t + tau == t:
@@ -245,18 +218,9 @@ class World:
 class Carriage:
     """Ride of one particle at the belt's speed, not turning, at the height it is released at.
 
-    Parameters
-    ----------
-    t : float
-        s; its start.
-
-    Attributes
-    ----------
-    top : float
-        s; when it is above the pulley's axis.
-    until : float
-        s; separation at cos φ1 = v²/(g ρ), at the top if that is 1 or more; or where another
-        surface is met; or the end of the run.
+    It begins at `t` (s), is above the pulley's axis at `top`, and lasts `until` separation at
+    cos φ1 = v²/(g ρ), at the top if that is 1 or more; or until another surface is met; or to the
+    end of the run.
     """
 
     def __init__(self, machine: Machine, world: World, particle: int, t: float) -> None:

@@ -8,7 +8,6 @@ where it is now.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -39,11 +38,8 @@ DRAWN = 300
 SMALLEST = 6.0
 """pt; the diameter a particle is drawn with if to scale it would be smaller."""
 
-MARKS = 3
-"""Marks on a belt across the window; they move with it."""
-
-HOLES = 3
-"""Holes in the pulley; they turn with it."""
+MARKS, HOLES = 3, 3
+"""Marks on a belt across the window, and holes in the pulley; they move with it."""
 
 
 def line(ax: Axes, gid: str, points: Callable[[int], Floats], **look: Any) -> Moving:
@@ -68,9 +64,7 @@ def _points(ax: Axes, length: float) -> float:
 
 def trail(ax: Axes, recording: Recording, times: Floats, reach: float) -> Moving:
     """Return the way that particle 0 came in the last `reach` seconds of the recording."""
-    clock = recording.track(0)["t"]
-    filmed = times[(times >= clock[0]) & (times <= clock[-1])]
-    passed = np.union1d(filmed, track_times(recording))
+    passed = np.union1d(times, track_times(recording))
     path, _ = nominal(recording, passed)
 
     def behind(index: int) -> Floats:
@@ -126,9 +120,8 @@ def crowd(ax: Axes, recording: Recording, times: Floats, reach: float) -> tuple[
     Trails reach back `reach` seconds of the recording, to the picture before at least; 0: there are
     none.
     """
-    released = np.diff(recording.offsets) > 0
     first, last = recording.ends()
-    during = released.nonzero()[0][(first["t"] <= times[-1]) & (last["t"] >= times[0])]
+    during = np.flatnonzero(recording.released)[(first["t"] <= times[-1]) & (last["t"] >= times[0])]
     others = during[during != 0]
     particles = others[spread(len(others), DRAWN - 1)]
     thinned = len(particles) < len(others)
@@ -194,12 +187,12 @@ class Writing:
         Its place, pixels from the left and the top.
     anchor : str
         What of it is there, as Pillow names it, such as "rs": the right end of the base line.
-    said : callable
-        Gives the text of the moment of an index.
+    said : list of str
+        The text of each moment.
     """
 
     def __init__(
-        self, size: float, dpi: float, x: float, y: float, anchor: str, said: Callable[[int], str]
+        self, size: float, dpi: float, x: float, y: float, anchor: str, said: list[str]
     ) -> None:
         path = findfont(FontProperties())
         self.font = ImageFont.truetype(
@@ -208,9 +201,9 @@ class Writing:
         self.place, self.anchor, self.said = (round(x), round(y)), anchor, said
 
     def paint(self, draw: ImageDraw.ImageDraw, index: int) -> None:
-        """Write it onto a picture."""
+        """Write the text of a moment onto a picture."""
         gap = 0.35 * self.font.size
-        draw.text(self.place, self.said(index), style.INK, self.font, self.anchor, spacing=gap)
+        draw.text(self.place, self.said[index], style.INK, self.font, self.anchor, spacing=gap)
 
 
 SIGNS = {
@@ -268,20 +261,17 @@ def bars(ax: Axes, table: Axes, books: dict[str, Floats]) -> tuple[list[Moving],
             base = base + factor * values
     table.set_axis_off()
     table.set(xlim=(0.0, 1.0), ylim=(len(SIGNS), 0.0))
-
-    def figure(name: str, index: int) -> str:
-        value = float(books[name][index])
-        if name == "residual":
-            return style.scientific(value, "J")
-        return f"{round(factor * value, 1) + 0.0:.1f}".replace("-", "−")
-
     writings = []
     for row, name in enumerate(SIGNS):
         table.add_patch(Rectangle((0.0, row + 0.2), 0.05, 0.6, color=style.ENERGY[name]))
         table.text(0.08, row + BASE, style.ENERGY_LABEL[name], fontsize=style.SMALL)
+        said = [f"{round(factor * value, 1) + 0.0:.1f}" for value in books[name].tolist()]
+        if name == "residual":
+            said = [style.scientific(value, "J") for value in books[name].tolist()]
         right, up = table.transData.transform((1.0, row + BASE))
         place = right, ax.figure.bbox.height - up
-        writings.append(Writing(style.SMALL, ax.figure.dpi, *place, "rs", partial(figure, name)))
+        said = [text.replace("-", "−") for text in said]
+        writings.append(Writing(style.SMALL, ax.figure.dpi, *place, "rs", said))
     return moving, writings
 
 

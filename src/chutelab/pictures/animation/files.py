@@ -15,7 +15,7 @@ from typing import Any, cast
 import numpy as np
 from PIL import Image
 
-from chutelab.pictures.animation.moments import film, frame_delay, slowness, span
+from chutelab.pictures.animation.moments import film, slowness, span
 from chutelab.pictures.animation.stage import SHOWS, Stage, lay_out
 from chutelab.pictures.plots import style
 from chutelab.results import Recording
@@ -53,18 +53,10 @@ def palette() -> tuple[str, ...]:
 def write_gif(
     path: Path, pictures: Iterable[Image.Image], delays: Iterable[int], comment: str = ""
 ) -> None:
-    """Write pictures as a GIF that loops for ever.
+    """Write RGB pictures of one size as a GIF that loops for ever.
 
-    Parameters
-    ----------
-    path : Path
-        Where to.
-    pictures : iterable of Image
-        RGB, all of one size. Pillow keeps a byte for each of their pixels until all are drawn.
-    delays : iterable of int
-        Hundredths of a second that each stays. Equal pictures in a row become one frame.
-    comment : str
-        Kept in the file, not shown.
+    Each stays for its delay in hundredths of a second; equal ones in a row become one frame. Pillow
+    keeps a byte for each of their pixels until all are drawn. The comment is kept, not shown.
     """
     table = b"".join(bytes.fromhex(colour[1:]) for colour in palette())
     reference = Image.new("P", (1, 1))
@@ -203,7 +195,6 @@ def animate(
     if kind in VIDEOS and (width % 2 or height % 2):
         raise ValueError(f"{width} x {height} pixels: allowed in a video are even numbers")
     fps = (25 if recording.count == 1 else 20) if fps is None else fps
-    frame_delay(fps)
     shows = frozenset([show] if isinstance(show, str) else show)
     layout = lay_out(
         recording, width=width, height=height, title=title, question=question, shows=shows

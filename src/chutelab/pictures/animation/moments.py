@@ -30,7 +30,7 @@ def surface_words(name: str) -> str:
 def contact_normal(machine: Machine, event: Any) -> Floats:
     """Return the unit normal of an impact, away from the surface, (2,).
 
-    From where the particle is: a fixed step's velocities have gravity in them, too.
+    It comes from where the particle is: a fixed step's velocities have gravity in them, too.
     """
     position, segments = event["position"], machine.segments
     mine = segments.surface == event["surface"]
@@ -127,14 +127,12 @@ RUNNING = 4.2
 LIVES = 3.0
 """A stream is filmed for at most this many times what particle 0 takes."""
 
-HOLDS = 4
-"""Impacts that the film stops at, the hardest; more would be a slide show."""
+HOLDS, WORTH = 4, 0.05
+"""The film stops at the hardest impacts only: at most so many, or it would be a slide show, and at
+none with less than this share of the largest impulse."""
 
-WORTH = 0.05
-"""Share of the largest impulse that an impact needs for the film to stop at it."""
-
-HOLD_TOTAL, HOLD_LONGEST = 300, 130
-"""Hundredths of a second: all holds together at most, and one of them."""
+HOLD_TOTAL, HOLD_LONGEST, TAIL = 300, 130, 120
+"""Hundredths of a second: all holds together at most, one of them, and the last picture."""
 
 EDGE = 0.012
 """Share of the window's larger side that particle 0 is inside it as the film begins: all of it."""
@@ -145,22 +143,12 @@ TOLD = 1.2
 LASTING = (Kind.STICK, Kind.SETTLE, Kind.EXIT)
 """Events that the caption tells until another happens: they begin what still goes on."""
 
-TAIL = 120
-"""Hundredths of a second that the last picture stays."""
-
 
 @dataclass(frozen=True)
 class Moment:
-    """One picture of the film.
+    """One picture of the film: the recording's time (s), and what happened last, in words.
 
-    Attributes
-    ----------
-    t : float
-        s, the recording's time.
-    delay : int
-        Hundredths of a second that the picture stays.
-    words : str
-        What happened last, and when.
+    It stays for `delay` hundredths of a second.
     """
 
     t: float
@@ -173,21 +161,20 @@ def film(
 ) -> tuple[Moment, ...]:
     """Return the moments from `begin` to `end`: even steps, and a hold at each impact worth it.
 
-    Parameters
-    ----------
-    begin, end : float
-        s.
-    fps : int
-        Pictures a second, see `frame_delay`.
-    slow : float
-        Seconds on the screen for one second of the recording.
+    There are `fps` pictures a second; `slow` is seconds on the screen for one of the recording.
 
     Raises
     ------
     ValueError
-        If `fps` is no divisor of 100 up to 50, or `slow` is not positive and finite.
+        If `fps` is no divisor of 100 up to 50 (a shorter delay browsers take for 10 hundredths of a
+        second), or `slow` is not positive and finite.
     """
-    delay = frame_delay(fps)
+    if not 0 < fps <= 50 or 100 % fps:
+        raise ValueError(
+            f"fps = {fps!r}: GIF delays are whole hundredths of a second; allowed are"
+            " 1, 2, 4, 5, 10, 20, 25 and 50"
+        )
+    delay = 100 // fps
     if not 0.0 < slow < float("inf"):
         raise ValueError(f"slow = {slow!r}: allowed is a positive number")
     step = 0.01 * delay / slow
@@ -206,22 +193,6 @@ def film(
     delays[-1] = max(delays[-1], TAIL)
     words = _words(recording, mine, held, times, slow)
     return tuple(Moment(float(t), int(d), w) for t, d, w in zip(times, delays, words, strict=True))
-
-
-def frame_delay(fps: int) -> int:
-    """Return the delay (hundredths of a second) between pictures.
-
-    Raises
-    ------
-    ValueError
-        If it is not whole, or under 2, which browsers take for 10.
-    """
-    if not 0 < fps <= 50 or 100 % fps:
-        raise ValueError(
-            f"fps = {fps!r}: GIF delays are whole hundredths of a second; allowed are"
-            " 1, 2, 4, 5, 10, 20, 25 and 50"
-        )
-    return 100 // fps
 
 
 def span(recording: Recording, shown: Window) -> tuple[float, float]:
@@ -257,14 +228,11 @@ def slowness(length: float) -> float:
 
 def _held(mine: NDArray[Any]) -> Ints:
     """Return the indices of the hardest impacts worth a hold, in order, one for each time."""
-    struck = np.flatnonzero(np.isin(mine["kind"], [int(kind) for kind in STRUCK]))
-    if not len(struck):
-        return struck
-    impulse = np.abs(mine["normal_impulse"][struck])
-    struck = struck[impulse >= WORTH * impulse.max()]
-    _, first = np.unique(mine["t"][struck], return_index=True)
-    struck = struck[first]
-    hardest = np.argsort(-np.abs(mine["normal_impulse"][struck]), kind="stable")[:HOLDS]
+    impulse = np.abs(mine["normal_impulse"])
+    struck = np.flatnonzero(np.isin(mine["kind"], STRUCK))
+    struck = struck[impulse[struck] >= WORTH * impulse[struck].max(initial=0.0)]
+    struck = struck[np.unique(mine["t"][struck], return_index=True)[1]]
+    hardest = np.argsort(-impulse[struck], kind="stable")[:HOLDS]
     return np.asarray(struck[np.sort(hardest)])
 
 
@@ -279,7 +247,8 @@ def _words(
 
     What is told: the impacts that the film holds at, and events that are no impacts.
     """
-    told = ~np.isin(mine["kind"], [int(kind) for kind in (*STRUCK, Kind.RELEASE)])
+    struck = np.isin(mine["kind"], STRUCK)
+    told = ~struck & (mine["kind"] != Kind.RELEASE)
     if list(mine["kind"][:2]) == [Kind.RELEASE, Kind.STICK]:
         # Released at the belt's speed, it never slipped.
         released, rode = mine["velocity_after"][:2]
@@ -288,7 +257,6 @@ def _words(
     stories = np.flatnonzero(told)
     lines = [f"t = {mine['t'][i]:.3f} s: {sentence(recording, mine[i])}" for i in stories]
     # Particle 0 comes on the incoming belt if that is the first thing it leaves.
-    struck = np.isin(mine["kind"], [int(kind) for kind in STRUCK])
     first = mine[struck | (mine["kind"] == Kind.SEPARATION)][:1]
     incoming = recording.surface_index("incoming")
     carried = any((first["kind"] == Kind.SEPARATION) & (first["surface"] == incoming))

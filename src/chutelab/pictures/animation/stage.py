@@ -8,8 +8,6 @@ from typing import Any, cast
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from PIL import Image, ImageDraw
@@ -34,9 +32,8 @@ from chutelab.pictures.plots.scenery import (
     strobe_step,
     track_times,
 )
+from chutelab.pictures.plots.style import Picture
 from chutelab.results import Recording
-
-Box = tuple[float, float, float, float]
 
 SHOWS = ("parabola", "trails", "strobe", "velocity", "energy")
 """What a picture can show besides the machine and the particles."""
@@ -62,7 +59,7 @@ LETTER_ROOM = 0.015
 
 @dataclass(frozen=True)
 class Layout:
-    """Where everything is; a box is left, bottom, width and height as shares of the picture.
+    """What the picture holds, and where.
 
     Attributes
     ----------
@@ -73,7 +70,7 @@ class Layout:
     shows : frozenset of str
         Some of `SHOWS`.
     view : tuple of float
-        Where the scene is.
+        Where the scene is: left, bottom, width and height as shares of the picture.
     window : Window
         What of the world is shown, of the shape of `view`.
     fastest : float
@@ -85,7 +82,7 @@ class Layout:
     title: str
     question: str
     shows: frozenset[str]
-    view: Box
+    view: tuple[float, float, float, float]
     window: Window
     fastest: float
 
@@ -131,7 +128,7 @@ def lay_out(
     view = (0.015, 0.135, 0.675 if "energy" in shows else 0.97, 0.65 if question else 0.71)
     aspect = view[2] * width / (view[3] * height)
     pulley = recording.machine.pulley
-    window = window_of(recording, recording.machine).fitted(aspect)
+    window = window_of(recording).fitted(aspect)
     begin, end = span(recording, window)
     times = track_times(recording, begin, min(end, float(recording.track(0)["t"][-1])))
     position, velocity = nominal(recording, times)
@@ -150,35 +147,17 @@ def lay_out(
     return replace(tight, window=grown.fitted(aspect))
 
 
-TITLE = 0.942
-"""Height of the line that the title stands on, as a share of the picture's."""
+RIGHT, GAP = 0.99, 0.015
+"""Shares of the picture's width: where text ends, and between the clock and how it runs."""
 
-LINE = 0.065
-"""Share of the picture's height that a line below the title takes."""
-
-RIGHT = 0.99
-"""Where text ends, as a share of the picture's width."""
-
-CAPTION = 0.055
-"""Height of the caption's middle, as a share of the picture's."""
-
-GAP = 0.015
-"""Share of the picture's width between the clock and how it runs."""
+TITLE, LINE, CAPTION = 0.942, 0.065, 0.055
+"""Shares of its height: the title's base line, a line below it, the middle of the caption."""
 
 
 class Stage:
     """Draws the moments of a film: the background once, and for each moment what moves on it.
 
-    Parameters
-    ----------
-    recording : Recording
-        From either engine.
-    layout : Layout
-        Where everything is, and which part of the world is shown.
-    moments : tuple of Moment
-        The film.
-    slow : float
-        Seconds on the screen for one second of the recording.
+    `slow` is seconds on the screen for one second of the recording.
 
     Attributes
     ----------
@@ -201,21 +180,21 @@ class Stage:
         times, shows = np.array([moment.t for moment in moments]), layout.shows
         # A hundredth of a pixel more: the canvas rounds down.
         inches = (layout.width + 0.01) / layout.dpi, (layout.height + 0.01) / layout.dpi
-        self.figure = Figure(figsize=inches, dpi=layout.dpi)
-        self.canvas = cast(Any, FigureCanvasAgg(self.figure))  # its methods are not annotated
+        self.figure = Picture(inches, layout.dpi)
+        self.canvas = cast(Any, self.figure.canvas)  # its methods are not annotated
         self.view = view = self.figure.add_axes(layout.view)
         draw_scene(view, recording.machine, layout.window)
         view.set(xticks=[], yticks=[])
         for spine in view.spines.values():
             spine.set_color(style.STEEL_LIGHT)
         _draw_scale(view)
-        parts = analytic_of(recording, recording.prediction)[0] if "parabola" in shows else ()
+        parts = analytic_of(recording)[0] if "parabola" in shows else ()
         draw_analytic(view, parts)
         position, velocity = nominal(recording, times)
         reach = layout.reach(TRAIL, "trails")
         others, how_many = crowd(view, recording, times, reach)
         self.moving = [*drives(view, recording.machine, times), *others]
-        # The legend names what is drawn, the commonest first.
+        # What the legend names, in its order.
         dot: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6.0}
         handles = [Line2D([], [], **dot, color=style.STRIKE, label="particle 0")]
         if recording.count > 1:
@@ -281,16 +260,13 @@ class Stage:
         # particles.
         steps = np.diff([moment.t for moment in moments])
         digits = 2 if len(steps) and np.median(steps) >= 0.01 else 3
+        times = [f"t = {moment.t:.{digits}f} s" for moment in moments]
+        words = [moment.words for moment in moments]
+        left, low, high = 0.02 * layout.width, 1.0 - CAPTION, 1.0 - above
         return [
-            Writing(
-                style.NORMAL, layout.dpi, right, layout.height * (1.0 - above), "rs",
-                lambda index: f"t = {moments[index].t:.{digits}f} s",
-            ),
-            Writing(
-                style.NORMAL, layout.dpi, 0.02 * layout.width, (1.0 - CAPTION) * layout.height,
-                "lm", lambda index: moments[index].words,
-            ),
-        ]  # fmt: skip
+            Writing(style.NORMAL, layout.dpi, right, layout.height * high, "rs", times),
+            Writing(style.NORMAL, layout.dpi, left, layout.height * low, "lm", words),
+        ]
 
 
 def _add_legend(ax: Axes, handles: list[Line2D], *, components: bool) -> None:

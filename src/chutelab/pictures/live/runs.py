@@ -373,7 +373,7 @@ def _window(study: Study) -> list[float]:
 
 
 def _sides(run: Recording) -> list[float]:
-    window = window_of(run, run.machine)
+    window = window_of(run)
     return [window.left, window.right, window.bottom, window.top]
 
 

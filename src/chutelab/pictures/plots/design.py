@@ -28,11 +28,6 @@ BARS = (style.TRACK, style.STREAM)
 def scan(solution: Solution) -> Picture:
     """Draw what a search over one key looked at: the quantity, its target, answers and jumps.
 
-    Parameters
-    ----------
-    solution : Solution
-        Of one key.
-
     Raises
     ------
     ValueError
@@ -54,31 +49,20 @@ def draw_scan(ax: Axes, solution: Solution) -> Axes:
     key, (name, *_), (unit, *_) = solution.ranges[0], solution.quantities, solution.units
     factor, said = style.scaled(found.values, unit)
     style.dress(ax, with_unit(key.key, key.unit), with_unit(name, said))
-    label = name
-    for piece in found.pieces:
-        ax.plot(
-            piece.x, factor * piece.values[:, 0],
-            color=style.TRACK, linewidth=1.8, zorder=4.0, label=label, gid="quantity",
-        )  # fmt: skip
-        label = ""
+    for i, piece in enumerate(found.pieces):
+        look: dict[str, Any] = {"color": style.TRACK, "lw": 1.8, "zorder": 4.0, "gid": "quantity"}
+        ax.plot(piece.x, factor * piece.values[:, 0], label="" if i else name, **look)
     if solution.goal == "solve":
-        ax.plot(
-            found.x, factor * found.values[:, 1],
-            color=style.ANALYTIC, linewidth=1.6, linestyle="--", zorder=3.0, label="target",
-            gid="target",
-        )  # fmt: skip
+        look = {"color": style.ANALYTIC, "lw": 1.6, "ls": "--", "zorder": 3.0, "gid": "target"}
+        ax.plot(found.x, factor * found.values[:, 1], label="target", **look)
     for i, change in enumerate(solution.changes):
-        ax.axvline(
-            change.at, color=style.MUTED, linewidth=1.0, linestyle=":", zorder=1.0,
-            label="" if i else "the particle's way changes",
-        )  # fmt: skip
+        label = "" if i else "the particle's way changes"
+        ax.axvline(change.at, color=style.MUTED, lw=1.0, ls=":", zorder=1.0, label=label)
     for low, high in solution.everywhere:
         ax.axvspan(low, high, color=style.STEEL_LIGHT, zorder=0.5, label="all solve it")
     for jump in solution.jumps:
-        ax.plot(
-            [jump.at] * 2, [factor * jump.before, factor * jump.after],
-            color=style.STRIKE, linewidth=1.2, linestyle=":", zorder=2.0,
-        )  # fmt: skip
+        ends = [factor * jump.before, factor * jump.after]
+        ax.plot([jump.at] * 2, ends, color=style.STRIKE, lw=1.2, ls=":", zorder=2.0)
     _mark(ax, solution, factor)
     return ax
 
@@ -108,13 +92,7 @@ def _mark(ax: Axes, solution: Solution, factor: float) -> None:
 
 
 def spread(found: Uncertainty) -> Picture:
-    """Draw how uncertain inputs spread: distribution, strongest input, and each one's share.
-
-    Parameters
-    ----------
-    found : Uncertainty
-        From `chutelab.studies.design.uncertainty`.
-    """
+    """Draw how uncertain inputs spread: distribution, strongest input, and each one's share."""
     rows = len(found.quantities)
     height = 1.4 + 3.1 * rows
     figure = Picture((13.0, height))
@@ -164,10 +142,8 @@ def draw_strongest(ax: Axes, found: Uncertainty, row: int) -> Axes:
     factor, unit = style.scaled(values, found.units[row])
     quantity = with_unit(found.quantities[row], unit)
     style.dress(ax, with_unit(one.key, one.unit), quantity, f"against {one.key}")
-    ax.plot(
-        found.inputs[:, k], factor * values,
-        linestyle="none", marker=".", markersize=3.0, color=style.TRACK, alpha=0.5, zorder=3.0,
-    )  # fmt: skip
+    look: dict[str, Any] = {"color": style.TRACK, "ms": 3.0, "alpha": 0.5, "zorder": 3.0}
+    ax.plot(found.inputs[:, k], factor * values, ".", **look)
     return ax
 
 
@@ -203,37 +179,23 @@ def _titles(figure: Picture, title: str, text: str, wide: int = 95) -> None:
     """Write a title, and a line below it."""
     height = float(figure.get_figheight())
     figure.headline(0.02, 1.0 - 0.28 / height, title, 70)
-    figure.text(
-        0.02, 1.0 - 0.47 / height, fill(text, wide),
-        fontsize=style.NORMAL, color=style.MUTED, verticalalignment="top",
-    )  # fmt: skip
+    figure.remark(0.02, 1.0 - 0.47 / height, fill(text, wide))
 
 
 SWEEP_SIZE = (8.6, 5.4)
 """Width and height of the figure, inches."""
 
-MOST_LINES = 8
-"""Values of a second key up to which each has a line; more make a heat map."""
+MOST_LINES, DOTS = 8, 60
+"""Values of a second key up to which each has a line (more make a heat map), and values up to which
+a line shows where they are."""
 
-DOTS = 60
-"""Values up to which a line shows where they are."""
-
-COLORS = "viridis"
-"""From dark to light with growing values, also for colour-blind readers and in print."""
-
-LIGHTEST = 0.88
-"""Share of the colours that is used for lines: what follows is too light on white."""
+COLORS, LIGHTEST = "viridis", 0.88
+"""From dark to light with growing values, also for colour-blind readers and in print; the share of
+it that is used for lines: what follows is too light on white."""
 
 
 def sweep_figure(swept: Sweep, column: str) -> Picture:
-    """Draw one column of a sweep over its varied keys.
-
-    Parameters
-    ----------
-    swept : Sweep
-        With one or two keys of more than one value.
-    column : str
-        Name of a column of numbers.
+    """Draw one column of numbers of a sweep over its one or two varied keys.
 
     Raises
     ------
@@ -250,15 +212,16 @@ def sweep_figure(swept: Sweep, column: str) -> Picture:
     reasons = Counter(reason for reason in swept.columns[REASON][gone].tolist() if reason)
     why = "".join(f", most: {reason}" for reason, _ in reasons.most_common(1))
     said = f"{len(gone):,} of {len(swept):,} have none{why}" if len(gone) else ""
-    figure.text(
-        0.03, 0.03, shorten(said, 118, placeholder=" …"), fontsize=style.SMALL, color=style.MUTED,
-        va="center",
-    )  # fmt: skip
+    said = shorten(said, 118, placeholder=" …")
+    figure.remark(0.03, 0.03, said, fontsize=style.SMALL, va="center")
     return figure
 
 
 def draw_sweep(ax: Axes, swept: Sweep, column: str) -> Axes:
-    """Draw one column: dots of samples, lines, or a heat map over two keys with many values."""
+    """Draw one column: lines, a heat map over two keys with many values, or dots of samples.
+
+    Dots over two keys have their values as colours; crosses are where there is none.
+    """
     keys = [key for key in swept.quantities if len(np.unique(swept.columns[key])) > 1]
     if len(keys) > 2:
         raise ValueError(f"a picture shows one or two varied keys, not {len(keys)}")
@@ -279,8 +242,15 @@ def draw_sweep(ax: Axes, swept: Sweep, column: str) -> Axes:
     names = [with_unit(key, swept.unit(key)) for key in keys]
     style.dress(ax, names[0], names[1] if by_colour else label)
     if by_colour:
-        painted = (_draw_dots if sampled else _draw_heat)(ax, first, second, z)
-        if np.isfinite(z).any():
+        known = np.isfinite(z)
+        if sampled:
+            ax.plot(first[~known], second[~known], "x", markersize=4.0, color=style.STEEL)
+            painted: ScalarMappable = ax.scatter(
+                first[known], second[known], c=z[known], cmap=COLORS, s=16.0
+            )
+        else:
+            painted = _draw_heat(ax, first, second, z)
+        if known.any():
             bar = ax.figure.colorbar(painted, ax=ax, pad=0.02)
             bar.set_label(label, fontsize=style.NORMAL)
             bar.ax.tick_params(labelsize=style.SMALL)
@@ -313,13 +283,6 @@ def _draw_lines(ax: Axes, x: Floats, others: Floats, z: Floats) -> None:
             x[mine], z[mine], color=shade if len(values) > 1 else style.TRACK, linewidth=1.8,
             marker="o" if len(mine) <= DOTS else "", markersize=4.0, label=f"{value:g}",
         )  # fmt: skip
-
-
-def _draw_dots(ax: Axes, x: Floats, y: Floats, z: Floats) -> ScalarMappable:
-    """Draw dots with their values as colours, and crosses where there is none."""
-    known = np.isfinite(z)
-    ax.plot(x[~known], y[~known], "x", markersize=4.0, color=style.STEEL)
-    return ax.scatter(x[known], y[known], c=z[known], cmap=COLORS, s=16.0)
 
 
 def _draw_heat(ax: Axes, x: Floats, y: Floats, z: Floats) -> ScalarMappable:

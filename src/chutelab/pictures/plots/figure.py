@@ -8,7 +8,6 @@ from __future__ import annotations
 from pathlib import Path
 from textwrap import fill
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -84,19 +83,15 @@ def overlay(
     said = "one particle" if recording.count == 1 else f"{recording.count:,} particles"
     if recording.count > STREAM_TRACKS:
         said += f", {STREAM_TRACKS} tracks drawn"
-    engine = figure.text(
-        0.985, 0.965, f"engine {recording.engine}, {said}", ha="right", va="center"
-    )
-    engine.set(fontsize=style.NORMAL, color=style.MUTED)
+    figure.remark(0.985, 0.965, f"engine {recording.engine}, {said}", ha="right", va="center")
     figure.write(path)
     return figure
 
 
 def draw_view(ax: Axes, recording: Recording, parts: tuple[Arc, ...]) -> Axes:
     """Draw the scene to scale with tracks, strobe dots and the analytic parabola, and a legend."""
-    machine = recording.machine
     style.dress(ax, "x, m", "y, m")
-    draw_scene(ax, machine, window_of(recording, machine))
+    draw_scene(ax, recording.machine, window_of(recording))
     draw_tracks(draw_analytic(ax, parts), recording)
     style.legend_above(ax, 4)
     return ax
@@ -120,36 +115,29 @@ TEXT = 0.215
 
 
 def paper_figure(found: PaperFigure) -> Picture:
-    """Draw a figure of the paper: panels side by side, and in words what the misprint does.
-
-    Parameters
-    ----------
-    found : PaperFigure
-        From `chutelab.theory.figures.figure`.
-    """
+    """Draw a figure of the paper: panels side by side, and in words what the misprint does."""
     texts = [fill(text, WIDE) for text in found.meaning]
     texts += [fill(f"Not in the paper's text: {text}", WIDE) for text in found.missing]
     lines = sum(text.count("\n") + 1 for text in texts)
-    panels = [panel for pair in found.panels for panel in pair]
     below = TEXT * lines + 0.85
     height = 1.0 + 4.1 + below
     figure = Picture((13.0, height))
     grid = figure.add_gridspec(
-        1, len(panels), left=0.06, right=0.985, top=1.0 - 1.0 / height, bottom=below / height,
-        wspace=0.16 if len(panels) == 2 else 0.3,
+        1, len(found.panels), left=0.06, right=0.985, top=1.0 - 1.0 / height, bottom=below / height,
+        wspace=0.16 if len(found.panels) == 2 else 0.3,
     )  # fmt: skip
-    axes = [draw_panel(figure.add_subplot(grid[i]), panel) for i, panel in enumerate(panels)]
-    for pair in zip(axes[::2], axes[1::2], strict=True):
-        # The same axes for both: the eye compares heights.
-        corners = np.concatenate([ax.dataLim.get_points() for ax in pair])
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        margin = MARGIN * (high - low)
-        for ax in pair:
-            ax.set_xlim(low[0] - margin[0], high[0] + margin[0])
-            ax.set_ylim(low[1] - margin[1], high[1] + margin[1])
-            if low[1] > 2.0 * margin[1]:
-                style.note(ax, "axis not from 0")
-    if panels[0].to_scale:
+    axes: list[Axes] = []
+    for i, panel in enumerate(found.panels):
+        # Both of a pair have the same limits: the eye compares heights.
+        first = axes[-1] if i % 2 else None
+        ax = figure.add_subplot(grid[i], sharex=first, sharey=first)
+        ax.margins(MARGIN)
+        axes.append(draw_panel(ax, panel))
+    for ax in axes:
+        low, high = ax.get_ylim()
+        if low > MARGIN * (high - low):
+            style.note(ax, "axis not from 0")
+    if found.panels[0].to_scale:
         figure.legend(
             *axes[0].get_legend_handles_labels(), loc="upper right",
             bbox_to_anchor=(0.985, 1.0 - 0.12 / height), ncols=4, fontsize=style.SMALL,
@@ -159,10 +147,8 @@ def paper_figure(found: PaperFigure) -> Picture:
     figure.headline(0.02, 1.0 - 0.3 / height, title, 150)
     y = below - 0.65
     for i, text in enumerate(texts):
-        figure.text(
-            0.02, y / height, text, fontsize=style.SMALL, verticalalignment="top",
-            color=style.INK if i < len(found.meaning) else style.MUTED,
-        )  # fmt: skip
+        color = style.INK if i < len(found.meaning) else style.MUTED
+        figure.remark(0.02, y / height, text, fontsize=style.SMALL, color=color)
         y -= TEXT * (text.count("\n") + 1)
     return figure
 

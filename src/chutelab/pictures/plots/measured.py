@@ -38,19 +38,12 @@ POINTS: dict[str, Any] = {"ls": "none", "marker": "+", "ms": 7.0, "mew": 1.3}
 def measured(found: Residuals, fit: Fit | None = None) -> Picture:
     """Draw a measured track over the simulation and its analytic parabola, and the residuals.
 
-    Parameters
-    ----------
-    found : Residuals
-        From `chutelab.measured.residuals`; of a fit, its `after`.
-    fit : Fit, optional
-        Also draw the track before the fit, and write the fitted values.
+    With a fit, whose residuals are its `after`, also the track before it and the fitted values.
     """
     figure = Picture(SIZE)
     lines = 0 if fit is None else min(len(fit.parameters), PARAMETERS)
     top = 0.88 - 0.032 * max(0, lines - 1)
-    view = figure.add_subplot(
-        figure.add_gridspec(1, 1, left=0.06, right=0.56, top=0.88, bottom=0.08)[0]
-    )
+    view = figure.add_axes((0.06, 0.08, 0.5, 0.8))
     draw_measured(view, found, None if fit is None else fit.before.recording)
     grid = figure.add_gridspec(2, 1, left=0.64, right=0.985, top=top, bottom=0.08, hspace=0.3)
     upper = figure.add_subplot(grid[0])
@@ -65,30 +58,23 @@ def measured(found: Residuals, fit: Fit | None = None) -> Picture:
             f"{one.key} = {plus_minus(x, error)} {one.unit}".rstrip() for one, x, error in fitted
         ]
     for i, text in enumerate(said):
-        figure.text(
-            0.985, 0.965 - 0.032 * i, text, fontsize=style.NORMAL, color=style.MUTED,
-            horizontalalignment="right", verticalalignment="center",
-        )  # fmt: skip
+        figure.remark(0.985, 0.965 - 0.032 * i, text, ha="right", va="center")
     return figure
 
 
 def draw_measured(ax: Axes, found: Residuals, before: Recording | None = None) -> Axes:
     """Draw the machine, the simulated track, the analytic parabola, and the measured points.
 
-    Parameters
-    ----------
-    before : Recording, optional
-        A run to show dotted: the one that a fit started from.
+    The run that a fit started from is dotted.
     """
     recording, position = found.recording, found.track.position
-    machine = recording.machine
-    window = window_of(recording, machine)
+    window = window_of(recording)
     far = window.padded(*[FAR] * 4)
     corners = np.array([[window.left, window.bottom], [window.right, window.top]])
     style.dress(ax, "x, m", "y, m")
     shown = far.holds(position)
-    draw_scene(ax, machine, around(np.concatenate([corners, position[shown]])))
-    parts, _ = analytic_of(recording, recording.prediction)
+    draw_scene(ax, recording.machine, around(np.concatenate([corners, position[shown]])))
+    parts, _ = analytic_of(recording)
     draw_analytic(ax, parts)
     for run, gid, colour, line, label in (
         (before, "before", style.MUTED, ":", "before the fit"),

@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 from chutelab.machine.releases import on_belt, release_velocity
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.scenery import (
-    action,
     energies,
     nominal,
     spread,
@@ -132,12 +131,17 @@ FLOOR = 1e-17
 """m; the lower end of the residual's axis, where an exact zero is drawn."""
 
 
-def analytic_of(recording: Recording, prediction: Transfer) -> tuple[tuple[Arc, ...], float]:
-    """Return the arcs known analytically, and the time (s) of the recording at which they begin."""
-    parts = arcs(prediction, recording.scene)
-    if isnan(measure(recording, "separation.t")):
+def analytic_of(
+    recording: Recording, prediction: Transfer | None = None
+) -> tuple[tuple[Arc, ...], float]:
+    """Return the arcs known analytically, and the time (s) of the recording at which they begin.
+
+    They are those of the recording's own prediction if none is given.
+    """
+    left = measure(recording, "separation.t")
+    if isnan(left):
         return (), 0.0
-    return parts, action(recording)[0]
+    return arcs(recording.prediction if prediction is None else prediction, recording.scene), left
 
 
 def draw_tracks(ax: Axes, recording: Recording) -> Axes:
@@ -147,7 +151,7 @@ def draw_tracks(ax: Axes, recording: Recording) -> Axes:
     """
     lines = []
     chosen = spread(recording.count, STREAM_TRACKS)[1:]
-    for i in chosen[np.diff(recording.offsets)[chosen] > 0]:
+    for i in chosen[recording.released[chosen]]:
         one = subset(recording, [i])
         knots = np.unique(one.knots["t"])
         times = np.union1d(np.linspace(knots[0], knots[-1], 200), knots[:: len(knots) // 200 + 1])
@@ -179,8 +183,8 @@ def draw_analytic(ax: Axes, parts: tuple[Arc, ...]) -> Axes:
     return ax
 
 
-def _times_of(parts: tuple[Arc, ...], each: int = 120) -> Floats:
-    return np.unique(np.concatenate([np.linspace(arc.begin, arc.end, each) for arc in parts]))
+def _times_of(parts: tuple[Arc, ...]) -> Floats:
+    return np.unique(np.concatenate([np.linspace(arc.begin, arc.end, 120) for arc in parts]))
 
 
 def draw_residual(
@@ -188,12 +192,8 @@ def draw_residual(
 ) -> Axes:
     """Draw the distance between simulated and analytic positions of particle 0, on a log scale.
 
-    Parameters
-    ----------
-    parts, start : tuple of Arc, float
-        See `analytic_of`; without arcs the panel says so, and why.
-    reason : str, optional
-        Why there is no analytic parabola, or none to the end.
+    `parts` and `start` are of `analytic_of`; without arcs the panel says so. `reason` says why
+    there is no analytic parabola, or none to the end.
     """
     note = shorten(f"; then {reason}", 95, placeholder=" …") if reason else ""
     style.dress(ax, f"time since separation, s{note}", "distance, m", "Simulated − analytic")
@@ -252,15 +252,15 @@ def _beyond(times: Floats) -> float:
     return float(times[-1] + (0.04 * (times[-1] - times[0]) or 1e-3))
 
 
-def draw_ledger(ax: Axes, recording: Recording, count: int = 240) -> Axes:
+def draw_ledger(ax: Axes, recording: Recording) -> Axes:
     """Draw the energy ledger of all particles over time.
 
     Kinetic and potential energy and both losses are stacked; energy at release plus belt work is a
     line. The line runs along the top of the stack but for the residual, which the title states.
     """
     t = recording.knots["t"]
-    times = np.linspace(t.min(), t.max(), count)
-    if len(recording.events) <= count:
+    times = np.linspace(t.min(), t.max(), 240)
+    if len(recording.events) <= len(times):
         times = upright(times, recording.events["t"])
     times = np.append(times, _beyond(times))
     books = energies(recording, times)

@@ -107,13 +107,13 @@ def strobe_times(recording: Recording) -> Floats:
 
 
 def track_times(
-    recording: Recording, begin: float | None = None, end: float | None = None, count: int = 400
+    recording: Recording, begin: float | None = None, end: float | None = None
 ) -> Floats:
     """Return even times, joined by the knots of particle 0 and the moments just before them.
 
     So a jump at an impact is drawn upright, not slanted. By default all of its track.
     """
-    knots = recording.track(0)["t"]
+    count, knots = 400, recording.track(0)["t"]
     begin, end = knots[0] if begin is None else begin, knots[-1] if end is None else end
     if len(knots) > count:
         knots = recording.events["t"][recording.events["particle"] == 0][:count]
@@ -127,17 +127,13 @@ def upright(times: Floats, jumps: Floats) -> Floats:
     return np.unique(np.concatenate([times, jumps, before[before >= times[0]]]))
 
 
-def energies(recording: Recording, times: ArrayLike) -> dict[str, Floats]:
-    """Return `Recording.energy_at` with the energy at release, all potential energy above 0.
+def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
+    """Return the ledger at times (T,), J, with potential energy above 0: it can be stacked.
 
-    Returns
-    -------
-    dict of ndarray, shape (T,)
-        What `energy_at` gives, and ``start``, kinetic and potential energy at the release of all
-        particles released so far; J. Potential energy is counted from the lowest point of the
-        particles that stay in the scene (of all, if it is negative otherwise): it can be stacked.
+    It is what `Recording.energy_at` gives, and ``start``, kinetic and potential energy at the
+    release of all particles released so far. Potential energy is counted from the lowest point of
+    the particles that stay in the scene (of all, if it is negative otherwise).
     """
-    times = np.atleast_1d(np.asarray(times, dtype=np.float64))
     books = recording.energy_at(times)
     first, _ = recording.ends()
     order = np.argsort(first["t"], kind="stable")
@@ -160,11 +156,9 @@ def energies(recording: Recording, times: ArrayLike) -> dict[str, Floats]:
 MANY = 60
 """Particles from which on some may stray out of the window."""
 
-NEARBY = 0.35
-"""Share of the action's size around it within which the ends of surfaces are shown."""
-
-FAR = 1.0
-"""Share of the action's size around it within which what happens later is shown."""
+NEARBY, FAR = 0.35, 1.0
+"""Shares of the action's size: around it within the first the ends of surfaces are shown, within
+the second what happens later."""
 
 
 @dataclass(frozen=True)
@@ -224,7 +218,7 @@ class Window:
         return (start + low * along, start + high * along) if low < high else None
 
 
-def window_of(recording: Recording, machine: Machine) -> Window:
+def window_of(recording: Recording) -> Window:
     """Return the window in which something happens, with room for labels.
 
     It holds particle 0 from separation (or release, without one) to its landing (or last impact),
@@ -232,6 +226,7 @@ def window_of(recording: Recording, machine: Machine) -> Window:
     of the other particles, as much as does not make all else small.
     """
     path, tail = _path(recording)
+    machine = recording.machine
     points = [path]
     if machine.pulley is not None:
         corner = np.full(2, machine.pulley.radius)
@@ -277,7 +272,7 @@ def _crowd(recording: Recording) -> Floats:
     """
     events = recording.events
     carried = np.isin(events["particle"], recording.select(Kind.SEPARATION)["particle"])
-    counts = np.isin(events["kind"], [int(kind) for kind in STRUCK])
+    counts = np.isin(events["kind"], STRUCK)
     counts |= ~carried & (events["kind"] == Kind.RELEASE)
     others = events[counts & (events["particle"] != 0)]
     if not len(others):
@@ -303,14 +298,7 @@ TWO_LINES = 32.0
 def draw_scene(ax: Axes, machine: Machine, window: Window | None = None) -> Axes:
     """Draw the machine's surfaces to scale, with their names.
 
-    Parameters
-    ----------
-    ax : Axes
-        Its limits are set to hold the window at equal scales.
-    machine : Machine
-        With one set of surfaces for all particles, segments (S,).
-    window : Window, optional
-        What to show, see `window_of`; by default all surfaces.
+    The limits of the axes are set to hold the window at equal scales; by default all surfaces.
     """
     if window is None:
         ends = np.concatenate([machine.segments.start, machine.segments.end])

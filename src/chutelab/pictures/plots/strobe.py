@@ -57,8 +57,6 @@ def strobe(
     OSError
         If the file cannot be written.
     """
-    if prediction is None:
-        prediction = recording.prediction
     figure = Picture(SIZE, DPI)
     ax = figure.add_axes((0.095, 0.09, 0.885, 0.77))
     draw_view(ax, recording, analytic_of(recording, prediction)[0])

@@ -155,15 +155,7 @@ ON_SCREEN = 80
 
 
 class Picture(Figure):
-    """A matplotlib figure with its canvas, made without pyplot.
-
-    Parameters
-    ----------
-    size : tuple of float
-        Width and height, inches.
-    dpi : float
-        Dots to the inch.
-    """
+    """A matplotlib figure of a size in inches with its canvas, made without pyplot."""
 
     def __init__(self, size: tuple[float, float], dpi: float = DPI) -> None:
         super().__init__(figsize=size, dpi=dpi)
@@ -175,6 +167,10 @@ class Picture(Figure):
             x, y, shorten(title, longest, placeholder=" …"),
             fontsize=LARGE, fontweight="bold", verticalalignment="center",
         )  # fmt: skip
+
+    def remark(self, x: float, y: float, text: str, **look: Any) -> None:
+        """Write grey text at a place, in shares of the figure; its upper left corner is there."""
+        self.text(x, y, text, **{"fontsize": NORMAL, "color": MUTED, "va": "top", **look})
 
     def write(self, path: str | Path | None) -> None:
         """Write the figure, whole or not at all; nothing without a path.

@@ -42,17 +42,7 @@ TITLES = {"pymunk": "pymunk, aligned", "fixed": "pymunk, fixed step"}
 
 
 def workprecision(timings: Sequence[Timing], title: str, about: Mapping[str, str]) -> Picture:
-    """Draw run time against error.
-
-    Parameters
-    ----------
-    timings : sequence of Timing
-        From `chutelab.checks.workprecision.measure`.
-    title : str
-        Of the scene.
-    about : mapping
-        The machine and the versions, from `chutelab.util.versions`.
-    """
+    """Draw run time against error, and below it what failed and what it ran on (`about`)."""
     below = failures(timings, CHARACTERS)
     said = [f"{key} {value}" if key in PACKAGES else value for key, value in about.items()]
     below += wrap(" · ".join(said), CHARACTERS)
@@ -62,10 +52,8 @@ def workprecision(timings: Sequence[Timing], title: str, about: Mapping[str, str
     box = (LEFT / WIDTH, 1.0 - (HEAD + PANEL) / height, width / WIDTH, PANEL / height)
     ax = style.dress(figure.add_axes(box), "relative error", "run time, s", title)
     draw_timings(ax, timings)
-    figure.text(
-        0.2 / WIDTH, (0.2 + LINE * len(below)) / height, "\n".join(below), fontsize=style.SMALL,
-        color=style.MUTED, verticalalignment="top", gid="below",
-    )  # fmt: skip
+    top = (0.2 + LINE * len(below)) / height
+    figure.remark(0.2 / WIDTH, top, "\n".join(below), fontsize=style.SMALL, gid="below")
     return figure
 
 

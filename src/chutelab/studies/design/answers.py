@@ -69,10 +69,8 @@ class Solution(Shown):
 
     Attributes
     ----------
-    asked : str
-        The question in words.
-    goal : {"solve", "minimize", "maximize"}
-        Its kind.
+    asked, goal : str
+        The question in words, and its kind.
     ranges : tuple of Span
         The varied keys.
     quantities, units : tuple of str
@@ -173,14 +171,14 @@ class Solution(Shown):
         """Return the answers in a table, with what to know of them."""
         keys = [with_unit(one.key, one.unit) for one in self.ranges]
         names = [with_unit(*one) for one in zip(self.quantities, self.units, strict=True)]
-        first, other = {
-            "solve": ("solution", "solution"), "minimize": ("least", "also"),
-            "maximize": ("most", "also"),
-        }[self.goal]  # fmt: skip
         rows = []
         for i, answer in enumerate(self.answers or filter(None, [self.nearest])):
-            head = (other if i else first) if self.solved else "nearest"
-            if self.goal == "solve" and len(self.answers) > 1:
+            head = {"solve": "solution", "minimize": "least", "maximize": "most"}[self.goal]
+            if not self.solved:
+                head = "nearest"
+            elif self.goal != "solve":
+                head = "also" if i else head
+            elif len(self.answers) > 1:
                 head += f" {i + 1}"
             numbers = (f"{value:.{DIGITS}g}" for value in (*answer.values, *answer.found))
             rows.append((head, *numbers, answer.course))
@@ -237,7 +235,7 @@ def as_dict(solution: Solution) -> dict[str, Any]:
         "format": 1,
         "scene": solution.base.title,
         **some(solution, "asked", "goal", "solved"),
-        "ranges": [some(one, "key", "unit", "low", "high", "start") for one in solution.ranges],
+        "ranges": solution.ranges,
         "quantities": dict(zip(solution.quantities, solution.units, strict=True)),
         "answers": [answer(one) for one in solution.answers],
         "best": solution.best if solution.solved else None,
@@ -269,30 +267,27 @@ def remarks(solution: Solution) -> Iterator[str]:
             f"Every {one.key} from {_size(low, one.unit)} to {_size(high, one.unit)} is a solution:"
             " the target does not depend on it there."
         )
-    if count:
-        if solution.answer.place == "end":
-            yield "It is at the end of the range: beyond it there may be better ones."
-        elif solution.answer.place == "change":
-            yield "It is a limit: right beyond it the particle goes another way."
-    if solution.goal != "solve":
-        if not count:
-            yield "No variant in the range has this quantity."
-    elif count > 1:
+    if count and solution.answer.place == "end":
+        yield "It is at the end of the range: beyond it there may be better ones."
+    if count and solution.answer.place == "change":
+        yield "It is a limit: right beyond it the particle goes another way."
+    if solution.goal == "solve" and count > 1:
         yield (
             f"{count} solutions; pictures and scene are of solution {solution.best + 1}, the"
             " nearest to the scene's own value. A narrower range chooses another."
         )
-    elif not count and solution.nearest is None:
-        yield "No solution: no variant in the range has these quantities."
-    elif not count:
-        near = solution.answer
+    if not count and solution.nearest is not None:
+        near = solution.nearest
+        numbers = zip(solution.quantities, solution.units, near.found, near.wanted, strict=True)
         parts = [
             f"{name} = {_size(found, unit)} instead of {_size(wanted, unit)}"
-            for name, unit, found, wanted in zip(
-                solution.quantities, solution.units, near.found, near.wanted, strict=True
-            )
+            for name, unit, found, wanted in numbers
         ]
         yield f"No solution in the range. Nearest to one: {', '.join(parts)}."
+    elif not count and solution.goal == "solve":
+        yield "No solution: no variant in the range has these quantities."
+    elif not count:
+        yield "No variant in the range has this quantity."
     unit, quantity = solution.units[0], solution.quantities[0]
     for jump in solution.jumps[:MOST]:
         yield (

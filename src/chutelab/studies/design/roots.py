@@ -167,24 +167,17 @@ SAME: Final = 1e-8
 """Share of the range within which two roots, or two minima, are one."""
 
 
-class Roots(NamedTuple):
-    """What a range holds."""
+def roots(
+    found: Scan, function: Function
+) -> tuple[list[float], list[tuple[float, float]], list[Change], float]:
+    """Find where a function is 0: the difference of the two quantities of a scan.
 
-    at: tuple[float, ...]
-    """Values of the key at which the two sides are equal, ascending."""
-
-    everywhere: tuple[tuple[float, float], ...]
-    """Ranges in which they are equal throughout."""
-
-    jumps: tuple[Change, ...]
-    """Where one side jumps over the other: no solutions."""
-
-    nearest: float
-    """The value at which they differ least; NaN if they have none anywhere."""
-
-
-def roots(found: Scan, function: Function) -> Roots:
-    """Find where a function is 0: the difference of the two quantities of a scan."""
+    Returns
+    -------
+    at, everywhere, jumps, nearest
+        Values of the key where it is 0, ascending; ranges in which it is 0 throughout; where it
+        jumps over 0, which is no solution; and where it is closest to 0, NaN if it has no value.
+    """
     brentq, zero = scipy("optimize").brentq, CLOSE * found.size
     ends, width = (found.x[0], found.x[-1]), float(np.ptp(found.x))
     at: list[float] = []
@@ -231,8 +224,8 @@ def roots(found: Scan, function: Function) -> Roots:
             distinct[-1] = min(distinct[-1], root, key=lambda x: abs(function(x)))
         else:
             distinct.append(root)
-    ordered = sorted(jumps, key=lambda jump: jump.low)
-    return Roots(tuple(distinct), tuple(everywhere), tuple(ordered), nearest)
+    jumps.sort(key=lambda jump: jump.low)
+    return distinct, everywhere, jumps, nearest
 
 
 def _flat(

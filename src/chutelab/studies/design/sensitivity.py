@@ -40,49 +40,33 @@ class Indices:
     total_interval: Floats
 
 
-def design(inputs: int, samples: int, seed: int) -> tuple[Floats, Floats]:
-    """Return A and B, shares 0 to 1 of shape (samples, inputs): scrambled Sobol points.
+def sampled(inputs: int, samples: int, seed: int) -> Floats:
+    """Return sets of shares, 0 to 1, at which a function tells its indices, (K + 2, N, K).
 
-    Parameters
-    ----------
-    samples : int
-        A power of 2.
+    A and B are scrambled Sobol points, whose number N is a power of 2; then A with each of its K
+    columns in turn taken from B.
     """
     sampler = scipy("stats").qmc.Sobol(d=2 * inputs, scramble=True, seed=seed)
     points = np.asarray(sampler.random_base2(int(samples).bit_length() - 1), dtype=np.float64)
-    return points[:, :inputs], points[:, inputs:]
+    a, b = points[:, :inputs], points[:, inputs:]
+    sets = np.stack([a, b, *[a] * inputs])
+    for i in range(inputs):
+        sets[2 + i, :, i] = b[:, i]
+    return sets
 
 
-def crossed(a: Floats, b: Floats) -> Floats:
-    """Return A with one column of B in turn, shape (inputs, samples, inputs)."""
-    every = np.repeat(a[np.newaxis], a.shape[1], axis=0)
-    for i in range(a.shape[1]):
-        every[i, :, i] = b[:, i]
-    return every
+def indices(sets: Floats, seed: int) -> Indices:
+    """Estimate the indices of a function from its values at `sampled` points, (K + 2, N).
 
-
-def indices(f_a: Floats, f_b: Floats, f_ab: Floats, seed: int) -> Indices:
-    """Estimate the indices of a function.
-
-    `scipy.stats.sobol_indices` takes no samples without a value, and a power of 2 of the others.
-    Its bootstrap has no seed, and takes time and memory with the square of the samples: 3.1 s for
-    4096 of three inputs, against 0.1 s here.
-
-    Parameters
-    ----------
-    f_a, f_b : ndarray, shape (N,)
-        The function at A and B; NaN where it has no value.
-    f_ab : ndarray, shape (K, N)
-        The function at `crossed` points.
-    seed : int
-        Of the bootstrap.
+    They may be NaN. `scipy.stats.sobol_indices` takes no samples without a value, and a power of 2
+    of the others. Its bootstrap has no seed, and takes time and memory with the square of the
+    samples: 3.1 s for 4096 of three inputs, against 0.1 s here.
     """
     # A point is left out of all sets if one of them has no value there.
-    sets = np.concatenate([[f_a, f_b], f_ab])
     sets = sets[:, np.isfinite(sets).all(axis=0)]
     count = sets.shape[1]
     if count < 2:
-        none = np.full((len(f_ab), 2), np.nan)
+        none = np.full((len(sets) - 2, 2), np.nan)
         return Indices(none[:, 0], none[:, 0], none, none)
     first, total = _estimates(sets)
     draws = np.random.default_rng(seed).integers(0, count, size=(RESAMPLES, count))

@@ -229,19 +229,17 @@ class _Search:
             left, right = self.evaluate([[x]]).values[0]
             return float(left - right)
 
-        found = roots(seen, function)
+        at, everywhere, jumps, nearest = roots(seen, function)
         own = one.start if one.start is not None else one.low
         edges = {x for change in seen.changes for x in (change.low, change.high)}
-        answers = [self.answer([x], "change" if x in edges else "inside") for x in found.at]
-        best = int(np.argmin([abs(x - own) for x in found.at])) if answers else 0
-        nearest = None
-        if not answers and isfinite(found.nearest):
-            nearest = self.answer([found.nearest])
-        if not answers and found.everywhere:
-            low, high = found.everywhere[0]
+        answers = [self.answer([x], "change" if x in edges else "inside") for x in at]
+        best = int(np.argmin([abs(x - own) for x in at])) if answers else 0
+        near = self.answer([nearest]) if not answers and isfinite(nearest) else None
+        if not answers and everywhere:
+            low, high = everywhere[0]
             answers = [self.answer([min(max(own, low), high)])]
         return self.solution(
-            answers, scan=seen, nearest=nearest, everywhere=found.everywhere, jumps=found.jumps,
+            answers, scan=seen, nearest=near, everywhere=tuple(everywhere), jumps=tuple(jumps),
             best=best,
         )  # fmt: skip
 

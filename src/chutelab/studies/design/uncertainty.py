@@ -9,8 +9,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import islice
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from chutelab.scene.units import read_size, with_unit
 from chutelab.scene.variants import Vary, quantity, reason
 from chutelab.studies.design.evaluation import INSIDE, Evaluator
 from chutelab.studies.design.quantities import each_once, measured, scipy
-from chutelab.studies.design.sensitivity import Indices, crossed, design, indices
+from chutelab.studies.design.sensitivity import Indices, indices, sampled
 from chutelab.util.arrays import Floats, Progress
 from chutelab.util.errors import InputError
 from chutelab.util.files import csv_text
@@ -66,7 +65,7 @@ class Spread:
     unit: str
     mean: float
     spread: float
-    law: Literal["normal", "uniform"]
+    law: str
     low: float
     high: float
 
@@ -74,25 +73,25 @@ class Spread:
     def cut(self) -> float:
         """Share of the distribution that the scene does not allow."""
         stats = scipy("stats")
-        whole = stats.norm(self.mean, self.spread)
         if self.law == "uniform":
             whole = stats.uniform(self.mean - self.spread, 2.0 * self.spread)
+        else:
+            whole = stats.norm(self.mean, self.spread)
         return float(whole.cdf(self.low) + whole.sf(self.high))
 
     def values(self, shares: Floats) -> Floats:
         """Return the values below which given shares, 0 to 1, of the (cut) distribution lie."""
-        stats = scipy("stats")
+        # Sobol points begin at 0, where a normal distribution has no value.
+        shares = np.clip(shares, 1e-12, 1.0 - 1e-12)
         if self.law == "uniform":
             low = max(self.low, self.mean - self.spread)
             high = min(self.high, self.mean + self.spread)
-            law = stats.uniform(low, high - low)
+            found = low + shares * (high - low)
         else:
             low, high = ((end - self.mean) / self.spread for end in (self.low, self.high))
-            law = stats.truncnorm(low, high, self.mean, self.spread)
-        # Sobol points begin at 0, where a normal distribution has no value; and rounding must not
-        # take a value past what the scene allows.
-        found: Floats = np.clip(law.ppf(np.clip(shares, 1e-12, 1.0 - 1e-12)), self.low, self.high)
-        return found
+            found = scipy("stats").truncnorm.ppf(shares, low, high, self.mean, self.spread)
+        # Rounding must not take a value past what the scene allows.
+        return np.asarray(np.clip(found, self.low, self.high))
 
 
 def spreads(scene: Scene, texts: Sequence[str]) -> tuple[Spread, ...]:
@@ -107,10 +106,13 @@ def spreads(scene: Scene, texts: Sequence[str]) -> tuple[Spread, ...]:
         if law not in ("", *LAWS):
             known = " and ".join(LAWS)
             raise InputError(f"{law} is no distribution here; there are {known}", typed)
-        if "." not in key and "[" not in key and key not in Scene.model_fields:
-            homes = (home for home in HOMES if getattr(scene, home) is not None)
-            known_in = (home for home in homes if key in Scene.tables()[home].model_fields)
-            key = ".".join([*islice(known_in, 1), key])
+        homes = [
+            home
+            for home in HOMES
+            if getattr(scene, home) is not None and key in Scene.tables()[home].model_fields
+        ]
+        if homes and key not in Scene.model_fields:
+            key = f"{homes[0]}.{key}"
         about = quantity(scene, Vary(key, (0.0,), typed))
 
         def number(text: str, unit: str) -> float:
@@ -142,8 +144,7 @@ def spreads(scene: Scene, texts: Sequence[str]) -> tuple[Spread, ...]:
                 scene.with_values({about.path: value})
             except SceneError as error:
                 raise InputError(reason(error), typed) from None
-        kind: Literal["normal", "uniform"] = "uniform" if law == "uniform" else "normal"
-        return Spread(about.path, about.unit, mean, spread, kind, low, high)
+        return Spread(about.path, about.unit, mean, spread, law or "normal", low, high)
 
     return each_once("--uncertainty", texts, read, ASK, MOST)
 
@@ -178,10 +179,8 @@ class Uncertainty(Shown):
         What is looked at.
     nominal : ndarray, shape (M,)
         The quantities with all inputs at their means.
-    inputs : ndarray, shape (N, K)
-        Values that were run: a sample of the inputs.
-    outputs : ndarray, shape (N, M)
-        What came of them, NaN where it did not happen.
+    inputs, outputs : ndarray, shape (N, K) and (N, M)
+        A sample of the inputs, and what came of it, NaN where it did not happen.
     indices : tuple of Indices
         Of each quantity.
     lost : dict of str
@@ -342,8 +341,7 @@ def uncertainty(
     runs = samples * (len(inputs) + 2) + 1
     evaluate = Evaluator(scene, [one.key for one in inputs], wanted, progress, runs)
     nominal = evaluate(np.array([[one.mean for one in inputs]])).values[0]
-    a, b = design(len(inputs), samples, seed)
-    shares = np.concatenate([a, b, crossed(a, b).reshape(-1, len(inputs))])
+    shares = sampled(len(inputs), samples, seed).reshape(-1, len(inputs))
     points = np.column_stack(
         [one.values(column) for one, column in zip(inputs, shares.T, strict=True)]
     )
@@ -359,7 +357,7 @@ def uncertainty(
         scene.title, inputs, tuple(names), tuple(one.unit for one in wanted), nominal,
         points[:used], outcomes.values[:used],
         tuple(
-            indices(sets[0], sets[1], sets[2:], seed)
+            indices(sets, seed)
             for sets in outcomes.values.T.reshape(len(wanted), -1, samples)
         ),
         dict(lost), evaluate.runs, samples, seed,
@@ -369,6 +367,7 @@ def uncertainty(
 def as_dict(found: Uncertainty) -> dict[str, Any]:
     """Return the result as plain lists and floats, for JSON; without the samples."""
     inputs = ("key", "unit", "mean", "spread", "law", "cut")
+    columns = {name: getattr(found, name) for name in ("nominal", "mean", "deviation", "interval")}
     told = {
         "format": 1,
         "scene": found.scene,
@@ -376,10 +375,9 @@ def as_dict(found: Uncertainty) -> dict[str, Any]:
         "quantities": {
             name: {
                 "unit": found.units[m],
-                **{
-                    of: getattr(found, of)[m] for of in ("nominal", "mean", "deviation", "interval")
-                },
-                **{of: getattr(found.indices[m], of) for of in ("first", "total")},
+                **{of: values[m] for of, values in columns.items()},
+                "first": found.indices[m].first,
+                "total": found.indices[m].total,
             }
             for m, name in enumerate(found.quantities)
         },

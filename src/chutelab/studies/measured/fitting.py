@@ -44,15 +44,7 @@ PART = 0.1
 
 
 class Problem:
-    """What a fit makes small.
-
-    Attributes
-    ----------
-    start, sizes : ndarray, shape (p,)
-        Of the parameters.
-    used : ndarray, shape (P,)
-        The points that count.
-    """
+    """What a fit makes small: p parameters, and which of the P points count, `used`, (P,)."""
 
     def __init__(self, scene: Scene, track: Track, parameters: tuple[Parameter, ...]) -> None:
         self.scene, self.track, self.parameters = scene, track, parameters
@@ -97,12 +89,10 @@ class Problem:
         is 0 where the scene refuses a step to either side.
         """
         columns = []
-        steps = np.maximum(steps, STEP * self.sizes)
-        for k, (parameter, step) in enumerate(zip(self.parameters, steps, strict=True)):
+        for k, step in enumerate(np.maximum(steps, STEP * self.sizes)):
             sides = []
             for side in (-step, step):
-                moved = values.copy()
-                moved[k] = np.clip(values[k] + side, parameter.low, parameter.high)
+                moved = self.moved(values, k, side)
                 try:
                     sides.append((moved[k], self.residuals(moved)))
                 except SceneError:
@@ -110,6 +100,12 @@ class Problem:
             (low, before), (high, after) = sides
             columns.append((after - before) / ((high - low) or 1.0))
         return np.stack(columns, axis=1)
+
+    def moved(self, values: Floats, k: int, step: float) -> Floats:
+        """Return the values with parameter k a step on, but not beyond its bounds."""
+        moved = values.copy()
+        moved[k] = np.clip(values[k] + step, self.parameters[k].low, self.parameters[k].high)
+        return moved
 
 
 def without_effect(derivatives: Floats, parameters: Sequence[Parameter]) -> list[str]:
@@ -269,10 +265,9 @@ def _elsewhere(problem: Problem, values: Floats) -> Floats | None:
     a descent does not get over it.
     """
     least, best = float(np.sum(problem.tried(values) ** 2)), None
-    for k, parameter in enumerate(problem.parameters):
+    for k, size in enumerate(problem.sizes):
         for part in np.linspace(-1.0, 1.0, SEARCHED):
-            other = values.copy()
-            other[k] = np.clip(values[k] + part * problem.sizes[k], parameter.low, parameter.high)
+            other = problem.moved(values, k, part * size)
             cost = float(np.sum(problem.tried(other) ** 2))
             if cost < least * (1.0 - 1e-6):
                 least, best = cost, other

@@ -5,10 +5,10 @@ Units and bounds are those of the scene's own validation, read from its JSON Sch
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
@@ -16,14 +16,6 @@ from chutelab.scene import MISSING, Fault, Scene, shown
 from chutelab.scene.overrides import at_path, joined, limits_of, parts_of, rule_at
 from chutelab.studies.measured.track import MeasuredError, Track
 from chutelab.util.errors import did_you_mean
-
-PLACEMENT: Final = {
-    "t0": ("s", -np.inf, np.inf),
-    "scale": ("m per unit", 0.0, np.inf),
-    "origin.x": ("file units", -np.inf, np.inf),
-    "origin.y": ("file units", -np.inf, np.inf),
-}
-"""What can be fitted of a track's `Placement`: unit and bounds."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +25,7 @@ class Parameter:
     Attributes
     ----------
     key, unit : str
-        Its full path in the scene, or one of `PLACEMENT`; "" for the unit of a pure number.
+        Its full path in the scene, or a key of `placements`; "" for the unit of a pure number.
     start : float
         Its value in the scene or the placement.
     low, high : float
@@ -52,6 +44,18 @@ class Parameter:
         return max(abs(self.start), 0.1)
 
 
+def placements(track: Track) -> dict[str, Parameter]:
+    """Return what can be fitted of a track's `Placement`."""
+    place, anything = track.placement, (-np.inf, np.inf)
+    found = (
+        Parameter("t0", "s", place.t0, *anything),
+        Parameter("scale", "m per unit", place.scale, 0.0, np.inf),
+        Parameter("origin.x", "file units", place.origin[0], *anything),
+        Parameter("origin.y", "file units", place.origin[1], *anything),
+    )
+    return {one.key: one for one in found}
+
+
 def resolve(scene: Scene, track: Track, keys: Sequence[str]) -> tuple[Parameter, ...]:
     """Return the parameters that keys name.
 
@@ -60,18 +64,13 @@ def resolve(scene: Scene, track: Track, keys: Sequence[str]) -> tuple[Parameter,
     MeasuredError
         With all keys that are unknown, no number, without a value to start from, or given twice.
     """
-    document = scene.model_dump(by_alias=True)
+    document, placed = scene.model_dump(by_alias=True), placements(track)
     faults: list[Fault] = []
     found: list[Parameter] = []
     if not keys:
         faults.append(Fault("fit", None, "name at least one key, such as plate.restitution"))
     for key in keys:
-        known: Parameter | str
-        if key in PLACEMENT:
-            unit, low, high = PLACEMENT[key]
-            known = Parameter(key, unit, _placement(track)[key], low, high)
-        else:
-            known = _of_scene(document, key)
+        known = placed.get(key) or _of_scene(document, key, placed)
         if isinstance(known, str):
             faults.append(Fault(f"fit {key}", None, known))
         elif any(known.key == other.key for other in found):
@@ -93,32 +92,21 @@ def changed(
     SceneError
         If the scene refuses a value, or two that do not go together.
     """
-    given = dict(zip((one.key for one in parameters), map(float, values), strict=True))
-    changes = {key: value for key, value in given.items() if key not in PLACEMENT}
-    place = _placement(track) | given
+    given = {one.key: float(value) for one, value in zip(parameters, values, strict=True)}
+    place = {key: given.pop(key, one.start) for key, one in placements(track).items()}
     origin = place["origin.x"], place["origin.y"]
     moved = track.placed(t0=place["t0"], scale=place["scale"], origin=origin)
-    return scene.with_values(changes) if changes else scene, moved
+    return scene.with_values(given) if given else scene, moved
 
 
-def _placement(track: Track) -> dict[str, float]:
-    place = track.placement
-    return {
-        "t0": place.t0,
-        "scale": place.scale,
-        "origin.x": place.origin[0],
-        "origin.y": place.origin[1],
-    }
-
-
-def _of_scene(document: Mapping[str, Any], key: str) -> Parameter | str:
-    """Return the parameter of a key of the scene, or why there is none."""
+def _of_scene(document: Mapping[str, Any], key: str, others: Iterable[str]) -> Parameter | str:
+    """Return the parameter of a key of the scene, or why there is none, with other known keys."""
     rule = None
     with suppress(ValueError):
         parts = parts_of(key, [surface["name"] for surface in document["surface"]])
         rule = rule_at(parts)
     if rule is None:
-        known = [*numbers(document), *PLACEMENT]
+        known = [*numbers(document), *others]
         last = key.rpartition(".")[2]
         near = [name for name in known if name.rpartition(".")[2] == last]
         advice = f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(known)}"
@@ -139,13 +127,8 @@ def _of_scene(document: Mapping[str, Any], key: str) -> Parameter | str:
 
 def numbers(document: Mapping[str, Any]) -> Iterator[str]:
     """Yield the keys of a scene's tables whose values are numbers that can be fitted."""
-    names = [surface["name"] for surface in document["surface"]]
-    tables = {head: table for head, table in document.items() if isinstance(table, dict)}
-    tables |= {f"surface.{surface['name']}": surface for surface in document["surface"]}
-    own = {key: value for key, value in document.items() if key not in tables}
-    entries = {
-        f"{head}.{key}": value for head, table in tables.items() for key, value in table.items()
-    }
-    for key, value in (own | entries).items():
-        if isinstance(value, float) and rule_at(parts_of(key, names)):
-            yield key
+    tables = {"": document}
+    tables |= {f"{head}.": table for head, table in document.items() if isinstance(table, dict)}
+    tables |= {f"surface.{surface['name']}.": surface for surface in document["surface"]}
+    for head, table in tables.items():
+        yield from (f"{head}{key}" for key, value in table.items() if isinstance(value, float))

@@ -36,13 +36,7 @@ _EMPTY: Final = ("", "nan", "null", "na", "n/a", "-", "--")
 
 
 def lines_of(path: Path) -> list[str]:
-    """Return the lines of a text file.
-
-    Raises
-    ------
-    MeasuredError
-        If it cannot be read, is too large, or holds no text.
-    """
+    """Return the lines of a text file; a `MeasuredError` if it is none."""
     try:
         with path.open("rb") as file:
             data = file.read(LARGEST_FILE + 1)
@@ -114,7 +108,7 @@ _HEADER_WITHIN: Final = 100
 
 @dataclass(frozen=True)
 class _Columns:
-    """Where a track's columns are: cell numbers, and the units that the header gives them."""
+    """Where a track's t, x and y are: cell numbers, and the units that the header gives them."""
 
     name: str
     cells: dict[str, int]
@@ -192,7 +186,7 @@ def read(
     columns = next((one for one in tracks if track in (None, one.name)), None)
     if columns is None:
         raise refused(source, place, f"no such track; there are {said}", track)
-    points, numbers, skipped = _rows(source, lines, header, separator, columns)
+    points, numbers, skipped = _rows(source, lines, header, separator, columns.cells)
     if len(points) < LEAST:
         text = f"{len(points)} points with a time and a position; at least {LEAST} are needed"
         raise refused(source, "", text)
@@ -272,14 +266,14 @@ def _tracks(header: Sequence[str], above: Sequence[str]) -> list[_Columns]:
 
 
 def _rows(
-    source: Path, lines: Sequence[str], header: int, separator: str, columns: _Columns
+    source: Path, lines: Sequence[str], header: int, separator: str, cells: dict[str, int]
 ) -> tuple[list[tuple[float, ...]], list[int], int]:
     """Return time, x and y of each point, their lines, and how many lines have no position."""
     width = len(cells_of(lines[header], separator))
     points: list[tuple[float, ...]] = []
     numbers: list[int] = []
-    skipped = 0
     marks: set[str] = set()
+    skipped = 0
     for line, text in enumerate(lines[header + 1 :], start=header + 2):
         if not text.strip() or text.lstrip().startswith("#"):
             continue
@@ -291,24 +285,28 @@ def _rows(
                 allowed += "; with decimal commas, export with tabs or semicolons between cells"
             raise refused(source, place, allowed, text.strip())
         row += [""] * (width - len(row))
-        wanted = {key: row[cell] for key, cell in columns.cells.items()}
+        wanted = {key: row[cell] for key, cell in cells.items()}
         if any(cell.lower() in _EMPTY for cell in wanted.values()):
             skipped += 1
             continue
-        found = {key: number(cell) for key, cell in wanted.items()}
-        for key, value in found.items():
-            if value is None or not abs(value) <= LARGEST:
+        found = []
+        for key, cell in wanted.items():
+            value = number(cell)
+            if value is None or abs(value) > LARGEST:
                 allowed = f"must be a number from {-LARGEST:g} to {LARGEST:g}, or empty"
-                raise refused(source, f"{place}, column {key}", allowed, wanted[key])
-        point = tuple(value for value in found.values() if value is not None)
+                raise refused(source, f"{place}, column {key}", allowed, cell)
+            found.append(value)
+        point = tuple(found)
         marks |= {mark for cell in wanted.values() for mark in ".," if mark in cell}
         if len(marks) > 1:
-            apart = f"cells apart by {SEPARATORS[separator]}"
-            allowed = f"decimal points and decimal commas in one file ({apart})"
+            allowed = (
+                "decimal points and decimal commas in one file"
+                f" (cells apart by {SEPARATORS[separator]})"
+            )
             raise refused(source, place, allowed, text.strip())
         if points and point[0] <= points[-1][0]:
-            before = f"the point before has {points[-1][0]:g} (line {numbers[-1]})"
-            allowed = f"times must increase; {before}"
+            last = f"{points[-1][0]:g} (line {numbers[-1]})"
+            allowed = f"times must increase; the point before has {last}"
             raise refused(source, f"{place}, column t", allowed, point[0])
         points.append(point)
         numbers.append(line)

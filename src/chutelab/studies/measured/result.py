@@ -69,12 +69,8 @@ def advice(found: Residuals) -> str:
 def notes(fit: Fit, bent: Floats, *, settled: bool) -> Iterator[str]:
     """Yield what should be said beside a result.
 
-    Parameters
-    ----------
-    bent : ndarray, shape (p,)
-        By how much the response to each parameter changes within its uncertainty, relatively.
-    settled : bool
-        Whether the fit came to an end with the same points within the simulated time.
+    `bent`, (p,), is by how much the response to each parameter changes within its uncertainty,
+    relatively; `settled`, whether the fit ended with the same points within the simulated time.
     """
     if doubt := advice(fit.after):
         # Then nothing else that could be said means anything.

@@ -7,13 +7,13 @@ does not fit is left over, to be run alone: that is never wrong, only slower.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from chutelab.engines.exact import CornerError, kinds, run
 from chutelab.engines.simulation import simulate
-from chutelab.machine import Machine, RefusedError, build, members
+from chutelab.machine import RefusedError, build
 from chutelab.results import Recording
 from chutelab.results.recorder import StalledError
 from chutelab.scene import Scene, SceneError
@@ -128,45 +128,36 @@ def together(block: Block) -> tuple[list[tuple[Recording, Ints]], dict[int, str]
         in the block, (N,); why there is no run, by row; and the rows that have to be run alone.
     """
     template, which, faults = screened(block)
-    if template is None or not _fits(template, block):
+    if template is None:
+        return [], faults, which.tolist()
+    stepped = (block.engine or template.run.engine) in ("contact", "pymunk")
+    # Whether a release lies on the belt is a matter of the last digits.
+    close = {"particle.radius", "incoming.pulley_radius", "incoming.length"} & {*block.paths}
+    if stepped or template.stream.count > 1 or (close and template.stream.at is not None):
         return [], faults, which.tolist()
 
     def scenes(some: Ints) -> Scene:
         return family(template, dict(zip(block.paths, block.values[some].T.copy(), strict=True)))
 
-    groups: list[tuple[Machine, Ints, Ints]] = []
+    groups: list[Ints] = []
     while len(which) and not groups:
         try:
-            machine = build(scenes(which))
+            groups = [which[alike] for alike in kinds(build(scenes(which)))]
         except RefusedError as refused:
             faults |= {int(which[n]): str(fault) for n, fault in refused.members.items()}
             which = np.delete(which, list(refused.members))
-        else:
-            groups = [(machine, which, alike) for alike in kinds(machine)]
     runs: list[tuple[Recording, Ints]] = []
     left: list[int] = []
     while groups:
-        machine, which, part = groups.pop()
-        which = which[part]
-        machine = replace(members(machine, part), scene=scenes(which))
+        which = groups.pop()
         try:
-            runs.append((run(machine, apart=True), which))
+            runs.append((run(build(scenes(which)), apart=True), which))
         except (CornerError, StalledError):
             # Whoever does not get through is found by halving.
-            halves = np.array_split(np.arange(len(which)), 2) if len(which) > 1 else []
-            groups += [(machine, which, half) for half in halves]
+            halves = np.array_split(which, 2) if len(which) > 1 else []
+            groups += halves
             left += [] if halves else which.tolist()
     return runs, faults, left
-
-
-def _fits(scene: Scene, block: Block) -> bool:
-    """Tell whether a scene and the like of it go through the exact engine, one particle each."""
-    wanted = block.engine or scene.run.engine
-    if wanted in ("contact", "pymunk") or scene.stream.count > 1:
-        return False
-    # Whether such a release lies on the belt is a matter of the last digits.
-    at_risk = {"particle.radius", "incoming.pulley_radius", "incoming.length"}
-    return scene.stream.at is None or at_risk.isdisjoint(block.paths)
 
 
 def swept(block: Block) -> Columns:

@@ -94,18 +94,7 @@ def planned(
     seed: int = 0,
     engine: str | None = None,
 ) -> Plan:
-    """Look whether a sweep can be done, before anything runs.
-
-    Parameters
-    ----------
-    scene : Scene
-        From `chutelab.load`.
-    varies : sequence of Vary or str, or mapping
-        What to vary: texts as ``--vary`` takes them, or values (with `sample`, two ends) by key.
-    sample, design, seed : int, str, int
-        How many samples to draw, how ("lhs" or "sobol"), and the seed; without `sample` a grid.
-    engine : {"auto", "exact", "contact", "pymunk"}, optional
-        Overrides the scene's ``run.engine``.
+    """Look whether a sweep can be done, before anything runs; takes what `sweep` does.
 
     Raises
     ------

@@ -9,7 +9,6 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
-import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -17,7 +16,6 @@ from dataclasses import dataclass
 from itertools import chain
 from math import isnan
 from pathlib import Path
-from time import monotonic
 from typing import Any, Final
 
 import numpy as np
@@ -42,14 +40,7 @@ PARQUET: Final = ("Parquet needs pyarrow", "parquet")
 
 
 def format_of(path: str | Path) -> str:
-    """Return the format of a file by its ending.
-
-    Raises
-    ------
-    InputError
-        If it is none that is known, or what it needs is not installed; or it is a folder, or in one
-        that is not there.
-    """
+    """Return the format of a file by its ending; an `InputError` if it cannot be written."""
     if Path(path).is_dir():
         raise InputError(f"{path} is a folder, not a file")
     if not (folder := Path(path).parent).is_dir():
@@ -191,9 +182,6 @@ class Sweep(Shown):
 FORMAT: Final = 2
 """Of the file of finished rows."""
 
-INTERVAL: Final = 0.5
-"""s between two times that the file is forced to the disk: what an interruption may cost."""
-
 WORDS: Final = {
     "format": "the format of the file",
     "chutelab": "the version of chutelab",
@@ -219,8 +207,8 @@ def unfinished(
     The first line of the file is about the sweep; each other one has the number that a block begins
     with, and its rows as text, in JSON.
 
-    Gives the texts that are there already, by the beginnings of their blocks; and a function that
-    adds a block.
+    Gives the texts that are there, by the beginnings of their blocks; and a function that adds a
+    block to them and to the file.
 
     Raises
     ------
@@ -238,20 +226,11 @@ def unfinished(
     }
     path, line = part_of(out), json.dumps(head).encode() + b"\n"
     done: dict[int, str] = {}
-    last, added = monotonic(), False
-
-    def sync() -> None:
-        nonlocal last
-        file.flush()
-        os.fsync(file.fileno())
-        last = monotonic()
 
     def add(begin: int, text: str) -> None:
-        nonlocal added
-        added = True
+        done[begin] = text
         file.write(json.dumps([begin, text]).encode() + b"\n")
-        if monotonic() - last >= INTERVAL:
-            sync()
+        file.flush()
 
     try:
         data = path.read_bytes() if path.exists() else b""
@@ -280,7 +259,7 @@ def unfinished(
         file.seek(length)
         if new:
             file.write(line)
-            sync()
+            file.flush()
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from error
     complete = False
@@ -288,9 +267,8 @@ def unfinished(
         yield done, add
         complete = True
     finally:
-        sync()
         file.close()
-        if complete or not (done or added):
+        if complete or not done:
             path.unlink()
 
 

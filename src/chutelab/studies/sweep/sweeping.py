@@ -79,12 +79,9 @@ class Crew:
         self.executor, self.ahead, self.anew = executor, ahead, anew
 
     def results(self, work: Callable[[Any], Any], jobs: Iterable[Job]) -> Iterator[tuple[int, Any]]:
-        """Yield a number and what came of it for each job, as they are finished.
+        """Yield the number of each job and what came of it, as they are finished.
 
-        Raises
-        ------
-        LostWorkersError
-            If processes keep dying, or a cluster is gone.
+        A `LostWorkersError` if processes keep dying.
         """
         if self.executor is None:
             yield from ((number, work(job)) for number, job in jobs)
@@ -272,23 +269,10 @@ def sweep_to(
     resume: bool = False,
     progress: Progress | None = None,
 ) -> Sweep:
-    """Carry a plan out and write its rows to a file, whole or not at all.
+    """Carry a plan out and write its rows to a .csv or .parquet file, whole or not at all.
 
-    Finished rows are kept beside it meanwhile, see `sweep.result`; an interrupted sweep goes
-    on from there with `resume`, and writes the same file as one that was not.
-
-    Parameters
-    ----------
-    plan : Plan
-        From `planned`.
-    out : str or Path
-        A .csv or .parquet file.
-    team : Crew
-        Who does the work, from `chutelab.studies.sweep.sweeping.crew`.
-    resume : bool
-        Whether to go on with an interrupted sweep, if there is one.
-    progress : callable, optional
-        Called now and then with the share that is done, 0 to 1.
+    Finished rows are kept beside it meanwhile, see `sweep.result`; with `resume` an interrupted
+    sweep, if there is one, goes on from there, and writes the same file as one that was not.
 
     Raises
     ------
@@ -297,13 +281,11 @@ def sweep_to(
     """
     out, form = Path(out), format_of(out)
     names = (*plan.keys, *NUMBERS, REASON)
-    with unfinished(out, plan, resume=resume) as (done, add):
-        texts = {begin: text for begin, text in done.items() if begin < plan.count}
+    with unfinished(out, plan, resume=resume) as (texts, add):
         blocks = {begin: columns_of(names, text) for begin, text in texts.items()}
         for begin, columns in _work(plan, team, texts, progress):
             blocks[begin] = columns
-            texts[begin] = text_of(columns)
-            add(begin, texts[begin])
+            add(begin, text_of(columns))
         order = sorted(texts)
         result = _gathered(plan, [blocks[begin] for begin in order])
         if form == "csv":

@@ -109,7 +109,8 @@ def overlap(e: Evidence) -> Verdict | None:
         (position,), _ = e.recording.at([now])
         there = np.flatnonzero(np.isfinite(position[:, 0]))
         deep, i, j = closest(position[there], e.machine.particle.radius)
-        found.append((deep, f"particles {there[i]} and {there[j]} at t = {now:.6g} s"))
+        if deep > 0.0:
+            found.append((deep, f"particles {there[i]} and {there[j]} at t = {now:.6g} s"))
     return worst(found, e.rounding + 2.0 * e.late, "m")
 
 

@@ -249,20 +249,15 @@ def grade(
 
 
 def write_csv(grades: Sequence[Grade], path: str | Path) -> Path:
-    """Write a row per grade; the file is whole or not there.
-
-    Names that a spreadsheet would take for a formula are put in its quotes.
-    """
+    """Write a row per grade; the file is whole or not there."""
     most = max((len(row.marks) for row in grades), default=0)
     heads = [f"q{i + 1}" for i in range(most)]
     rows = [["file", "student", "lesson", *heads, "total", "out_of", "revealed", "reason"]]
-    formula = ("=", "+", "-", "@", "\t", "\r")
     for row in grades:
         marks = [*map(str, row.marks), *[""] * (most - len(row.marks))]
         revealed = " ".join(map(str, row.revealed))
         cells = [row.file, row.student, row.lesson, *marks]
-        cells += [str(row.total), str(row.out_of), revealed, row.reason]
-        rows.append([f"'{cell}" if cell.startswith(formula) else cell for cell in cells])
+        rows.append([*cells, str(row.total), str(row.out_of), revealed, row.reason])
     return write_lines(path, csv_lines(rows, end="\r\n"), errors="replace")
 
 

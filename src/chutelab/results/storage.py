@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import json
+import warnings
+import zipfile
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict
-from math import inf
+from errno import EINVAL
+from math import inf, prod
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
 
 from chutelab.machine import build
 from chutelab.results.recording import ENTRIES, EVENT, KNOT, REASONS, Kind, Recording
@@ -28,15 +33,30 @@ ARRAYS = {
     "by_surface": np.dtype("f8"),
 }
 
+HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+"""Readers of an array's shape and type, by the version of its format."""
+
+SMALL = 1 << 20
+"""Bytes of an array that may be packed however well."""
+
+MOST_UNPACKED = 150
+"""How many times as large as packed a larger array may be: runs in which next to nothing happens
+come to 60, and a file that is made to fill the memory to 1000."""
+
+ENGINES = ("exact", "contact", "pymunk")
+"""Who can have made a recording."""
+
+FAR = 1e100
+"""Bound on every number: energies and distances computed from it stay finite."""
+
 COLUMNS = ("t", "particle", "other", "kind", "surface")
 """Fields of an event that events.csv begins with."""
 
 SAMPLES = 200
 """Instants in trajectory.csv where no interval is asked for."""
 
-MOST_SAMPLES = 1_000_000
-"""Rows of trajectory.csv where no interval is asked for: beyond it no spreadsheet opens the file,
-so many particles get fewer instants."""
+MOST_ROWS = 1_000_000
+"""Rows of trajectory.csv, at most: beyond it no spreadsheet opens the file."""
 
 
 class RecordingError(InputError):
@@ -56,29 +76,68 @@ def save(recording: Recording, path: str | Path) -> Path:
 def load(path: str | Path) -> Recording:
     """Read what `save` wrote.
 
+    Nothing is unpacked whose size is not known, and sane, before.
+
     Raises
     ------
     RecordingError
-        If the file is missing, damaged, of another kind or of another version.
+        If the file is missing, damaged, of another kind or of another version; or if it is too
+        large for what it holds, or holds what no run leaves.
     """
     path = Path(path)
+    kind = "not a recording as `chutelab run --out` writes it"
     try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
-            about: dict[str, Any] = json.loads(str(data["about"]))
+        with zipfile.ZipFile(_regular(path)) as archive:
+            about = json.loads(str(_array(archive, "about")))
             if about.get("format") == FORMAT:
-                return _recording(about, {name: data[name] for name in ARRAYS})
+                return _recording(about, {name: _array(archive, name) for name in ARRAYS})
     except FileNotFoundError:
         raise RecordingError(f"{path}: no such file") from None
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except MemoryError:
+    except (MemoryError, RecordingError):
         raise
+    except _UnfitError as error:
+        raise RecordingError(f"{path}: {kind}: {error}") from None
     except Exception as error:
         # Damaged bytes come up as anything: from zipfile, zlib, tokenize, json, NumPy.
-        raise RecordingError(
-            f"{path}: not a recording as `chutelab run --out` writes it (recording.npz)"
-        ) from error
+        raise RecordingError(f"{path}: {kind} (recording.npz)") from error
     raise RecordingError(f"{path}: a recording of another version of chutelab; run its scene again")
+
+
+class _UnfitError(ValueError):
+    """What a file holds is not what a run leaves; the text says in what."""
+
+
+def _regular(path: Path) -> Path:
+    """Return a path that is not of a pipe, which would be waited for, or of a device."""
+    if path.exists() and not path.is_file():
+        raise OSError(EINVAL, "it is no regular file")
+    return path
+
+
+def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
+    """Return one array of an archive."""
+    info = archive.getinfo(f"{name}.npy")
+    # Other methods can make a million bytes of one.
+    if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        raise _UnfitError(f"{name} is packed by another method")
+    with archive.open(info) as entry, warnings.catch_warnings():
+        warnings.simplefilter("error")
+        shape, _, dtype = HEADERS[npy.read_magic(entry)](entry)
+        size = prod(shape) * dtype.itemsize
+        if entry.tell() + size != info.file_size:
+            raise _UnfitError(f"{name} has another size than it says")
+    if dtype != ARRAYS.get(name, dtype) or (name == "about" and (dtype.kind, shape) != ("U", ())):
+        raise _UnfitError(f"{name} is of another type")
+    packed = min(info.compress_size, Path(str(archive.filename)).stat().st_size)
+    if size > max(SMALL, MOST_UNPACKED * packed):
+        raise _UnfitError(
+            f"{name} would be {size / 1e6:.3g} MB, unpacked from {packed / 1e6:.3g} MB"
+        )
+    with archive.open(info) as entry:
+        array: NDArray[Any] = npy.read_array(entry, allow_pickle=False)
+    return array
 
 
 def _about(recording: Recording) -> dict[str, Any]:
@@ -98,32 +157,51 @@ def _about(recording: Recording) -> dict[str, Any]:
 
 
 def _recording(about: dict[str, Any], arrays: dict[str, Any]) -> Recording:
-    """Return what header and arrays hold; a ValueError if they contradict each other or the scene.
+    """Return what header and arrays hold; an error if they contradict each other or the scene.
 
     Every index has to lead somewhere. The scene's text may be an older one, without later keys.
     """
+    counts = about["steps"], about["contacts"]
+    if about["engine"] not in ENGINES:
+        raise _UnfitError("the header names no engine")
+    if not all(type(count) is int and 0 <= count < 2**63 for count in counts):
+        raise _UnfitError("steps and contacts in the header have to be whole numbers")
+    if type(about["seconds"]) not in (int, float) or not 0.0 <= about["seconds"] < inf:
+        raise _UnfitError("seconds in the header has to be a time")
     scene = from_dict(json.loads(about["scene"]), about["title"])
     told = {name: about[name] for name in ("engine", "steps", "contacts", "seconds")}
     recording = Recording(machine=build(scene), **told, **arrays)
     if _about(recording) | {"scene": about["scene"]} != about:
-        raise ValueError("the header is of another scene")
-    offsets, events = recording.offsets, recording.events
+        raise _UnfitError("the header is of another scene")
+    numbers = {"by_surface": arrays["by_surface"]}
+    for name, dtype in (("knots", KNOT), ("events", EVENT)):
+        numbers |= {f"{name}.{key}": arrays[name][key] for key in dtype.names or ()}
+    for name, values in numbers.items():
+        if not np.all(np.abs(values) < FAR):
+            raise _UnfitError(f"{name} has a number that is not finite, or beyond {FAR:g}")
+    offsets, knots, events = recording.offsets, recording.knots, recording.events
+    if not (knots.ndim == events.ndim == offsets.ndim == 1):
+        raise _UnfitError("an array has another number of dimensions")
     sizes, surfaces = np.diff(offsets), len(recording.surfaces)
     sound = (
-        all(getattr(recording, name).dtype == dtype for name, dtype in ARRAYS.items())
-        and recording.knots.ndim == events.ndim == offsets.ndim == 1
+        len(offsets) > 0
         and offsets[0] == 0
-        and offsets[-1] == len(recording.knots)
+        and offsets[-1] == len(knots)
         and not np.any((sizes < 0) | (sizes == 1))
         and recording.ended.shape == sizes.shape
         and not np.any((recording.ended < 0) | (recording.ended >= len(REASONS)))
         and recording.by_surface.shape == (surfaces, len(ENTRIES))
         and not np.any((events["surface"] < -1) | (events["surface"] >= surfaces))
         and not np.any((events["particle"] < 0) | (events["particle"] >= len(sizes)))
+        and not np.any((events["other"] < -1) | (events["other"] >= len(sizes)))
         and not np.any((events["kind"] < 0) | (events["kind"] >= len(Kind)))
     )
     if not sound:
-        raise ValueError("the arrays do not fit together")
+        raise _UnfitError("the arrays do not fit together")
+    backward = np.diff(knots["t"]) < 0.0
+    backward[offsets[1:-1][(offsets[1:-1] > 0) & (offsets[1:-1] < len(knots))] - 1] = False
+    if np.any(backward) or np.any(np.diff(events["t"]) < 0.0):
+        raise _UnfitError("the times of a track, or of the events, go backward")
     return recording
 
 
@@ -143,17 +221,29 @@ def to_csv(
     folder : path
         Existing directory.
     step : float, optional
-        Interval of the trajectory, s; by default `SAMPLES` instants, fewer for many particles.
+        Interval of the trajectory, s; by default that of `instants`.
     only : collection of str
         Which of the two.
 
     Raises
     ------
     ValueError
-        If `step` is not positive and finite.
+        If `step` is not positive and finite, or so short that the trajectory would have more than
+        `MOST_ROWS` rows; nothing is written then.
     """
-    if step is not None and not 0.0 < step < inf:
-        raise ValueError(f"step = {step!r}: a finite number above 0 s")
+    if step is not None:
+        if not 0.0 < step < inf:
+            raise ValueError(f"step = {step!r}: a finite number above 0 s")
+        first, last = recording.ends()
+        spans = float((last["t"] - first["t"]).sum())
+        many = spans / step + len(first)
+        if "trajectory" in only and many > MOST_ROWS:
+            room = MOST_ROWS - len(first)
+            least = f"{1.05 * spans / room:.2g} s or more" if room > 0 else "none"
+            raise ValueError(
+                f"step = {step!r}: trajectory.csv would have up to {many:.3g} rows, and"
+                f" {MOST_ROWS:,} are what a spreadsheet opens; allowed: {least}"
+            )
     written = []
     for name, rows in (
         ("events", _events(recording)),
@@ -163,6 +253,20 @@ def to_csv(
             path = Path(folder) / f"{name}.csv"
             written.append(write_lines(path, csv_lines(rows)))
     return written
+
+
+def instants(recording: Recording) -> int:
+    """Return how many instants trajectory.csv has where no interval is asked for.
+
+    `SAMPLES`, or as many as keep it to `MOST_ROWS` rows.
+    """
+    if not len(recording.knots):
+        return 0
+    first, last = recording.ends()
+    whole = float(last["t"].max() - first["t"].min())
+    # A particle has a row at each instant of its track, and one more at most for where it begins.
+    share = float((last["t"] - first["t"]).sum()) / whole if whole > 0.0 else float(len(first))
+    return max(2, min(SAMPLES, 1 + int((MOST_ROWS - len(first)) / share))) if share else SAMPLES
 
 
 def _events(recording: Recording) -> Iterator[Sequence[object]]:
@@ -185,8 +289,7 @@ def _trajectory(recording: Recording, step: float | None) -> Iterator[Sequence[o
         return
     begin, end = float(recording.knots["t"].min()), float(recording.knots["t"].max())
     if step is None:
-        rows = max(2, min(SAMPLES, MOST_SAMPLES // recording.count))
-        times = np.linspace(begin, end, rows).tolist()
+        times = np.linspace(begin, end, instants(recording)).tolist()
     else:
         # An end that is a whole number of steps away belongs to the table, whatever rounding says.
         last = int((end - begin) / step * (1.0 + 1e-12))

@@ -6,6 +6,7 @@ It imports no NumPy: commands that need none answer at once.
 from __future__ import annotations
 
 import csv
+import re
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -13,7 +14,7 @@ from dataclasses import fields
 from errno import ENOENT
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Final
 
 
 @contextmanager
@@ -32,19 +33,50 @@ def whole(path: str | Path) -> Iterator[Path]:
         unfinished.replace(path)
 
 
+_FORMULA: Final = r"((?:\A|[;\t\r\n])[\s\"']*)({}[=+\-@\uff1d\uff0b\uff0d\uff20])"
+"""What a spreadsheet takes for a formula, at the start of a cell or of what becomes one where
+semicolons or tabs separate the cells; the last four are Japanese keyboards' =, +, - and @."""
+
+_BARE: Final = re.compile(_FORMULA.format(""))
+_QUOTED: Final = re.compile(_FORMULA.format("'"))
+
+
+def harmless(cell: object) -> object:
+    """Return a cell with a quote before whatever a spreadsheet would take for a formula.
+
+    Numbers stay as they are, also those that are written out.
+
+    >>> harmless("=1+1"), harmless("a;=1+1"), harmless("-0.5"), harmless(-0.5)
+    ("'=1+1", "a;'=1+1", '-0.5', -0.5)
+    """
+    if not isinstance(cell, str) or not cell:
+        return cell
+    try:
+        float(cell)
+    except ValueError:
+        return _BARE.sub(r"\1'\2", cell)
+    return cell
+
+
+def unquoted(cell: str) -> str:
+    """Return the text that `harmless` made this cell of."""
+    return _QUOTED.sub(lambda found: found[1] + found[2].removeprefix("'"), cell)
+
+
 def csv_lines(
     rows: Iterable[Iterable[object]], *, separator: str = ",", end: str = "\n"
 ) -> Iterator[str]:
     r"""Yield rows as lines of CSV, cells quoted where they must be.
 
-    None is an empty cell, numbers come back to the last bit.
+    None is an empty cell, numbers come back to the last bit; no text is a formula, see `harmless`.
 
     >>> list(csv_lines([("t", "what"), (0.1, "a, b"), (1, None)]))
     ['t,what\n', '0.1,"a, b"\n', '1,\n']
     """
     # `writerow` returns what `write` does: the line.
-    out = csv.writer(SimpleNamespace(write=str), delimiter=separator, lineterminator=end)
-    return map(out.writerow, rows)
+    # Cells are only quoted for the line ends that it writes itself, so it writes both.
+    out = csv.writer(SimpleNamespace(write=str), delimiter=separator, lineterminator="\r\n")
+    return (out.writerow(map(harmless, row)).removesuffix("\r\n") + end for row in rows)
 
 
 def write_lines(path: str | Path, texts: Iterable[str], *, errors: str = "strict") -> Path:

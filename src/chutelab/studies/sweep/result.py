@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import hashlib
+import io
 import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -26,7 +27,7 @@ from chutelab.scene.variants import Quantity
 from chutelab.studies.sweep.plan import Plan
 from chutelab.studies.sweep.rows import NUMBERS, REASON
 from chutelab.util.errors import InputError
-from chutelab.util.files import csv_lines, whole, write_lines
+from chutelab.util.files import csv_lines, unquoted, whole, write_lines
 from chutelab.util.tables import Sheet, Shown, frame, number
 from chutelab.util.versions import library, version_of
 
@@ -85,9 +86,9 @@ def _number(x: float) -> str:
 
 def columns_of(names: Sequence[str], text: str) -> dict[str, NDArray[Any]]:
     """Read what `text_of` wrote."""
-    cells = list(zip(*csv.reader(text.splitlines()), strict=True))
+    cells = list(zip(*csv.reader(io.StringIO(text, newline="")), strict=True))
     return {
-        name: np.array(column, dtype=object)
+        name: np.array(list(map(unquoted, column)), dtype=object)
         if name == REASON
         else np.array([float(cell) if cell else np.nan for cell in column])
         for name, column in zip(names, cells, strict=True)

@@ -167,6 +167,11 @@ def printable(text: str) -> str:
     )
 
 
+def printable_lines(text: str) -> str:
+    """Return a text of several lines, each of them `printable`."""
+    return "\n".join(map(printable, text.split("\n")))
+
+
 def shown(value: object) -> str:
     """Write a value as a scene file would, cut to one short line."""
     return cut(_toml(value, depth=0), _VALUE_WIDTH)

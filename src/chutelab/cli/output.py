@@ -140,7 +140,8 @@ class Output:
                 elif kind == "npz":
                     recording.save(path)
                 else:
-                    write_json(_summary(recording, accuracy), path)
+                    # Only what is printed tells how long it took: the same run, the same file.
+                    write_json({**_summary(recording, accuracy), "seconds": None}, path)
 
     def tell(self, recording: Recording, accuracy: Accuracy | None = None) -> None:
         """Print the summary and what was written."""

@@ -1,4 +1,7 @@
-"""Recordings on disk: one npz file that round-trips to the last bit, and CSV for spreadsheets."""
+"""Recordings on disk: one npz file that round-trips to the last bit, and CSV for spreadsheets.
+
+How long the run took is not in them: the same run makes the same bytes.
+"""
 
 from __future__ import annotations
 
@@ -152,7 +155,6 @@ def _about(recording: Recording) -> dict[str, Any]:
         "surfaces": list(recording.surfaces),
         "steps": recording.steps,
         "contacts": recording.contacts,
-        "seconds": recording.seconds,
     }
 
 
@@ -166,10 +168,9 @@ def _recording(about: dict[str, Any], arrays: dict[str, Any]) -> Recording:
         raise _UnfitError("the header names no engine")
     if not all(type(count) is int and 0 <= count < 2**63 for count in counts):
         raise _UnfitError("steps and contacts in the header have to be whole numbers")
-    if type(about["seconds"]) not in (int, float) or not 0.0 <= about["seconds"] < inf:
-        raise _UnfitError("seconds in the header has to be a time")
     scene = from_dict(json.loads(about["scene"]), about["title"])
-    told = {name: about[name] for name in ("engine", "steps", "contacts", "seconds")}
+    about.pop("seconds", None)  # earlier files tell how long the run took
+    told = {name: about[name] for name in ("engine", "steps", "contacts")}
     recording = Recording(machine=build(scene), **told, **arrays)
     if _about(recording) | {"scene": about["scene"]} != about:
         raise _UnfitError("the header is of another scene")

@@ -127,7 +127,7 @@ def test_a_terminal_is_told_nothing_to_obey(monkeypatch, evil, args, colour):
 
 def test_a_scene_that_is_written_can_be_read_whatever_is_said_of_it():
     again = parse(to_toml(scene(), f"{NAME}: \0\x1b\x7f\r\n\N{LINE SEPARATOR}x = 1"))
-    assert to_dict(again) == to_dict(scene())
+    assert again == scene().model_copy(update={"expect": ()})
 
 
 def test_a_recording_prints_nothing_to_obey():

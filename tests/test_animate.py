@@ -799,7 +799,18 @@ def test_a_stream_has_fewer_pictures_a_second(name: str, delay: int, tmp_path: P
         assert gif.info["duration"] == delay
 
 
-@pytest.mark.parametrize("name", [*EXACT, "inclined-20", "perpendicular-fast"])
+# The first has the largest file.
+LONE = [
+    "belt-landing",
+    *(
+        pytest.param(name, marks=pytest.mark.slow)
+        for name in (*EXACT, "inclined-20", "perpendicular-fast")
+        if name != "belt-landing"
+    ),
+]
+
+
+@pytest.mark.parametrize("name", LONE)
 def test_lesson_of_one_particle_is_small(name: str, tmp_path: Path) -> None:
     path = animate(simulate(scene.load(name)), tmp_path / "lesson.gif")
     assert path.stat().st_size < 200_000

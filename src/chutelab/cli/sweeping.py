@@ -174,7 +174,7 @@ def sweep(
         raise click.ClickException(f"{error} {_kept(out)}".strip()) from error
     except KeyboardInterrupt:
         if said := _kept(out):
-            click.echo(f"\n{said}", err=True)
+            console.say(f"\n{said}", err=True)
         raise
     if plot is not None:
         from chutelab.pictures.plots.design import sweep_figure

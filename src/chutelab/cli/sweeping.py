@@ -176,7 +176,7 @@ def sweep(
         raise click.ClickException(". ".join(filter(None, (str(error), _kept(out))))) from error
     except KeyboardInterrupt:
         if said := _kept(out):
-            click.echo(f"\n{said}", err=True)
+            console.say(f"\n{said}", err=True)
         raise
     if plot is not None:
         from chutelab.pictures.plots.design import sweep_figure

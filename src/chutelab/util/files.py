@@ -18,6 +18,8 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Final
 
+from chutelab.util.errors import printable
+
 
 @contextmanager
 def whole(path: str | Path) -> Iterator[Path]:
@@ -114,5 +116,5 @@ def tsv_text(rows: Sequence[object], kind: type, about: Mapping[str, str]) -> st
     """
     names = [field.name for field in fields(kind)]
     cells = [[getattr(row, name) for name in names] for row in rows]
-    head = "".join(f"# {key}: {value}\n" for key, value in about.items())
+    head = "".join(f"# {key}: {printable(value)}\n" for key, value in about.items())
     return head + "".join(csv_lines([names, *cells], separator="\t"))

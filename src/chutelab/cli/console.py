@@ -5,18 +5,100 @@ The bar is for people who wait longer than a second.
 
 from __future__ import annotations
 
+import io
 import json
+import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from threading import Timer
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from chutelab.util.errors import printable, printable_lines
+
 if TYPE_CHECKING:
-    from rich.console import RenderableType
+    from rich.console import Console, ConsoleOptions, RenderableType
     from rich.progress import Progress
+    from rich.segment import Segment
+
+
+class _Output(io.TextIOWrapper):
+    """Standard output, whose errors say which file they mean: it has no name."""
+
+    def write(self, text: str, /) -> int:
+        with self._named():
+            return super().write(text)
+
+    def flush(self) -> None:
+        with self._named():
+            super().flush()
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, "standard output") from None
+
+
+class _Errors(io.TextIOWrapper):
+    """Standard error. If it cannot be written there is nowhere to say so: the exit code is left."""
+
+    def write(self, text: str, /) -> int:
+        with suppress(OSError):
+            super().write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        with suppress(OSError):
+            super().flush()
+
+
+def open_streams() -> None:
+    """Make the standard streams such that the rest need not ask what they are.
+
+    One that is closed becomes the null device: else the next file that is opened gets its number,
+    and what others print. A title in Greek does not fail in a terminal that has no Greek.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        stream = getattr(sys, name)
+        if stream is None:
+            null = os.open(os.devnull, os.O_RDWR)
+            if null != number:
+                os.dup2(null, number)
+                os.close(null)
+            os.set_inheritable(number, True)
+            setattr(sys, name, os.fdopen(number, "w" if number else "r", encoding="utf-8"))
+        elif number and isinstance(stream, io.TextIOWrapper):
+            if stream is not getattr(sys, f"__{name}__"):
+                stream.reconfigure(errors="replace")
+                continue
+            kind = _Output if name == "stdout" else _Errors
+            with_its = {"encoding": stream.encoding, "line_buffering": stream.line_buffering}
+            setattr(sys, name, kind(stream.buffer, errors="replace", **with_its))
+
+
+def say(text: str, *, err: bool = False, end: str = "\n") -> None:
+    """Print a text in which a terminal finds nothing to obey, whatever titles and names are in it.
+
+    All text goes through here, or through `show`.
+    """
+    click.echo(f"{printable_lines(text)}{end}", err=err, nl=False)
+
+
+class _Shown:
+    """What rich prints of something, in which a terminal finds nothing to obey but colours."""
+
+    def __init__(self, part: RenderableType) -> None:
+        self.part = part
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Segment]:
+        from rich.segment import Segment
+
+        for text, style, control in console.render(self.part, options):
+            yield Segment(text if control else printable_lines(text), style, control)
 
 
 def show(*parts: RenderableType) -> None:
@@ -26,7 +108,8 @@ def show(*parts: RenderableType) -> None:
     console = Console(highlight=False)
     with console.capture() as capture:
         for part in parts:
-            console.print(part)
+            # What was made printable is longer than it was, and not to be cut for it.
+            console.print(_Shown(part), crop=False)
     # Through click: it flushes, and knows what to do when the reader has gone.
     click.echo(capture.get().removeprefix("\n"), nl=False)
 
@@ -51,7 +134,7 @@ def tell(
     elif not quiet:
         show(*parts)
         if wrote:
-            click.echo(wrote)
+            say(wrote)
 
 
 PATIENCE = 1.0
@@ -83,7 +166,7 @@ def progress(
         from rich.console import Console
 
         bar = rich.Progress(
-            rich.TextColumn("{task.description}"),
+            rich.TextColumn("{task.description}", markup=False),
             rich.BarColumn(),
             rich.TimeElapsedColumn(),
             *([rich.TextColumn("left:"), rich.TimeRemainingColumn()] if left else []),
@@ -91,7 +174,7 @@ def progress(
             transient=True,
         )
         # Without a total it pulses: nobody has said yet how far it is.
-        bar.add_task(what, total=None)
+        bar.add_task(printable(what), total=None)
         bar.start()
         bars.append(bar)
         if done is not None:

@@ -14,6 +14,7 @@ from typing import Any
 
 import click
 
+from chutelab.cli.console import open_streams, say
 from chutelab.util.errors import InputError, MissingLibraryError
 from chutelab.util.signals import INTERRUPTED, exit_code, raised
 
@@ -41,20 +42,13 @@ class Program(InOrder):
         kwargs |= {"obj": asked, "standalone_mode": False}
         with raised():
             try:
+                open_streams()
                 code = super().main(*args, **kwargs)
             except (KeyboardInterrupt, Exception) as error:
                 if asked["debug"] and not isinstance(error, EXPECTED) and not exit_code(error):
                     raise
                 code = _told(error)
             sys.exit(code or 0)
-
-    def invoke(self, ctx: click.Context) -> Any:
-        """Run a command."""
-        for stream in (sys.stdout, sys.stderr):
-            # A title in Greek must not fail in a terminal that has no Greek.
-            if isinstance(stream, io.TextIOWrapper):
-                stream.reconfigure(errors="replace")
-        return super().invoke(ctx)
 
 
 EXPECTED = (click.ClickException, InputError, MissingLibraryError)
@@ -64,22 +58,26 @@ EXPECTED = (click.ClickException, InputError, MissingLibraryError)
 def _told(error: BaseException) -> int:
     """Say on standard error what went wrong; return the exit code."""
     if code := exit_code(error):
-        click.echo("Interrupted." if code == INTERRUPTED else "Terminated.", err=True)
+        say("Interrupted." if code == INTERRUPTED else "Terminated.", err=True)
         return code
     if isinstance(error, (InputError, MissingLibraryError)):
         error = RefusedError(str(error))
     if isinstance(error, click.ClickException):
-        error.show()
+        text = io.StringIO()
+        error.show(text)
+        say(text.getvalue(), err=True, end="")
         return error.exit_code
     said = str(error)
     if isinstance(error, MemoryError):
         said = f"not enough memory; fewer particles need less. ({error})"
-    elif not isinstance(error, OSError):
+    elif isinstance(error, OSError):
+        said = ": ".join(filter(None, (error.filename, error.strerror))) or said
+    else:
         said = (
             f"{type(error).__name__}: {' '.join(said.split()) or 'no message'}; please"
             " report it, with what `chutelab --debug ...` prints for the same command"
         )
-    click.echo(f"chutelab failed: {said}", err=True)
+    say(f"chutelab failed: {said}", err=True)
     return 1
 
 
@@ -87,7 +85,7 @@ def _version(ctx: click.Context, _parameter: click.Parameter, asked: bool) -> No
     if asked and not ctx.resilient_parsing:
         import chutelab
 
-        click.echo(f"chutelab {chutelab.__version__}")
+        say(f"chutelab {chutelab.__version__}")
         ctx.exit()
 
 

@@ -138,7 +138,7 @@ class InputError(ValueError):
 
 
 class MissingLibraryError(ImportError):
-    """A library that Chutelab can do without is not installed; the text says what to install."""
+    """A library is not installed, or too old; the text says what to install."""
 
 
 def cut(text: str, width: int) -> str:
@@ -146,12 +146,30 @@ def cut(text: str, width: int) -> str:
     return text if len(text) <= width else text[: width - 3] + "..."
 
 
+_KEPT: Final = "\u00a0\u2007\u2009\u202f\u200c\u200d"
+"""Characters that Python does not call printable, though many languages need them: spaces at which
+no line is broken, and what joins letters or keeps them apart."""
+
+
 def printable(text: str) -> str:
-    """Replace what a terminal would obey or cannot show by its escape."""
+    r"""Replace what a terminal would obey or cannot show by its escape.
+
+    That is control characters, and those that turn the direction of what is read.
+
+    >>> print(printable("\x1b[31m\u202e"), printable("café, 漢字"))
+    \x1b[31m\u202e café, 漢字
+    """
     return "".join(
-        c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode("ascii")
+        c
+        if c.isprintable() or c in _KEPT
+        else c.encode("unicode_escape", "surrogatepass").decode("ascii")
         for c in text
     )
+
+
+def printable_lines(text: str) -> str:
+    """Return a text of several lines, each of them `printable`."""
+    return "\n".join(map(printable, text.split("\n")))
 
 
 def shown(value: object) -> str:

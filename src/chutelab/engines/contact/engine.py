@@ -253,7 +253,7 @@ class Job:
         """Return what was recorded."""
         recorder = Recorder(machine)
         world, module = self.module.world, self.module
-        # Each chunk is let go as soon as it is handed over: together they are what takes the memory.
+        # Chunks are let go as they are handed over: all of them are most of the memory.
         self.knots.reverse()
         self.events.reverse()
         while self.knots:

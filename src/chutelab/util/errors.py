@@ -138,7 +138,7 @@ class InputError(ValueError):
 
 
 class MissingLibraryError(ImportError):
-    """A library that Chutelab can do without is not installed; the text says what to install."""
+    """A library is not installed, or too old; the text says what to install."""
 
 
 def cut(text: str, width: int) -> str:

@@ -174,7 +174,7 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Recording:
     scene = from_dict(json.loads(about["scene"]), about["title"])
     # Of particles that were never released, any number is packed into next to nothing.
     room = 8 * (scene.stream.count + 1)
-    arrays = {name: _array(archive, name, room) for name in ARRAYS}
+    arrays: dict[str, Any] = {name: _array(archive, name, room) for name in ARRAYS}
     about.pop("seconds", None)  # earlier files tell how long the run took
     told = {name: about[name] for name in ("engine", "steps", "contacts")}
     recording = Recording(machine=build(scene), **told, **arrays)

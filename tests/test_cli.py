@@ -122,7 +122,7 @@ def test_a_run_prints_particle_0_beside_the_theory_the_ledger_and_the_endings():
 
 
 def test_a_summary_fits_a_terminal_and_has_no_colours_in_a_pipe():
-    for arguments in (["run", "belt-landing"], ["tables"], ["scenes"], ["verify", "slip"]):
+    for arguments in (["run", "belt-landing"], ["tables"], ["scenes"], ["verify", "inclined-60"]):
         text = call(*arguments).stdout
         assert max(map(len, text.splitlines())) <= 80
         assert "\x1b" not in text
@@ -209,11 +209,11 @@ def test_settings_change_the_run():
     plain_steps = "--set", "run.align=false"
     arguments = ("run", "perpendicular", "--json", "--engine", "pymunk", *plain_steps)
     coarse = json.loads(call(*arguments).stdout)
-    fine = json.loads(call(*arguments, "--dt", "1e-4").stdout)
+    fine = json.loads(call(*arguments, "--dt", "2e-4").stdout)
     assert coarse["engine"] == fine["engine"] == "pymunk"
-    assert fine["steps"] > 5 * coarse["steps"]
+    assert fine["steps"] > 2.5 * coarse["steps"]
     # An option is the setting of its name.
-    settings = ["--set", "run.engine=pymunk", "--set", "run.dt=0.0001"]
+    settings = ["--set", "run.engine=pymunk", "--set", "run.dt=0.0002"]
     again = json.loads(call("run", "perpendicular", "--json", *settings, *plain_steps).stdout)
     for result in (fine, again):
         del result["seconds"]
@@ -913,9 +913,9 @@ def test_verify_ends_with_1_when_a_scene_shows_something_else():
         "exact", "contact", "pymunk", "theory",
     ]  # fmt: skip
     assert said.endswith("4 outside the tolerance\n")
-    found = json.loads(call("verify", "other.toml", "slip", "--json", code=1).stdout)
+    found = json.loads(call("verify", "other.toml", "inclined-60", "--json", code=1).stdout)
     assert found["failures"] == 4
-    other, slip = found["scenes"]
+    other, inclined = found["scenes"]
     assert list(other) == ["scene", "title", "expectations", "agreement", "skipped"]
     assert list(other["expectations"][0]) == [
         "quantity", "unit", "source", "engine", "expected", "simulated", "error", "tolerance",
@@ -923,8 +923,8 @@ def test_verify_ends_with_1_when_a_scene_shows_something_else():
     ]  # fmt: skip
     wrong = [row for row in other["expectations"] if not row["holds"]]
     assert [(row["quantity"], row["expected"]) for row in wrong] == [("d3", 0.95)] * 4
-    assert all(row["holds"] for row in slip["expectations"])
-    assert list(slip["agreement"][0]) == [
+    assert all(row["holds"] for row in inclined["expectations"])
+    assert list(inclined["agreement"][0]) == [
         *("pair", "quantity", "difference", "tolerance", "least", "holds")
     ]
 
@@ -1007,7 +1007,8 @@ def test_a_run_that_takes_too_long_ends_with_what_is_recorded():
     told = json.loads(Path("out/summary.json").read_text())
     assert told["ended"]["reason"] == 200 * ["stopped"]
     assert told["stopped"]["particles"] + told["stopped"]["unreleased"] == 200
-    assert " ".join(call("show", "out/recording.npz").stdout.split()) in text
+    lasted = re.search(r", [-\d.e]+ s(?= ended)", text)[0]  # what no recording tells
+    assert " ".join(call("show", "out/recording.npz").stdout.split()) in text.replace(lasted, "")
     assert json.loads(call("run", "perpendicular", "--json").stdout)["stopped"] is None
 
 

@@ -19,6 +19,8 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Final
 
+from chutelab.util.errors import printable
+
 _ASIDE: Final = ".chutelab-unfinished-"
 """Beginning of the names of folders in which files are made before they get their place."""
 
@@ -133,6 +135,14 @@ def _beside(path: Path) -> Iterator[Path]:
         yield folder / real.name
 
 
+def remove_unfinished(path: str | Path) -> None:
+    """Remove what processes that were killed in `whole` left; nobody else may be writing `path`."""
+    path = Path(path)
+    for folder in path.parent.glob(f"{_ASIDE}????????"):
+        if folder.is_dir() and [file.name for file in folder.iterdir()] == [path.name]:
+            shutil.rmtree(folder, ignore_errors=True)
+
+
 _FORMULA: Final = r"((?:\A|[;\t\r\n])[\s\"']*)({}[=+\-@\uff1d\uff0b\uff0d\uff20])"
 """What a spreadsheet takes for a formula, at the start of a cell or of what becomes one where
 semicolons or tabs separate the cells; the last four are Japanese keyboards' =, +, - and @."""
@@ -204,5 +214,5 @@ def tsv_text(rows: Sequence[object], kind: type, about: Mapping[str, str]) -> st
     """
     names = [field.name for field in fields(kind)]
     cells = [[getattr(row, name) for name in names] for row in rows]
-    head = "".join(f"# {key}: {value}\n" for key, value in about.items())
+    head = "".join(f"# {key}: {printable(value)}\n" for key, value in about.items())
     return head + "".join(csv_lines([names, *cells], separator="\t"))

@@ -111,7 +111,8 @@ def overlap(e: Evidence) -> Verdict | None:
         if not len(there):
             continue  # the last has landed, the next is not released
         deep, i, j = closest(position[there], e.machine.particle.radius)
-        found.append((deep, f"particles {there[i]} and {there[j]} at t = {now:.6g} s"))
+        if deep > 0.0:
+            found.append((deep, f"particles {there[i]} and {there[j]} at t = {now:.6g} s"))
     return worst(found, e.rounding + 2.0 * e.late, "m")
 
 

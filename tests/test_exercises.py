@@ -296,7 +296,7 @@ def test_what_is_no_known_mistake_is_told_how_far_off_it_is():
 def exchange(name):
     """All that is said about one question of a lesson, a line each."""
     task, cases = lesson(name, "Ada Lovelace"), draw(EXERCISES[name], "Ada Lovelace")[1]
-    number = 1 + task.exercise.number % 4
+    number = 1 + EXERCISES[task.lesson].number % 4
     case = cases[number - 1]
     own = [trace.number for trace in case.mistakes[: len(case.question.mistakes)]]
     answers = [case.right, *own, 1.03 * case.right, 3.3 * case.right, None]

@@ -1,6 +1,27 @@
-"""``python -m chutelab`` does what the command ``chutelab`` does."""
+"""The command ``chutelab``, which is ``python -m chutelab`` too.
 
-from chutelab.cli import main
+What takes long to import is imported inside `main`, where signals are waited for.
+"""
+
+import sys
+
+from chutelab.util.signals import exit_code, raised
+
+
+def main() -> None:
+    """Run the command line; a signal ends it without a traceback, from the first import on."""
+    with raised(last=True):
+        try:
+            from chutelab.cli import main as program
+
+            program()
+        except BaseException as error:
+            # What `program` raises is a SystemExit, with the code that it should be.
+            code = None if isinstance(error, SystemExit) else exit_code(error)
+            if code is None:
+                raise
+            sys.exit(code)
+
 
 if __name__ == "__main__":
     main()

@@ -2,7 +2,8 @@
 
 0: done. 1: something failed that is not the user's to mend, ``verify`` or ``stress`` found what
 does not hold, or an accuracy was not reached.
-2: what the user gave cannot be used. 130: interrupted with Ctrl-C.
+2: what the user gave cannot be used. 130: interrupted with Ctrl-C. 143: terminated.
+129: the terminal was closed. 130, 143 and 129 leave nothing behind.
 """
 
 from __future__ import annotations
@@ -14,9 +15,7 @@ from typing import Any
 import click
 
 from chutelab.util.errors import InputError, MissingLibraryError
-
-INTERRUPTED = 130
-"""128 + SIGINT, as shells have it."""
+from chutelab.util.signals import INTERRUPTED, exit_code, raised
 
 
 class RefusedError(click.ClickException):
@@ -37,56 +36,51 @@ class Program(InOrder):
     """The commands of ``chutelab``, which never show a traceback."""
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
-        """Run the program; Ctrl-C between two commands' worth of code is Ctrl-C all the same."""
-        try:
-            return super().main(*args, **kwargs)
-        except KeyboardInterrupt:
-            raise SystemExit(INTERRUPTED) from None
-        except SystemExit as end:
-            if _was_interrupted(end.__context__):
-                raise SystemExit(INTERRUPTED) from None
-            raise
+        """Run the program, and exit; what goes wrong becomes a message and an exit code."""
+        asked = {"debug": False}
+        kwargs |= {"obj": asked, "standalone_mode": False}
+        with raised():
+            try:
+                code = super().main(*args, **kwargs)
+            except (KeyboardInterrupt, Exception) as error:
+                if asked["debug"] and not isinstance(error, EXPECTED) and not exit_code(error):
+                    raise
+                code = _told(error)
+            sys.exit(code or 0)
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run a command; turn what goes wrong into a message and an exit code."""
+        """Run a command."""
         for stream in (sys.stdout, sys.stderr):
             # A title in Greek must not fail in a terminal that has no Greek.
             if isinstance(stream, io.TextIOWrapper):
                 stream.reconfigure(errors="replace")
-        try:
-            return super().invoke(ctx)
-        except KeyboardInterrupt:
-            click.echo("\nInterrupted.", err=True)
-            ctx.exit(INTERRUPTED)
-        except (click.ClickException, click.exceptions.Exit, click.Abort, BrokenPipeError):
-            raise
-        except Exception as error:
-            if _was_interrupted(error):
-                click.echo("\nInterrupted.", err=True)
-                ctx.exit(INTERRUPTED)
-            if isinstance(error, (InputError, MissingLibraryError)):
-                raise RefusedError(str(error)) from error
-            if ctx.params["debug"]:
-                raise
-            said = str(error)
-            if isinstance(error, MemoryError):
-                said = f"not enough memory; fewer particles need less. ({error})"
-            elif not isinstance(error, OSError):
-                said = (
-                    f"{type(error).__name__}: {' '.join(said.split()) or 'no message'}; please"
-                    " report it, with what `chutelab --debug ...` prints for the same command"
-                )
-            click.echo(f"chutelab failed: {said}", err=True)
-            ctx.exit(1)
+        return super().invoke(ctx)
 
 
-def _was_interrupted(error: BaseException | None) -> bool:
-    """Tell whether Ctrl-C is behind an error: compiled code may turn it into another one."""
-    while error is not None:
-        if isinstance(error, KeyboardInterrupt):
-            return True
-        error = error.__cause__ or error.__context__
-    return False
+EXPECTED = (click.ClickException, InputError, MissingLibraryError)
+"""What somebody gave: told the same with ``--debug``."""
+
+
+def _told(error: BaseException) -> int:
+    """Say on standard error what went wrong; return the exit code."""
+    if code := exit_code(error):
+        click.echo("Interrupted." if code == INTERRUPTED else "Terminated.", err=True)
+        return code
+    if isinstance(error, (InputError, MissingLibraryError)):
+        error = RefusedError(str(error))
+    if isinstance(error, click.ClickException):
+        error.show()
+        return error.exit_code
+    said = str(error)
+    if isinstance(error, MemoryError):
+        said = f"not enough memory; fewer particles need less. ({error})"
+    elif not isinstance(error, OSError):
+        said = (
+            f"{type(error).__name__}: {' '.join(said.split()) or 'no message'}; please"
+            " report it, with what `chutelab --debug ...` prints for the same command"
+        )
+    click.echo(f"chutelab failed: {said}", err=True)
+    return 1
 
 
 def _version(ctx: click.Context, _parameter: click.Parameter, asked: bool) -> None:
@@ -113,7 +107,8 @@ def _version(ctx: click.Context, _parameter: click.Parameter, asked: bool) -> No
     callback=_version,
     help="Show the version and exit.",
 )
-def main(debug: bool) -> None:
+@click.pass_obj
+def main(asked: dict[str, bool], debug: bool) -> None:
     """Simulate a belt, a damping plate and a second belt, and account for every joule."""
-    # `debug` is read where errors are caught, in `Program.invoke`.
-    del debug
+    # It is read where errors are caught, in `Program.main`.
+    asked["debug"] = debug

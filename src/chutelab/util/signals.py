@@ -1,0 +1,84 @@
+"""Signals that tell a program to end: Ctrl-C, TERM and HUP, all raised as a KeyboardInterrupt.
+
+So whatever cleans up after Ctrl-C cleans up after all of them. It imports next to nothing: the
+command line is guarded by it before anything else is imported.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import inf
+from threading import current_thread, main_thread
+from time import monotonic
+
+INTERRUPTED = 128 + signal.SIGINT
+"""Exit code, as shells have it."""
+
+NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
+"""HUP comes when a terminal closes; BREAK is what Windows sends then, and for Ctrl-Break."""
+
+GRACE = 3.0
+"""s after a signal in which further ones are passed over, for the first is being obeyed.
+
+Later ones are raised again: the first may have been lost in code that catches everything.
+"""
+
+
+class Terminated(KeyboardInterrupt):
+    """The program was told to end by a signal other than Ctrl-C, `signum`."""
+
+    def __init__(self, signum: int) -> None:
+        super().__init__(signum)
+        self.signum = signum
+
+
+@contextmanager
+def raised(*, last: bool = False) -> Iterator[None]:
+    """Raise a KeyboardInterrupt, or a `Terminated`, for each signal of `NAMES`.
+
+    Signals that are ignored (``nohup``, jobs in the background) or have a handler of somebody
+    else's are left alone, and so are all in a thread, which can set none. With `last` the program
+    ends after this: then a signal no longer raises anything, since nobody would catch it, but ends
+    the process at once with the exit code that it would have had.
+    """
+    obeyed = -inf
+
+    def obey(signum: int, _frame: object) -> None:
+        nonlocal obeyed
+        now = monotonic()
+        if now - obeyed < GRACE:
+            return
+        obeyed = now
+        raise KeyboardInterrupt if signum == signal.SIGINT else Terminated(signum)
+
+    usual = (signal.SIG_DFL, signal.default_int_handler)
+    known = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
+    mine = {number: now for number in known if (now := signal.getsignal(number)) in usual}
+    if current_thread() is not main_thread():
+        mine = {}
+    try:
+        for number in mine:
+            signal.signal(number, obey)
+        yield
+    finally:
+        for number, before in mine.items():
+            signal.signal(number, _end_at_once if last else before)
+
+
+def _end_at_once(signum: int, _frame: object) -> None:
+    os._exit(128 + signum)
+
+
+def exit_code(error: BaseException | None) -> int | None:
+    """Return the exit code if a signal is behind an error, else None.
+
+    Compiled code may turn a KeyboardInterrupt into an error of its own.
+    """
+    while error is not None:
+        if isinstance(error, KeyboardInterrupt):
+            return 128 + error.signum if isinstance(error, Terminated) else INTERRUPTED
+        error = error.__cause__ or error.__context__
+    return None

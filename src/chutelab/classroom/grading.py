@@ -51,7 +51,8 @@ def code_of(path: Path) -> list[str | None]:
         regular = stat.S_ISREG(path.stat().st_mode)
         data = b""
         if regular:
-            with open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb") as file:
+            flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+            with os.fdopen(os.open(path, flags), "rb") as file:
                 # A size that is told may be wrong.
                 regular = stat.S_ISREG(os.fstat(file.fileno()).st_mode)
                 data = file.read(LARGEST + 1) if regular else b""

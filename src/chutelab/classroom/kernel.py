@@ -2,9 +2,10 @@
 
 Three processes: whoever calls `run`; the watcher, `_watch`; and the kernel, `_work`, which runs the
 cells in a session and a folder of its own. The watcher ends the kernel and its descendants when the
-kernel is through, takes too much, or `run` is gone; a cell that signals its parent hits the watcher.
-What the cells print goes nowhere. The kernel tells what was checked through a pipe, a JSON object a
-line; students' code can write there too, so nothing of it is believed unchecked.
+kernel is through, takes too much, or `run` is gone. A cell that signals its parent hits the
+watcher, which takes no signals. What the cells print goes nowhere. The kernel tells what was
+checked through a pipe, a JSON object a line; students' code can write there too, so nothing of it
+is believed unchecked.
 
 This keeps accidents and clumsy tricks from the computer, not somebody who means harm: the cells run
 with all rights of whoever calls.
@@ -16,6 +17,7 @@ import asyncio
 import ctypes
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -25,6 +27,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
+from secrets import token_hex
 from threading import Event, Lock, Thread, Timer
 from time import monotonic, sleep
 from typing import IO, Any, Final
@@ -67,13 +70,12 @@ NAME: Final = "chutelab.classroom.kernel"
 
 ENDS: Final = {
     0: "",
-    3: f"stopped: it took more than {MEMORY >> 20} MB of memory",
-    4: f"stopped: it started more than {PROCESSES} processes",
-    5: "some processes that it started could not be ended",
+    (TOO_MUCH := 3): f"it took more than {MEMORY >> 20} MB of memory",
+    (TOO_MANY := 4): f"it started more than {PROCESSES} processes",
+    (LEFT := 5): "some processes that it started could not be ended",
+    (SIGNALLED := 6): "it sent its parent process a signal",
 }
 """Exit codes of the watcher, and what they say of the notebook."""
-
-TOO_MUCH, TOO_MANY, LEFT = 3, 4, 5
 
 _POSIX: Final = os.name == "posix"
 _PR_SET_PDEATHSIG: Final = 1
@@ -93,7 +95,7 @@ class Ran:
     tasks
         What `report` in `classroom.exercises.catalogue` gave, unchecked: student's code ran there.
     trouble
-        What went wrong first, or empty.
+        What went wrong, or empty; of errors the first.
     """
 
     tasks: object
@@ -145,10 +147,10 @@ def run(cells: Sequence[str | None], time_limit: float) -> Ran:
     # Left open where a process that got away still holds the other end.
     if not listener.is_alive():
         watcher.stdout.close()
-    troubles = [ENDS.get(ended, ""), heard.trouble]
+    troubles = [heard.trouble, ENDS.get(ended, "")]
     if heard.folder and Path(heard.folder).exists():
         troubles.append(f"its folder {heard.folder} could not be removed")
-    return Ran(heard.tasks, next(filter(None, troubles), ""))
+    return Ran(heard.tasks, "; ".join(filter(None, troubles)))
 
 
 def _listen(pipe: int, said: SimpleQueue[bytes | None]) -> None:
@@ -232,18 +234,39 @@ def _end(watcher: subprocess.Popen[bytes], folder: str) -> int:
         watcher.wait(PATIENCE)
     if watcher.returncode not in ENDS:
         watcher.kill()
-        _sweep(folder)
+        if folder:
+            _sweep(folder)
     return watcher.wait()
 
 
 def _sweep(folder: str) -> None:
-    """End what has a kernel's folder in its environment, for want of a watcher."""
+    """Do what is left to do without a watcher; a folder in the environment tells whose it is."""
     import psutil
 
     for process in psutil.process_iter():
         with suppress(psutil.Error):
-            if folder and process.environ().get("IPYTHONDIR") == folder:
+            if process.environ().get("IPYTHONDIR") == folder:
                 process.kill()
+    _remove(folder)
+
+
+def _remove(folder: str) -> None:
+    """Remove a folder, however deep: folders in it move up, and go when they hold no other."""
+    top = Path(folder)
+    with suppress(OSError):
+        top.chmod(0o700)
+        while found := _folders(top):
+            for one in found:
+                one.chmod(0o700)
+                for deeper in _folders(one):
+                    deeper.chmod(0o700)
+                    deeper.rename(top / token_hex(16))
+                shutil.rmtree(one)
+        shutil.rmtree(top)
+
+
+def _folders(folder: Path) -> list[Path]:
+    return [one for one in folder.iterdir() if one.is_dir() and not one.is_symlink()]
 
 
 # The watcher
@@ -263,11 +286,8 @@ def _watch() -> None:
     code = 0
     gone = Event()
     Thread(target=_wait_for_end, args=(gone,), daemon=True).start()
-    # What cannot be removed, the caller finds.
-    with (
-        suppress(RecursionError, OSError),
-        tempfile.TemporaryDirectory(prefix="chutelab-grade-") as folder,
-    ):
+    folder = tempfile.mkdtemp(prefix="chutelab-grade-")
+    try:
         _say(sys.stdout.buffer, folder=folder)
         kernel = subprocess.Popen(
             [sys.executable, "-m", NAME, "work"],
@@ -302,8 +322,12 @@ def _watch() -> None:
                 code = LEFT
                 break
             sleep(PERIOD / 10)
-    # Not through the interpreter's end: a thread still reads standard input.
-    os._exit(code)
+        if _POSIX and code == 0 and signal.sigpending() - {signal.SIGCHLD, signal.SIGCONT}:
+            code = SIGNALLED
+    finally:
+        _remove(folder)
+        # Not through the interpreter's end: a thread still reads standard input.
+        os._exit(code)
 
 
 def _wait_for_end(gone: Event) -> None:
@@ -363,11 +387,18 @@ def _work() -> None:
 
     from chutelab.classroom.exercises import catalogue
 
+    class Shell(InteractiveShell):
+        def enable_gui(self, gui: str | None = None) -> None:
+            """Do nothing: there are no windows."""
+
+        def ask_exit(self) -> None:
+            """Do nothing: the next cell has its turn."""
+
     config = Config()
     config.HistoryManager.enabled = False
     # Tracebacks take time, and nobody reads them.
     config.InteractiveShell.xmode = "Minimal"
-    shell = InteractiveShell.instance(config=config)
+    shell = Shell.instance(config=config)
     turn = Lock()
     last: list[object] = []
 
@@ -432,7 +463,7 @@ def _limit() -> None:
 def _said(error: BaseException) -> str:
     """Return name and text of an error, which may fail too."""
     try:
-        return f"{type(error).__name__}: {error}"[:LONGEST]
+        return f"{type(error).__name__}: {error}".removesuffix(": ")[:LONGEST]
     except BaseException:
         return type(error).__name__
 

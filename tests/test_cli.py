@@ -35,7 +35,7 @@ FILES = [
 # The contract of section 4, copied by hand.
 KEYS = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
-    "impact", "landing", "ended", "rolling", "waited", "squeezed", "ledger", "theory",
+    "impact", "landing", "ended", "stopped", "rolling", "waited", "squeezed", "ledger", "theory",
     "theory_as_printed", "error", "accuracy",
 ]  # fmt: skip
 THEORY = [
@@ -879,3 +879,36 @@ def test_shells_complete_scenes_and_kinds():
     expected = ["plain,perpendicular", "plain,perpendicular-fast", "file,perp"]
     assert sorted(completed("run", "perp")) == sorted(expected)
     assert completed("run", "slip", "--only", "png,c") == ["plain,png,csv"]
+
+
+def test_a_run_that_takes_too_long_ends_with_what_is_recorded():
+    """Exit code 0; tables, JSON and `show` say that it was stopped, and the files are all there."""
+    run = ("run", "stream", "--max-seconds", "1e-9", "--out", "out")
+    text = " ".join(call(*run).stdout.split())
+    assert re.search(r"ended: 200 stopped .* STOPPED before it was over, with \d+ particles", text)
+    assert "under way and 19" in text
+    assert sorted(path.name for path in Path("out").iterdir()) == FILES
+    told = json.loads(Path("out/summary.json").read_text())
+    assert told["ended"]["reason"] == 200 * ["stopped"]
+    assert told["stopped"]["particles"] + told["stopped"]["unreleased"] == 200
+    assert " ".join(call("show", "out/recording.npz").stdout.split()) in text
+    assert json.loads(call("run", "perpendicular", "--json").stdout)["stopped"] is None
+
+
+@pytest.mark.parametrize("seconds", ["0", "-1", "nan", "inf", "soon"])
+def test_a_time_limit_is_a_number_above_0(seconds):
+    result = call("run", "perpendicular", "--max-seconds", seconds, code=2)
+    assert "--max-seconds" in result.stderr
+    assert "--accuracy" in call(
+        "run", "slip", "--max-seconds", "1", "--accuracy", "1mm", code=2
+    ).stderr  # fmt: skip
+
+
+def test_a_trajectory_that_had_to_be_thinned_says_so(monkeypatch):
+    run = ("run", "free-fall", "--out", "out", "--only", "csv")
+    assert "instants" not in call(*run).stdout
+    monkeypatch.setattr("chutelab.results.storage.MOST_ROWS", 60)
+    said = "trajectory.csv has 20 instants, not 200: with more it would have over 60 rows\n"
+    assert call(*run).stdout.endswith(said)
+    assert call(*run, "--json").stderr == said
+    assert call(*run, "-q").stdout == call(*run, "-q").stderr == ""

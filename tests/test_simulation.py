@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from importlib import import_module
 
+import numpy as np
 import pytest
 
 from chutelab import machine, scene
 from chutelab.engines import exact
 from chutelab.engines.simulation import ENGINES, choose, simulate
-from chutelab.results import REASONS
+from chutelab.results import REASONS, Kind, Recording
+from chutelab.results.ledger import ledger
+from chutelab.results.quantities import stopped, waits
+from chutelab.results.recorder import EnoughError
+from chutelab.results.summary import summary
 
 ARRAYS = ("knots", "offsets", "ended", "events", "by_surface")
 
@@ -120,3 +125,90 @@ def test_progress_goes_from_0_to_1(engine):
     assert shares == sorted(shares)
     assert shares[0] >= 0.0
     assert shares[-1] == 1.0
+
+
+# Ended before it is over.
+
+STOPPABLE = (
+    # scene, engine, what is changed, looks until the end
+    ("stream", "contact", (), 7),
+    ("stream", "pymunk", ("stream.count=20", "run.until=0.7"), 9),
+    ("stream-independent", "exact", ("stream.count=6000",), 4),
+    ("stream-independent", "exact", ("stream.count=6000", "run.until=settled"), 6),
+    ("stream-independent", "contact", ("stream.count=300",), 8),
+    ("stream-independent", "pymunk", ("stream.count=5", "run.until=settled"), 9),
+    ("belt-landing", "exact", (), 3),
+    ("belt-landing", "contact", (), 5),
+    ("belt-landing", "pymunk", (), 9),
+    ("perpendicular", "pymunk", ("run.align=false",), 6),
+)
+
+
+def after(looks):
+    """Return a progress that ends a run at so many looks."""
+    seen = []
+
+    def progress(share):
+        assert 0.0 <= share <= 1.0
+        seen.append(share)
+        if len(seen) >= looks:
+            raise EnoughError
+
+    return progress
+
+
+@pytest.mark.parametrize(("name", "engine", "changes", "looks"), STOPPABLE)
+def test_a_run_that_is_stopped_keeps_what_was_recorded(name, engine, changes, looks, tmp_path):
+    scene_, whole = loaded(name, *changes), simulate(loaded(name, *changes), engine)
+    recording = simulate(scene_, engine, after(looks))
+    found = stopped(recording)
+    assert found is not None
+    assert stopped(whole) is None
+    halted = recording.ended == REASONS.index("stopped")
+    assert (recording.ended[~halted] == whole.ended[~halted]).all()
+    assert found.particles == np.count_nonzero(halted & recording.released) > 0
+    assert found.unreleased == np.count_nonzero(halted & ~recording.released)
+    # The books close, and no event is made up or left out up to there.
+    assert ledger(recording).relative_residual < (1e-3 if engine == "pymunk" else 1e-12)
+    assert 0.0 < found.t < whole.knots["t"].max()
+    for kind in (Kind.RELEASE, Kind.IMPACT, Kind.LANDING, Kind.COLLISION):
+        mine, all_ = (
+            run.select(kind)[run.select(kind)["t"] < found.t] for run in (recording, whole)
+        )
+        assert mine.tobytes() == all_.tobytes()
+    times = np.linspace(0.0, found.t, 50, endpoint=False)
+    for mine, all_ in zip(recording.at(times), whole.at(times), strict=True):
+        # A track may leave out 1e-4 radii of what lasts.
+        assert np.allclose(mine, all_, rtol=0.0, atol=1e-3, equal_nan=True)
+    again = Recording.load(recording.save(tmp_path / "part.npz"))
+    assert same(recording, again)
+    assert summary(again)["stopped"] == vars(found)
+    assert waits(again) is None
+
+
+def test_who_has_not_been_reached_is_not_said_to_have_waited():
+    """The engine for particles that do not meet takes one block after the other."""
+    recording = simulate(loaded("stream-independent"), "exact", after(2))
+    assert stopped(recording).unreleased > 5000
+    assert waits(recording) is None
+
+
+@pytest.mark.parametrize("engine", ["exact", "contact", "pymunk"])
+def test_a_time_limit_ends_a_run(engine):
+    found = stopped(simulate(loaded("belt-landing"), engine, max_seconds=1e-9))
+    assert (found.particles, found.unreleased) == (1, 0)
+    assert stopped(simulate(loaded("perpendicular"), engine, max_seconds=1e3)) is None
+
+
+def test_a_run_that_is_over_is_not_stopped_by_the_last_look():
+    for engine in ("exact", "contact", "pymunk"):
+        looks = []
+        whole = simulate(loaded("perpendicular"), engine, looks.append)
+        assert looks[-1] == 1.0
+        assert same(whole, simulate(loaded("perpendicular"), engine, after(len(looks))))
+
+
+@pytest.mark.parametrize("seconds", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_time_limit_is_a_number_above_0(seconds):
+    with pytest.raises(ValueError, match=r"max_seconds = .*: a finite number above 0 s"):
+        simulate(loaded("perpendicular"), max_seconds=seconds)

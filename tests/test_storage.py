@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from dataclasses import fields, replace
 from functools import cache
 from io import StringIO
@@ -274,9 +275,35 @@ def test_an_end_that_is_whole_steps_away_has_a_row(tmp_path):
 
 
 def test_many_particles_get_fewer_instants(tmp_path, monkeypatch):
-    monkeypatch.setattr(storage, "MOST_SAMPLES", 60)
-    run("free-fall").to_csv(tmp_path, only=["trajectory"])
-    assert len({row[0] for row in table(tmp_path / "trajectory.csv")[1:]}) == 12
+    recording = run("free-fall")
+    assert storage.instants(recording) == storage.SAMPLES
+    monkeypatch.setattr(storage, "MOST_ROWS", 60)
+    few = storage.instants(recording)
+    recording.to_csv(tmp_path, only=["trajectory"])
+    rows = table(tmp_path / "trajectory.csv")[1:]
+    assert len({row[0] for row in rows}) == few
+    # As many as there is room for, but for one more a particle.
+    assert 60 - 2 * recording.count <= len(rows) <= 60
+
+
+def test_particles_that_are_not_there_together_need_not_share_their_instants():
+    # 40,000 particles of 0.5 s in 200 s: a hundredth of them is there at a time.
+    assert storage.instants(run("stream-independent", "stream.count=40000")) == storage.SAMPLES
+
+
+@pytest.mark.parametrize("step", [5e-324, 1e-9, 2e-3])
+def test_a_trajectory_that_would_be_too_large_is_refused_with_the_step_that_would_do(
+    tmp_path, monkeypatch, step
+):
+    recording = run("free-fall")
+    monkeypatch.setattr(storage, "MOST_ROWS", 1000)
+    with pytest.raises(ValueError, match=r"^step = .* would have up to .* 1,000 are") as refused:
+        recording.to_csv(tmp_path, step=step)
+    assert listing(tmp_path) == []
+    least = float(re.search(r"allowed: (\S+) s or more$", str(refused.value))[1])
+    recording.to_csv(tmp_path, step=least)
+    assert 900 < len(table(tmp_path / "trajectory.csv")) - 1 <= 1000
+    assert recording.to_csv(tmp_path, step=step, only=["events"])
 
 
 @pytest.mark.parametrize("step", [0.0, -0.1, float("nan"), float("inf")])

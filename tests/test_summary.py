@@ -18,7 +18,7 @@ from chutelab.results.summary import summary
 
 TOP = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
-    "impact", "landing", "ended", "rolling", "waited", "squeezed", "ledger", "theory",
+    "impact", "landing", "ended", "stopped", "rolling", "waited", "squeezed", "ledger", "theory",
     "theory_as_printed",
     "error",
     "accuracy",

@@ -152,6 +152,15 @@ class Output:
             show(*report(recording, accuracy))
             if self.out is not None:
                 click.echo(f"wrote into {self.out}: {', '.join(self.files)}")
+        if self.out is not None and "csv" in self.kinds and not self.quiet:
+            from chutelab.results import storage
+
+            if (few := storage.instants(recording)) < storage.SAMPLES:
+                click.echo(
+                    f"trajectory.csv has {few} instants, not {storage.SAMPLES}: with more it would"
+                    f" have over {storage.MOST_ROWS:,} rows",
+                    err=self.as_json,
+                )
 
 
 def _summary(recording: Recording, accuracy: Accuracy | None) -> dict[str, Any]:

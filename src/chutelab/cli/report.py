@@ -11,7 +11,7 @@ from rich.text import Text
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
-from chutelab.results.quantities import rolling, squeezed, waits
+from chutelab.results.quantities import rolling, squeezed, stopped, waits
 from chutelab.studies.accuracy import Accuracy, written
 from chutelab.util.tables import Sheet, number, wrapped
 
@@ -36,7 +36,7 @@ def report(recording: Recording, accuracy: Accuracy | None = None) -> list[Rende
     if compared.notes and (way := _way(recording)).rows:
         parts.append(way)
     parts.append(ledger(recording))
-    notes = (waits(recording), squeezed(recording), rolling(recording))
+    notes = (stopped(recording), waits(recording), squeezed(recording), rolling(recording))
     parts += [Sheet("", (), (), notes=(f"{note}.",)) for note in notes if note is not None]
     if accuracy is not None:
         what = "relative error" if accuracy.unit == "relative" else "error of places"

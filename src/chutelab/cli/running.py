@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -44,6 +45,12 @@ def _accuracy(text: str) -> Wanted:
     help="Choose engine and step so that errors are at most this: relative, such as 1e-6, or a"
     " length, such as 1mm; say what was reached.",
 )
+@click.option(
+    "--max-seconds",
+    metavar="S",
+    type=click.FloatRange(min=0.0, min_open=True),
+    help="End the simulation after S seconds with what is recorded; the summary says so.",
+)
 @set_option
 @output_options
 @click.option(
@@ -56,6 +63,7 @@ def run(
     engine: str | None,
     dt: float | None,
     accuracy: Wanted | None,
+    max_seconds: float | None,
     overrides: tuple[str, ...],
     output: Output,
     partial: bool,
@@ -64,13 +72,19 @@ def run(
 
     Without --out nothing is written. With --accuracy, --engine is kept to and --dt is the longest
     step that is tried; if the accuracy cannot be reached, everything is printed and written all
-    the same, and the exit code is 1.
+    the same, and the exit code is 1. A run that --max-seconds ends is a run: its summary and files
+    are of what is recorded, particles that had not ended have "stopped" as their end, and the exit
+    code is 0.
     """
     from chutelab.engines.simulation import simulate
     from chutelab.results.recorder import StalledError
 
     if partial and output.out is None:
         raise click.UsageError("--partial keeps files of --out DIR: give --out too.")
+    if max_seconds is not None and accuracy is not None:
+        raise click.UsageError("--max-seconds ends one run, --accuracy makes several: give one.")
+    if max_seconds is not None and not isfinite(max_seconds):
+        raise click.UsageError(f"--max-seconds {max_seconds}: a finite number above 0 s.")
     loaded = loaded_as_told(scene, overrides, engine, dt)
     reached: Accuracy | None = None
     stuck = ""
@@ -78,7 +92,7 @@ def run(
         try:
             with progress("simulating", quiet=output.quiet) as update:
                 if accuracy is None:
-                    recording = simulate(loaded, progress=update)
+                    recording = simulate(loaded, progress=update, max_seconds=max_seconds)
                 else:
                     from chutelab.studies.accuracy import reach
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import inf
 from time import perf_counter
 
 from chutelab.machine import Machine, build
 from chutelab.results import Recording
+from chutelab.results.recorder import EnoughError
 from chutelab.scene import Fault, Scene, SceneError
 from chutelab.util.arrays import Progress
 
@@ -40,6 +42,8 @@ def simulate(
     scene: Scene,
     engine: str | None = None,
     progress: Progress | None = None,
+    *,
+    max_seconds: float | None = None,
 ) -> Recording:
     """Run a scene.
 
@@ -52,6 +56,10 @@ def simulate(
         spinning disk between a moving surface and another) goes to contact.
     progress : callable, optional
         Called now and then with the share of the run that is done, 0 to 1.
+    max_seconds : float, optional
+        Wall time, s, after which the run ends with what is recorded: particles that have not ended
+        have reason ``"stopped"``, and `results.quantities.stopped` says up to when all is there.
+        Looked at after each step or so, which of a large crowd may take some tenths of a second.
 
     Returns
     -------
@@ -63,9 +71,30 @@ def simulate(
     ------
     SceneError
         If the geometry contradicts itself, or the engine cannot run the scene.
+    ValueError
+        If `max_seconds` is not a finite number above 0, or there is no such engine.
     """
     began = perf_counter()
+    if max_seconds is not None and not 0.0 < max_seconds < inf:
+        raise ValueError(f"max_seconds = {max_seconds!r}: a finite number above 0 s")
+
+    def bounded(share: float) -> None:
+        if progress is not None:
+            progress(share)
+        if max_seconds is not None and perf_counter() - began > max_seconds:
+            raise EnoughError
+
     machine = build(scene)
+    return replace(
+        follow(scene, machine, engine, progress if max_seconds is None else bounded),
+        seconds=perf_counter() - began,
+    )
+
+
+def follow(
+    scene: Scene, machine: Machine, engine: str | None, progress: Progress | None
+) -> Recording:
+    """Run a machine with the engine that is asked for, or the one it needs; see `simulate`."""
     name = choose(machine, engine)
     if name == "exact":
         if machine.interact:
@@ -74,7 +103,7 @@ def simulate(
         from chutelab.engines.exact import CornerError, run
 
         try:
-            return run(machine, progress, began)
+            return run(machine, progress)
         except CornerError as error:
             if "exact" in (engine, scene.run.engine):
                 raise _refused(scene, "run.engine", "exact", str(error)) from error
@@ -82,10 +111,10 @@ def simulate(
     if machine.particle.radius == 0.0:
         raise _refused(scene, "particle.radius", 0.0, f'more than 0 with run.engine = "{name}"')
     if name == "contact":
-        from chutelab.engines.contact import run as follow
+        from chutelab.engines.contact import run as stepped
     else:
-        from chutelab.engines.pymunk import run as follow
-    return replace(follow(machine, progress), seconds=perf_counter() - began)
+        from chutelab.engines.pymunk import run as stepped
+    return stepped(machine, progress)
 
 
 def _refused(scene: Scene, key: str, value: object, allowed: str) -> SceneError:

@@ -211,6 +211,43 @@ def from_events(
 
 
 @dataclass(frozen=True)
+class Stopped:
+    """A run that was ended before it was over, as ``--max-seconds`` does.
+
+    How many particles were under way then, how many not yet released, and up to which time all that
+    happened is recorded, s.
+    """
+
+    particles: int
+    unreleased: int
+    t: float
+
+    def __str__(self) -> str:
+        who = "1 particle" if self.particles == 1 else f"{self.particles:,} particles"
+        after = f" and {self.unreleased:,} not yet released" if self.unreleased else ""
+        return (
+            f"STOPPED before it was over, with {who} under way{after}: all of it is recorded up to"
+            f" t = {number(self.t)} s, and sums are of what is recorded"
+        )
+
+
+def stopped(recording: Recording) -> Stopped | None:
+    """Return where a run was stopped; None if it was not."""
+    halted = recording.ended == REASONS.index("stopped")
+    if not halted.any():
+        return None
+    under_way = halted & recording.released
+    t = float(recording.knots["t"].max(initial=0.0))
+    if not recording.machine.interact:
+        # Each by itself: some are ahead of others.
+        last = recording.knots["t"][recording.offsets[1:][under_way] - 1]
+        due = schedule(recording.scene)[halted & ~recording.released]
+        t = min(float(last.min(initial=t)), float(due.min(initial=t)))
+    released = int(np.count_nonzero(under_way))
+    return Stopped(released, int(np.count_nonzero(halted)) - released, t)
+
+
+@dataclass(frozen=True)
 class Waits:
     """Particles that were released late because their place was taken.
 
@@ -244,7 +281,8 @@ def waits(recording: Recording) -> Waits | None:
     released = recording.select(Kind.RELEASE)
     late = released["t"] - due[released["particle"]]
     late = late[late > least]
-    end = recording.knots["t"].max(initial=0.0)
+    halt = stopped(recording)
+    end = recording.knots["t"].max(initial=0.0) if halt is None else halt.t
     missing = int(np.count_nonzero(due[~recording.released] < end - dt))
     if not len(late) and not missing:
         return None

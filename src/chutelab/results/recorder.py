@@ -45,6 +45,14 @@ class StalledError(RuntimeError):
         return f"particle {self.particle} is stuck at {place}: {self.reason}"
 
 
+class EnoughError(Exception):
+    """Raised by who watches a run's progress: the run is to end here.
+
+    An engine closes the tracks that are under way with reason ``"stopped"``, which is also that of
+    particles not yet released, and returns the recording.
+    """
+
+
 class Recorder:
     """Grows by chunks; `finish` turns it into a frozen `Recording` of the machine's run.
 

@@ -34,9 +34,8 @@ COLUMNS = ("t", "particle", "other", "kind", "surface")
 SAMPLES = 200
 """Instants in trajectory.csv where no interval is asked for."""
 
-MOST_SAMPLES = 1_000_000
-"""Rows of trajectory.csv where no interval is asked for: beyond it no spreadsheet opens the file,
-so many particles get fewer instants."""
+MOST_ROWS = 1_000_000
+"""Rows of trajectory.csv, at most: beyond it no spreadsheet opens the file."""
 
 
 class RecordingError(InputError):
@@ -143,17 +142,29 @@ def to_csv(
     folder : path
         Existing directory.
     step : float, optional
-        Interval of the trajectory, s; by default `SAMPLES` instants, fewer for many particles.
+        Interval of the trajectory, s; by default that of `instants`.
     only : collection of str
         Which of the two.
 
     Raises
     ------
     ValueError
-        If `step` is not positive and finite.
+        If `step` is not positive and finite, or so short that the trajectory would have more than
+        `MOST_ROWS` rows; nothing is written then.
     """
-    if step is not None and not 0.0 < step < inf:
-        raise ValueError(f"step = {step!r}: a finite number above 0 s")
+    if step is not None:
+        if not 0.0 < step < inf:
+            raise ValueError(f"step = {step!r}: a finite number above 0 s")
+        first, last = recording.ends()
+        spans = float((last["t"] - first["t"]).sum())
+        many = spans / step + len(first)
+        if "trajectory" in only and many > MOST_ROWS:
+            room = MOST_ROWS - len(first)
+            least = f"{1.05 * spans / room:.2g} s or more" if room > 0 else "none"
+            raise ValueError(
+                f"step = {step!r}: trajectory.csv would have up to {many:.3g} rows, and"
+                f" {MOST_ROWS:,} are what a spreadsheet opens; allowed: {least}"
+            )
     written = []
     for name, rows in (
         ("events", _events(recording)),
@@ -163,6 +174,20 @@ def to_csv(
             path = Path(folder) / f"{name}.csv"
             written.append(write_lines(path, csv_lines(rows)))
     return written
+
+
+def instants(recording: Recording) -> int:
+    """Return how many instants trajectory.csv has where no interval is asked for.
+
+    `SAMPLES`, or as many as keep it to `MOST_ROWS` rows.
+    """
+    if not len(recording.knots):
+        return 0
+    first, last = recording.ends()
+    whole = float(last["t"].max() - first["t"].min())
+    # A particle has a row at each instant of its track, and one more at most for where it begins.
+    share = float((last["t"] - first["t"]).sum()) / whole if whole > 0.0 else float(len(first))
+    return max(2, min(SAMPLES, 1 + int((MOST_ROWS - len(first)) / share))) if share else SAMPLES
 
 
 def _events(recording: Recording) -> Iterator[Sequence[object]]:
@@ -185,8 +210,7 @@ def _trajectory(recording: Recording, step: float | None) -> Iterator[Sequence[o
         return
     begin, end = float(recording.knots["t"].min()), float(recording.knots["t"].max())
     if step is None:
-        rows = max(2, min(SAMPLES, MOST_SAMPLES // recording.count))
-        times = np.linspace(begin, end, rows).tolist()
+        times = np.linspace(begin, end, instants(recording)).tolist()
     else:
         # An end that is a whole number of steps away belongs to the table, whatever rounding says.
         last = int((end - begin) / step * (1.0 + 1e-12))

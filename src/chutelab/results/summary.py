@@ -8,7 +8,7 @@ from typing import Any
 
 from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
-from chutelab.results.quantities import column, end_times, first, rolling, squeezed, waits
+from chutelab.results.quantities import column, end_times, first, rolling, squeezed, stopped, waits
 from chutelab.results.recording import REASONS, Recording
 from chutelab.scene.rules import SYMBOLS
 from chutelab.theory import Transfer, predict
@@ -25,7 +25,8 @@ def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> 
     """Return a recording's numbers as plain lists and floats, None for what did not happen.
 
     Lists have one entry a particle. Lengths, times and energies are in SI units, angles in degrees
-    under names that end in ``_deg``. ``accuracy`` is None unless one was asked for, ``rolling``
+    under names that end in ``_deg``. ``accuracy`` is None unless one was asked for, ``stopped``
+    unless the run was ended before it was over (see `results.quantities.Stopped`), ``rolling``
     unless disks settled on the outgoing belt without being carried by it (see `rolling`), and
     ``waited`` unless particles found their place taken (see `results.quantities.Waits`), and
     ``squeezed`` unless riders by adhesion got into each other (see `machine.releases.Squeeze`).
@@ -52,6 +53,7 @@ def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> 
         "impact": events("impact", *AFTER),
         "landing": events("landing", *AFTER),
         "ended": {"t": end_times(recording), "reason": [REASONS[k] for k in recording.ended]},
+        "stopped": stopped(recording),
         "rolling": rolling(recording),
         "waited": waits(recording),
         "squeezed": squeezed(recording),

@@ -45,7 +45,7 @@ STATISTICS: Final = ("mean", "spread", "min", "max")
 ENTRIES: Final = ("belt_work", "restitution_loss", "friction_loss")
 STORED: Final = ("kinetic", "potential")
 TOTALS: Final = (*ENTRIES, "residual", "turned_over")
-ENDINGS: Final = ("time", "landed", "settled", "exit")
+ENDINGS: Final = ("time", "landed", "settled", "exit", "stopped")
 NEEDED: Final = {"separation": "incoming", "impact": "plate", "landing": "outgoing"}
 """Events, and the table without which there are none; impacts on free surfaces go by name."""
 

@@ -15,4 +15,5 @@ Numbers = Floats | float
 """A number, or an array (N,) where a family of scenes differs in it."""
 
 Progress = Callable[[float], None]
-"""Called now and then with the share of the work that is done, 0 to 1."""
+"""Called now and then with the share of the work that is done, 0 to 1. One that an engine calls may
+raise `results.recorder.EnoughError`: the run ends there, with what is recorded."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from math import inf
 from time import perf_counter
 from typing import Any
@@ -11,8 +12,8 @@ from numpy.typing import NDArray
 
 from chutelab.engines.contact.module import Module, Status, borrow, constants, dtype, give_back
 from chutelab.machine import Machine, moved, origin
-from chutelab.results import EVENT, KNOT, Recording
-from chutelab.results.recorder import Recorder, StalledError
+from chutelab.results import EVENT, KNOT, REASONS, Recording
+from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Progress
 
 GREATEST = 1e300
@@ -38,6 +39,9 @@ FULL = {
 SLICE = 0.05
 """s of wall time between two looks at Ctrl-C and reports of progress."""
 
+MOST_STEPS = 512
+"""Steps between two looks, at most: what follows may take a thousand times as long as what was."""
+
 SWEEPS, SWEEPS_ALONE = 100, 500
 """Most sweeps of the contact solver in a step: with 60 a pile of 2,000 hardly comes to rest."""
 
@@ -50,7 +54,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Recording:
     machine : Machine
         From `chutelab.machine.build`; the radius must be more than 0.
     progress : callable, optional
-        Called now and then with the share of the run that is done.
+        Called now and then with the share of the run that is done; may end the run.
 
     Returns
     -------
@@ -90,6 +94,8 @@ class Job:
         self.module, self.machine = module, machine
         self.knots: list[NDArray[Any]] = []
         self.events: list[NDArray[Any]] = []
+        # Whoever is under way or to come when the run is ended, from the first disk of this part.
+        self.stopped_from = machine.count
         n = machine.count
         count = self.surface_count = len(machine.segments.length) + (machine.pulley is not None)
         self.owners = len(machine.surfaces)
@@ -178,22 +184,38 @@ class Job:
 
     def run(self, progress: Progress | None) -> tuple[int, float, tuple[float, float]] | None:
         """Run to the end, or until a particle stalls: return which one, when and where."""
-        steps, module = 64, self.module
-        while True:
-            begin = perf_counter()
-            status = self.proceed(steps)
-            if status is Status.DONE:
+        steps, status = 8, Status.PAUSED
+        with suppress(EnoughError):
+            while status not in (Status.DONE, Status.STALLED):
+                begin = perf_counter()
+                status = self.proceed(steps)
+                if status is Status.PAUSED:
+                    took = perf_counter() - begin
+                    steps = min(2 * steps, MOST_STEPS) if took < SLICE else max(1, steps // 2)
                 if progress is not None:
-                    progress(1.0)
-                return None
-            if status is Status.STALLED:
-                i = module.world.stalled
-                disk = module.array("disks", dtype("Disk"), self.machine.count)[i]
-                return i, module.world.now, (float(disk["x"]), float(disk["y"]))
-            if status is Status.PAUSED and perf_counter() - begin < SLICE:
-                steps *= 2
-            if progress is not None:
-                progress(self.share())
+                    progress(1.0 if status is Status.DONE else self.share())
+        if status not in (Status.DONE, Status.STALLED):
+            status = self.stop()
+        if status is Status.DONE:
+            return None
+        world = self.module.world
+        disk = self.module.array("disks", dtype("Disk"), self.machine.count)[world.stalled]
+        return world.stalled, world.now, (float(disk["x"]), float(disk["y"]))
+
+    def stop(self) -> Status:
+        """Have the run be over at the end of the step that it is in."""
+        while (status := self.proceed(0)) in FULL:
+            pass
+        if status is Status.PAUSED:
+            world = self.module.world
+            self.stopped_from = world.low
+            world.end_time = world.t
+            # Without contacts between them disks run one after the other: no further one does.
+            disks = self.module.array("disks", dtype("Disk"), self.machine.count)
+            disks["release"][world.high :] = inf
+            while status not in (Status.DONE, Status.STALLED):
+                status = self.proceed(1)
+        return status
 
     def proceed(self, steps: int) -> Status:
         """Run on for at most so many steps, take what was written, make room where it is full."""
@@ -245,7 +267,9 @@ class Job:
                 events[f"omega_{when}"] = rows[when][:, 2]
             recorder.tell(events)
         disks = module.array("disks", dtype("Disk"), machine.count)
-        recorder.ended[:] = disks["reason"]
+        reasons, late = disks["reason"].copy(), np.arange(machine.count) >= self.stopped_from
+        reasons[late & (reasons == REASONS.index("time"))] = REASONS.index("stopped")
+        recorder.ended[:] = reasons
         books = module.array("books", REAL, 3 * (self.owners + 1))
         recorder.by_surface[:] = books.reshape(-1, 3)
         recorder.contacts = world.impact_count

@@ -21,8 +21,8 @@ from chutelab.engines.exact.obstacles import (
 )
 from chutelab.engines.exact.particle_state import Mode, State
 from chutelab.machine import Machine, moved, origin
-from chutelab.results import Kind, Recording
-from chutelab.results.recorder import Recorder, StalledError
+from chutelab.results import REASONS, Kind, Recording
+from chutelab.results.recorder import EnoughError, Recorder, StalledError
 from chutelab.util.arrays import Bools, Ints, Progress
 
 
@@ -96,7 +96,6 @@ m/s, are 200 times as far apart."""
 def run(
     machine: Machine,
     progress: Progress | None = None,
-    began: float | None = None,
     *,
     apart: bool = False,
 ) -> Recording:
@@ -107,9 +106,7 @@ def run(
     machine : Machine
         From `chutelab.machine.build`.
     progress : callable, optional
-        Called with the share of particles that have ended, after every round.
-    began : float, optional
-        Reading of `time.perf_counter` from which `Recording.seconds` counts; now by default.
+        Called with the share of particles that have ended, after every round; may end the run.
     apart : bool
         Keep the books of the particles apart: `Recording.by_surface` is (N, S, 3) then. For a
         family of machines, alike in what `chutelab.engines.exact.kinds` tells apart.
@@ -130,9 +127,9 @@ def run(
     """
     if machine.interact:
         raise ValueError("the exact engine has no contacts between particles")
-    begin = perf_counter() if began is None else began
+    begin = perf_counter()
     recorder = Recorder(machine, apart=apart)
-    rounds, stalled = 0, None
+    rounds, stalled, enough = 0, None, False
     place = origin(machine)
     near = moved(machine, -place[0], -place[1])
     surfaces = obstacles(near, max(map(abs, place)))
@@ -146,9 +143,13 @@ def run(
                 _to_the_end(s, progress)
             except StalledError as error:
                 stalled = error
+            except EnoughError:
+                s.finish(s.mode.nonzero()[0], "stopped")
+                recorder.ended[first + size :] = REASONS.index("stopped")
+                enough = True
             rounds = max(rounds, s.rounds)
             s.close(recorder)
-            if stalled is not None:
+            if enough or stalled is not None:
                 break
     recording = recorder.finish(
         engine="exact", steps=rounds, seconds=perf_counter() - begin, origin=place

@@ -10,18 +10,22 @@ outside.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from contextlib import suppress
 from time import perf_counter
 
 from chutelab.engines.pymunk.lone import Lone
 from chutelab.engines.pymunk.shared import Shared
 from chutelab.engines.pymunk.world import World
 from chutelab.machine import Machine, moved, origin
-from chutelab.results import Recording
-from chutelab.results.recorder import Recorder, StalledError
+from chutelab.results import REASONS, Recording
+from chutelab.results.recorder import EnoughError, Recorder, StalledError
+from chutelab.util.arrays import Progress
+
+LOOK, SLICE = 64, 0.05
+"""Steps and s of wall time between two reports of progress, about: whichever is over first."""
 
 
-def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Recording:
+def run(machine: Machine, progress: Progress | None = None) -> Recording:
     """Run a machine in Pymunk.
 
     Parameters
@@ -29,7 +33,7 @@ def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Re
     machine : Machine
         From `chutelab.machine.build`; the radius must be more than 0.
     progress : callable, optional
-        Called with the share of the run that is done.
+        Called now and then with the share of the run that is done; may end the run.
 
     Returns
     -------
@@ -57,7 +61,15 @@ def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Re
             engine="pymunk", steps=steps, seconds=perf_counter() - begin, origin=place
         )
 
-    report = progress or (lambda _share: None)
+    asked, told = 0, begin
+
+    def report(share: float) -> None:
+        nonlocal asked, told
+        asked += 1
+        if progress is not None and (asked % LOOK == 0 or perf_counter() - told > SLICE):
+            told = perf_counter()
+            progress(share)
+
     world = World(machine)
     try:
         if machine.interact or not machine.align:
@@ -66,13 +78,17 @@ def run(machine: Machine, progress: Callable[[float], None] | None = None) -> Re
             steps = shared.steps
         else:
             for i in range(machine.count):
-                lone = Lone(machine, world, recorder, i)
+                lone = Lone(machine, world, recorder, i, report)
                 try:
                     lone.run()
+                except EnoughError:
+                    recorder.ended[i + 1 :] = REASONS.index("stopped")
+                    break
                 finally:
                     steps += lone.steps
-                report((i + 1) / machine.count)
-        report(1.0)
+        if progress is not None:
+            with suppress(EnoughError):
+                progress(1.0)
     except StalledError as stalled:
         stalled.recording = finished()
         x, y = stalled.position

@@ -32,7 +32,8 @@ from chutelab.engines.pymunk.world import (
 )
 from chutelab.machine import Machine
 from chutelab.results import REASONS, Kind
-from chutelab.results.recorder import Recorder, StalledError
+from chutelab.results.recorder import EnoughError, Recorder, StalledError
+from chutelab.util.arrays import Progress
 
 WEDGED = 1000
 """Iterations of Chipmunk's solver for a disk held by several surfaces, each of which takes off a
@@ -68,6 +69,9 @@ WINDOW = 10_000
 
 TICK = 1e-12
 """s; blows closer to each other are at one instant."""
+
+OFTEN = 1000
+"""Steps of a flight between two reports of progress; they take 2 ms."""
 
 TURNS = 200
 """Blows at one instant, one surface after the other, before all are solved together."""
@@ -106,11 +110,13 @@ class Step(NamedTuple):
 class Lone:
     """Runs one particle from its release to its end."""
 
-    def __init__(self, machine: Machine, world: World, recorder: Recorder, particle: int) -> None:
+    def __init__(
+        self, machine: Machine, world: World, recorder: Recorder, particle: int, report: Progress
+    ) -> None:
         self.machine, self.world = machine, world
         self.tracks = Tracks(recorder, machine.particle.radius, range(particle, particle + 1))
         self.entries = recorder.entries[particle]
-        self.recorder, self.particle = recorder, particle
+        self.recorder, self.particle, self.report = recorder, particle, report
         p, start = machine.particle, machine.releases
         self.r, self.g, self.dt = p.radius, machine.gravity, machine.dt
         self.pull, self.weight = Vec2d(0.0, -self.g), p.mass * self.g
@@ -142,6 +148,7 @@ class Lone:
         if released:
             self._carry()
         while not self.ended:
+            self._look()
             touching, room = {}, inf
             for face in self.world.faces:
                 gap, normal = face.gap(self.x)
@@ -156,6 +163,18 @@ class Lone:
                 self._fly(touching)
             released = False
         self.world.space.remove(self.body, self.circle)
+        self._look()
+
+    def _look(self) -> None:
+        """Report the progress; end the track here if that was enough."""
+        span = self.machine.end_time - float(self.machine.releases.t[self.particle])
+        left = 0.0 if self.ended else (self.machine.end_time - self.t) / span
+        try:
+            self.report((self.particle + 1.0 - left) / self.machine.count)
+        except EnoughError:
+            if not self.ended:
+                self._end("stopped")
+            raise
 
     # Chipmunk
 
@@ -209,13 +228,17 @@ class Lone:
                 span, reason = met, ""
         count = ceil(span / self.dt)
         if count:
-            h, self.restitution = span / count, {}
+            h, self.restitution, begin, v = span / count, {}, self.t, self.v
             self._step(self.x, self.v + 0.5 * h * self.pull, h, self.pull)
-            for _ in range(count - 1):
+            for taken in range(1, count):
+                if taken % OFTEN == 0:
+                    self.t, self.x = begin + taken * h, self.body.position
+                    self.v = v + taken * h * self.pull
+                    self._look()
                 self.world.space.step(h)
             self.steps += count - 1
-            self.t += span
-            self.x, self.v = self.body.position, self.v + span * self.pull
+            self.t = begin + span
+            self.x, self.v = self.body.position, v + span * self.pull
         if reason:
             self._end(reason, Kind.EXIT if reason == "exit" else None)
         else:

@@ -14,7 +14,6 @@ off by δ shifts the last push by (6 δ/a)^(1/3): in `slip` it is 21, 12, 5 and 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import ceil, inf, sqrt
 from typing import Any
 
@@ -25,8 +24,8 @@ from pymunk import Vec2d, batch
 from chutelab.engines.pymunk.world import PARTICLE, Carriage, Flight, Tracks, World
 from chutelab.machine import Machine
 from chutelab.results import REASONS, Kind
-from chutelab.results.recorder import Recorder
-from chutelab.util.arrays import Floats, Ints
+from chutelab.results.recorder import EnoughError, Recorder
+from chutelab.util.arrays import Floats, Ints, Progress
 
 SLOP, BIAS = 1e-3, 1e-97
 """Overlap that Chipmunk leaves alone, as a share of the radius, and the share of what is beyond it
@@ -156,8 +155,9 @@ class Shared:
         arbiter.process_collision = out.dot(disk.body.position - end.offset) > 0.0
         arbiter.surface_velocity = face.belt(normal) * Vec2d(normal.y, -normal.x)
 
-    def run(self, report: Callable[[float], None]) -> None:
+    def run(self, report: Progress) -> None:
         """Run to the end."""
+        reason = "time"
         while self.clock < self.most and (self.waiting or self.inside.any()):
             if not self.inside.any():
                 # Nothing to step until the next release.
@@ -167,10 +167,14 @@ class Shared:
                 self.t = self.begin + self.clock * self.h
             self._release()
             self._step()
-            if self.clock % 64 == 0:
+            try:
                 report(self.clock / self.most)
+            except EnoughError:
+                self.recorder.ended[self.waiting] = REASONS.index("stopped")
+                reason = "stopped"
+                break
         for i in np.flatnonzero(self.inside).tolist():
-            self._end(i, "time")
+            self._end(i, reason)
         faces = slice(self.count, None)
         np.add.at(self.recorder.by_surface, self.surface[faces], self.entries.T[faces])
 

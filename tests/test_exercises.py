@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import re
 from fractions import Fraction
@@ -13,7 +14,15 @@ import numpy as np
 import pytest
 
 from chutelab.classroom.exercises import EXERCISES, ExerciseError, Values, Verdict, find, lesson
-from chutelab.classroom.exercises.exercise import attempt, draw, shown
+from chutelab.classroom.exercises.exercise import (
+    Case,
+    Exercise,
+    Mistake,
+    Question,
+    attempt,
+    draw,
+    shown,
+)
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind
 from chutelab.scene import from_dict
@@ -143,6 +152,32 @@ def test_answers_are_exact_and_the_tolerance_is_the_one_stated(name):
         assert task.check(number, case.right * 0.9901).right
         assert not task.check(number, case.right * 1.0101).right
         assert not task.check(number, case.right * 0.9899).right
+
+
+def held(thing, depth=5):
+    """All that hangs on an object, by attributes and items."""
+    yield thing
+    if depth == 0 or callable(thing) or isinstance(thing, (str, int, float)):
+        return
+    inside = [getattr(thing, name) for name in dir(thing) if not name.startswith("__")]
+    if isinstance(thing, (dict, list, tuple)):
+        inside = list(thing.values() if isinstance(thing, dict) else thing)
+    for one in inside:
+        yield from held(one, depth - 1)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_nothing_that_hangs_on_a_task_is_a_right_answer(name):
+    task = lesson(name, "reader")
+    for number in (1, 2, 3, 4):
+        task.check(number, 1e-3)
+    found = list(held(task))
+    given = [task.given[key] for key in task.given]
+    numbers = {one for one in found if isinstance(one, float)}
+    assert numbers == {1e-3, *given}
+    assert not any(isinstance(one, (Case, Exercise, Question, Mistake)) for one in found)
+    gc.collect()
+    assert not any(isinstance(one, Case) for one in gc.get_objects())
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from math import isfinite
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises.catalogue import LONGEST_NAME, OPENED, UNNAMED
@@ -75,7 +75,7 @@ def code_of(path: Path) -> list[str | None]:
     return list(map(_text, sources))
 
 
-def _text(source: object) -> str | None:
+def _text(source: Any) -> str | None:
     """Return the source of a cell: a text, or a list of lines."""
     lines = source if isinstance(source, list) else [source]
     return "".join(lines) if all(isinstance(line, str) for line in lines) else None

@@ -143,10 +143,10 @@ def run(cells: Sequence[str | None], time_limit: float) -> Ran:
         heard.follow(said)
     finally:
         ended = _end(watcher, heard.folder)
-    listener.join(PERIOD)
-    # Left open where a process that got away still holds the other end.
-    if not listener.is_alive():
-        watcher.stdout.close()
+        listener.join(PERIOD)
+        # Left open where a process that got away still holds the other end.
+        if not listener.is_alive():
+            watcher.stdout.close()
     troubles = [heard.trouble, ENDS.get(ended, "")]
     if heard.folder and Path(heard.folder).exists():
         troubles.append(f"its folder {heard.folder} could not be removed")
@@ -424,7 +424,7 @@ def _work() -> None:
             try:
                 error: BaseException | None = TypeError("its source is no text")
                 if source is not None:
-                    code = shell.transform_cell(source)
+                    code = shell.transform_cell(source)  # type: ignore[no-untyped-call]
                     ran = await shell.run_cell_async(source, transformed_cell=code)
                     error = ran.error_before_exec or ran.error_in_exec
             except BaseException as raised:  # whatever it is, the next cell has its turn

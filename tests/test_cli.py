@@ -511,6 +511,34 @@ def test_a_reader_that_has_gone_is_no_reason_for_a_traceback():
         assert writer.wait(timeout=60) == 1
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
+@pytest.mark.parametrize(
+    ("arguments", "streams", "code", "says"),
+    [
+        ("run perpendicular --out out --only json", "2>&-", 0, ""),
+        ("run perpendicular --out out --only json", ">&- 2>&- <&-", 0, ""),
+        ("run nowhere", ">&- 2>&-", 2, ""),
+        ("run nowhere", "2>/dev/full", 2, ""),
+        ("--help", ">/dev/full", 1, "chutelab failed: standard output: No space left on device\n"),
+        ("schema", ">/dev/full 2>/dev/full", 1, ""),
+    ],
+)
+def test_streams_that_are_closed_or_full_change_no_exit_code(arguments, streams, code, says):
+    done = subprocess.run(
+        f'"{sys.executable}" -m chutelab {arguments} {streams}',
+        shell=True,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": SOURCES},
+        timeout=60,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (code, says)
+    if "--out" in arguments:
+        assert [path.name for path in Path("out").iterdir()] == ["summary.json"]
+        assert ("wrote into" in done.stdout) == (">&- " not in streams)
+
+
 def test_a_terminal_without_greek_gets_question_marks():
     Path("greek.toml").write_text(
         'title = "Ω"\n[incoming]\nspeed = 2\npulley_radius = 0.1\n', encoding="utf-8"

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import re
+import tracemalloc
+import zipfile
 from dataclasses import fields, replace
 from functools import cache
-from io import StringIO
+from io import BytesIO, StringIO
 
 import numpy as np
 import pytest
@@ -190,6 +193,113 @@ def test_arrays_that_do_not_fit_are_refused(tmp_path):
             path = recording.save(tmp_path / "arrays.npz")
             altered(path, **{name: array})
             assert "not a recording" in refused(path), (name, array)
+
+
+@pytest.mark.parametrize(
+    ("array", "field"),
+    [
+        *(("knots", field) for field in ("t", "position", "velocity", "omega", "entries")),
+        *(("events", field) for field in ("t", "velocity_after", "normal_impulse")),
+        ("by_surface", ...),
+    ],
+)
+@pytest.mark.parametrize("value", [np.nan, np.inf, -1e300])
+def test_numbers_that_no_run_leaves_are_refused_and_named(tmp_path, array, field, value):
+    recording = run()
+    wrong = getattr(recording, array).copy()
+    wrong[field][-1] = value
+    altered(recording.save(tmp_path / "wrong.npz"), **{array: wrong})
+    text = refused(tmp_path / "wrong.npz")
+    assert f"{array if field is ... else f'{array}.{field}'} has a number" in text
+
+
+@pytest.mark.parametrize("array", ["knots", "events"])
+def test_times_that_go_backward_are_refused(tmp_path, array):
+    recording = run("free-fall")
+    wrong = getattr(recording, array).copy()
+    wrong["t"][1] = -1.0
+    altered(recording.save(tmp_path / "back.npz"), **{array: wrong})
+    assert "go backward" in refused(tmp_path / "back.npz")
+
+
+@pytest.mark.parametrize(
+    ("key", "values", "told"),
+    [
+        ("engine", (None, 1, "", "newton", ["exact"]), "engine"),
+        ("steps", (None, 1.0, True, -1, "1", [], 10**40), "whole numbers"),
+        ("contacts", (None, 0.5, False, -1, {}), "whole numbers"),
+        ("title", (None, 5, "another"), "not a recording"),
+        ("scene", (None, 5, "", "{", "[]", '{"stream": 3}', "[" * 10_000), "not a recording"),
+    ],
+)
+def test_a_header_of_wrong_types_is_refused(tmp_path, key, values, told):
+    recording = run()
+    for value in values:
+        path = recording.save(tmp_path / "types.npz")
+        altered(path, lambda about, value=value: {**about, key: value})
+        assert told in refused(path), value
+
+
+def repacked(path, name, data, method=zipfile.ZIP_DEFLATED):
+    """Write an archive anew with other bytes in one entry."""
+    with zipfile.ZipFile(path) as old:
+        held = {info.filename: old.read(info) for info in old.infolist()}
+    with zipfile.ZipFile(path, "w") as new:
+        for one, content in {**held, f"{name}.npy": data}.items():
+            new.writestr(one, content, method if one == f"{name}.npy" else zipfile.ZIP_DEFLATED)
+
+
+def npy(array, shape=None):
+    """Return an array as a file, with another shape in its header if wanted."""
+    out = BytesIO()
+    about = {"descr": np.lib.format.dtype_to_descr(array.dtype), "fortran_order": False}
+    np.lib.format.write_array_header_1_0(out, {**about, "shape": shape or array.shape})
+    return out.getvalue() + array.tobytes()
+
+
+def test_an_archive_that_would_fill_the_memory_is_refused_before_it_is_unpacked(tmp_path):
+    recording = run()
+    path = recording.save(tmp_path / "bomb.npz")
+    many = 400_000
+    repacked(path, "knots", npy(np.zeros(many, recording.knots.dtype)))
+    assert path.stat().st_size < 200_000
+    tracemalloc.start()
+    try:
+        assert "knots would be 28.8 MB, unpacked from 0.02" in refused(path)
+        _, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert most < 2_000_000
+
+
+def test_sizes_that_are_not_what_they_say_are_refused(tmp_path):
+    recording = run()
+    knots = recording.knots
+    lies = [npy(knots, shape) for shape in [(10**12,), (len(knots) + 1,), (2, 3), (-1,)]]
+    for data in (*lies, npy(knots)[:-1], npy(knots) + b"0"):
+        path = recording.save(tmp_path / "lies.npz")
+        repacked(path, "knots", data)
+        assert "knots has another size" in refused(path)
+    # The directory says less than there is, and more.
+    for size in (len(npy(knots)) - 80, 10**9):
+        path = recording.save(tmp_path / "lies.npz")
+        data = path.read_bytes()
+        true = len(npy(knots)).to_bytes(4, "little")
+        assert data.count(true) >= 1
+        path.write_bytes(data.replace(true, size.to_bytes(4, "little")))
+        assert "not a recording" in refused(path)
+
+
+def test_other_ways_of_packing_are_refused(tmp_path):
+    path = run().save(tmp_path / "xz.npz")
+    repacked(path, "knots", npy(run().knots), zipfile.ZIP_LZMA)
+    assert "another method" in refused(path)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes with names are of Unix")
+def test_a_pipe_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe.npz")
+    assert "no regular file" in refused(tmp_path / "pipe.npz")
 
 
 def test_damage_anywhere_is_refused_or_harmless(tmp_path):

@@ -27,9 +27,12 @@ pymunk or wasmtime.
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
+# Not from `typing`: its import takes as long as the rest until the command line waits for signals.
+TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from typing import Any
+
     from chutelab import theory
     from chutelab.classroom import exercises
     from chutelab.engines.simulation import simulate

@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from secrets import token_hex
-from threading import Event, Lock, Thread, Timer
+from threading import Event, Lock, Thread
 from time import monotonic, sleep
 from typing import IO, Any, Final
 
@@ -49,6 +49,9 @@ LAST_WORD: Final = 1.0
 
 PATIENCE: Final = 10.0
 """s for the watcher to end everything and remove the folder; it takes a hundredth of it."""
+
+OFTEN: Final = 0.5
+"""s between two times that the kernel hands over what there is new while a cell runs."""
 
 PERIOD: Final = 0.1
 """s between two looks of the watcher."""
@@ -408,14 +411,18 @@ def _work() -> None:
 
     def hand_over() -> None:
         # It may be bent by the cells, which is theirs to answer for.
-        with suppress(Exception):
+        with suppress(Exception), turn:
             found = catalogue.report()
             if last != found:
-                tell(tasks=found)
+                _say(pipe, tasks=found)
                 last[:] = found
 
-    def stop() -> None:
-        hand_over()
+    def watch_time() -> None:
+        # Now and then too: a cell may end the kernel, or let no other thread run.
+        until = monotonic() + time_limit
+        while (left := until - monotonic()) > 0.0:
+            sleep(min(left, OFTEN))
+            hand_over()
         tell(end=False)
 
     async def go() -> None:
@@ -434,12 +441,9 @@ def _work() -> None:
             hand_over()
 
     tell(cell=0)
-    alarm = Timer(time_limit, stop)
-    alarm.daemon = True
-    alarm.start()
+    Thread(target=watch_time, daemon=True).start()
     # In a loop that runs, as in Jupyter.
     asyncio.run(go())
-    alarm.cancel()
     hand_over()
     tell(end=True)
     # Threads and what is registered for the end do not keep it.

@@ -5,10 +5,12 @@ The bar is for people who wait longer than a second.
 
 from __future__ import annotations
 
+import io
 import json
+import os
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from threading import Timer
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +19,62 @@ import click
 if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.progress import Progress
+
+
+class _Output(io.TextIOWrapper):
+    """Standard output, whose errors say which file they mean: it has no name."""
+
+    def write(self, text: str, /) -> int:
+        with self._named():
+            return super().write(text)
+
+    def flush(self) -> None:
+        with self._named():
+            super().flush()
+
+    @contextmanager
+    def _named(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            raise OSError(error.errno, error.strerror, "standard output") from None
+
+
+class _Errors(io.TextIOWrapper):
+    """Standard error. If it cannot be written there is nowhere to say so: the exit code is left."""
+
+    def write(self, text: str, /) -> int:
+        with suppress(OSError):
+            super().write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        with suppress(OSError):
+            super().flush()
+
+
+def open_streams() -> None:
+    """Make the standard streams such that the rest need not ask what they are.
+
+    One that is closed becomes the null device: else the next file that is opened gets its number,
+    and what others print. A title in Greek does not fail in a terminal that has no Greek.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        stream = getattr(sys, name)
+        if stream is None:
+            null = os.open(os.devnull, os.O_RDWR)
+            if null != number:
+                os.dup2(null, number)
+                os.close(null)
+            os.set_inheritable(number, True)
+            setattr(sys, name, os.fdopen(number, "w" if number else "r", encoding="utf-8"))
+        elif number and isinstance(stream, io.TextIOWrapper):
+            if stream is not getattr(sys, f"__{name}__"):
+                stream.reconfigure(errors="replace")
+                continue
+            kind = _Output if name == "stdout" else _Errors
+            with_its = {"encoding": stream.encoding, "line_buffering": stream.line_buffering}
+            setattr(sys, name, kind(stream.buffer, errors="replace", **with_its))
 
 
 def show(*parts: RenderableType) -> None:

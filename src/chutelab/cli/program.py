@@ -8,12 +8,12 @@ does not hold, or an accuracy was not reached.
 
 from __future__ import annotations
 
-import io
 import sys
 from typing import Any
 
 import click
 
+from chutelab.cli.console import open_streams
 from chutelab.util.errors import InputError, MissingLibraryError
 from chutelab.util.signals import INTERRUPTED, exit_code, raised
 
@@ -41,20 +41,13 @@ class Program(InOrder):
         kwargs |= {"obj": asked, "standalone_mode": False}
         with raised():
             try:
+                open_streams()
                 code = super().main(*args, **kwargs)
             except (KeyboardInterrupt, Exception) as error:
                 if asked["debug"] and not isinstance(error, EXPECTED) and not exit_code(error):
                     raise
                 code = _told(error)
             sys.exit(code or 0)
-
-    def invoke(self, ctx: click.Context) -> Any:
-        """Run a command."""
-        for stream in (sys.stdout, sys.stderr):
-            # A title in Greek must not fail in a terminal that has no Greek.
-            if isinstance(stream, io.TextIOWrapper):
-                stream.reconfigure(errors="replace")
-        return super().invoke(ctx)
 
 
 EXPECTED = (click.ClickException, InputError, MissingLibraryError)
@@ -74,7 +67,9 @@ def _told(error: BaseException) -> int:
     said = str(error)
     if isinstance(error, MemoryError):
         said = f"not enough memory; fewer particles need less. ({error})"
-    elif not isinstance(error, OSError):
+    elif isinstance(error, OSError):
+        said = ": ".join(filter(None, (error.filename, error.strerror))) or said
+    else:
         said = (
             f"{type(error).__name__}: {' '.join(said.split()) or 'no message'}; please"
             " report it, with what `chutelab --debug ...` prints for the same command"

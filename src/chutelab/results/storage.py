@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import json
+import warnings
+import zipfile
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict
-from math import inf
+from errno import EINVAL
+from math import inf, prod
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
 
 from chutelab.machine import build
 from chutelab.results.recording import ENTRIES, EVENT, KNOT, REASONS, Kind, Recording
@@ -27,6 +32,22 @@ ARRAYS = {
     "events": EVENT,
     "by_surface": np.dtype("f8"),
 }
+
+HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
+"""Readers of an array's shape and type, by the version of its format."""
+
+SMALL = 1 << 20
+"""Bytes of an array that may be packed however well."""
+
+MOST_UNPACKED = 150
+"""How many times as large as packed a larger array may be: runs in which next to nothing happens
+come to 60, and a file that is made to fill the memory to 1000."""
+
+ENGINES = ("exact", "contact", "pymunk")
+"""Who can have made a recording."""
+
+FAR = 1e100
+"""Bound on every number: energies and distances computed from it stay finite."""
 
 COLUMNS = ("t", "particle", "other", "kind", "surface")
 """Fields of an event that events.csv begins with."""
@@ -55,29 +76,68 @@ def save(recording: Recording, path: str | Path) -> Path:
 def load(path: str | Path) -> Recording:
     """Read what `save` wrote.
 
+    Nothing is unpacked whose size is not known, and sane, before.
+
     Raises
     ------
     RecordingError
-        If the file is missing, damaged, of another kind or of another version.
+        If the file is missing, damaged, of another kind or of another version; or if it is too
+        large for what it holds, or holds what no run leaves.
     """
     path = Path(path)
+    kind = "not a recording as `chutelab run --out` writes it"
     try:
-        with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
-            about: dict[str, Any] = json.loads(str(data["about"]))
+        with zipfile.ZipFile(_regular(path)) as archive:
+            about = json.loads(str(_array(archive, "about")))
             if about.get("format") == FORMAT:
-                return _recording(about, {name: data[name] for name in ARRAYS})
+                return _recording(about, {name: _array(archive, name) for name in ARRAYS})
     except FileNotFoundError:
         raise RecordingError(f"{path}: no such file") from None
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from None
-    except MemoryError:
+    except (MemoryError, RecordingError):
         raise
+    except _UnfitError as error:
+        raise RecordingError(f"{path}: {kind}: {error}") from None
     except Exception as error:
         # Damaged bytes come up as anything: from zipfile, zlib, tokenize, json, NumPy.
-        raise RecordingError(
-            f"{path}: not a recording as `chutelab run --out` writes it (recording.npz)"
-        ) from error
+        raise RecordingError(f"{path}: {kind} (recording.npz)") from error
     raise RecordingError(f"{path}: a recording of another version of chutelab; run its scene again")
+
+
+class _UnfitError(ValueError):
+    """What a file holds is not what a run leaves; the text says in what."""
+
+
+def _regular(path: Path) -> Path:
+    """Return a path that is not of a pipe, which would be waited for, or of a device."""
+    if path.exists() and not path.is_file():
+        raise OSError(EINVAL, "it is no regular file")
+    return path
+
+
+def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
+    """Return one array of an archive."""
+    info = archive.getinfo(f"{name}.npy")
+    # Other methods can make a million bytes of one.
+    if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        raise _UnfitError(f"{name} is packed by another method")
+    with archive.open(info) as entry, warnings.catch_warnings():
+        warnings.simplefilter("error")
+        shape, _, dtype = HEADERS[npy.read_magic(entry)](entry)
+        size = prod(shape) * dtype.itemsize
+        if entry.tell() + size != info.file_size:
+            raise _UnfitError(f"{name} has another size than it says")
+    if dtype != ARRAYS.get(name, dtype) or (name == "about" and (dtype.kind, shape) != ("U", ())):
+        raise _UnfitError(f"{name} is of another type")
+    packed = min(info.compress_size, Path(str(archive.filename)).stat().st_size)
+    if size > max(SMALL, MOST_UNPACKED * packed):
+        raise _UnfitError(
+            f"{name} would be {size / 1e6:.3g} MB, unpacked from {packed / 1e6:.3g} MB"
+        )
+    with archive.open(info) as entry:
+        array: NDArray[Any] = npy.read_array(entry, allow_pickle=False)
+    return array
 
 
 def _about(recording: Recording) -> dict[str, Any]:
@@ -97,32 +157,51 @@ def _about(recording: Recording) -> dict[str, Any]:
 
 
 def _recording(about: dict[str, Any], arrays: dict[str, Any]) -> Recording:
-    """Return what header and arrays hold; a ValueError if they contradict each other or the scene.
+    """Return what header and arrays hold; an error if they contradict each other or the scene.
 
     Every index has to lead somewhere. The scene's text may be an older one, without later keys.
     """
+    counts = about["steps"], about["contacts"]
+    if about["engine"] not in ENGINES:
+        raise _UnfitError("the header names no engine")
+    if not all(type(count) is int and 0 <= count < 2**63 for count in counts):
+        raise _UnfitError("steps and contacts in the header have to be whole numbers")
+    if type(about["seconds"]) not in (int, float) or not 0.0 <= about["seconds"] < inf:
+        raise _UnfitError("seconds in the header has to be a time")
     scene = from_dict(json.loads(about["scene"]), about["title"])
     told = {name: about[name] for name in ("engine", "steps", "contacts", "seconds")}
     recording = Recording(machine=build(scene), **told, **arrays)
     if _about(recording) | {"scene": about["scene"]} != about:
-        raise ValueError("the header is of another scene")
-    offsets, events = recording.offsets, recording.events
+        raise _UnfitError("the header is of another scene")
+    numbers = {"by_surface": arrays["by_surface"]}
+    for name, dtype in (("knots", KNOT), ("events", EVENT)):
+        numbers |= {f"{name}.{key}": arrays[name][key] for key in dtype.names or ()}
+    for name, values in numbers.items():
+        if not np.all(np.abs(values) < FAR):
+            raise _UnfitError(f"{name} has a number that is not finite, or beyond {FAR:g}")
+    offsets, knots, events = recording.offsets, recording.knots, recording.events
+    if not (knots.ndim == events.ndim == offsets.ndim == 1):
+        raise _UnfitError("an array has another number of dimensions")
     sizes, surfaces = np.diff(offsets), len(recording.surfaces)
     sound = (
-        all(getattr(recording, name).dtype == dtype for name, dtype in ARRAYS.items())
-        and recording.knots.ndim == events.ndim == offsets.ndim == 1
+        len(offsets) > 0
         and offsets[0] == 0
-        and offsets[-1] == len(recording.knots)
+        and offsets[-1] == len(knots)
         and not np.any((sizes < 0) | (sizes == 1))
         and recording.ended.shape == sizes.shape
         and not np.any((recording.ended < 0) | (recording.ended >= len(REASONS)))
         and recording.by_surface.shape == (surfaces, len(ENTRIES))
         and not np.any((events["surface"] < -1) | (events["surface"] >= surfaces))
         and not np.any((events["particle"] < 0) | (events["particle"] >= len(sizes)))
+        and not np.any((events["other"] < -1) | (events["other"] >= len(sizes)))
         and not np.any((events["kind"] < 0) | (events["kind"] >= len(Kind)))
     )
     if not sound:
-        raise ValueError("the arrays do not fit together")
+        raise _UnfitError("the arrays do not fit together")
+    backward = np.diff(knots["t"]) < 0.0
+    backward[offsets[1:-1][(offsets[1:-1] > 0) & (offsets[1:-1] < len(knots))] - 1] = False
+    if np.any(backward) or np.any(np.diff(events["t"]) < 0.0):
+        raise _UnfitError("the times of a track, or of the events, go backward")
     return recording
 
 

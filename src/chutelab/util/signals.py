@@ -9,9 +9,7 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
-from math import inf
-from threading import current_thread, main_thread
+from contextlib import contextmanager, suppress
 from time import monotonic
 
 INTERRUPTED = 128 + signal.SIGINT
@@ -28,44 +26,52 @@ Later ones are raised again: the first may have been lost in code that catches e
 
 
 class Terminated(KeyboardInterrupt):
-    """The program was told to end by a signal other than Ctrl-C, `signum`."""
+    """The program was told to end, by the signal `signum`.
+
+    Ctrl-C too: of a plain KeyboardInterrupt that has passed through `exec`, Python remembers it to
+    the end, and kills itself then although it was caught.
+    """
 
     def __init__(self, signum: int) -> None:
         super().__init__(signum)
         self.signum = signum
 
 
+_obeyed: list[tuple[int, float]] = []
+"""The signals that were raised, and when, s."""
+
+
 @contextmanager
 def raised(*, last: bool = False) -> Iterator[None]:
-    """Raise a KeyboardInterrupt, or a `Terminated`, for each signal of `NAMES`.
+    """Raise `Terminated` for each signal of `NAMES`.
 
     Signals that are ignored (``nohup``, jobs in the background) or have a handler of somebody
     else's are left alone, and so are all in a thread, which can set none. With `last` the program
     ends after this: then a signal no longer raises anything, since nobody would catch it, but ends
     the process at once with the exit code that it would have had.
     """
-    obeyed = -inf
-
-    def obey(signum: int, _frame: object) -> None:
-        nonlocal obeyed
-        now = monotonic()
-        if now - obeyed < GRACE:
-            return
-        obeyed = now
-        raise KeyboardInterrupt if signum == signal.SIGINT else Terminated(signum)
-
     usual = (signal.SIG_DFL, signal.default_int_handler)
     known = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
-    mine = {number: now for number in known if (now := signal.getsignal(number)) in usual}
-    if current_thread() is not main_thread():
-        mine = {}
+    before = {number: now for number in known if (now := signal.getsignal(number)) in usual}
+    if before:
+        _obeyed.clear()
     try:
-        for number in mine:
-            signal.signal(number, obey)
+        for number in before:
+            with suppress(ValueError):
+                signal.signal(number, _obey)
         yield
     finally:
-        for number, before in mine.items():
-            signal.signal(number, _end_at_once if last else before)
+        for number, handler in before.items():
+            with suppress(ValueError):
+                signal.signal(number, _end_at_once if last else handler)
+
+
+def _obey(signum: int, _frame: object) -> None:
+    now = monotonic()
+    if _obeyed and now - _obeyed[-1][1] < GRACE:
+        return
+    _obeyed.append((signum, now))
+    raise Terminated(signum)
 
 
 def _end_at_once(signum: int, _frame: object) -> None:
@@ -75,10 +81,13 @@ def _end_at_once(signum: int, _frame: object) -> None:
 def exit_code(error: BaseException | None) -> int | None:
     """Return the exit code if a signal is behind an error, else None.
 
-    Compiled code may turn a KeyboardInterrupt into an error of its own.
+    Compiled code may turn a KeyboardInterrupt into an error of its own, and keep no trace of it:
+    whatever fails after a signal was raised fails because of it.
     """
+    if _obeyed:
+        return 128 + _obeyed[0][0]
     while error is not None:
         if isinstance(error, KeyboardInterrupt):
-            return 128 + error.signum if isinstance(error, Terminated) else INTERRUPTED
+            return INTERRUPTED
         error = error.__cause__ or error.__context__
     return None

@@ -146,10 +146,23 @@ def cut(text: str, width: int) -> str:
     return text if len(text) <= width else text[: width - 3] + "..."
 
 
+_KEPT: Final = "\u00a0\u2007\u2009\u202f\u200c\u200d"
+"""Characters that Python does not call printable, though many languages need them: spaces at which
+no line is broken, and what joins letters or keeps them apart."""
+
+
 def printable(text: str) -> str:
-    """Replace what a terminal would obey or cannot show by its escape."""
+    r"""Replace what a terminal would obey or cannot show by its escape.
+
+    That is control characters, and those that turn the direction of what is read.
+
+    >>> print(printable("\x1b[31m\u202e"), printable("café, 漢字"))
+    \x1b[31m\u202e café, 漢字
+    """
     return "".join(
-        c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode("ascii")
+        c
+        if c.isprintable() or c in _KEPT
+        else c.encode("unicode_escape", "surrogatepass").decode("ascii")
         for c in text
     )
 

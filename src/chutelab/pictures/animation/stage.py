@@ -247,10 +247,11 @@ class Stage:
     def _add_text(self, layout: Layout, pace: str, moments: tuple[Moment, ...]) -> list[Writing]:
         """Write title, question and pace; return clock and caption, which change."""
         text = self.figure.text
-        title = text(0.02, TITLE, layout.title, fontsize=style.LARGE, fontweight="bold")
+        said = [style.plain(" ".join(one.split())) for one in (layout.title, layout.question)]
+        title = text(0.02, TITLE, said[0], fontsize=style.LARGE, fontweight="bold")
         _shorten(title, RIGHT * layout.width)
         if layout.question:
-            asked = text(0.02, TITLE - LINE, layout.question, fontsize=style.NORMAL)
+            asked = text(0.02, TITLE - LINE, said[1], fontsize=style.NORMAL)
             _shorten(asked, RIGHT * layout.width)
         # Near what moves: the rectangle around all of it is what a frame of the file costs.
         above = layout.view[1] + layout.view[3] + 0.02
@@ -261,7 +262,8 @@ class Stage:
         steps = np.diff([moment.t for moment in moments])
         digits = 2 if len(steps) and np.median(steps) >= 0.01 else 3
         times = [f"t = {moment.t:.{digits}f} s" for moment in moments]
-        words = [moment.words for moment in moments]
+        shown = {said: style.drawable(said) for said in {moment.words for moment in moments}}
+        words = [shown[moment.words] for moment in moments]
         left, low, high = 0.02 * layout.width, 1.0 - CAPTION, 1.0 - above
         return [
             Writing(style.NORMAL, layout.dpi, right, layout.height * high, "rs", times),

@@ -51,7 +51,7 @@ def draw_scan(ax: Axes, solution: Solution) -> Axes:
     style.dress(ax, with_unit(key.key, key.unit), with_unit(name, said))
     for i, piece in enumerate(found.pieces):
         look: dict[str, Any] = {"color": style.TRACK, "lw": 1.8, "zorder": 4.0, "gid": "quantity"}
-        ax.plot(piece.x, factor * piece.values[:, 0], label="" if i else name, **look)
+        ax.plot(piece.x, factor * piece.values[:, 0], label="" if i else style.plain(name), **look)
     if solution.goal == "solve":
         look = {"color": style.ANALYTIC, "lw": 1.6, "ls": "--", "zorder": 3.0, "gid": "target"}
         ax.plot(found.x, factor * found.values[:, 1], label="target", **look)
@@ -164,7 +164,8 @@ def draw_shares(ax: Axes, found: Uncertainty, row: int) -> Axes:
             places + offset, shown, height=0.36, color=colour, zorder=3.0, label=label,
             xerr=errors, error_kw={"ecolor": style.INK, "elinewidth": 1.0, "capsize": 2.5},
         )  # fmt: skip
-    ax.set_yticks(places, [fill(one.key, 18, break_long_words=False) for one in found.spreads])
+    names = [style.plain(fill(one.key, 18, break_long_words=False)) for one in found.spreads]
+    ax.set_yticks(places, names)
     ax.invert_yaxis()
     ax.set_xlim(0.0, max(105.0, ax.get_xlim()[1]))
     ax.grid(visible=False, axis="y")
@@ -261,9 +262,9 @@ def draw_sweep(ax: Axes, swept: Sweep, column: str) -> Axes:
         _draw_lines(ax, first, second if len(keys) == 2 else np.zeros(len(z)), z)
     if len(keys) == 2:
         ax.legend(
-            title=names[1], loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=8, frameon=False,
-            fontsize=style.SMALL, title_fontsize=style.SMALL, columnspacing=1.2, handlelength=1.4,
-            borderaxespad=0.2, alignment="right",
+            title=style.plain(names[1]), loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=8,
+            frameon=False, fontsize=style.SMALL, title_fontsize=style.SMALL, columnspacing=1.2,
+            handlelength=1.4, borderaxespad=0.2, alignment="right",
         )  # fmt: skip
     low, high = float(first.min()), float(first.max())
     if low < high:  # all of the range, also where there are no rows

@@ -200,7 +200,8 @@ def draw_residual(
     if not parts:
         ax.set_axis_off()
         why = reason or "particle 0 does not separate from a pulley"
-        text = ax.text(0.5, 0.5, fill(f"no analytic parabola; {why}", 60), ha="center", va="center")
+        said = style.plain(fill(f"no analytic parabola; {why}", 60))
+        text = ax.text(0.5, 0.5, said, ha="center", va="center")
         text.set(transform=ax.transAxes, fontsize=style.NORMAL, color=style.MUTED)
         return ax
     times = _times_of(parts)

@@ -368,7 +368,7 @@ def _label(
         across = "center" if abs(down[0]) < 0.2 else "right" if down[0] < 0.0 else "left"
         along = "top" if down[1] < -0.2 else "center"
     label = ax.annotate(
-        text.replace("-", "−"),
+        style.plain(text.replace("-", "−")),
         (float(where[0]), float(where[1])),
         xytext=offset,
         textcoords="offset points",

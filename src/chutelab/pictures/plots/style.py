@@ -16,9 +16,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties, findfont, get_font
 from numpy.typing import ArrayLike
 
 from chutelab.pictures import BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
+from chutelab.util.errors import printable
 from chutelab.util.files import whole
 
 INK = "#000000"
@@ -100,11 +102,41 @@ def tint(colour: str, share: float, ground: str = "#FFFFFF") -> str:
     return "#" + bytes(mixed).hex().upper()
 
 
+def drawable(text: str) -> str:
+    """Return a text with another sign for each character that the font lacks.
+
+    So matplotlib, which draws the text in bold or not, need not warn of any.
+    """
+    fonts = [
+        [get_font(findfont(FontProperties(family=[name], weight=weight))) for name in families]
+        for families in [FontProperties().get_family()]
+        for weight in ("normal", "bold")
+    ]
+
+    def has(c: str) -> bool:
+        within = (any(font.get_char_index(ord(c)) for font in every) for every in fonts)
+        return printable(c) == c and all(within)
+
+    other = "\N{REPLACEMENT CHARACTER}" if has("\N{REPLACEMENT CHARACTER}") else "?"
+    return "".join(c if c == "\n" or has(c) else other for c in text)
+
+
+def plain(text: str) -> str:
+    r"""Return a text such that matplotlib writes it as it is, and takes no ``$`` for mathematics.
+
+    Whatever somebody else has written, a title, a name, a key, goes through this.
+
+    >>> plain("5 $ or $x_1$"), plain("\x1b[31m")
+    ('5 \\$ or \\$x_1\\$', '�[31m')
+    """
+    return drawable(text).replace("$", r"\$")
+
+
 def dress(ax: Axes, x: str = "", y: str = "", title: str = "") -> Axes:
-    """Give axes the common look: light grid, two spines, readable text."""
-    ax.set_xlabel(x, fontsize=NORMAL)
-    ax.set_ylabel(y, fontsize=NORMAL)
-    ax.set_title(title, fontsize=NORMAL, loc="left", fontweight="bold")
+    """Give axes the common look, light grid, two spines, readable text; see `plain`."""
+    ax.set_xlabel(plain(x), fontsize=NORMAL)
+    ax.set_ylabel(plain(y), fontsize=NORMAL)
+    ax.set_title(plain(title), fontsize=NORMAL, loc="left", fontweight="bold")
     ax.tick_params(labelsize=SMALL, color=MUTED)
     ax.grid(visible=True, color=STEEL_LIGHT, linewidth=0.6)
     ax.set_axisbelow(True)
@@ -115,7 +147,7 @@ def dress(ax: Axes, x: str = "", y: str = "", title: str = "") -> Axes:
 
 def note(ax: Axes, text: str) -> None:
     """Write a remark above axes, at the right."""
-    ax.set_title(text, fontsize=SMALL, loc="right", color=MUTED)
+    ax.set_title(plain(text), fontsize=SMALL, loc="right", color=MUTED)
 
 
 def legend_above(ax: Axes, columns: int) -> None:
@@ -164,13 +196,13 @@ class Picture(Figure):
     def headline(self, x: float, y: float, title: str, longest: int = 80) -> None:
         """Write a title at a place, in shares of the figure, cut at `longest` characters."""
         self.text(
-            x, y, shorten(title, longest, placeholder=" …"),
+            x, y, plain(shorten(title, longest, placeholder=" …")),
             fontsize=LARGE, fontweight="bold", verticalalignment="center",
         )  # fmt: skip
 
     def remark(self, x: float, y: float, text: str, **look: Any) -> None:
         """Write grey text at a place, in shares of the figure; its upper left corner is there."""
-        self.text(x, y, text, **{"fontsize": NORMAL, "color": MUTED, "va": "top", **look})
+        self.text(x, y, plain(text), **{"fontsize": NORMAL, "color": MUTED, "va": "top", **look})
 
     def write(self, path: str | Path | None) -> None:
         """Write the figure, whole or not at all; nothing without a path.

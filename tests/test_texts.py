@@ -1,0 +1,88 @@
+"""Texts that somebody else wrote, titles, names, paths: shown as they are, and never obeyed."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+
+import pytest
+from matplotlib.cbook import is_math_text
+from matplotlib.text import Text
+
+import chutelab
+from chutelab.engines.simulation import simulate
+from chutelab.pictures import plots
+from chutelab.pictures.animation import animate
+from chutelab.pictures.plots import style
+from chutelab.pictures.plots.design import scan, spread, sweep_figure
+from chutelab.pictures.plots.measured import measured
+from chutelab.scene import from_dict, to_dict
+from chutelab.studies.design import solve, uncertainty
+from chutelab.studies.measured import read, residuals
+from chutelab.studies.sweep import sweep
+
+NAME = "$x_{1$\x1b\N{RIGHT-TO-LEFT OVERRIDE}</b>漢"
+TITLE = f"Cost \\$5 or $\\frac{{\n\t\x9b2J {NAME} <script>alert(1)</script> & $y$ 🎈"
+HOSTILE = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]")
+
+
+@cache
+def scene(name="perpendicular"):
+    told = to_dict(chutelab.load(name))
+    told["title"] = TITLE
+    # Below the first quarter of the way from plate to belt.
+    told["surface"] = [{"name": NAME, "from": [0.4, -0.6], "to": [0.7, -0.6], "speed": -1.0}]
+    return from_dict(told, "evil.toml")
+
+
+@cache
+def run():
+    return simulate(scene())
+
+
+def figures():
+    yield "overlay", lambda: plots.overlay(run())
+    yield "strobe", lambda: plots.strobe(run())
+    key = f"surface.{NAME}.speed"
+    yield "sweep", lambda: sweep_figure(sweep(scene(), [f"{key}=0:1:3"]), "landing.x")
+    two = [f"{key}=0:1:3", "plate.restitution=0,1"]
+    yield "sweep over two", lambda: sweep_figure(sweep(scene(), two), "landing.x")
+    struck = f"impact.{NAME}.vx"
+    yield "scan", lambda: scan(solve(scene(), "plate.restitution=0.3:0.6", f"{struck}=-1"))
+    doubt = ["plate.restitution=0.5±0.1", f"{key}=0±0.1"]
+    yield "spread", lambda: spread(uncertainty(scene(), doubt, [struck], samples=64))
+    yield "measured", lambda: measured(residuals(scene(), read("perpendicular-track")))
+
+
+@pytest.mark.parametrize(
+    ("name", "draw"),
+    [
+        # SciPy's sampling takes seconds.
+        pytest.param(*one, id=one[0], marks=[pytest.mark.slow] if one[0] == "spread" else [])
+        for one in figures()
+    ],
+)
+def test_pictures_write_texts_as_they_are(tmp_path, name, draw):
+    # Warnings of missing glyphs are errors here, as is mathematics that cannot be parsed.
+    figure = draw()
+    figure.write(tmp_path / f"{name}.png")
+    said = [text.get_text() for text in figure.findobj(Text)]
+    theirs = [text for text in said if "Cost" in text or "x_{1" in text]
+    assert any("Cost" in text for text in theirs)
+    for text in theirs:
+        assert not is_math_text(text)
+        assert not HOSTILE.search(text)
+    assert any(r"\$x_{1\$" in text for text in theirs)
+
+
+def test_a_film_writes_texts_as_they_are(tmp_path):
+    path = tmp_path / "lesson.gif"
+    animate(run(), path, width=320, height=180, fps=10, slow=1.0, question=TITLE)
+    assert path.stat().st_size > 1000
+
+
+def test_a_text_that_the_font_has_is_as_it_was():
+    text = "Größe µ, −20°, ε = ½ → Ελληνικά\nпример"
+    assert style.plain(text) == style.drawable(text) == text
+    assert style.drawable("漢\x1b\N{RIGHT-TO-LEFT OVERRIDE}\r") == "\N{REPLACEMENT CHARACTER}" * 4
+    assert style.plain(r"\$ $") == r"\\$ \$"

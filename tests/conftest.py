@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import gc
 import signal
 
 from hypothesis import settings
@@ -10,6 +11,14 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 # The same draws everywhere: a red run is red again, on any machine.
 settings.register_profile("chutelab", derandomize=True, deadline=None)
 settings.load_profile("chutelab")
+
+
+def pytest_collection_finish(session):
+    """Leave all modules and tests out of garbage collections: benchmarks ask for many."""
+    del session
+    gc.collect()
+    gc.freeze()
+
 
 # Cells of notebooks, not modules.
 collect_ignore_glob = ["solutions/*"]

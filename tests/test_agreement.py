@@ -131,11 +131,12 @@ def test_where_all_contacts_are_blows_the_engines_agree_to_what_each_promises():
     assert all(row.holds and not row.least for row in rows.values())
 
 
-@pytest.mark.parametrize(("engine", "least"), [("contact", 1.5), ("pymunk", 0.5)])
-def test_where_contacts_last_a_stepped_engine_converges(engine, least):
-    row = rows_of("slip")[f"{engine}, exact"]
-    assert (row.least, row.tolerance, row.holds) == (True, least, True)
-    assert row.difference > 1.5
+def test_where_contacts_last_a_stepped_engine_converges():
+    rows = rows_of("slip")
+    for engine, least in (("contact", 1.5), ("pymunk", 0.5)):
+        row = rows[f"{engine}, exact"]
+        assert (row.least, row.tolerance, row.holds) == (True, least, True)
+        assert row.difference > 1.5
 
 
 def test_the_promise_grows_with_what_a_scene_makes_of_a_change():
@@ -182,7 +183,7 @@ def test_what_the_answers_share_is_what_they_import():
         "theory": theory.__path__[0],
         "pymunk": __import__("chutelab.engines.pymunk", fromlist=["run"]).__path__[0],
     }
-    ours = r"chutelab\.(ballistics|impact|ride|nominal|exact)\b"
+    ours = r"chutelab\.(mechanics|machine\.nominal|engines\.exact)\b"
     for name, folder in sources.items():
         text = "".join(path.read_text("utf-8") for path in Path(folder).glob("*.py"))
         assert not re.search(rf"(from|import) {ours}", text), name

@@ -716,7 +716,7 @@ def test_ctrl_c_stops_a_long_run_at_once(engine):
     with subprocess.Popen(
         command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as running:
-        time.sleep(3.0)
+        time.sleep(2.0)
         assert running.poll() is None
         running.send_signal(signal.SIGINT)
         out, said = running.communicate(timeout=10.0)

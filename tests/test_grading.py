@@ -29,6 +29,10 @@ psutil = pytest.importorskip("psutil")
 SOLUTIONS = Path(__file__).parent / "solutions"
 LESSONS = Path(__file__).parent.parent / "lessons"
 OPEN = 'from chutelab.classroom.exercises import lesson\ntask = lesson("the-bounce", student="{}")'
+NOTEBOOKS = [
+    name if name == "the-bounce" else pytest.param(name, marks=pytest.mark.slow)
+    for name in EXERCISES
+]
 
 # What jupyter's own packages warn of when they are imported or closed is not ours to mend.
 pytestmark = pytest.mark.filterwarnings("default")
@@ -65,15 +69,14 @@ def saved(folder, name, *cells):
     return path
 
 
-async def run_through(found, in_turn):
+async def run_through(found):
     """Run a notebook as a reader does, every error a failure; return its cells by id."""
     import nbformat
     from nbclient import NotebookClient
 
     book = nbformat.reads(json.dumps(found), 4)
     nbformat.validate(book)
-    async with in_turn:
-        await NotebookClient(book, timeout=60, kernel_name="python3").async_execute()
+    await NotebookClient(book, timeout=60, kernel_name="python3").async_execute()
     return {cell.id: cell for cell in book.cells}
 
 
@@ -81,25 +84,10 @@ def text_of(cell):
     return cell.outputs[-1]["data"]["text/plain"]
 
 
-@pytest.fixture(scope="module")
-def as_shipped():
-    """All notebooks, run two at a time; an error stands in the place of its cells."""
-
-    async def run_all():
-        in_turn = asyncio.Semaphore(2)
-        runs = (run_through(shipped(name), in_turn) for name in EXERCISES)
-        return await asyncio.gather(*runs, return_exceptions=True)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PYTHONPATH", str(Path(chutelab.__file__).parent.parent))
-        return dict(zip(EXERCISES, asyncio.run(run_all()), strict=True))
-
-
-@pytest.mark.parametrize("name", list(EXERCISES))
-def test_notebooks_run_as_shipped_and_say_not_attempted(name, as_shipped):
-    cells = as_shipped[name]
-    if isinstance(cells, Exception):
-        raise cells
+@pytest.mark.parametrize("name", NOTEBOOKS)
+def test_notebooks_run_as_shipped_and_say_not_attempted(name, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", str(Path(chutelab.__file__).parent.parent))
+    cells = asyncio.run(run_through(shipped(name)))
     for number in (1, 2, 3, 4):
         assert f"Question {number}: not attempted" in text_of(cells[f"answer-{number}"])
         assert "text/html" in cells[f"question-{number}"].outputs[-1]["data"]
@@ -107,22 +95,13 @@ def test_notebooks_run_as_shipped_and_say_not_attempted(name, as_shipped):
     assert "application/vnd.jupyter.widget-view+json" in cells["live"].outputs[-1]["data"]
 
 
-def check_solved(name, folder):
-    path = folder / f"{name}.ipynb"
+@pytest.mark.parametrize("name", NOTEBOOKS)
+def test_every_solved_notebook_earns_full_marks(name, tmp_path):
+    path = tmp_path / f"{name}.ipynb"
     path.write_text(json.dumps(solved(name, "Ada Lovelace")), encoding="utf-8")
     assert list(grade([path])) == [
         Grade(str(path), "Ada Lovelace", name, marks=(1, 1, 1, 1), out_of=4, reason="")
     ]
-
-
-def test_a_solved_notebook_earns_full_marks(tmp_path):
-    check_solved("the-bounce", tmp_path)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in EXERCISES if name != "the-bounce"])
-def test_every_solved_notebook_earns_full_marks(name, tmp_path):
-    check_solved(name, tmp_path)
 
 
 def first_of(student):

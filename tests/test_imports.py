@@ -82,7 +82,7 @@ def loaded_by(*arguments, cwd=None):
             {"click", "pydantic", "numpy"},
         ),
     ],
-    ids=" ".join,
+    ids=lambda words: " ".join(sorted(words) if isinstance(words, set) else words),
 )
 def test_a_command_loads_what_it_needs_and_nothing_else(arguments, needed, tmp_path):
     assert loaded_by(*arguments, cwd=tmp_path) == needed

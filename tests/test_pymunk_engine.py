@@ -57,16 +57,25 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case",
+    [
+        "grips, slips, leaves",
+        "rolls",
+        pytest.param("slips at once", marks=pytest.mark.slow),
+        pytest.param("no friction", marks=pytest.mark.slow),
+    ],
+)
 def test_a_ride_round_the_pulley_converges(case):
     name, overrides = CASES[case]
     want = exact(machine(name, *overrides))
-    steps = (2e-3, 1e-3, 5e-4, 2.5e-4)
-    errors = [off(run(machine(name, *overrides, f"run.dt={dt}")), want) for dt in steps]
-    assert errors[1] < 1e-4
-    assert errors[-1] < 1e-5
-    order = np.log(errors[1] / errors[-1]) / np.log(4.0)
-    assert order > 1.0 or errors[1] < 1e-6
+    coarse, fine = (
+        off(run(machine(name, *overrides, f"run.dt={dt}")), want) for dt in (1e-3, 2.5e-4)
+    )
+    assert coarse < 1e-4
+    assert fine < 1e-5
+    order = np.log(coarse / fine) / np.log(4.0)
+    assert order > 1.0 or coarse < 1e-6
 
 
 def test_friction_on_the_belt_leaves_at_the_top_without_a_hit():

@@ -56,7 +56,7 @@ MEASURE = import_module("workprecision.measure")
 
 def one(case, method, value=None):
     """One record, as little of it as possible."""
-    trial = MEASURE.Trial(KNOWN[case], METHODS[method], value, patience=0.3)
+    trial = MEASURE.Trial(KNOWN[case], METHODS[method], value, patience=0.03)
     trial.repeat()
     return trial.record()
 
@@ -459,9 +459,9 @@ def test_scaling_counts_particles_and_events():
 
 
 def test_scaling_measures_every_size(monkeypatch):
-    monkeypatch.setitem(MEASURE.QUICK, "independent", 1000)
+    monkeypatch.setitem(MEASURE.COUNTS, "independent", (1, 150, 600))
     sizes = scaling(["independent", "interacting"], ["exact"], repeats=1, quick=True)
-    assert [one.particles for one in sizes] == [1, 10, 100, 1000]
+    assert [one.particles for one in sizes] == [1, 150, 600]
     assert exponent(sizes, "independent", "exact", "memory") == pytest.approx(1.0, abs=0.2)
 
 
@@ -604,6 +604,13 @@ def test_every_method_has_its_own_look():
 # The command.
 
 
+@pytest.fixture(autouse=True)
+def hasty(monkeypatch):
+    """No measurement is repeated for long: what is measured is not looked at."""
+    monkeypatch.setattr(MEASURE, "QUICK_PATIENCE", 0.02)
+    monkeypatch.setattr(MEASURE, "SCALING_PATIENCE", 0.02)
+
+
 def call(*arguments, code=0):
     result = CliRunner().invoke(main, [*map(str, arguments)])
     assert result.exit_code == code, result.output
@@ -643,7 +650,7 @@ def test_the_scripts_json(tmp_path, monkeypatch):
 
 
 def test_the_scripts_scaling(tmp_path, monkeypatch):
-    monkeypatch.setitem(MEASURE.QUICK, "independent", 100)
+    monkeypatch.setitem(MEASURE.COUNTS, "independent", (1, 10, 100))
     said = call("--scaling", "independent", "--quick", "--repeats", 1, "--out", tmp_path).stdout
     assert "Independent, exact: time ∝ N^" in said
     assert "400" in said

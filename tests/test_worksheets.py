@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+from functools import cache
 from math import acos, atan, cos, degrees, erfc, hypot, log, pi, radians, sin, sqrt, tan
 from pathlib import Path
 
@@ -58,7 +59,7 @@ SLOW = (
     "uncertainty",
     "stream --",
     "stream-independent",
-    "fixed-steps.toml --set run.dt=0.0000",
+    "fixed-steps.toml --set run.dt=0.000",
 )
 QUICK = [
     (number, line)
@@ -191,6 +192,7 @@ def layer_delay(h):
     return (sqrt(down**2 + 2.0 * G * (0.5 + h)) - sqrt(down**2 + 2.0 * G * 0.5)) / G
 
 
+@cache
 def fixed(dt):
     scene = load(find(8).folder / "fixed-steps.toml", [f"run.dt={dt}"])
     recording = simulate(scene)
@@ -633,7 +635,7 @@ def test_impacts_of_lesson_8_are_late_by_a_step_or_a_part_of_one_as_it_says():
     for dt in (2e-4, 1e-4, 5e-5, 2e-5):
         assert 0.298 / dt == pytest.approx(round(0.298 / dt), abs=1e-9)
     assert pytest.approx(1862.5) == 0.298 / 1.6e-4
-    for dt, share in ((2e-4, 1.0), (1e-4, 1.0), (1.6e-4, 0.5)):
+    for dt, share in ((2e-4, 1.0), (1.6e-4, 0.5)):
         scene = load(find(8).folder / "fixed-steps.toml", [f"run.dt={dt}"])
         late = (compare(simulate(scene)).simulated["t2"] - 0.298) / dt
         assert late == pytest.approx(share, abs=1e-8)

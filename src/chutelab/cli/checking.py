@@ -7,7 +7,7 @@ from itertools import chain
 
 import click
 
-from chutelab.cli.console import progress, tell
+from chutelab.cli.console import progress, say, tell
 from chutelab.cli.parameters import (
     complete_scene,
     dt_option,
@@ -28,8 +28,10 @@ from chutelab.cli.parameters import (
 def check(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool) -> None:
     """Look at each SCENE before it runs, or say all that is wrong with it.
 
-    Says what will be built and what is skipped, which engine runs and why, what a run will cost,
-    what the closed form covers, and for each warning what to change.
+    Says what will be built and what is skipped, which engine runs and why, what a run will cost in
+    time and memory, what the closed form covers, and for each warning what to change. What a run
+    costs comes from a trial of the whole of it, cut off after 1 s: longer ones are told from how
+    far it got, or not at all.
     """
     from chutelab.checks.preflight import Preflight, preflight
     from chutelab.scene import SceneError, load
@@ -42,7 +44,7 @@ def check(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool) ->
             found[name] = preflight(load(name, overrides))
         except SceneError as error:
             refused = True
-            click.echo(f"Error: {error}", err=True)
+            say(f"Error: {error}", err=True)
     looks = [{"scene": name, **plain(look)} for name, look in found.items()]
     titled = (replace(look, title=f"{name}: {look.title}") for name, look in found.items())
     tell({"scenes": looks}, *titled, as_json=as_json)

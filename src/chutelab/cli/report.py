@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from math import isnan
 
 import numpy as np
 from rich.console import RenderableType
@@ -26,8 +27,8 @@ def report(recording: Recording, accuracy: Accuracy | None = None) -> list[Rende
     head.append(
         f"\nengine {recording.engine}, {_many(recording.count, 'particle')},"
         f" {_many(recording.contacts, 'contact')},"
-        f" {recording.steps} {'rounds' if recording.engine == 'exact' else 'steps'},"
-        f" {recording.seconds:.3g} s\n"
+        f" {recording.steps} {'rounds' if recording.engine == 'exact' else 'steps'}"
+        f"{'' if isnan(recording.seconds) else f', {recording.seconds:.3g} s'}\n"
         f"ended: {', '.join(f'{counted[k]} {REASONS[k]}' for k in sorted(counted))}",
         style="not bold",
     )

@@ -6,6 +6,7 @@ end.
 
 from __future__ import annotations
 
+from math import nan
 from typing import Any
 
 import numpy as np
@@ -145,7 +146,7 @@ class Recorder:
         *,
         engine: str,
         steps: int,
-        seconds: float = 0.0,
+        seconds: float = nan,
         origin: tuple[float, float] = (0.0, 0.0),
     ) -> Recording:
         """Sort what was collected, counted from `origin` (m), and freeze it."""

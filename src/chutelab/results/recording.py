@@ -12,6 +12,7 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
+from math import isnan, nan
 from pathlib import Path
 from typing import Any
 
@@ -162,7 +163,7 @@ class Recording(Shown):
     contacts : int
         Impacts and collisions resolved.
     seconds : float
-        Wall time from the validated scene to the recording.
+        Wall time from the validated scene to the recording; NaN in one that was loaded.
     """
 
     machine: Machine
@@ -174,7 +175,7 @@ class Recording(Shown):
     by_surface: Floats
     steps: int
     contacts: int
-    seconds: float = 0.0
+    seconds: float = nan
 
     def __post_init__(self) -> None:
         for name in ("knots", "offsets", "ended", "events", "by_surface"):
@@ -232,8 +233,9 @@ class Recording(Shown):
             "events": ", ".join(f"{n:,} {Kind(k).name.lower()}" for k, n in happened),
             "ended": ", ".join(f"{n:,} {REASONS[k]}" for k, n in ended),
             "knots": f"{len(self.knots):,}",
-            "run time": f"{self.seconds:.3g} s",
         }
+        if not isnan(self.seconds):
+            told["run time"] = f"{self.seconds:.3g} s"
         return Sheet(self.title, ("", ""), tuple(told.items()), texts=2)
 
     def save(self, path: str | Path) -> Path:

@@ -25,11 +25,13 @@ def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> 
     """Return a recording's numbers as plain lists and floats, None for what did not happen.
 
     Lists have one entry a particle. Lengths, times and energies are in SI units, angles in degrees
-    under names that end in ``_deg``. ``accuracy`` is None unless one was asked for, ``stopped``
-    unless the run was ended before it was over (see `results.quantities.Stopped`), ``rolling``
-    unless disks settled on the outgoing belt without being carried by it (see `rolling`), and
-    ``waited`` unless particles found their place taken (see `results.quantities.Waits`), and
-    ``squeezed`` unless riders by adhesion got into each other (see `machine.releases.Squeeze`).
+    under names that end in ``_deg``. ``seconds`` is None of a recording that was loaded, and in
+    summary.json, where the same run leaves the same bytes. ``accuracy`` is None unless one was
+    asked for, ``stopped`` unless the run was ended before it was over (see
+    `results.quantities.Stopped`), ``rolling`` unless disks settled on the outgoing belt without
+    being carried by it (see `rolling`), ``waited`` unless particles found their place taken (see
+    `results.quantities.Waits`), and ``squeezed`` unless riders by adhesion got into each other (see
+    `machine.releases.Squeeze`).
     """
     error, scene = compare(recording), recording.scene
     as_printed = None

@@ -108,8 +108,11 @@ def overlap(e: Evidence) -> Verdict | None:
     for now in np.concatenate([_instants(e), _some(e, Kind.COLLISION)["t"]]):
         (position,), _ = e.recording.at([now])
         there = np.flatnonzero(np.isfinite(position[:, 0]))
+        if not len(there):
+            continue  # the last has landed, the next is not released
         deep, i, j = closest(position[there], e.machine.particle.radius)
-        found.append((deep, f"particles {there[i]} and {there[j]} at t = {now:.6g} s"))
+        if deep > 0.0:
+            found.append((deep, f"particles {there[i]} and {there[j]} at t = {now:.6g} s"))
     return worst(found, e.rounding + 2.0 * e.late, "m")
 
 

@@ -87,6 +87,10 @@ VIDEOS = {
 Lines and letters stay sharp; the file begins to play before it is all there.
 """
 
+ALIKE = ("-threads", "4", "-flags:v", "+bitexact", "-fflags", "+bitexact")
+"""Options by which the same pictures make the same bytes: the encoders' work depends on how many
+threads share it, and ffmpeg gives a webm a random number unless told."""
+
 
 class VideoError(MissingLibraryError):
     """A video cannot be written, and what to do about it."""
@@ -119,7 +123,7 @@ def write_video(
         "quality": None,
         "pixelformat": "yuv420p",
         "macro_block_size": 2,
-        "output_params": parameters.split(),
+        "output_params": [*parameters.split(), *ALIKE],
         "ffmpeg_log_level": "error",
     }
     with cast(Any, get_writer(path, format="FFMPEG", mode="I", fps=fps, **options)) as video:

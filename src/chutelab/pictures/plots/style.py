@@ -13,6 +13,7 @@ from textwrap import shorten
 from typing import Any
 
 import numpy as np
+from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -182,6 +183,9 @@ def scientific(value: float, unit: str) -> str:
 DPI = 120
 """Dots to the inch in files, unless a picture is for print."""
 
+UNDATED = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+"""By format, what keeps the time at which a picture is written out of its file."""
+
 ON_SCREEN = 80
 """Dots to the inch in a notebook; files have what the figure was made with."""
 
@@ -207,12 +211,13 @@ class Picture(Figure):
     def write(self, path: str | Path | None) -> None:
         """Write the figure, whole or not at all; nothing without a path.
 
-        The suffix says the format, PNG without one.
+        The suffix says the format, PNG without one. The same figure makes the same bytes.
         """
         if path is None:
             return
-        with whole(path) as unfinished:
-            self.savefig(unfinished, format=Path(path).suffix.lstrip(".") or "png")
+        form = Path(path).suffix.lstrip(".").lower() or "png"
+        with whole(path) as unfinished, rc_context({"svg.hashsalt": "chutelab"}):
+            self.savefig(unfinished, format=form, metadata=UNDATED.get(form))
 
     def _repr_png_(self) -> bytes:
         buffer = BytesIO()

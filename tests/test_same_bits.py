@@ -1,0 +1,98 @@
+"""The same command leaves the same files to the last bit, whoever runs it, where and when."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from chutelab.cli import main
+
+HERE = Path(__file__).parent
+
+QUICK = [
+    "run perpendicular --out run --only png,csv,npz,json -q",
+    "page perpendicular --vary plate.angle_deg=0,20",
+]
+
+# The words of one command a line; each may use what those above it have written.
+EVERY = [
+    *QUICK,
+    "run stream --out film --format mp4 --set stream.count=9 -q",
+    "run perpendicular --out film --only gif,webm,strobe -q",
+    "run stream --out met --set stream.count=20 --set stream.interact=true --only npz,json,png -q",
+    "run slip --out pymunk --engine pymunk --only npz,json,csv -q",
+    "run perpendicular --out reached --engine pymunk --accuracy 1e-6 --only npz,json -q",
+    "sweep perpendicular --vary plate.angle_deg=0:40:5 --out a.csv --plot a.svg",
+    "show run/recording.npz --out shown",
+    "sweep perpendicular --vary plate.angle_deg=0:40:5 --json --out a.parquet --plot a.pdf",
+    "sweep perpendicular --vary plate.angle_deg=0:40:5 --vary incoming.speed=1:3:4 --jobs 2"
+    " --out b.csv --plot b.svg",
+    "sweep perpendicular --vary plate.angle_deg=0:40 --vary incoming.speed=1:3 --sample 8"
+    " --design sobol --out c.parquet --plot c.pdf",
+    "sweep perpendicular --uncertainty plate.restitution=0.5±0.05 --out u.csv --plot u.png",
+    "solve perpendicular --vary plate.angle_deg=0:60 --target landing.vx=1 --out solved",
+    "solve perpendicular --vary plate.angle_deg=0:60 --vary incoming.speed=1:3"
+    " --minimize belt_work --out least",
+    "compare perpendicular --data perpendicular-track --out compared",
+    "compare perpendicular --data perpendicular-track --fit plate.restitution --json --out fitted",
+    "lesson list --json",
+    "lesson show 3",
+    "lesson build 1 --out built",
+    "lesson page 1 -o pages",
+    "lesson new own",
+    "lesson new mine --from 3",
+    "lesson grade mine/exercise.ipynb --out class.csv",
+    "figure 6 --out figures",
+    "tables --json",
+    "scenes --json",
+    "schema",
+    "new mine.toml",
+    "verify perpendicular stream --json",
+    "stress slip --json",
+]
+
+TIMED = {"bench", "check"}
+"""Commands whose answer is how long something takes, or will."""
+
+ONE = {"PYTHONHASHSEED": "1", "TZ": "UTC", "LC_ALL": "C.UTF-8", "COLUMNS": "80"}
+OTHER = {"PYTHONHASHSEED": "77", "TZ": "Asia/Tokyo", "OPENBLAS_NUM_THREADS": "1"}
+
+
+def written(folder: Path, commands: list[str], environment: dict[str, str]) -> dict[str, bytes]:
+    """Run commands in a new folder; return what is in its files by their paths in it."""
+    folder.mkdir(parents=True)
+    arguments = [HERE / "in_a_row.py", json.dumps([line.split() for line in commands])]
+    found = {key: value for key, value in os.environ.items() if key not in {*ONE, *OTHER}}
+    path = os.pathsep.join([str(HERE.parent / "src"), *filter(None, [found.get("PYTHONPATH")])])
+    subprocess.run(
+        [sys.executable, *arguments],
+        cwd=folder,
+        env={**found, "COLUMNS": "80", "PYTHONPATH": path, **environment},
+        check=True,
+        timeout=600,
+    )
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    return {str(path.relative_to(folder)): path.read_bytes() for path in files}
+
+
+@pytest.mark.parametrize(
+    "commands", [pytest.param(QUICK, id="quick"), pytest.param(EVERY, marks=pytest.mark.slow)]
+)
+def test_files_are_the_same_bits_whoever_writes_them(tmp_path, commands):
+    one = written(tmp_path / "one", commands, ONE)
+    other = written(tmp_path / "another folder" / "other", commands, OTHER)
+    assert list(one) == list(other)
+    assert [name for name in one if one[name] != other[name]] == []
+    assert {"run/recording.npz", "run/summary.json", "overlay.svg", "overlay.pdf"} <= one.keys()
+
+
+def test_every_command_is_compared_or_answers_with_times():
+    lesson = main.commands["lesson"].commands
+    lines = [line.split() for line in EVERY]
+    assert {words[0] for words in lines} | TIMED == main.commands.keys()
+    assert {words[1] for words in lines if words[0] == "lesson"} == lesson.keys()

@@ -8,6 +8,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import matplotlib as mpl
 import numpy as np
 import pytest
 from click.testing import CliRunner
@@ -687,7 +688,9 @@ def test_what_changes_is_set_as_matplotlib_would(text: str) -> None:
     assert ours.sum() == pytest.approx(theirs.sum(), rel=0.15)
     for axis in (0, 1):
         inked = [np.flatnonzero(ink.any(axis=axis))[[0, -1]] for ink in (ours, theirs)]
-        assert inked[0] == pytest.approx(inked[1], abs=max(2, 0.03 * np.ptp(inked[1])))
+        # Up to 3.10 matplotlib hints with its own FreeType 2.6.1, which sets letters closer.
+        apart = 0.03 if mpl.__version_info__ >= (3, 11) else 0.08
+        assert inked[0] == pytest.approx(inked[1], abs=max(2, apart * np.ptp(inked[1])))
 
 
 # The file

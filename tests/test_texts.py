@@ -6,17 +6,19 @@ import re
 from functools import cache
 
 import pytest
+from click.testing import CliRunner
 from matplotlib.cbook import is_math_text
 from matplotlib.text import Text
 
 import chutelab
+from chutelab.cli import main
 from chutelab.engines.simulation import simulate
 from chutelab.pictures import plots
 from chutelab.pictures.animation import animate
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.design import scan, spread, sweep_figure
 from chutelab.pictures.plots.measured import measured
-from chutelab.scene import from_dict, to_dict
+from chutelab.scene import from_dict, parse, to_dict, to_toml
 from chutelab.studies.design import solve, uncertainty
 from chutelab.studies.measured import read, residuals
 from chutelab.studies.sweep import sweep
@@ -86,3 +88,48 @@ def test_a_text_that_the_font_has_is_as_it_was():
     assert style.plain(text) == style.drawable(text) == text
     assert style.drawable("漢\x1b\N{RIGHT-TO-LEFT OVERRIDE}\r") == "\N{REPLACEMENT CHARACTER}" * 4
     assert style.plain(r"\$ $") == r"\\$ \$"
+
+
+@pytest.fixture
+def evil(tmp_path):
+    path = tmp_path / "evil\x1b]0;t\x07.toml"
+    path.write_text(to_toml(scene()), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    "args",
+    [
+        ["run"],
+        ["check"],
+        ["verify"],
+        ["stress"],
+        ["sweep", "--vary", "plate.restitution=0,1"],
+        ["solve", "--vary", "plate.restitution=0.3:0.6", "--target", f"impact.{NAME}.vx=-1"],
+        ["run", "--set", f"surface.{NAME}.colour=1"],
+        ["run", "--out", "/dev/null/\x9b31m"],
+        ["compare", "--data", "no\x1b[2Jne"],
+        ["show"],
+    ],
+    ids=lambda args: args[0],
+)
+@pytest.mark.parametrize("colour", [False, True])
+def test_a_terminal_is_told_nothing_to_obey(monkeypatch, evil, args, colour):
+    if colour:
+        monkeypatch.setenv("FORCE_COLOR", "1")
+    ran = CliRunner().invoke(main, [args[0], str(evil), *args[1:]], color=True)
+    assert ran.exit_code in (0, 2)
+    # What rich colours with is all there is.
+    said = re.sub(r"\x1b\[[\d;]*m", "", ran.output) if colour else ran.output
+    assert not HOSTILE.search(said)
+    assert r"\x1b" in said or r"\x9b" in said
+
+
+def test_a_scene_that_is_written_can_be_read_whatever_is_said_of_it():
+    again = parse(to_toml(scene(), f"{NAME}: \0\x1b\x7f\r\n\N{LINE SEPARATOR}x = 1"))
+    assert again == scene().model_copy(update={"expect": ()})
+
+
+def test_a_recording_prints_nothing_to_obey():
+    assert not HOSTILE.search(str(run()))
+    assert r"\x1b" in str(run())

@@ -7,7 +7,7 @@ from itertools import chain
 
 import click
 
-from chutelab.cli.console import progress, tell
+from chutelab.cli.console import progress, say, tell
 from chutelab.cli.parameters import (
     complete_scene,
     dt_option,
@@ -42,7 +42,7 @@ def check(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool) ->
             found[name] = preflight(load(name, overrides))
         except SceneError as error:
             refused = True
-            click.echo(f"Error: {error}", err=True)
+            say(f"Error: {error}", err=True)
     looks = [{"scene": name, **plain(look)} for name, look in found.items()]
     titled = (replace(look, title=f"{name}: {look.title}") for name, look in found.items())
     tell({"scenes": looks}, *titled, as_json=as_json)

@@ -16,9 +16,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from chutelab.util.errors import printable, printable_lines
+
 if TYPE_CHECKING:
-    from rich.console import RenderableType
+    from rich.console import Console, ConsoleOptions, RenderableType
     from rich.progress import Progress
+    from rich.segment import Segment
 
 
 class _Output(io.TextIOWrapper):
@@ -77,6 +80,27 @@ def open_streams() -> None:
             setattr(sys, name, kind(stream.buffer, errors="replace", **with_its))
 
 
+def say(text: str, *, err: bool = False, end: str = "\n") -> None:
+    """Print a text in which a terminal finds nothing to obey, whatever titles and names are in it.
+
+    All text goes through here, or through `show`.
+    """
+    click.echo(f"{printable_lines(text)}{end}", err=err, nl=False)
+
+
+class _Shown:
+    """What rich prints of something, in which a terminal finds nothing to obey but colours."""
+
+    def __init__(self, part: RenderableType) -> None:
+        self.part = part
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Segment]:
+        from rich.segment import Segment
+
+        for text, style, control in console.render(self.part, options):
+            yield Segment(text if control else printable_lines(text), style, control)
+
+
 def show(*parts: RenderableType) -> None:
     """Print tables and texts; in colour on a terminal, unless NO_COLOR is set."""
     from rich.console import Console
@@ -84,7 +108,8 @@ def show(*parts: RenderableType) -> None:
     console = Console(highlight=False)
     with console.capture() as capture:
         for part in parts:
-            console.print(part)
+            # What was made printable is longer than it was, and not to be cut for it.
+            console.print(_Shown(part), crop=False)
     # Through click: it flushes, and knows what to do when the reader has gone.
     click.echo(capture.get().removeprefix("\n"), nl=False)
 
@@ -109,7 +134,7 @@ def tell(
     elif not quiet:
         show(*parts)
         if wrote:
-            click.echo(wrote)
+            say(wrote)
 
 
 PATIENCE = 1.0
@@ -141,7 +166,7 @@ def progress(
         from rich.console import Console
 
         bar = rich.Progress(
-            rich.TextColumn("{task.description}"),
+            rich.TextColumn("{task.description}", markup=False),
             rich.BarColumn(),
             rich.TimeElapsedColumn(),
             *([rich.TextColumn("left:"), rich.TimeRemainingColumn()] if left else []),
@@ -149,7 +174,7 @@ def progress(
             transient=True,
         )
         # Without a total it pulses: nobody has said yet how far it is.
-        bar.add_task(what, total=None)
+        bar.add_task(printable(what), total=None)
         bar.start()
         bars.append(bar)
         if done is not None:

@@ -115,6 +115,7 @@ def build(wanted: tuple[str, ...], out: Path | None, force: bool, quiet: bool) -
     the same bytes.
     """
     from chutelab.classroom.lessons.building import build as build_lesson
+    from chutelab.classroom.lessons.building import check_inside
 
     for one in _lessons(wanted):
         with (
@@ -122,10 +123,12 @@ def build(wanted: tuple[str, ...], out: Path | None, force: bool, quiet: bool) -
             progress(one.name, quiet=quiet) as update,
         ):
             target = out / one.folder.name if out else None
+            if target is not None:
+                check_inside(target)
             built = build_lesson(one, target, force=force, progress=update)
         if not quiet:
             done = "written" if built.made else "up to date"
-            click.echo(f"{built.path}: {done}, {built.size / 1000:.0f} kB")
+            console.say(f"{built.path}: {done}, {built.size / 1000:.0f} kB")
 
 
 @lesson.command(short_help="Start a lesson of your own.")
@@ -155,7 +158,7 @@ def new(name: Path, model: str | None) -> None:
         made = start(name, copied)
     # A name with a folder in front is taken for a folder, even if a shipped lesson has it.
     said = made if len(made.parts) > 1 else f"./{made}"
-    click.echo(f"wrote {made}; edit it, and make its picture with: chutelab lesson build {said}")
+    console.say(f"wrote {made}; edit it, and make its picture with: chutelab lesson build {said}")
 
 
 @lesson.command(short_help="Bundle the lessons as web pages that need no server.")
@@ -175,7 +178,7 @@ def page(wanted: tuple[str, ...], out: Path, quiet: bool) -> None:
         made = bundle(_lessons(wanted), out, update)
     if not quiet:
         size = sum(path.stat().st_size for path in made)
-        click.echo(f"wrote {len(made)} files, {size / 1e6:.1f} MB; open {out / 'index.html'}")
+        console.say(f"wrote {len(made)} files, {size / 1e6:.1f} MB; open {out / 'index.html'}")
 
 
 def _lessons(wanted: tuple[str, ...]) -> list[Lesson]:
@@ -260,4 +263,4 @@ def grade(files: tuple[Path, ...], out: Path | None, time_limit: float, quiet: b
     if out is not None:
         with writing(f"--out {out}"):
             write_csv(grades, out)
-        click.echo(f"wrote {out}")
+        console.say(f"wrote {out}")

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
-from chutelab.cli.console import progress, show, show_json
+from chutelab.cli.console import progress, say, show, show_json
 from chutelab.cli.parameters import json_option, out_option
 from chutelab.cli.program import RefusedError
 from chutelab.util.tables import plain
@@ -152,12 +152,12 @@ class Output:
 
             show(*report(recording, accuracy))
             if self.out is not None:
-                click.echo(f"wrote into {self.out}: {', '.join(self.files)}")
+                say(f"wrote into {self.out}: {', '.join(self.files)}")
         if self.out is not None and "csv" in self.kinds and not self.quiet:
             from chutelab.results import storage
 
             if (few := storage.instants(recording)) < storage.SAMPLES:
-                click.echo(
+                say(
                     f"trajectory.csv has {few} instants, not {storage.SAMPLES}: with more it would"
                     f" have over {storage.MOST_ROWS:,} rows",
                     err=self.as_json,

@@ -8,12 +8,13 @@ does not hold, or an accuracy was not reached.
 
 from __future__ import annotations
 
+import io
 import sys
 from typing import Any
 
 import click
 
-from chutelab.cli.console import open_streams
+from chutelab.cli.console import open_streams, say
 from chutelab.util.errors import InputError, MissingLibraryError
 from chutelab.util.signals import INTERRUPTED, exit_code, raised
 
@@ -57,12 +58,14 @@ EXPECTED = (click.ClickException, InputError, MissingLibraryError)
 def _told(error: BaseException) -> int:
     """Say on standard error what went wrong; return the exit code."""
     if code := exit_code(error):
-        click.echo("Interrupted." if code == INTERRUPTED else "Terminated.", err=True)
+        say("Interrupted." if code == INTERRUPTED else "Terminated.", err=True)
         return code
     if isinstance(error, (InputError, MissingLibraryError)):
         error = RefusedError(str(error))
     if isinstance(error, click.ClickException):
-        error.show()
+        text = io.StringIO()
+        error.show(text)
+        say(text.getvalue(), err=True, end="")
         return error.exit_code
     said = str(error)
     if isinstance(error, MemoryError):
@@ -74,7 +77,7 @@ def _told(error: BaseException) -> int:
             f"{type(error).__name__}: {' '.join(said.split()) or 'no message'}; please"
             " report it, with what `chutelab --debug ...` prints for the same command"
         )
-    click.echo(f"chutelab failed: {said}", err=True)
+    say(f"chutelab failed: {said}", err=True)
     return 1
 
 
@@ -82,7 +85,7 @@ def _version(ctx: click.Context, _parameter: click.Parameter, asked: bool) -> No
     if asked and not ctx.resilient_parsing:
         import chutelab
 
-        click.echo(f"chutelab {chutelab.__version__}")
+        say(f"chutelab {chutelab.__version__}")
         ctx.exit()
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from chutelab.cli.console import progress
+from chutelab.cli.console import progress, say
 from chutelab.cli.output import KINDS, Output, destination, output_options, writing
 from chutelab.cli.parameters import (
     dt_option,
@@ -186,9 +186,9 @@ def page(
         written = write(loaded, sliders, path, progress=update)
     if not quiet:
         variants = "1 variant" if written.variants == 1 else f"{written.variants} variants"
-        click.echo(f"wrote {written.path}, {written.size / 1000:.0f} kB: {variants}")
+        say(f"wrote {written.path}, {written.size / 1000:.0f} kB: {variants}")
         for values, fault in list(written.faults.items())[:1]:
-            click.echo(
+            say(
                 f"{len(written.faults)} of them cannot be run, and the page says why; the first,"
                 f" at {', '.join(f'{value:g}' for value in values)}: {fault}"
             )

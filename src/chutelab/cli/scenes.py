@@ -39,7 +39,7 @@ def schema() -> None:
     """Print the JSON Schema of scene files, for editors that complete them."""
     from chutelab.scene import schema as schema_of_scenes
 
-    click.echo(json.dumps(schema_of_scenes(), indent=2))
+    console.say(json.dumps(schema_of_scenes(), indent=2))
 
 
 @click.command(short_help="Write a complete, commented scene to start from.")
@@ -51,7 +51,7 @@ def new(path: Path, force: bool) -> None:
     from chutelab.util.files import whole
 
     if path == STANDARD_OUTPUT:
-        click.echo(template(), nl=False)
+        console.say(template(), end="")
         return
     if path.is_dir():
         raise RefusedError(f"{path} is a folder; give the name of a file.")
@@ -59,7 +59,7 @@ def new(path: Path, force: bool) -> None:
         raise RefusedError(f"{path} is there already; --force overwrites it.")
     with writing(str(path)), whole(path) as unfinished:
         unfinished.write_text(template(), encoding="utf-8")
-    click.echo(f"wrote {path}; run it with: chutelab run {path}")
+    console.say(f"wrote {path}; run it with: chutelab run {path}")
 
 
 NUMBERS = (1, 3, 4, 5)

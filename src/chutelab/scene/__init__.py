@@ -26,6 +26,7 @@ from chutelab.scene.rules import Expect
 from chutelab.scene.schema import Incoming, Outgoing, Particle, Plate, Run, Scene, Stream, Surface
 from chutelab.scene.units import RESERVED_NAMES
 from chutelab.util.errors import MISSING, Fault, shown
+from chutelab.util.versions import need_all
 
 __all__ = [
     "MISSING",
@@ -54,3 +55,5 @@ __all__ = [
     "to_dict",
     "to_toml",
 ]
+
+need_all()

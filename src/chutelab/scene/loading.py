@@ -20,7 +20,7 @@ from pydantic import ValidationError
 from chutelab.scene.overrides import Override, apply, at_path, joined, rule_at
 from chutelab.scene.rules import ConflictError, Look, conflicts
 from chutelab.scene.schema import Scene
-from chutelab.util.errors import MISSING, Fault, InputError, did_you_mean
+from chutelab.util.errors import MISSING, Fault, InputError, did_you_mean, printable
 
 
 class SceneError(InputError):
@@ -331,7 +331,7 @@ def to_toml(scene: Scene, comment: str = "") -> str:
     )
     # tomli-w writes a line for each number of a list; no text holds a line break as it stands.
     text = _POINT.sub(r"[\1, \2]", tomli_w.dumps(tables))
-    remark = "".join(f"# {line}".rstrip() + "\n" for line in comment.splitlines())
+    remark = "".join(f"# {printable(line)}".rstrip() + "\n" for line in comment.splitlines())
     return f"{remark}\n{text}" if remark else text
 
 

@@ -138,7 +138,7 @@ class InputError(ValueError):
 
 
 class MissingLibraryError(ImportError):
-    """A library that Chutelab can do without is not installed; the text says what to install."""
+    """A library is not installed, or too old; the text says what to install."""
 
 
 def cut(text: str, width: int) -> str:
@@ -165,6 +165,11 @@ def printable(text: str) -> str:
         else c.encode("unicode_escape", "surrogatepass").decode("ascii")
         for c in text
     )
+
+
+def printable_lines(text: str) -> str:
+    """Return a text of several lines, each of them `printable`."""
+    return "\n".join(map(printable, text.split("\n")))
 
 
 def shown(value: object) -> str:

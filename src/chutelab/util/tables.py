@@ -14,6 +14,8 @@ from math import isfinite
 from textwrap import wrap
 from typing import Any
 
+from chutelab.util.errors import printable
+
 WIDTH = 80
 """Columns of a line of prose in a terminal, at most."""
 
@@ -112,7 +114,9 @@ class Sheet:
 
         out = io.StringIO()
         Console(file=out, width=UNBOUNDED, color_system=None).print(self)
-        return "\n".join(line.rstrip() for line in out.getvalue().strip("\n").splitlines())
+        return "\n".join(
+            printable(line.rstrip()) for line in out.getvalue().strip("\n").split("\n")
+        )
 
     def html(self) -> str:
         """Return the table as HTML that takes its colours from the page around it."""

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 from collections.abc import Mapping
+from contextlib import suppress
 from importlib import import_module
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError, distribution, requires, version
 from pathlib import Path
 from typing import Any
 
@@ -34,13 +36,56 @@ def library(module: str, what: str, extra: str) -> Any:
     Raises
     ------
     MissingLibraryError
-        Without it; says `what`, such as "a fit needs SciPy", and what to install.
+        Without it, or if it is too old; says `what`, such as "a fit needs SciPy", and what to
+        install.
     """
+    install = f'pip install "chutelab[{extra}]"'
+    if old := too_old(extra):
+        raise MissingLibraryError(f"{what}, {'; '.join(old)}: {install}")
     try:
         return import_module(module)
     except ImportError as error:
-        text = f'{what}: pip install "chutelab[{extra}]"'
-        raise MissingLibraryError(text, name=error.name) from error
+        raise MissingLibraryError(f"{what}: {install}", name=error.name) from error
+
+
+_BOUND = re.compile(r"([\w.-]+)[^>;]*>=([\d.]+)(?:.*extra == .([\w-]+))?")
+_VERSION = re.compile(r"^Version: (.+)$", re.MULTILINE)
+
+
+def too_old(extra: str | None = None) -> list[str]:
+    """Return for what packages are too old that are installed, by the bounds of chutelab's own.
+
+    Such as "pydantic>=2.9 (2.7.0 is installed)". By default those that it always needs, else those
+    of one extra. Empty where it is not installed itself.
+    """
+    lines: list[str] = []
+    with suppress(PackageNotFoundError):
+        lines = requires("chutelab") or []
+    found = []
+    for bound in filter(None, map(_BOUND.match, lines)):
+        if bound[3] != extra:
+            continue
+        with suppress(PackageNotFoundError):  # the import says so
+            # Reading all that is said of a package takes five times as long as its version.
+            said = _VERSION.search(distribution(bound[1]).read_text("METADATA") or "")
+            if said is not None and _numbers(said[1]) < _numbers(bound[2]):
+                found.append(f"{bound[1]}>={bound[2]} ({said[1]} is installed)")
+    return found
+
+
+def _numbers(version: str) -> tuple[int, ...]:
+    """Return the first three numbers of a version."""
+    return (*map(int, re.findall(r"\d+", version)), 0, 0, 0)[:3]
+
+
+def need_all() -> None:
+    """Raise a `MissingLibraryError` if a package that chutelab always needs is too old.
+
+    Some of them fail only by doing less.
+    """
+    if old := too_old():
+        needed = " ".join(f'"{line.partition(" ")[0]}"' for line in old)
+        raise MissingLibraryError(f"chutelab needs {'; '.join(old)}: pip install {needed}")
 
 
 def own_version() -> str:

@@ -9,8 +9,8 @@
 ===============  ==================================================================================
 
 What may come of a command: 0, 2 with a message, 1 where the help promises it, 130 and 143 when it
-is told to stop. No traceback, no wait of more than `worker.PATIENCE`, nothing left over or half-written.
+is told to stop. No traceback, no wait of more than `worker.PATIENCE`, nothing left over or torn.
 
-A default run draws few cases; ``CHUTELAB_HOSTILE=10000 CHUTELAB_KILLS=300 pytest -m slow
-tests/hostile`` as many as asked.
+A default run draws few cases; as many as asked come with ``CHUTELAB_HOSTILE=10000
+CHUTELAB_KILLS=300 python -m pytest -n auto -m slow tests/hostile``.
 """

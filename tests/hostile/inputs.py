@@ -23,6 +23,8 @@ import tomli_w
 import chutelab
 from chutelab import scene
 from chutelab.cli import main
+from chutelab.studies.sweep import planned
+from chutelab.studies.sweep.sweeping import Crew, sweep_to
 from hostile.mutants import NUMBERS, TEXTS, changed, garbled, value
 
 GOOD = Path("../good")
@@ -65,9 +67,6 @@ def begin() -> None:
     GOOD.mkdir()
     chutelab.simulate(chutelab.load("perpendicular")).save(GOOD / "recording.npz")
     (GOOD / "film.txt").write_text(TRACK, encoding="utf-8")
-    from chutelab.studies.sweep import planned
-    from chutelab.studies.sweep.result import part_of
-    from chutelab.studies.sweep.sweeping import Crew, sweep_to
 
     class EnoughError(Exception):
         pass
@@ -80,7 +79,7 @@ def begin() -> None:
     out = GOOD / "rows.csv"
     with suppress(EnoughError):
         sweep_to(plan, out, Crew(), progress=watch)
-    part_of(out).rename(GOOD / "part")
+    (GOOD / "rows.csv.part").rename(GOOD / "part")
     sweep_to(plan, out, Crew())
     cells = [
         "from chutelab.classroom.exercises import lesson",

@@ -142,9 +142,6 @@ def faults_of(error: ValidationError, document: Mapping[str, Any]) -> list[Fault
         parts, missing = detail["loc"], detail["type"] == "missing"
         if detail["type"] == "extra_forbidden":
             text = _unknown(parts)
-        elif detail["type"] == "string_unicode" and at_path(document, parts) != detail["input"]:
-            # The location is that of its table.
-            parts, text = (*parts, detail["input"]), "unknown key; it is not even text"
         else:
             if missing and isinstance(parts[-1], int):
                 # A point with one coordinate: show what is there, not what is not.

@@ -135,14 +135,6 @@ def _beside(path: Path) -> Iterator[Path]:
         yield folder / real.name
 
 
-def remove_unfinished(path: str | Path) -> None:
-    """Remove what processes that were killed in `whole` left; nobody else may be writing `path`."""
-    path = Path(path)
-    for folder in path.parent.glob(f"{_ASIDE}????????"):
-        if folder.is_dir() and [file.name for file in folder.iterdir()] == [path.name]:
-            shutil.rmtree(folder, ignore_errors=True)
-
-
 _FORMULA: Final = r"((?:\A|[;\t\r\n])[\s\"']*)({}[=+\-@\uff1d\uff0b\uff0d\uff20])"
 """What a spreadsheet takes for a formula, at the start of a cell or of what becomes one where
 semicolons or tabs separate the cells; the last four are Japanese keyboards' =, +, - and @."""

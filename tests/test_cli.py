@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+from importlib import import_module
 from io import StringIO
 from pathlib import Path
 
@@ -571,7 +572,7 @@ def test_what_cannot_be_written_to_is_refused_before_the_work(arguments, monkeyp
     def worked(*_arguments, **_options):
         pytest.fail("the work has begun")
 
-    for work in (
+    works = (
         "engines.simulation.simulate",
         "studies.sweep.swept_by",
         "studies.sweep.sweep_to",
@@ -584,8 +585,11 @@ def test_what_cannot_be_written_to_is_refused_before_the_work(arguments, monkeyp
         "pictures.plots.figure.paper_figure",
         "classroom.lessons.building.simulate",
         "classroom.lessons.building._lesson",
-    ):
-        monkeypatch.setattr(f"chutelab.{work}", worked)
+    )
+    # All imported first: one that is imported later would keep what stands for another's.
+    modules = [import_module(f"chutelab.{work.rpartition('.')[0]}") for work in works]
+    for module, work in zip(modules, works, strict=True):
+        monkeypatch.setattr(module, work.rpartition(".")[2], worked)
     said = refused(*arguments.split())
     name = next(word for word in arguments.split() if word.startswith("/proc"))
     assert re.fullmatch(rf"Error: .*{name}\S*: cannot be written.*: No such file .*\n", said)

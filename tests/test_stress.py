@@ -210,7 +210,7 @@ def interrupted(folder, *arguments, when, sent=(signal.SIGINT,)):
 ENDS = [
     # A second signal does not break off the clean-up of the first.
     ([signal.SIGINT] * 5, 130, "Interrupted."),
-    ([signal.SIGTERM, signal.SIGINT], 143, "Terminated."),
+    ([signal.SIGTERM] * 3, 143, "Terminated."),
     ([signal.SIGHUP], 129, "Terminated."),
 ]
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 from html.parser import HTMLParser
+from urllib.parse import unquote
 
 import pytest
 from click.testing import CliRunner
 
 from chutelab.classroom.lessons import find, shipped_lessons
-from chutelab.classroom.lessons.building import bundle, html_of
+from chutelab.classroom.lessons.building import bundle, html_of, start
 from chutelab.cli import main
 
 
@@ -64,7 +66,7 @@ def broken_links(web):
     broken = set()
     for page in (web / "index.html", *web.glob("*/index.html")):
         for address in Links(page.read_text(encoding="utf-8")).addresses:
-            target = (page.parent / address.partition("#")[0]).resolve()
+            target = (page.parent / unquote(address.partition("#")[0])).resolve()
             inside = target.is_relative_to(web.resolve())
             if not address.startswith(elsewhere) and not (inside and target.is_file()):
                 broken.add(address)
@@ -187,3 +189,123 @@ def test_a_bundle_works_from_a_file_in_a_browser(web):
     assert troubles == []
     assert wide == 360
     assert all(url.startswith(("file:", "data:")) for url in requests)
+
+
+EVIL = "<script>alert(1)</script>\"'><img src=x onerror=alert(1)> & $x"
+
+
+class Tags(HTMLParser):
+    """The tags of a page with their attributes, and its text."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.tags, self.text = [], ""
+        self.feed(page)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_data(self, data):
+        self.text += data
+
+
+SCENE = "javascript:alert(1)#?.toml"
+
+
+@pytest.fixture
+def hostile(tmp_path):
+    """A lesson whose texts and names are markup, and whose files' names are addresses."""
+    folder = tmp_path / "01-a\"><b onclick='x'>#?%41 & c"
+    start(tmp_path / "new").rename(folder)
+    (folder / "scene.toml").rename(folder / SCENE)
+    said, name = json.dumps(EVIL), json.dumps(SCENE)
+    plan = f'title = {said}\nquestion = {said}\nlevel = "start"\nscenes = [{name}]\n'
+    plan += "[picture]\nwidth = 320\nheight = 180\nfps = 10\nslow = 1\n"
+    (folder / "lesson.toml").write_text(plan, encoding="utf-8")
+    sheet = f"# {EVIL}\n\n{EVIL}\n\n[x](javascript:alert(1))\n\n![{EVIL}](lesson.gif)\n"
+    (folder / "README.md").write_text(sheet, encoding="utf-8")
+    return folder
+
+
+def test_no_text_or_name_becomes_markup_or_script(web, hostile, tmp_path):
+    out = tmp_path / "web"
+    result = chutelab("lesson", "page", hostile, "-o", out)
+    assert result.exit_code == 0, result.output
+    for page, usual in (
+        (out / hostile.name / "index.html", web / "06-grip-or-slip" / "index.html"),
+        (out / "index.html", web / "index.html"),
+    ):
+        found, other = (Tags(one.read_text(encoding="utf-8")) for one in (page, usual))
+        assert EVIL in found.text
+        known = {(tag, *attributes) for tag, attributes in other.tags}
+        assert {(tag, *attributes) for tag, attributes in found.tags} <= known
+        for _, attributes in found.tags:
+            assert not str(attributes.get("href")).startswith("javascript:")
+    assert broken_links(out) == set()
+    assert (out / hostile.name / SCENE).is_file()
+
+
+def test_a_page_of_a_scene_has_its_texts_as_texts(tmp_path):
+    names = {}
+    for title in ("x", f"{EVIL} </title><!-- \N{LINE SEPARATOR}"):
+        path = tmp_path / "page.html"
+        override = f"title={json.dumps(title)}"
+        assert chutelab("page", "free-fall", "--set", override, "-o", path).exit_code == 0
+        found = Tags(path.read_text(encoding="utf-8"))
+        names[title] = [(tag, *attributes) for tag, attributes in found.tags]
+        assert title in found.text
+    first, second = names.values()
+    assert first == second
+
+
+def linked(folder, name, target):
+    (folder / name).unlink(missing_ok=True)
+    try:
+        (folder / name).symlink_to(target)
+    except OSError:
+        pytest.skip("no symbolic links here")
+
+
+@pytest.mark.parametrize("name", ["notes.txt", "README.md", "lesson.toml", "lesson.gif", "gone"])
+@pytest.mark.parametrize("command", ["page", "new", "show", "build"])
+def test_no_lesson_reads_what_lies_elsewhere(tmp_path, name, command):
+    folder = start(tmp_path / "mine")
+    target = tmp_path / "secret"
+    if name != "gone":
+        target.write_bytes((folder / name).read_bytes() if (folder / name).exists() else b"secret")
+    linked(folder, name, target)
+    arguments = {"page": ["-o", tmp_path / "out"], "new": [tmp_path / "copy", "--from"]}
+    result = chutelab("lesson", command, *arguments.get(command, []), folder)
+    assert result.exit_code == 2
+    assert f"{name}: a symbolic link out of the lesson's folder" in result.output
+    assert not (tmp_path / "out").exists()
+    assert not (tmp_path / "copy").exists()
+
+
+def test_a_link_within_a_lesson_is_a_file(tmp_path):
+    folder = start(tmp_path / "mine")
+    linked(folder, "again.toml", "scene.toml")
+    assert chutelab("lesson", "new", tmp_path / "copy", "--from", folder).exit_code == 0
+    copy = tmp_path / "copy" / "again.toml"
+    assert not copy.is_symlink()
+    assert copy.read_bytes() == (folder / "scene.toml").read_bytes()
+
+
+@pytest.mark.parametrize("command", [["page", "-o"], ["build", "--out"]])
+def test_no_lesson_writes_through_a_link(tmp_path, command):
+    folder = start(tmp_path / "mine")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "elsewhere").mkdir()
+    linked(tmp_path / "out", "mine", tmp_path / "elsewhere")
+    result = chutelab("lesson", *command, tmp_path / "out", folder)
+    assert result.exit_code == 2
+    assert "symbolic link" in result.output
+    assert list((tmp_path / "elsewhere").iterdir()) == []
+
+
+def test_lessons_of_one_name_are_refused_before_anything_is_made(tmp_path):
+    first, second = start(tmp_path / "a" / "mine"), start(tmp_path / "b" / "mine")
+    result = chutelab("lesson", "page", first, second, "-o", tmp_path / "out")
+    assert result.exit_code == 2
+    assert f"{second}: another lesson" in result.output
+    assert not (tmp_path / "out").exists()

@@ -82,6 +82,14 @@ def test_what_was_never_released_comes_back_too(tmp_path):
     assert back.offsets.tobytes() == recording.offsets.tobytes()
 
 
+def test_any_number_of_particles_may_wait_for_their_release(tmp_path):
+    """They are packed as well as what is made to fill the memory, and are 8 bytes each."""
+    recording = run("stream-independent", "stream.count=300_000", "run.until=0.001")
+    path = recording.save(tmp_path / "many.npz")
+    assert recording.offsets.nbytes > 300 * path.stat().st_size
+    assert Recording.load(path).offsets.tobytes() == recording.offsets.tobytes()
+
+
 @pytest.mark.parametrize("error", [OSError, KeyboardInterrupt])
 def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(tmp_path, monkeypatch, error):
     path = tmp_path / "recording.npz"
@@ -297,6 +305,12 @@ def test_sizes_that_are_not_what_they_say_are_refused(tmp_path):
         assert data.count(true) >= 1
         path.write_bytes(data.replace(true, size.to_bytes(4, "little")))
         assert "not a recording" in refused(path)
+    # An address in the directory leads to before the beginning of the file.
+    data = recording.save(path).read_bytes()
+    end = data.rindex(b"PK\5\6") + 16
+    place = int.from_bytes(data[end : end + 4], "little") + 100_000
+    path.write_bytes(data[:end] + place.to_bytes(4, "little") + data[end + 4 :])
+    assert "not a recording" in refused(path)
 
 
 def test_other_ways_of_packing_are_refused(tmp_path):
@@ -357,6 +371,17 @@ def test_events_csv_holds_every_event_digit_for_digit(tmp_path):
             e["omega_before"], e["omega_after"], e["normal_impulse"], e["tangential_impulse"],
         ]  # fmt: skip
         assert [row[0], *row[5:]] == [repr(float(number)) for number in numbers]
+
+
+def test_no_name_of_a_surface_breaks_events_csv_or_is_a_formula(tmp_path):
+    names = {"a,b": "a,b", "+1+1": "'+1+1", "a;@SUM(A1:A9)": "a;'@SUM(A1:A9)", "-0": "-0"}
+    told = {"stream": {"at": [0.0, 1.0], "velocity": [0.0, 0.0]}, "run": {"until": 2.0}}
+    for name, cell in names.items():
+        floor = {"name": name, "from": [-1.0, 0.0], "to": [1.0, 0.0]}
+        simulate(scene.from_dict({**told, "surface": [floor]})).to_csv(tmp_path, only=["events"])
+        header, *rows = table(tmp_path / "events.csv")
+        assert {len(row) for row in rows} == {len(header)}
+        assert {row[4] for row in rows} == {"", cell}
 
 
 def test_a_collision_names_its_partner(tmp_path):

@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
+import socket
+import subprocess
+import sys
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack
 from pathlib import Path
+from threading import Thread
+from time import monotonic, sleep
 
 import pytest
+from click.testing import CliRunner
 
+import chutelab
+from chutelab.cli import main
 from chutelab.scene import load
 from chutelab.studies.sweep import LostWorkersError, crew, planned, sweep, sweep_to
+from chutelab.studies.sweep.part import part_of
 
 
 @pytest.fixture(scope="module")
@@ -87,3 +98,122 @@ def test_a_cluster_that_loses_a_worker_writes_the_same_bytes(stepped):
             sweep_to(plan, "rows.csv", team, progress=kill)
     assert killed
     assert Path("rows.csv").read_bytes() == whole
+
+
+# schedulers that are none, or go ------------------------------------------------------------------
+
+
+def served(stack, answer):
+    """Listen at a port, answer with these bytes, and return the port."""
+    listening = stack.enter_context(socket.create_server(("127.0.0.1", 0)))
+
+    def serve():
+        while True:
+            try:
+                caller, _ = listening.accept()
+            except OSError:
+                return
+            stack.callback(caller.close)
+            if answer is not None:
+                caller.sendall(answer)
+
+    Thread(target=serve, daemon=True).start()
+    return listening.getsockname()[1]
+
+
+@pytest.mark.parametrize("answer", [None, b"HTTP/1.1 400 Bad Request\r\n\r\n", b"\xff" * 4096])
+def test_somebody_else_at_the_port_is_no_scheduler(monkeypatch, capfd, answer):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("chutelab.studies.sweep.sweeping.PATIENCE", 1.0)
+    with ExitStack() as stack:
+        address = f"tcp://127.0.0.1:{served(stack, answer)}"
+        refused = swept_at(address)
+    assert refused.exit_code == 2
+    assert f"--scheduler {address}: no Dask scheduler answers" in refused.stderr
+    assert refused.stderr.count("\n") == 1
+    assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("address", "said"),
+    [
+        ("tcp://127.0.0.1:9", "nothing in 1 s"),
+        ("tls://127.0.0.1:9", "TLS expects"),
+        ("foo://127.0.0.1:9", "unknown address scheme 'foo'"),
+        ("127.0.0.1", "must be like tcp://10.0.0.1:8786"),
+    ],
+)
+def test_an_address_without_a_scheduler_is_refused(monkeypatch, capfd, address, said):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("chutelab.studies.sweep.sweeping.PATIENCE", 1.0)
+    refused = swept_at(address)
+    assert refused.exit_code == 2
+    assert f"--scheduler {address}: " in refused.stderr
+    assert said in refused.stderr
+    assert refused.stderr.count("\n") == 1
+    assert capfd.readouterr().err == ""
+
+
+def swept_at(address):
+    command = ["sweep", "perpendicular", "--vary", "plate.angle_deg=0:10:3", "--scheduler", address]
+    return CliRunner().invoke(main, command)
+
+
+LOST = """
+import sys
+import distributed
+from chutelab.cli import main
+from chutelab.studies.sweep import sweeping
+
+if __name__ == "__main__":
+    sweeping.PATIENCE = 2.0
+    sys.exit(main())
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("lost", ["killed", "stopped", "workers"])
+def test_a_cluster_that_is_lost_ends_a_sweep_in_one_message(lost):
+    """Of the scheduler killed, or stopped, or of all workers killed."""
+    pytest.importorskip("distributed")
+    Path("lost.py").write_text(LOST)
+    sources = str(Path(chutelab.__file__).parent.parent)
+    environment = {**os.environ, "PYTHONPATH": sources}
+
+    def begun(*command, **how):
+        running = subprocess.Popen([sys.executable, *command], env=environment, **how)
+        stack.callback(running.wait)
+        stack.callback(running.kill)
+        return running
+
+    with ExitStack() as stack:
+        log = stack.enter_context(Path("log").open("w+"))
+        where = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
+        scheduler = begun("-m", "distributed.cli.dask_scheduler", *where, stderr=log)
+        address = waited(lambda: re.search(r"tcp://127.0.0.1:\d+", Path("log").read_text()))[0]
+        crowd = ["--nthreads", "1", "--no-nanny", "--no-dashboard"]
+        worker = begun("-m", "distributed.cli.dask_worker", address, *crowd, stderr=log)
+        waited(lambda: "Registered to:" in Path("log").read_text())
+        command = ["sweep", "perpendicular", "--vary", "plate.angle_deg=-20:20:5000"]
+        command += ["--engine", "pymunk", "--out", "rows.csv", "--scheduler", address]
+        running = begun("lost.py", *command, stderr=subprocess.PIPE, text=True)
+        part = part_of(Path("rows.csv"))
+        waited(lambda: part.exists() and part.read_bytes().count(b"\n") > 3)
+        if lost == "workers":
+            worker.kill()
+        else:
+            scheduler.send_signal(signal.SIGKILL if lost == "killed" else signal.SIGSTOP)
+        _, said = running.communicate(timeout=30)
+    assert running.returncode == 1
+    assert said.count("\n") == 1
+    assert "the workers or the scheduler are gone" in said
+    assert "rows.csv.part has the finished rows; --resume goes on" in said
+
+
+def waited(holds):
+    """Wait until something holds, for a minute at most, and return what it gives."""
+    patience = monotonic() + 60.0
+    while not (found := holds()):
+        assert monotonic() < patience
+        sleep(0.1)
+    return found

@@ -115,6 +115,7 @@ def build(wanted: tuple[str, ...], out: Path | None, force: bool, quiet: bool) -
     the same bytes.
     """
     from chutelab.classroom.lessons.building import build as build_lesson
+    from chutelab.classroom.lessons.building import check_inside
 
     for one in _lessons(wanted):
         with (
@@ -122,6 +123,8 @@ def build(wanted: tuple[str, ...], out: Path | None, force: bool, quiet: bool) -
             progress(one.name, quiet=quiet) as update,
         ):
             target = out / one.folder.name if out else None
+            if target is not None:
+                check_inside(target)
             built = build_lesson(one, target, force=force, progress=update)
         if not quiet:
             done = "written" if built.made else "up to date"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import nullcontext
+import logging
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -118,7 +119,8 @@ def sweep(
 
     A variant that cannot be, or misses the outgoing belt, is a row with its reason. Rows that are
     finished are kept beside --out FILE until all are: --resume goes on after an interruption, and
-    writes the same file as a sweep that was not interrupted.
+    writes the same file as a sweep that was not interrupted. Rows that were changed meanwhile are
+    refused, and so is a file that another sweep is writing.
 
     Columns are the varied keys, then, in SI units: landing.x, landing.y, landing.vx, landing.vy
     (mean over the particles; x, vx and vy also with _spread, the standard deviation), landing.t and
@@ -162,16 +164,16 @@ def sweep(
             raise RefusedError(f"--plot draws one or two varied keys, not {varied}")
         what = f"{plan.count:,} variants"
         with (
+            _unlogged() if scheduler else nullcontext(),
             crew(jobs, scheduler) as team,
             console.progress(what, quiet=quiet, left=True) as update,
-            writing(f"--out {out}") if out is not None else nullcontext(),
         ):
             if out is None:
                 found = swept_by(plan, team, progress=update)
             else:
                 found = sweep_to(plan, out, team, resume=resume, progress=update)
     except LostWorkersError as error:
-        raise click.ClickException(f"{error} {_kept(out)}".strip()) from error
+        raise click.ClickException(". ".join(filter(None, (str(error), _kept(out))))) from error
     except KeyboardInterrupt:
         if said := _kept(out):
             console.say(f"\n{said}", err=True)
@@ -213,9 +215,20 @@ def _propagated(
     return found
 
 
+@contextmanager
+def _unlogged() -> Iterator[None]:
+    """Keep Dask from logging tracebacks of what is said in one message here."""
+    before = logging.root.manager.disable
+    logging.disable()
+    try:
+        yield
+    finally:
+        logging.disable(before)
+
+
 def _kept(out: Path | None) -> str:
     """Say where the finished rows are, if there are some."""
-    from chutelab.studies.sweep.result import part_of
+    from chutelab.studies.sweep.part import part_of
 
     if out is None or not part_of(out).exists():
         return ""

@@ -10,7 +10,7 @@ import warnings
 import zipfile
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import asdict
-from errno import EINVAL
+from errno import EINVAL, ESPIPE
 from math import inf, prod
 from pathlib import Path
 from typing import Any
@@ -93,11 +93,14 @@ def load(path: str | Path) -> Recording:
         with zipfile.ZipFile(_regular(path)) as archive:
             about = json.loads(str(_array(archive, "about")))
             if about.get("format") == FORMAT:
-                return _recording(about, {name: _array(archive, name) for name in ARRAYS})
+                return _recording(about, archive)
     except FileNotFoundError:
         raise RecordingError(f"{path}: no such file") from None
     except OSError as error:
-        raise RecordingError(f"{path}: cannot be read: {error.strerror or error}") from None
+        # In a damaged file an address may lead to before its beginning.
+        unread = f"cannot be read: {error.strerror or error}"
+        said = f"{kind} (recording.npz)" if error.errno == EINVAL else unread
+        raise RecordingError(f"{path}: {said}") from None
     except (MemoryError, RecordingError):
         raise
     except _UnfitError as error:
@@ -115,12 +118,12 @@ class _UnfitError(ValueError):
 def _regular(path: Path) -> Path:
     """Return a path that is not of a pipe, which would be waited for, or of a device."""
     if path.exists() and not path.is_file():
-        raise OSError(EINVAL, "it is no regular file")
+        raise OSError(ESPIPE, "it is no regular file")
     return path
 
 
-def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
-    """Return one array of an archive."""
+def _array(archive: zipfile.ZipFile, name: str, room: int = 0) -> NDArray[Any]:
+    """Return one array of an archive; it may have `room` bytes, however well it is packed."""
     info = archive.getinfo(f"{name}.npy")
     # Other methods can make a million bytes of one.
     if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
@@ -134,7 +137,7 @@ def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
     if dtype != ARRAYS.get(name, dtype) or (name == "about" and (dtype.kind, shape) != ("U", ())):
         raise _UnfitError(f"{name} is of another type")
     packed = min(info.compress_size, Path(str(archive.filename)).stat().st_size)
-    if size > max(SMALL, MOST_UNPACKED * packed):
+    if size > max(SMALL, room, MOST_UNPACKED * packed):
         raise _UnfitError(
             f"{name} would be {size / 1e6:.3g} MB, unpacked from {packed / 1e6:.3g} MB"
         )
@@ -158,7 +161,7 @@ def _about(recording: Recording) -> dict[str, Any]:
     }
 
 
-def _recording(about: dict[str, Any], arrays: dict[str, Any]) -> Recording:
+def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Recording:
     """Return what header and arrays hold; an error if they contradict each other or the scene.
 
     Every index has to lead somewhere. The scene's text may be an older one, without later keys.
@@ -169,6 +172,9 @@ def _recording(about: dict[str, Any], arrays: dict[str, Any]) -> Recording:
     if not all(type(count) is int and 0 <= count < 2**63 for count in counts):
         raise _UnfitError("steps and contacts in the header have to be whole numbers")
     scene = from_dict(json.loads(about["scene"]), about["title"])
+    # Of particles that were never released, any number is packed into next to nothing.
+    room = 8 * (scene.stream.count + 1)
+    arrays: dict[str, Any] = {name: _array(archive, name, room) for name in ARRAYS}
     about.pop("seconds", None)  # earlier files tell how long the run took
     told = {name: about[name] for name in ("engine", "steps", "contacts")}
     recording = Recording(machine=build(scene), **told, **arrays)

@@ -9,21 +9,24 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import re
 import shutil
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from errno import ENOTDIR
+from errno import ELOOP, ENOTDIR
 from html import escape
 from io import BytesIO
+from math import prod
 from pathlib import Path
 from string import Template
 from typing import Final
+from urllib.parse import quote
 
 from markdown_it import MarkdownIt
 from markdown_it.tree import SyntaxTreeNode
-from PIL import Image, UnidentifiedImageError
+from PIL.GifImagePlugin import GifImageFile
 
 from chutelab.classroom.lessons.reading import Lesson, LessonError, read, scene_of, split, unusable
 from chutelab.engines.simulation import simulate
@@ -32,6 +35,9 @@ from chutelab.util.versions import own_version, version_of
 
 _HERE: Final = Path(__file__).parent
 PICTURE: Final = "lesson.gif"
+MOST_PIXELS: Final = 3840 * 2160
+"""Of a picture, as `Picture` in `reading` has it."""
+
 LIBRARIES: Final = ("chutelab", "numpy", "pymunk", "matplotlib", "pillow")
 """What decides on the bytes of a picture, besides its inputs."""
 
@@ -110,12 +116,14 @@ def stamp_of(lesson: Lesson) -> str:
 
 
 def comment_of(picture: Path) -> str:
-    """Return the comment of a GIF file; "" if there is none, or no whole GIF."""
+    """Return the comment of a GIF file; "" if there is none, or no whole GIF of a sane size."""
     gif = picture.read_bytes() if picture.is_file() else b""
     try:
-        with Image.open(BytesIO(gif)) as opened:
-            comment = opened.info.get("comment", b"")
-    except UnidentifiedImageError:
+        with GifImageFile(BytesIO(gif)) as opened:
+            size, comment = opened.size, opened.info.get("comment", b"")
+    except SyntaxError:
+        return ""
+    if prod(size) > MOST_PIXELS:
         return ""
     # Every GIF ends with a semicolon.
     return str(comment.decode("ascii", "replace")) if gif.endswith(b";") else ""
@@ -254,6 +262,7 @@ def bundle(
         If it cannot be written.
     """
     folder = Path(folder)
+    _check_places(lessons, folder)
     if folder.exists() and not folder.is_dir():
         raise NotADirectoryError(ENOTDIR, "it is a file, not a folder", str(folder))
     folder.parent.mkdir(parents=True, exist_ok=True)
@@ -282,12 +291,33 @@ def bundle(
         return written
 
 
+def _check_places(lessons: Sequence[Lesson], folder: Path) -> None:
+    """Refuse, before anything is made, what would be written over another's or out of a folder."""
+    names = [INDEX, *_SHARED]
+    for lesson in lessons:
+        name = lesson.folder.name
+        if not name or name in names:
+            text = "another lesson, or a file of the pages, has the same name; rename the folder"
+            raise unusable(lesson.folder, text)
+        names.append(name)
+        check_inside(folder / name)
+
+
+def check_inside(folder: Path) -> None:
+    """Refuse to write into a folder that is a link: an `OSError`."""
+    if folder.is_symlink():
+        raise OSError(ELOOP, "it is a symbolic link, which may lead anywhere", str(folder))
+
+
+def _address(*names: str) -> str:
+    """Return a relative address, in which no name is markup, a scheme, or the start of a query."""
+    return "/".join(quote(os.fsencode(name)) for name in names)
+
+
 def _lesson(
     lesson: Lesson, folder: Path, before: str, after: str, progress: Callable[[float], None]
 ) -> str:
     """Make the folder of one lesson, with links to its neighbours; return its card."""
-    from PIL.GifImagePlugin import GifImageFile
-
     folder.mkdir()
     for file in files_of(lesson):
         shutil.copyfile(file, folder / file.name)
@@ -311,11 +341,11 @@ def _lesson(
         doors.append('<li><a href="exercise.ipynb" download>Exercise (Jupyter notebook)</a></li>')
     for name in lesson.scenes:
         if (folder / name).is_file():
-            said = escape(name)
-            doors.append(f'<li><a href="{said}" download>Scene {said}</a></li>')
+            door = f'<li><a href="{_address(name)}" download>Scene {escape(name)}</a></li>'
+            doors.append(door)
     markdown = lesson.worksheet.read_text(encoding="utf-8") if lesson.worksheet.is_file() else ""
     facts = {
-        "folder": lesson.folder.name,
+        "folder": _address(lesson.folder.name),
         "title": _heading(lesson),
         "question": escape(lesson.question),
         "level": lesson.level,
@@ -342,7 +372,7 @@ def _heading(lesson: Lesson) -> str:
 
 def _link(lesson: Lesson, relation: str, form: str) -> str:
     text = form.format(_heading(lesson))
-    return f'<a rel="{relation}" href="../{lesson.folder.name}/{INDEX}">{text}</a>'
+    return f'<a rel="{relation}" href="../{_address(lesson.folder.name, INDEX)}">{text}</a>'
 
 
 def _page(name: str, **values: str) -> str:

@@ -6,6 +6,7 @@ A folder is validated with its scenes, and all that is wrong is said at once.
 from __future__ import annotations
 
 import difflib
+import os
 import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
@@ -142,6 +143,9 @@ def shipped_lessons() -> list[Lesson]:
 
 PLAN: Final = "lesson.toml"
 
+LARGEST: Final = 1 << 20
+"""Bytes of it."""
+
 
 class LessonError(SceneError):
     """A lesson that cannot be used; its text lists every fault."""
@@ -162,6 +166,13 @@ def read(folder: str | Path) -> Lesson:
         cannot be read.
     """
     source = Path(folder) / PLAN
+    if source.is_file():
+        if strays := _strays(source.parent):
+            raise LessonError(str(source.parent), strays)
+        if source.stat().st_size > LARGEST:
+            raise unusable(source, f"too large: it has at most {LARGEST} bytes")
+    elif source.exists():
+        raise unusable(source, "cannot be read: it is no regular file")
     try:
         document = tomllib.loads(source.read_text(encoding="utf-8"))
     except OSError as error:
@@ -187,6 +198,24 @@ def read(folder: str | Path) -> Lesson:
     if faults:
         raise LessonError(str(source), faults)
     return lesson
+
+
+def _strays(folder: Path) -> list[Fault]:
+    """Return the files of a folder that are links to some elsewhere: they may be anybody's.
+
+    A page or a copy of the lesson would have what is in them.
+    """
+    home = os.path.realpath(folder)
+    try:
+        paths = sorted(folder.iterdir())
+    except OSError as error:
+        raise unusable(folder, f"cannot be read: {error.strerror or error}") from None
+    return [
+        Fault(path.name, None, "a symbolic link out of the lesson's folder; put the file in there")
+        for path in paths
+        if path.is_symlink() and not path.is_dir()
+        and not Path(os.path.realpath(path)).is_relative_to(home)
+    ]  # fmt: skip
 
 
 def scene_of(lesson: Lesson, name: str | None = None, settings: Sequence[str] = ()) -> Scene:

@@ -9,7 +9,8 @@
 - `plan`: what is to be varied, looked at before anything runs; samples of ranges.
 - `rows`: what a row holds, and how it is read off a recording.
 - `batch`: a block of variants run: many at once through the exact engine, or one by one.
-- `result`: `Sweep`, CSV and Parquet files, and the rows of a sweep that is not finished.
+- `result`: `Sweep`, and CSV and Parquet files.
+- `part`: the file of the finished rows of a sweep that is not finished.
 - `sweeping`: `sweep`, and who does the work: this process, several, or a Dask cluster.
 
 SciPy, pyarrow, Dask and pandas are imported when they are needed.

@@ -18,6 +18,7 @@ from chutelab.scene.variants import (
     Range,
     Vary,
     count_of,
+    is_plain,
     parse,
     parse_range,
     quantities,
@@ -36,6 +37,15 @@ MOST_VARIANTS: Final = 1_000_000
 
 MOST_KEYS: Final = 20
 """Keys varied at once."""
+
+TOGETHER: Final = 8192
+"""Variants in a block that goes through the exact engine at once."""
+
+EXACT: Final = 16
+"""The same of variants that go one by one, a millisecond each."""
+
+STEPPED: Final = 1
+"""The same of variants that are stepped: each may take seconds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +82,22 @@ class Plan:
         """Number of variants N."""
         return count_of(self.varies) if self.samples is None else len(self.samples)
 
+    @property
+    def begins(self) -> range:
+        """The numbers that blocks begin with; they depend on the plan only, so it can resume."""
+        stream = self.scene.stream
+        one = stream.count == 1 and "stream.count" not in self.keys
+        wanted = self.engine or self.scene.run.engine
+        if wanted in ("contact", "pymunk") or (stream.interact and not one):
+            size = STEPPED
+        else:
+            plain = all(is_plain(quantity.path) for quantity in self.quantities)
+            size = TOGETHER if one and plain else EXACT
+        return range(0, self.count, size)
+
     def block(self, first: int, last: int) -> Block:
-        """Return the variants from `first` up to `last`."""
+        """Return the variants from `first` up to `last`, or the end."""
+        last = min(last, self.count)
         if self.samples is not None:
             values = self.samples[first:last]
         else:

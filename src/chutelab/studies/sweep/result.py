@@ -1,17 +1,15 @@
 """`Sweep`: the rows of all variants, and their files.
 
 Rows are written as text that gives them back to the bit, in CSV or Parquet, whole or not at all.
-The finished rows of an unfinished sweep are in a file beside the one it is to write.
 """
 
 from __future__ import annotations
 
 import csv
-import hashlib
 import io
-import json
+import os
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import chain
@@ -22,14 +20,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.scene import to_dict
 from chutelab.scene.variants import Quantity
-from chutelab.studies.sweep.plan import Plan
 from chutelab.studies.sweep.rows import NUMBERS, REASON
 from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, unquoted, whole, write_lines
 from chutelab.util.tables import Sheet, Shown, frame, number
-from chutelab.util.versions import library, version_of
+from chutelab.util.versions import library
 
 Rows = Mapping[str, NDArray[Any]]
 
@@ -68,6 +64,26 @@ def write(columns: Rows, path: str | Path, form: str) -> Path:
 def write_csv(names: Sequence[str], texts: Iterable[str], path: str | Path) -> Path:
     """Write a head and texts of rows as a CSV file."""
     return write_lines(path, chain(csv_lines([names]), texts))
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Turn the OSError of a file that cannot be written into an `InputError`."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def synced(path: Path) -> None:
+    """Have a file that was written, and its name, survive a power cut."""
+    for place, flags in ((path, os.O_RDWR), (path.parent, os.O_RDONLY)):
+        with suppress(PermissionError):  # Windows opens no folders.
+            handle = os.open(place, flags)
+            try:
+                os.fsync(handle)
+            finally:
+                os.close(handle)
 
 
 def text_of(columns: Rows) -> str:
@@ -177,113 +193,4 @@ class Sweep(Shown):
             tuple(rows),
             texts=2,
             notes=tuple(notes),
-        )
-
-
-FORMAT: Final = 2
-"""Of the file of finished rows."""
-
-WORDS: Final = {
-    "format": "the format of the file",
-    "chutelab": "the version of chutelab",
-    "scene": "the scene",
-    "vary": "what --vary says",
-    "samples": "--sample, --design or --seed",
-    "engine": "--engine",
-}
-"""What a sweep can differ in, for people."""
-
-
-def part_of(out: Path) -> Path:
-    """Return where the finished rows are kept while the sweep goes on."""
-    return out.with_name(f"{out.name}.part")
-
-
-@contextmanager
-def unfinished(
-    out: Path, plan: Plan, *, resume: bool
-) -> Iterator[tuple[dict[int, str], Callable[[int, str], None]]]:
-    """Keep the rows of a sweep that are finished beside the file it is to write, until all are.
-
-    The first line of the file is about the sweep; each other one has the number that a block begins
-    with, and its rows as text, in JSON.
-
-    Gives the texts that are there, by the beginnings of their blocks; and a function that adds a
-    block to them and to the file.
-
-    Raises
-    ------
-    InputError
-        If the file is of another sweep, there although not to `resume`, or cannot be written.
-    """
-    samples = None if plan.samples is None else hashlib.sha256(plan.samples.tobytes()).hexdigest()
-    head = {
-        "format": FORMAT,
-        "chutelab": version_of("chutelab"),
-        "scene": to_dict(plan.scene),
-        "vary": [[vary.key, vary.values] for vary in plan.varies],
-        "samples": samples,
-        "engine": plan.engine,
-    }
-    path, line = part_of(out), json.dumps(head).encode() + b"\n"
-    done: dict[int, str] = {}
-
-    def add(begin: int, text: str) -> None:
-        done[begin] = text
-        file.write(json.dumps([begin, text]).encode() + b"\n")
-        file.flush()
-
-    try:
-        data = path.read_bytes() if path.exists() else b""
-        # It may have been cut off in its first line.
-        new = len(data) < len(line) and line.startswith(data)
-        if not new and not resume:
-            raise InputError(
-                f"{path} holds the finished rows of a sweep that was interrupted: go on"
-                " with --resume, or remove the file"
-            )
-        length = 0
-        if not new:
-            first, *blocks = data.splitlines(keepends=True)
-            _check_same(path, first, line)
-            length = len(first)
-            # The last one may have been cut off; nothing counts from there on.
-            with suppress(ValueError):
-                for block in blocks:
-                    if not block.endswith(b"\n"):
-                        break
-                    begin, text = json.loads(block)
-                    done[begin] = text
-                    length += len(block)
-        file = path.open("r+b" if data else "wb")
-        file.truncate(length)
-        file.seek(length)
-        if new:
-            file.write(line)
-            file.flush()
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror or error}") from error
-    complete = False
-    try:
-        yield done, add
-        complete = True
-    finally:
-        file.close()
-        if complete or not done:
-            path.unlink()
-
-
-def _check_same(path: Path, first: bytes, line: bytes) -> None:
-    """Refuse a file whose first line is not that of this sweep, and say in what it differs."""
-    try:
-        found = json.loads(first)
-    except ValueError:
-        found = None
-    if not isinstance(found, dict):
-        raise InputError(f"{path} holds no rows of a sweep: remove it, or choose --out")
-    head = json.loads(line)
-    if other := [words for key, words in WORDS.items() if found.get(key) != head[key]]:
-        raise InputError(
-            f"{path} is of another sweep, with a difference in {', '.join(other)}: repeat"
-            " that command, or remove the file and begin anew"
         )

@@ -5,11 +5,12 @@ The work is done by this process, by processes of this computer, or by a Dask cl
 
 from __future__ import annotations
 
+import asyncio
 import multiprocessing
 import os
 import re
 import signal
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
     BrokenExecutor,
@@ -19,24 +20,20 @@ from concurrent.futures import (
     ProcessPoolExecutor,
     wait,
 )
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
+from queue import Empty, SimpleQueue
+from threading import Thread
+from types import ModuleType
 from typing import Any, Final
 
 from chutelab.scene import Scene
-from chutelab.scene.variants import Vary, is_plain
+from chutelab.scene.variants import Vary
 from chutelab.studies.sweep.batch import swept
+from chutelab.studies.sweep.part import unfinished
 from chutelab.studies.sweep.plan import Plan, planned
-from chutelab.studies.sweep.result import (
-    Sweep,
-    columns_of,
-    format_of,
-    text_of,
-    unfinished,
-    write,
-    write_csv,
-)
+from chutelab.studies.sweep.result import Sweep, format_of, synced, write, write_csv, writing
 from chutelab.studies.sweep.rows import NUMBERS, REASON, Columns, joined
 from chutelab.util.arrays import Progress
 from chutelab.util.errors import InputError
@@ -62,7 +59,8 @@ class LostWorkersError(RuntimeError):
 class Crew:
     """An executor, how many jobs it has at a time, and how to get a new one if it breaks.
 
-    Without an executor this process does the work.
+    `alive` is called while nothing comes back; it raises an error if nothing can any more. Without
+    an executor this process does the work.
 
     `concurrent.futures` does the work. What it lacks: `Executor.map` takes all jobs at once (2.3 kB
     each, and there may be a million) and gives results in their order only, so that a slow run
@@ -75,13 +73,14 @@ class Crew:
         executor: Executor | None = None,
         ahead: int = 1,
         anew: Callable[[], Executor] | None = None,
+        alive: Callable[[], None] | None = None,
     ) -> None:
-        self.executor, self.ahead, self.anew = executor, ahead, anew
+        self.executor, self.ahead, self.anew, self.alive = executor, ahead, anew, alive
 
     def results(self, work: Callable[[Any], Any], jobs: Iterable[Job]) -> Iterator[tuple[int, Any]]:
         """Yield the number of each job and what came of it, as they are finished.
 
-        A `LostWorkersError` if processes keep dying.
+        A `LostWorkersError` if processes keep dying, or a cluster is lost.
         """
         if self.executor is None:
             yield from ((number, work(job)) for number, job in jobs)
@@ -96,7 +95,10 @@ class Crew:
                     job = again.pop() if again else next(left, None)
                 if not running:
                     return
-                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                finished = wait(running, PATIENCE, FIRST_COMPLETED).done
+                if not finished and self.alive is not None:
+                    self.alive()
+                for future in finished:
                     result = future.result()
                     deaths = 0
                     yield running.pop(future)[0], result
@@ -136,14 +138,12 @@ def crew(jobs: int = 1, scheduler: str | None = None) -> Iterator[Crew]:
     if count == 1:
         yield Crew()
         return
-    # Not forked: there may be threads. Ctrl-C goes to all processes of a terminal; the first one
-    # tells the others.
+    # Not forked: there may be threads.
     processes = partial(
         ProcessPoolExecutor,
         count,
         mp_context=multiprocessing.get_context("spawn"),
-        initializer=signal.signal,
-        initargs=(signal.SIGINT, signal.SIG_IGN),
+        initializer=_serve,
     )
     others = {child.pid for child in multiprocessing.active_children()}
     team = Crew(processes(), 2 * count, processes)
@@ -160,35 +160,78 @@ def crew(jobs: int = 1, scheduler: str | None = None) -> Iterator[Crew]:
         team.executor.shutdown()
 
 
+def _serve() -> None:
+    """Prepare a worker process: it ends when its parent tells it to, or has died."""
+    # Ctrl-C goes to all processes of a terminal; the first one tells the others.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    Thread(target=_follow, daemon=True).start()
+
+
+def _follow() -> None:
+    """Wait for the end of the parent, however it comes, and end this process."""
+    if (parent := multiprocessing.parent_process()) is not None:
+        parent.join()
+        os._exit(1)
+
+
 def _cluster(address: str) -> Iterator[Crew]:
     dask = library("distributed", "--scheduler needs Dask", "cluster")
     if not ADDRESS.fullmatch(address):
         raise InputError(f"--scheduler {address}: must be like tcp://10.0.0.1:8786")
+    _ask(dask, address)
+    client = dask.Client(address, timeout=PATIENCE, set_as_default=False)
+
+    def alive() -> None:
+        client.sync(client.scheduler.identity, callback_timeout=PATIENCE)
+        client.wait_for_workers(1, timeout=PATIENCE)
+
     try:
-        client = dask.Client(address, timeout=PATIENCE, set_as_default=False)
-    except (OSError, TimeoutError, ValueError) as error:
-        raise InputError(f"--scheduler {address}: no Dask scheduler answers: {error}") from error
-    with client:
         threads = sum(client.nthreads().values())
-        if not threads:
-            raise InputError(f"--scheduler {address}: it has no workers; start some with `dask`")
+        if threads:
+            yield Crew(client.get_executor(pure=False), 2 * threads, alive=alive)
+    except Exception as error:
+        gone = isinstance(error, (dask.KilledWorker, CancelledError, TimeoutError))
+        if client.status == "running" and not gone:
+            raise
+        raise LostWorkersError(
+            f"--scheduler {address}: the workers or the scheduler are gone"
+            f" ({' '.join(str(error).split()) or type(error).__name__})"
+        ) from error
+    finally:
+        # Jobs that are not done are dropped with it.
+        with suppress(Exception):
+            client.close(PATIENCE)
+    if not threads:
+        raise InputError(f"--scheduler {address}: it has no workers; start some with `dask`")
+
+
+def _ask(dask: ModuleType, address: str) -> None:
+    """Refuse an address at which no Dask scheduler answers, in time.
+
+    A client waits for ever for one who accepts a connection and says nothing, and prints a
+    traceback of other faults after 20 s. Nobody has to wait for the thread that asks first.
+    """
+    answers: SimpleQueue[str | Exception] = SimpleQueue()
+
+    async def ask() -> str:
+        security = dask.Security().get_connection_args("client")
+        async with dask.rpc(address, connection_args=security) as scheduler:
+            return str((await scheduler.identity())["type"])
+
+    def run() -> None:
         try:
-            with client.get_executor(pure=False) as executor:
-                yield Crew(executor, 2 * threads)
-        except (dask.KilledWorker, CancelledError) as error:
-            raise LostWorkersError(
-                f"--scheduler {address}: the workers or the scheduler are gone: {error}"
-            ) from error
+            answers.put(asyncio.run(ask()))
+        except Exception as error:
+            answers.put(error)
 
-
-TOGETHER: Final = 8192
-"""Variants in a block that goes through the exact engine at once."""
-
-EXACT: Final = 16
-"""The same of variants that go one by one, a millisecond each."""
-
-STEPPED: Final = 1
-"""The same of variants that are stepped: each may take seconds."""
+    Thread(target=run, daemon=True).start()
+    found: str | Exception = TimeoutError(f"nothing in {PATIENCE:g} s")
+    with suppress(Empty):
+        found = answers.get(timeout=PATIENCE)
+    if found != "Scheduler":
+        said = " ".join(f"{found}".split()) or type(found).__name__
+        raise InputError(f"--scheduler {address}: no Dask scheduler answers: {said}")
 
 
 AHEAD: Final = 64
@@ -257,7 +300,7 @@ def sweep(
 
 def swept_by(plan: Plan, team: Crew, *, progress: Progress | None = None) -> Sweep:
     """Carry a plan out; see `sweep_to`."""
-    found = dict(_work(plan, team, {}, progress))
+    found = dict(_work(plan, team, (), progress))
     return _gathered(plan, [found[begin] for begin in sorted(found)])
 
 
@@ -271,59 +314,45 @@ def sweep_to(
 ) -> Sweep:
     """Carry a plan out and write its rows to a .csv or .parquet file, whole or not at all.
 
-    Finished rows are kept beside it meanwhile, see `sweep.result`; with `resume` an interrupted
+    Finished rows are kept beside it meanwhile, see `sweep.part`; with `resume` an interrupted
     sweep, if there is one, goes on from there, and writes the same file as one that was not.
 
     Raises
     ------
     InputError
-        If the file is of no known format or a folder, or there are rows of another sweep.
+        If the file is of no known format, a folder or cannot be written, or there are rows that
+        this sweep cannot go on with.
     """
     out, form = Path(out), format_of(out)
-    names = (*plan.keys, *NUMBERS, REASON)
-    with unfinished(out, plan, resume=resume) as (texts, add):
-        blocks = {begin: columns_of(names, text) for begin, text in texts.items()}
-        for begin, columns in _work(plan, team, texts, progress):
-            blocks[begin] = columns
-            add(begin, text_of(columns))
-        order = sorted(texts)
-        result = _gathered(plan, [blocks[begin] for begin in order])
-        if form == "csv":
-            write_csv(names, (texts[begin] for begin in order), out)
-        else:
-            write(result.columns, out, form)
+    with unfinished(out, plan, resume=resume) as part:
+        for begin, columns in _work(plan, team, part.done, progress):
+            with writing(out):
+                part.add(begin, columns)
+        texts, blocks = zip(*(part.done[begin] for begin in plan.begins), strict=True)
+        result = _gathered(plan, blocks)
+        with writing(out):
+            if form == "csv":
+                write_csv((*plan.keys, *NUMBERS, REASON), texts, out)
+            else:
+                write(result.columns, out, form)
+            synced(out)
     return result
 
 
 def _work(
-    plan: Plan,
-    team: Crew,
-    done: Mapping[int, object],
-    progress: Progress | None,
+    plan: Plan, team: Crew, done: Container[int], progress: Progress | None
 ) -> Iterator[tuple[int, Columns]]:
     """Yield where blocks begin, and their rows, but for those that are done."""
-    size = _size(plan)
-    begins = [begin for begin in range(0, plan.count, size) if begin not in done]
-    jobs = ((begin, plan.block(begin, min(begin + size, plan.count))) for begin in begins)
+    size = plan.begins.step
+    begins = [begin for begin in plan.begins if begin not in done]
+    jobs = ((begin, plan.block(begin, begin + size)) for begin in begins)
     over = plan.count - sum(min(size, plan.count - begin) for begin in begins)
     for begin, columns in team.results(swept, jobs):
-        count = len(columns[REASON])
-        over += count
+        over += len(columns[REASON])
         if progress is not None:
             progress(over / plan.count)
-        varied = plan.block(begin, begin + count).values.T.copy()
+        varied = plan.block(begin, begin + size).values.T.copy()
         yield begin, {**dict(zip(plan.keys, varied, strict=True)), **columns}
-
-
-def _size(plan: Plan) -> int:
-    """Return how many variants make a block; it depends on the plan only, so that it can resume."""
-    stream = plan.scene.stream
-    one = stream.count == 1 and "stream.count" not in plan.keys
-    wanted = plan.engine or plan.scene.run.engine
-    if wanted in ("contact", "pymunk") or (stream.interact and not one):
-        return STEPPED
-    plain = all(is_plain(quantity.path) for quantity in plan.quantities)
-    return TOGETHER if one and plain else EXACT
 
 
 def _gathered(plan: Plan, blocks: Sequence[Columns]) -> Sweep:

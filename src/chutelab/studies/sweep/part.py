@@ -1,0 +1,260 @@
+"""The file of finished rows, which lies beside the one that a sweep is to write until all are.
+
+It is locked while the sweep runs, which tells a sweep that runs from one that was interrupted.
+It has lines of JSON. The first one is about the sweep, and has the process that writes. Each other
+one has the number that a block of rows begins with, the rows as text, and the SHA-256 of what
+stands in all lines up to there: a line that is changed, doubled, moved or missing is found. It is
+no protection against somebody who computes hashes for rows of their own.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import json
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from itertools import count
+from pathlib import Path
+from time import monotonic
+from typing import Any, BinaryIO, Final
+
+import numpy as np
+
+from chutelab.scene import to_dict
+from chutelab.studies.sweep.plan import Plan
+from chutelab.studies.sweep.result import columns_of, synced, text_of, writing
+from chutelab.studies.sweep.rows import NUMBERS, REASON, Columns
+from chutelab.util.errors import InputError
+from chutelab.util.files import remove_unfinished
+from chutelab.util.versions import version_of
+
+if sys.platform == "win32":
+    import msvcrt
+else:
+    import fcntl
+
+FORMAT: Final = 3
+"""Of the file."""
+
+WORDS: Final = {
+    "format": "the format of the file",
+    "chutelab": "the version of chutelab",
+    "scene": "the scene",
+    "vary": "what --vary says",
+    "samples": "--sample, --design or --seed",
+    "engine": "--engine",
+}
+"""What a sweep can differ in, for people."""
+
+LONGEST: Final = 2**26
+"""Bytes of a line: twice those of the largest block, all of whose rows have a long reason."""
+
+INTERVAL: Final = 0.5
+"""s from one fsync to the next at least: an fsync takes milliseconds, and so may a block."""
+
+BEYOND: Final = 2**31 - 2
+"""Byte that is locked on Windows, where nobody could read a locked one; the file ends before."""
+
+
+def part_of(out: Path) -> Path:
+    """Return where the finished rows are kept while the sweep goes on."""
+    return out.with_name(f"{out.name}.part")
+
+
+@contextmanager
+def unfinished(out: Path, plan: Plan, *, resume: bool) -> Iterator[Part]:
+    """Keep the finished rows of a sweep until all are; with `resume`, from those that are there.
+
+    Raises
+    ------
+    InputError
+        If the file is of another sweep, not as it was written, there although not to `resume`, of
+        a sweep that still runs, or cannot be written.
+    """
+    part, complete = Part(part_of(out), plan), False
+    try:
+        with writing(part.path):
+            part.take_up(resume=resume)
+            remove_unfinished(out)
+        yield part
+        complete = True
+    finally:
+        part.close(complete=complete)
+
+
+class Part:
+    """The file, open and locked.
+
+    Attributes
+    ----------
+    path : Path
+        Where it is.
+    done : dict of int to (str, dict of str to ndarray)
+        The finished rows as text and as columns, by the numbers that their blocks begin with.
+    """
+
+    def __init__(self, path: Path, plan: Plan) -> None:
+        self.done: dict[int, tuple[str, Columns]] = {}
+        self.path, self._plan = path, plan
+        self._chain = hashlib.sha256()
+        self._synced = -INTERVAL
+        self._ours = False  # not what an earlier sweep, or somebody else, left
+        self._file = _locked(path)
+
+    def take_up(self, *, resume: bool) -> None:
+        """Read what is there, and get ready to add to it."""
+        samples = self._plan.samples
+        head = {
+            "format": FORMAT,
+            "chutelab": version_of("chutelab"),
+            "scene": to_dict(self._plan.scene),
+            "vary": [[vary.key, vary.values] for vary in self._plan.varies],
+            "samples": None if samples is None else hashlib.sha256(samples.tobytes()).hexdigest(),
+            "engine": self._plan.engine,
+        }
+        start = json.dumps(head).encode()[:-1]
+        # As long for every process: who resumes writes over it.
+        mine = start + b', "process": %10d}\n' % os.getpid()
+        self._chain.update(start)
+        first = self._file.readline(LONGEST)
+        # It may have been cut off in its first line, and then has no rows.
+        new = not first.endswith(b"\n") and (mine.startswith(first) or first.startswith(start))
+        self._ours = new
+        if not new and not resume:
+            raise InputError(
+                f"{self.path} holds the finished rows of a sweep that was interrupted: go on"
+                " with --resume, or remove the file"
+            )
+        if not new:
+            self._check_same(first, json.loads(mine))
+            if len(first) != len(mine) or not first.startswith(start):
+                raise InputError(f"{self.path}, line 1: not as it was written: remove the file")
+        self._file.seek(0)
+        self._file.write(mine)
+        self._file.flush()
+        length = len(mine) + (0 if new else self._read())
+        self._file.truncate(length)
+        self._file.seek(length)
+        synced(self.path)
+        self._ours = True
+
+    def _check_same(self, first: bytes, head: dict[str, Any]) -> None:
+        """Refuse a file whose first line is not that of this sweep, and say in what it differs."""
+        found = _object(first)
+        if not found:
+            raise InputError(f"{self.path} holds no rows of a sweep: remove it, or choose --out")
+        if other := [words for key, words in WORDS.items() if found.get(key) != head[key]]:
+            raise InputError(
+                f"{self.path} is of another sweep, with a difference in {', '.join(other)}:"
+                " repeat that command, or remove the file and begin anew"
+            )
+
+    def _read(self) -> int:
+        """Read the finished blocks, and return how many bytes they take."""
+        length = 0
+        for number in count(2):
+            line = self._file.readline(LONGEST)
+            # The last one may have been cut off.
+            if not line.endswith(b"\n") and len(line) < LONGEST:
+                break
+            try:
+                begin, text, columns = self._block(line)
+            except (ValueError, TypeError, RecursionError, csv.Error):
+                raise InputError(
+                    f"{self.path}, line {number}: not as it was written: rows have been changed,"
+                    " doubled, moved or removed. Remove this line and all after it and go on with"
+                    " --resume, which simulates them again; or remove the file and begin anew"
+                ) from None
+            self.done[begin] = text, columns
+            length += len(line)
+        return length
+
+    def _block(self, line: bytes) -> tuple[int, str, Columns]:
+        """Return what a line says; a ValueError or the like if it cannot be the next one."""
+        begin, text, _ = json.loads(line)
+        if line != self._line(begin, text) or begin in self.done or begin not in self._plan.begins:
+            raise ValueError
+        columns = columns_of((*self._plan.keys, *NUMBERS, REASON), text)
+        given = np.stack([columns[key] for key in self._plan.keys], axis=1)
+        planned = self._plan.block(begin, begin + self._plan.begins.step).values
+        if not np.array_equal(given, planned):
+            raise ValueError
+        return begin, text, columns
+
+    def add(self, begin: int, columns: Columns) -> None:
+        """Add a finished block."""
+        text = text_of(columns)
+        self._file.write(self._line(begin, text))
+        self._file.flush()
+        self.done[begin] = text, columns
+        if monotonic() - self._synced >= INTERVAL:
+            self._sync()
+
+    def close(self, *, complete: bool) -> None:
+        """Close the file and unlock it; remove it if the sweep is complete, or it has no rows."""
+        remove = complete or (self._ours and not self.done)
+        with suppress(OSError):  # What cannot be written was said before.
+            if not remove:
+                self._sync()
+            elif sys.platform != "win32":  # Before it is unlocked; Windows removes no open file.
+                self.path.unlink()
+        with suppress(OSError):
+            self._file.close()
+        if remove and sys.platform == "win32":
+            self.path.unlink()
+
+    def _sync(self) -> None:
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        self._synced = monotonic()
+
+    def _line(self, begin: int, text: str) -> bytes:
+        """Return the next line of the file."""
+        body = json.dumps([begin, text]).encode()[:-1]
+        self._chain.update(body)
+        return body + b', "%s"]\n' % self._chain.hexdigest().encode()
+
+
+def _locked(path: Path) -> BinaryIO:
+    """Open the file, made if there is none, and lock it; refuse one that is locked."""
+    while True:
+        with ExitStack() as stack:
+            if path.exists() and not path.is_file():
+                raise InputError(f"{path} is no file of finished rows: remove it")
+            with writing(path):
+                number = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666)
+            file = stack.enter_context(os.fdopen(number, "r+b"))
+            try:
+                if sys.platform == "win32":
+                    file.seek(BEYOND)
+                    msvcrt.locking(number, msvcrt.LK_NBLCK, 1)
+                else:
+                    fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except (BlockingIOError, PermissionError):
+                file.seek(0)
+                found = _object(file.readline(LONGEST)).get("process")
+                process = f" (process {found})" if isinstance(found, int) else ""
+                raise InputError(
+                    f"{path}: the sweep that writes it is still running{process}: wait for it, end"
+                    " it, or choose another --out"
+                ) from None
+            except OSError:
+                pass  # There are file systems without locks.
+            file.seek(0)
+            # Whoever had it may have removed it just now: then it is made anew.
+            with suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(number), path.stat()):
+                    stack.pop_all()
+                    return file
+
+
+def _object(line: bytes) -> dict[str, Any]:
+    """Return the JSON object of a line, an empty one if it is none."""
+    try:
+        found = json.loads(line)
+    except (ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}

@@ -1,0 +1,423 @@
+"""The file of finished rows: it goes on after any interruption, and believes nothing unchecked."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from time import monotonic, sleep
+
+import pytest
+from click.testing import CliRunner
+
+import chutelab
+from chutelab.cli import main
+from chutelab.scene import load
+from chutelab.studies.sweep import crew, planned, sweep_to
+from chutelab.studies.sweep.batch import alone
+from chutelab.studies.sweep.part import part_of
+from chutelab.studies.sweep.rows import joined
+from chutelab.util.errors import InputError
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def interrupted(tmp_path_factory):
+    """A sweep of 40 rows in blocks of one, its file, and the rows kept while it was written."""
+    folder = tmp_path_factory.mktemp("whole")
+    plan = planned(load("perpendicular"), ["plate.angle_deg=-20:20:40"], engine="pymunk")
+    kept = []
+    with crew() as team:
+        sweep_to(plan, folder / "rows.csv", team)
+        with pytest.raises(KeyboardInterrupt):
+            sweep_to(plan, folder / "cut.csv", team, progress=stop_at(0.99))
+    kept = part_of(folder / "cut.csv").read_bytes()
+    return plan, (folder / "rows.csv").read_bytes(), kept
+
+
+def stop_at(share):
+    def update(done):
+        if done >= share:
+            raise KeyboardInterrupt
+
+    return update
+
+
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.1, 0.3, 0.5, 0.77, 0.98, 1.0])
+@pytest.mark.parametrize("form", ["csv", "parquet"])
+def test_a_sweep_goes_on_and_writes_the_same_bytes(interrupted, share, form):
+    plan, whole, kept = interrupted
+    out = Path(f"rows.{form}")
+    # Cut anywhere, in the middle of a line or of a number.
+    part_of(out).write_bytes(kept[: int(share * len(kept))])
+    ran = []
+    with crew() as team:
+        sweep_to(plan, out, team, resume=True, progress=ran.append)
+        if form == "parquet":
+            sweep_to(plan, "again.parquet", team)
+            whole = Path("again.parquet").read_bytes()
+    assert out.read_bytes() == whole
+    assert not part_of(out).exists()
+    if share > 0.2:
+        assert len(ran) < plan.count
+
+
+def test_rows_that_are_there_are_not_simulated_again(interrupted, monkeypatch):
+    plan, whole, kept = interrupted
+    part_of(Path("rows.csv")).write_bytes(kept)
+    asked = []
+
+    def noting(block):
+        asked.append(len(block.values))
+        return joined([alone(block, row) for row in range(len(block.values))])
+
+    monkeypatch.setattr("chutelab.studies.sweep.sweeping.swept", noting)
+    with crew() as team:
+        sweep_to(plan, "rows.csv", team, resume=True)
+    assert sum(asked) == 1
+    assert Path("rows.csv").read_bytes() == whole
+
+
+def test_rows_of_another_sweep_are_refused(interrupted):
+    plan, _, kept = interrupted
+    scene = load("perpendicular")
+    part_of(Path("rows.csv")).write_bytes(kept)
+    others = {
+        "what --vary says": planned(scene, ["plate.angle_deg=-20:20:41"], engine="pymunk"),
+        "--engine": planned(scene, ["plate.angle_deg=-20:20:40"], engine="exact"),
+        "the scene": planned(
+            load("perpendicular", ["gravity=9.8"]), ["plate.angle_deg=-20:20:40"], engine="pymunk"
+        ),
+        "--sample": planned(scene, ["plate.angle_deg=-20:20"], engine="pymunk", sample=40),
+    }
+    with crew() as team:
+        for difference, other in others.items():
+            with pytest.raises(InputError, match=difference):
+                sweep_to(other, "rows.csv", team, resume=True)
+        with pytest.raises(InputError, match="--resume"):
+            sweep_to(plan, "rows.csv", team)
+        assert part_of(Path("rows.csv")).read_bytes() == kept
+        part_of(Path("rows.csv")).write_bytes(b"my notes\n")
+        with pytest.raises(InputError, match="no rows of a sweep"):
+            sweep_to(plan, "rows.csv", team, resume=True)
+
+
+def test_there_may_be_nothing_to_go_on_with(interrupted):
+    plan, whole, _ = interrupted
+    with crew() as team:
+        sweep_to(plan, "rows.csv", team, resume=True)
+    assert Path("rows.csv").read_bytes() == whole
+
+
+# what is not as it was written -------------------------------------------------------------------
+
+
+def edited(lines):
+    lines[4] = lines[4].replace(b"1", b"2", 1)
+
+
+def rounded(lines):
+    lines[4] = re.sub(rb"(\.\d{6})\d+", rb"\1", lines[4], count=1)
+
+
+def spaced(lines):
+    lines[4] = lines[4].replace(b", ", b",", 1)
+
+
+def rehashed(lines):
+    lines[4] = re.sub(rb'"\w{64}"', b'"' + b"0" * 64 + b'"', lines[4])
+
+
+def doubled(lines):
+    lines.insert(4, lines[3])
+
+
+def removed(lines):
+    del lines[4]
+
+
+def swapped(lines):
+    lines[4], lines[5] = lines[5], lines[4]
+
+
+def shifted(lines):
+    """Give each block the number of the next."""
+    for n in range(4, len(lines)):
+        begin, *rest = json.loads(lines[n])
+        lines[n] = json.dumps([begin + 1, *rest]).encode() + b"\n"
+
+
+def blank(lines):
+    lines.insert(4, b"\n")
+
+
+def deep(lines):
+    lines[4] = b"[" * 100_000 + b"\n"
+
+
+def zeros(lines):
+    lines[4] = bytes(4096) + b"\n"
+
+
+def binary(lines):
+    lines[4] = b"\xff\xfe" + lines[4]
+
+
+def huge(lines):
+    lines[4] = b"[" + b"9" * 5000 + b', "", ""]\n'
+
+
+def text_only(lines):
+    lines[4] = b'"begin, text"\n'
+
+
+HARM = [
+    edited, rounded, spaced, rehashed, doubled, removed, swapped, shifted, blank, deep, zeros,
+    binary, huge, text_only,
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("harm", HARM)
+def test_rows_that_were_changed_are_refused_with_their_line(interrupted, harm):
+    plan, whole, kept = interrupted
+    lines = kept.splitlines(keepends=True)
+    harm(lines)
+    part = part_of(Path("rows.csv"))
+    part.write_bytes(b"".join(lines))
+    with crew() as team:
+        with pytest.raises(InputError, match=r"rows\.csv\.part, line 5: .*remove the file"):
+            sweep_to(plan, "rows.csv", team, resume=True)
+        assert part.read_bytes().splitlines()[1:] == b"".join(lines).splitlines()[1:]
+        assert not Path("rows.csv").exists()
+        # What the message advises: the lines before are sound.
+        part.write_bytes(b"".join(lines[:4]))
+        ran = []
+        sweep_to(plan, "rows.csv", team, resume=True, progress=ran.append)
+    assert len(ran) == plan.count - 3
+    assert Path("rows.csv").read_bytes() == whole
+
+
+def test_a_first_line_that_was_changed_is_refused(interrupted):
+    plan, _, kept = interrupted
+    part = part_of(Path("rows.csv"))
+    for changed in (
+        kept.replace(b'", "', b'",  "', 1),
+        kept.replace(b"}\n", b', "more": 1}\n', 1),
+        b"[" * 100_000 + b"\n" + kept,
+        b"\n" + kept,
+    ):
+        part.write_bytes(changed)
+        with crew() as team, pytest.raises(InputError, match=r"line 1: not|no rows of a sweep"):
+            sweep_to(plan, "rows.csv", team, resume=True)
+        assert part.read_bytes() == changed
+
+
+def without_a_row(begin, text):
+    return begin, ""
+
+
+def with_a_row_more(begin, text):
+    return begin, text + text
+
+
+def without_a_column(begin, text):
+    return begin, text.partition(",")[2]
+
+
+def of_another_block(begin, text):
+    return begin + 1, text
+
+
+def of_no_block(begin, text):
+    return begin + 1000, text
+
+
+def with_words(begin, text):
+    first, *cells = text.split(",")
+    return begin, ",".join([first, "fast", *cells[1:]])
+
+
+@pytest.mark.parametrize(
+    "forge",
+    [without_a_row, with_a_row_more, without_a_column, of_another_block, of_no_block, with_words],
+)
+def test_blocks_with_true_hashes_must_be_of_the_plan(interrupted, forge):
+    plan, _, kept = interrupted
+    head, *blocks = kept.splitlines(keepends=True)
+    chain = hashlib.sha256(head[: head.index(b', "process"')])
+    lines = [head]
+    for number, block in enumerate(blocks):
+        begin, text, hashed = json.loads(block)
+        if number == 3:
+            begin, text = forge(begin, text)
+        body = json.dumps([begin, text])[:-1]
+        chain.update(body.encode())
+        # The formula is that of the file: blocks before are as they were.
+        assert number >= 3 or chain.hexdigest() == hashed
+        lines.append(f'{body}, "{chain.hexdigest()}"]\n'.encode())
+    part_of(Path("rows.csv")).write_bytes(b"".join(lines))
+    with crew() as team, pytest.raises(InputError, match="line 5"):
+        sweep_to(plan, "rows.csv", team, resume=True)
+
+
+def test_the_command_says_which_line_and_ends_with_2():
+    arguments = ["sweep", "perpendicular", "--vary", "plate.angle_deg=0:20:5", "--engine", "pymunk"]
+    plan = planned(load("perpendicular"), ["plate.angle_deg=0:20:5"], engine="pymunk")
+    with crew() as team, pytest.raises(KeyboardInterrupt):
+        sweep_to(plan, "rows.csv", team, progress=stop_at(0.8))
+    part = part_of(Path("rows.csv"))
+    head, first, second, *rest = part.read_bytes().splitlines(keepends=True)
+    part.write_bytes(b"".join([head, second, first, *rest]))
+    found = CliRunner().invoke(main, [*arguments, "--out", "rows.csv", "--resume"])
+    assert found.exit_code == 2
+    assert "rows.csv.part, line 2: not as it was written" in found.stderr
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no FIFO")
+def test_the_file_of_finished_rows_is_a_file():
+    plan = planned(load("perpendicular"), ["plate.angle_deg=0:20:5"])
+    os.mkfifo("pipe.csv.part")
+    Path("folder.csv.part").mkdir()
+    with crew() as team:
+        for name in ("pipe.csv", "folder.csv"):
+            with pytest.raises(InputError, match=r"\.part is no file"):
+                sweep_to(plan, name, team)
+
+
+# who writes it -----------------------------------------------------------------------------------
+
+
+def test_a_sweep_that_runs_is_told_from_one_that_was_interrupted(interrupted):
+    plan, whole, _ = interrupted
+    told = []
+
+    def begin_another(_):
+        part = part_of(Path("rows.csv"))
+        for resume in (False, True):
+            before = part.read_bytes()
+            with crew() as team, pytest.raises(InputError) as refused:
+                sweep_to(plan, "rows.csv", team, resume=resume)
+            told.append(str(refused.value))
+            assert part.read_bytes() == before
+
+    with crew() as team:
+        sweep_to(plan, "rows.csv", team, progress=begin_another)
+    assert len(told) == 2 * plan.count
+    assert all(f"still running (process {os.getpid()})" in text for text in told)
+    assert Path("rows.csv").read_bytes() == whole
+    assert not part_of(Path("rows.csv")).exists()
+
+
+def test_who_goes_on_is_named_in_the_file(interrupted):
+    plan, _, kept = interrupted
+    part = part_of(Path("rows.csv"))
+    part.write_bytes(re.sub(rb'"process": +\d+', b'"process": %10d' % 1, kept, count=1))
+    with crew() as team, pytest.raises(KeyboardInterrupt):
+        sweep_to(plan, "rows.csv", team, resume=True, progress=stop_at(0.9))
+    assert json.loads(part.read_bytes().splitlines()[0])["process"] == os.getpid()
+
+
+def test_rows_are_on_the_disk_before_anything_relies_on_them(interrupted, monkeypatch):
+    plan, _, _ = interrupted
+    synced = []
+    known = os.fsync
+
+    def fsync(number):
+        known(number)
+        about = os.fstat(number)
+        synced.append((about.st_ino, about.st_size, part_of(Path("rows.csv")).exists()))
+
+    monkeypatch.setattr("os.fsync", fsync)
+    with crew() as team:
+        with pytest.raises(KeyboardInterrupt):
+            sweep_to(plan, "rows.csv", team, progress=stop_at(0.9))
+        about = part_of(Path("rows.csv")).stat()
+        assert synced[-1][:2] == (about.st_ino, about.st_size)
+        sweep_to(plan, "rows.csv", team, resume=True)
+    about = Path("rows.csv").stat()
+    assert (about.st_ino, about.st_size, True) in synced
+    # At most one each half second, two files, and two folders.
+    assert len(synced) < plan.count
+
+
+@pytest.mark.parametrize("room", [0, 500, 5000, 12_000])
+def test_a_full_disk_loses_nothing(interrupted, room):
+    resource = pytest.importorskip("resource")
+    plan, whole, kept = interrupted
+    assert len(kept) > 12_000
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (room, hard))
+        with crew() as team, pytest.raises(InputError, match=r"rows\.csv.*: cannot be written: "):
+            sweep_to(plan, "rows.csv", team)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    left = [path.name for path in Path().iterdir()]
+    assert left == ([] if room < 5000 else ["rows.csv.part"])
+    with crew() as team:
+        sweep_to(plan, "rows.csv", team, resume=True)
+    assert Path("rows.csv").read_bytes() == whole
+
+
+KILLED = """
+import os, signal
+from chutelab.util.files import whole
+
+with whole("rows.csv") as unfinished:
+    unfinished.write_text("plate.angle_deg,")
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_what_a_killed_sweep_was_writing_is_removed_by_the_next(interrupted):
+    plan, whole, kept = interrupted
+    sources = str(Path(chutelab.__file__).parent.parent)
+    subprocess.run([sys.executable, "-c", KILLED], env={**os.environ, "PYTHONPATH": sources})
+    mine = Path(".rows.csv-mynotes1")
+    mine.mkdir()
+    (mine / "notes").touch()
+    part_of(Path("rows.csv")).write_bytes(kept)
+    assert len(list(Path().iterdir())) == 3
+    with crew() as team:
+        sweep_to(plan, "rows.csv", team, resume=True)
+    assert sorted(path.name for path in Path().iterdir()) == [mine.name, "rows.csv"]
+    assert Path("rows.csv").read_bytes() == whole
+
+
+# signals -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "signum",
+    [pytest.param(signal.SIGINT, marks=pytest.mark.slow), signal.SIGTERM, signal.SIGKILL],
+)
+def test_a_signal_keeps_the_finished_rows_and_leaves_no_process(signum):
+    sources = str(Path(chutelab.__file__).parent.parent)
+    command = ["sweep", "perpendicular", "--vary", "plate.angle_deg=-20:20:100"]
+    command += ["--vary", "plate.restitution=0:1:100", "--engine", "pymunk", "--jobs", "2"]
+    running = subprocess.Popen(
+        [sys.executable, "-m", "chutelab", *command, "--out", "rows.csv"],
+        env={**os.environ, "PYTHONPATH": sources, "TMPDIR": str(Path().absolute())},
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    part, patience = part_of(Path("rows.csv")), monotonic() + 60.0
+    while not (part.exists() and part.read_bytes().count(b"\n") > 5) and monotonic() < patience:
+        sleep(0.05)
+    running.send_signal(signum)
+    # Workers have the same standard error: this returns when the last of them has ended.
+    _, said = running.communicate(timeout=30)
+    assert running.returncode == (-signum if signum == signal.SIGKILL else 128 + signum)
+    assert "Traceback" not in said
+    if signum != signal.SIGKILL:
+        assert "rows.csv.part has the finished rows; --resume goes on" in said
+    assert [path.name for path in Path().iterdir()] == [part.name]

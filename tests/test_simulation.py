@@ -154,13 +154,15 @@ def after(looks):
         if len(seen) >= looks:
             raise EnoughError
 
+    progress.seen = seen
     return progress
 
 
 @pytest.mark.parametrize(("name", "engine", "changes", "looks"), STOPPABLE)
 def test_a_run_that_is_stopped_keeps_what_was_recorded(name, engine, changes, looks, tmp_path):
     scene_, whole = loaded(name, *changes), simulate(loaded(name, *changes), engine)
-    recording = simulate(scene_, engine, after(looks))
+    recording = simulate(scene_, engine, watch := after(looks))
+    assert len(watch.seen) == looks
     found = stopped(recording)
     assert found is not None
     assert stopped(whole) is None

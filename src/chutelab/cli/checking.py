@@ -28,8 +28,10 @@ from chutelab.cli.parameters import (
 def check(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool) -> None:
     """Look at each SCENE before it runs, or say all that is wrong with it.
 
-    Says what will be built and what is skipped, which engine runs and why, what a run will cost,
-    what the closed form covers, and for each warning what to change.
+    Says what will be built and what is skipped, which engine runs and why, what a run will cost in
+    time and memory, what the closed form covers, and for each warning what to change. What a run
+    costs comes from a trial of the whole of it, cut off after 1 s: longer ones are told from how
+    far it got, or not at all.
     """
     from chutelab.checks.preflight import Preflight, preflight
     from chutelab.scene import SceneError, load

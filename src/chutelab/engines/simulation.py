@@ -86,15 +86,14 @@ def simulate(
 
     machine = build(scene)
     return replace(
-        follow(scene, machine, engine, progress if max_seconds is None else bounded),
+        follow(machine, engine, progress if max_seconds is None else bounded),
         seconds=perf_counter() - began,
     )
 
 
-def follow(
-    scene: Scene, machine: Machine, engine: str | None, progress: Progress | None
-) -> Recording:
+def follow(machine: Machine, engine: str | None, progress: Progress | None) -> Recording:
     """Run a machine with the engine that is asked for, or the one it needs; see `simulate`."""
+    scene = machine.scene
     name = choose(machine, engine)
     if name == "exact":
         if machine.interact:

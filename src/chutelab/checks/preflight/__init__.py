@@ -1,7 +1,7 @@
 """The look at a scene before it runs: what will happen, what it will cost, what to mind.
 
 - `results`: `Preflight` and its parts: what will be built, what the closed form answers.
-- `trial`: a short run of the first particles; contacts and run time, estimated from it.
+- `trial`: a run that is cut off after 1 s; contacts, run time and memory, estimated from it.
 - `advice`: `preflight`, all of it, and the warnings, each with the key and the value that would do.
 """
 

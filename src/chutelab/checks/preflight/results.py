@@ -61,9 +61,10 @@ class Effort:
     """What a run is expected to cost."""
 
     contacts: int  # impacts and collisions, about
-    seconds: float  # run time here and now, about
-    at_least: bool  # the trial run was cut off: both are lower bounds
+    seconds: float  # processor time of a run here and now, about
+    at_least: bool  # how much cannot be told: all are lower bounds
     how: str  # what the estimate rests on
+    memory: int  # bytes that a run needs at its peak, about
 
 
 @dataclass(frozen=True)
@@ -107,12 +108,13 @@ class Preflight(Shown):
         rows += [("how it runs",), ("engine", f"{self.engine}: {self.why}"), ("ends", self.ends)]
         if self.stepping is not None:
             rows += self.stepping.rows()
-        about = "at least" if self.effort.at_least else "about"
-        # Two digits of contacts and one of the time are known.
+        about = "not known, at least" if self.effort.at_least else "about"
+        # Two digits of contacts and memory and one of the time are known.
         contacts = int(float(f"{self.effort.contacts:.2g}"))
         lasts = write_size(float(f"{self.effort.seconds:.1g}"), "s", digits=6)
         rows.append(("contacts", f"{about} {contacts:,}"))
         rows.append(("run time", f"{about} {lasts}; {self.effort.how}"))
+        rows.append(("memory", f"{about} {float(f'{self.effort.memory / 1e6:.2g}'):,.0f} MB"))
         rows.append(("closed form",))
         if self.theory.covers:
             rows.append(("covers", ", ".join(self.theory.covers)))

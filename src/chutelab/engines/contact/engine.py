@@ -241,20 +241,27 @@ class Job:
     def share(self) -> float:
         """Return the share of the run that is done."""
         world, n = self.module.world, self.machine.count
-        ended: float = world.done / n
-        if not self.machine.interact:
-            return ended
-        passed: float = world.t / self.machine.end_time if self.machine.end_time > 0 else 1.0
-        return min(1.0, max(ended, passed))
+        end, ended = self.machine.end_time, world.done / n
+        if self.machine.interact:
+            return float(min(1.0, max(ended, world.t / end if end > 0.0 else 1.0)))
+        # One after the other, each from its release on.
+        begin = float(self.machine.releases.t[world.low]) if world.low < n else end
+        passed = (world.t - begin) / (end - begin) if begin < world.t < end else 0.0
+        return float(min(1.0, ended + passed / n))
 
     def recording(self, machine: Machine, place: tuple[float, float], seconds: float) -> Recording:
         """Return what was recorded."""
         recorder = Recorder(machine)
         world, module = self.module.world, self.module
-        for rows in self.knots:
+        # Chunks are let go as they are handed over: all of them are most of the memory.
+        self.knots.reverse()
+        self.events.reverse()
+        while self.knots:
+            rows = self.knots.pop()
             owner = rows["disk"].astype(np.int64)
             recorder.add(owner, rows.view("<f8").reshape(-1, 10)[:, :9].copy().view(KNOT)[:, 0])
-        for rows in self.events:
+        while self.events:
+            rows = self.events.pop()
             events = np.empty(len(rows), EVENT)
             for name, source in (("t", "t"), ("particle", "disk"), ("other", "other"),
                                  ("kind", "kind"), ("surface", "surface"),

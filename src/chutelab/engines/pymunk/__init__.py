@@ -10,7 +10,6 @@ outside.
 
 from __future__ import annotations
 
-from contextlib import suppress
 from time import perf_counter
 
 from chutelab.engines.pymunk.lone import Lone
@@ -74,8 +73,10 @@ def run(machine: Machine, progress: Progress | None = None) -> Recording:
     try:
         if machine.interact or not machine.align:
             shared = Shared(machine, world, recorder)
-            shared.run(report)
-            steps = shared.steps
+            try:
+                shared.run(report)
+            finally:
+                steps = shared.steps
         else:
             for i in range(machine.count):
                 lone = Lone(machine, world, recorder, i, report)
@@ -83,12 +84,13 @@ def run(machine: Machine, progress: Progress | None = None) -> Recording:
                     lone.run()
                 except EnoughError:
                     recorder.ended[i + 1 :] = REASONS.index("stopped")
-                    break
+                    raise
                 finally:
                     steps += lone.steps
         if progress is not None:
-            with suppress(EnoughError):
-                progress(1.0)
+            progress(1.0)
+    except EnoughError:
+        return finished()
     except StalledError as stalled:
         stalled.recording = finished()
         x, y = stalled.position

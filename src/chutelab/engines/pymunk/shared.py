@@ -157,7 +157,7 @@ class Shared:
 
     def run(self, report: Progress) -> None:
         """Run to the end."""
-        reason = "time"
+        reason, enough = "time", None
         while self.clock < self.most and (self.waiting or self.inside.any()):
             if not self.inside.any():
                 # Nothing to step until the next release.
@@ -169,7 +169,8 @@ class Shared:
             self._step()
             try:
                 report(self.clock / self.most)
-            except EnoughError:
+            except EnoughError as error:
+                enough = error
                 self.recorder.ended[self.waiting] = REASONS.index("stopped")
                 reason = "stopped"
                 break
@@ -177,6 +178,8 @@ class Shared:
             self._end(i, reason)
         faces = slice(self.count, None)
         np.add.at(self.recorder.by_surface, self.surface[faces], self.entries.T[faces])
+        if enough is not None:
+            raise enough
 
     # Releases and rides
 

@@ -451,6 +451,10 @@ def test_no_marks_and_no_notebook_are_written_over(tmp_path):
     refused = CliRunner().invoke(main, ["lesson", "grade", str(tmp_path), "--out", str(book)])
     assert (refused.exit_code, book.read_bytes()) == (2, before)
     assert "one of the notebooks" in refused.stderr
+    longest = str(tmp_path / ("x" * 252))  # one more than leaves room for .part
+    refused = CliRunner().invoke(main, ["lesson", "grade", str(tmp_path), "--out", longest])
+    assert refused.exit_code == 2
+    assert "name too long" in refused.stderr
     (tmp_path / "class.csv.part").write_text("marks", encoding="utf-8")
     out = ["--out", str(tmp_path / "class.csv")]
     refused = CliRunner().invoke(main, ["lesson", "grade", str(tmp_path), *out])

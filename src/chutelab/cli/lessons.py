@@ -261,12 +261,14 @@ def grade(files: tuple[Path, ...], out: Path | None, time_limit: float, quiet: b
     check_file("--out", out)
     if out is not None:
         part = out.with_name(f"{out.name}.part")
-        if part.exists():
+        with writing(f"--out {out}", instead="another name"):
+            interrupted, there = part.exists(), out.exists()
+        if interrupted:
             raise RefusedError(
                 f"{part}: has the marks of a grading that was interrupted, or still runs; move or"
                 " remove it first"
             )
-        if out.exists() and any(one.exists() and one.samefile(out) for one in notebooks):
+        if there and any(one.exists() and one.samefile(out) for one in notebooks):
             raise RefusedError(f"--out {out}: is one of the notebooks; give another name")
     done: list[Grade] = []
 

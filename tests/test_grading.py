@@ -3,17 +3,28 @@
 from __future__ import annotations
 
 import asyncio
-import csv
 import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+from dataclasses import replace
 from pathlib import Path
+from time import monotonic, sleep
 
 import pytest
+from click.testing import CliRunner
 
 import chutelab
+from chutelab.classroom import grading
 from chutelab.classroom.exercises import EXERCISES, lesson
-from chutelab.classroom.grading import Grade, grade, write_csv
+from chutelab.classroom.grading import LARGEST, Grade, grade, write_csv
+from chutelab.classroom.kernel import Ran
+from chutelab.cli import main
 
 pytest.importorskip("nbclient")
+psutil = pytest.importorskip("psutil")
 
 SOLUTIONS = Path(__file__).parent / "solutions"
 LESSONS = Path(__file__).parent.parent / "lessons"
@@ -88,20 +99,49 @@ def test_notebooks_run_as_shipped_and_say_not_attempted(name, monkeypatch):
 def test_every_solved_notebook_earns_full_marks(name, tmp_path):
     path = tmp_path / f"{name}.ipynb"
     path.write_text(json.dumps(solved(name, "Ada Lovelace")), encoding="utf-8")
-    assert grade([path]) == [
+    assert list(grade([path])) == [
         Grade(str(path), "Ada Lovelace", name, marks=(1, 1, 1, 1), out_of=4, reason="")
     ]
 
 
-def test_a_class_is_graded_whatever_comes_back(tmp_path):
-    given = lesson("the-bounce", "Bo").given
-    first = -given.e * given.v0
+def first_of(student):
+    """A cell with the right answer to question 1 of lesson 3."""
+    given = lesson("the-bounce", student).given
+    return f"task.check(1, {-given.e * given.v0})"
+
+
+def gone(pid):
+    """Whether a process is over, at the latest in a while."""
+    until = monotonic() + 20.0
+    while monotonic() < until:
+        if not psutil.pid_exists(pid) or psutil.Process(pid).status() == psutil.STATUS_ZOMBIE:
+            return True
+        sleep(0.02)
+    return False
+
+
+@pytest.fixture
+def in_own_tmp(tmp_path, monkeypatch):
+    """Temporary folders are made in here, and none is left."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setenv("TMPDIR", str(folder))
+    yield
+    until = monotonic() + 20.0
+    while list(folder.iterdir()) and monotonic() < until:
+        sleep(0.02)
+    assert list(folder.iterdir()) == []
+
+
+def test_a_class_is_graded_whatever_comes_back(tmp_path, in_own_tmp):
     files = [
         # Cells renamed, lost and broken: what was checked counts.
         saved(
-            tmp_path, "broken.ipynb", OPEN.format("Bo").replace("task =", "mine ="),
-            "import nothing_like_that", "this is no Python", f"x = {first}; mine.check(1, x)",
-            "mine.reveal(2)\nmine.check(2, 1.0)\nmine.check(2, 'one')", "input('and now?')",
+            tmp_path, "broken.ipynb", OPEN.format("Bo").replace("task =", "mine ="), None, 5,
+            [1, "x"], "x = '\ud800'", "import nothing_like_that", "this is no Python",
+            "%matplotlib inline", "exit()", "import asyncio\nawait asyncio.sleep(0)",
+            f"mine.check(2, 1.0)\n{first_of('Bo')}".replace("task", "mine"),
+            "mine.reveal(2)\nmine.check(2, 'one')", "input('and now?')",
         ),
         # Printed praise and a bent check earn nothing.
         saved(
@@ -113,47 +153,193 @@ def test_a_class_is_graded_whatever_comes_back(tmp_path):
             "task.progress = lambda: '4 of 4 done'\n"
             "print('{\"marks\": [1, 1, 1, 1]}')",
         ),
-        saved(tmp_path, "twin.ipynb", OPEN.format(" bo "), f"task.check(1, {first})"),
+        saved(tmp_path, "twin.ipynb", OPEN.format(" bo "), first_of("bo")),
         saved(tmp_path, "unnamed.ipynb", OPEN.format("your name"), "import os; os._exit(1)"),
         saved(tmp_path, "empty.ipynb", "1 + 1"),
         tmp_path / "not-there.ipynb",
         tmp_path / "no-notebook.ipynb",
+        tmp_path / "endless.ipynb",
+        tmp_path / "pipe.ipynb",
+        tmp_path / "large.ipynb",
+        tmp_path,
     ]  # fmt: skip
-    files[-1].write_text("# my homework", encoding="utf-8")
-    shares = []
-    rows = {Path(row.file).name: row for row in grade(files, 30.0, shares.append)}
-    assert shares == sorted(shares)
-    assert (shares[0], shares[-1], len(shares)) == (0.0, 1.0, len(files) + 1)
+    (tmp_path / "no-notebook.ipynb").write_text("# my homework", encoding="utf-8")
+    (tmp_path / "endless.ipynb").symlink_to("/dev/zero")
+    os.mkfifo(tmp_path / "pipe.ipynb")
+    with (tmp_path / "large.ipynb").open("wb") as large:
+        large.truncate(LARGEST + 1)
+    rows = {Path(row.file).name: row for row in grade(files, 30.0)}
     broken = rows["broken.ipynb"]
     assert (broken.student, broken.lesson, broken.marks) == ("Bo", "the-bounce", (1, 0, 0, 0))
     assert (broken.total, broken.out_of, broken.revealed) == (1, 4, (2,))
-    assert broken.reason.startswith("code cell 2: ModuleNotFoundError")
+    assert broken.reason == "code cell 2: TypeError: its source is no text"
     assert (rows["cheat.ipynb"].marks, rows["cheat.ipynb"].reason) == ((0, 0, 0, 0), "")
     assert rows["twin.ipynb"].marks == (1, 0, 0, 0)
     assert rows["twin.ipynb"].reason == f"same lesson and student as {files[0]}"
-    assert rows["unnamed.ipynb"].reason == "the kernel died in code cell 2"
+    unnamed = "the kernel died in code cell 2; the name was left at 'your name'"
+    assert rows["unnamed.ipynb"].reason == unnamed
     assert rows["empty.ipynb"].reason.startswith("no exercise was opened")
-    assert rows["not-there.ipynb"].reason == "cannot be read: No such file or directory"
-    assert rows["no-notebook.ipynb"].reason == "not a notebook: not JSON"
-    for name in ("empty.ipynb", "not-there.ipynb", "no-notebook.ipynb"):
+    reasons = {
+        "not-there.ipynb": "cannot be read: No such file or directory",
+        "no-notebook.ipynb": "not a notebook: not JSON",
+        "endless.ipynb": "not a notebook: not a regular file",
+        "pipe.ipynb": "not a notebook: not a regular file",
+        "large.ipynb": "too large for a notebook, which has at most 25 MB",
+        tmp_path.name: "not a notebook: not a regular file",
+    }
+    assert {name: rows[name].reason for name in reasons} == reasons
+    for name in ("empty.ipynb", *reasons):
         assert (rows[name].marks, rows[name].out_of) == ((), 0)
 
 
-def test_what_hangs_is_stopped_and_marked_for_what_it_had(tmp_path):
-    given = lesson("the-bounce", "Di").given
-    answer = f"task.check(1, {-given.e * given.v0})"
-    hung = saved(
-        tmp_path, "hung.ipynb", OPEN.format("Di"), answer, "import time\ntime.sleep(60)", "1 / 0"
+def test_what_hangs_and_prints_is_stopped_and_marked_for_what_it_had(tmp_path, in_own_tmp):
+    flood = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"
+    flood += f"{first_of('Di')}\nwhile True: print('x' * 1_000_000)"
+    hung = saved(tmp_path, "hung.ipynb", OPEN.format("Di"), flood, "1 / 0")
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    [row] = grade([hung], time_limit=2.0)
+    assert (row.marks, row.reason) == ((1, 0, 0, 0), "stopped after 2 s, in code cell 2")
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 50_000
+
+
+@pytest.mark.parametrize(
+    ("sent", "remark"),
+    [
+        ("SIGTERM", "it sent its parent process a signal"),
+        ("SIGKILL", "the kernel died in code cell 3"),
+        pytest.param("SIGSTOP", "", marks=pytest.mark.slow),
+    ],
+)
+def test_a_notebook_ends_with_all_it_started_whatever_it_does_to_its_parent(
+    tmp_path, in_own_tmp, sent, remark
+):
+    pids = tmp_path / "pids"
+    start = (
+        "import os, signal, subprocess\nfrom pathlib import Path\n"
+        "child = subprocess.Popen(['sleep', '600'], start_new_session=True)\n"
+        f"Path({str(pids)!r}).write_text(str(child.pid))\n"
+        f"os.kill(os.getppid(), signal.{sent})\n"
+        "import time; time.sleep(0.5)"
     )
-    [row] = grade([hung], time_limit=4.0)
-    assert (row.marks, row.reason) == ((1, 0, 0, 0), "stopped after 4 s, in code cell 3")
+    bad = saved(tmp_path, "bad.ipynb", OPEN.format("Ed"), first_of("Ed"), start)
+    [row] = grade([bad], time_limit=20.0)
+    assert (row.marks, row.reason) == ((1, 0, 0, 0), remark)
+    assert gone(int(pids.read_text()))
+
+
+def test_a_child_that_hides_is_ended_too(tmp_path, in_own_tmp):
+    pids = tmp_path / "pids"
+    hide = (
+        "import os\n"
+        "if os.fork() == 0:\n"
+        "    os.setsid()\n"
+        "    if os.fork() == 0:\n"
+        f"        script = 'echo $$ > {pids}; exec sleep 600'\n"
+        "        os.execve('/bin/sh', ['sh', '-c', script], {'PATH': os.environ['PATH']})\n"
+        "    os._exit(0)\n"
+        "os.wait()\n"
+        f"while not os.path.exists({str(pids)!r}) or not os.path.getsize({str(pids)!r}): pass"
+    )
+    [row] = grade([saved(tmp_path, "hides.ipynb", OPEN.format("Flo"), hide)], time_limit=20.0)
+    assert (row.marks, row.reason) == ((0, 0, 0, 0), "")
+    assert gone(int(pids.read_text()))
 
 
 @pytest.mark.slow
-def test_what_will_not_be_interrupted_is_stopped_too(tmp_path):
-    stubborn = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)\nwhile True: pass"
-    [row] = grade([saved(tmp_path, "stubborn.ipynb", OPEN.format("Ed"), stubborn)], time_limit=3.0)
-    assert (row.marks, row.reason) == ((), "stopped after 3 s, in code cell 2")
+@pytest.mark.parametrize(
+    ("cell", "remark"),
+    [
+        ("x = bytearray(2 << 30)", "code cell 3: MemoryError"),
+        (
+            "import os, time\n"
+            "for _ in range(4):\n"
+            "    if os.fork() == 0:\n"
+            "        x = b'x' * (600 << 20)\n"
+            "        time.sleep(60)\n"
+            "time.sleep(60)",
+            "the kernel died in code cell 3; it took more than 1536 MB of memory",
+        ),
+        (
+            "import subprocess, time\n"
+            "for _ in range(80): subprocess.Popen(['sleep', '60'])\n"
+            "time.sleep(60)",
+            "the kernel died in code cell 3; it started more than 64 processes",
+        ),
+        (
+            "import os\nfor _ in range(1500): os.mkdir('x'); os.chdir('x')\nos.chmod('.', 0)",
+            "",
+        ),
+        ("10 ** 10 ** 10", "stopped after 10 s, in code cell 3"),
+    ],
+)
+def test_what_takes_too_much_is_stopped(tmp_path, in_own_tmp, cell, remark):
+    bad = saved(tmp_path, "bad.ipynb", OPEN.format("Gus"), first_of("Gus"), cell)
+    [row] = grade([bad], time_limit=10.0)
+    assert (row.marks, row.reason) == ((1, 0, 0, 0), remark)
+
+
+def one(**changes):
+    return {
+        "lesson": "the-bounce", "student": "Hal", "answers": {"1": 1.0}, "revealed": [], **changes
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "report",
+    [
+        # Sizes.
+        [one(student=f"s{i}") for i in range(20_000)],
+        [one(student=f"s{i}") for i in range(65)],
+        [one(student="x" * 201)],
+        # Shapes.
+        {},
+        [5],
+        [one(student="")],
+        [one(lesson="no-such")],
+        [one(lesson=["the-bounce"])],
+        [one(answers=[1.0])],
+        [one(answers={"5": 1.0})],
+        [one(answers={"1": True})],
+        [one(answers={"1": "1.0"})],
+        [one(answers={"1": 10**400})],
+        [one(revealed=[True])],
+        [one(revealed=[[1]])],
+        [one(revealed=list(range(1000)))],
+    ],
+)
+def test_a_forged_report_is_refused(monkeypatch, tmp_path, report):
+    monkeypatch.setattr(grading, "run", lambda *_: Ran(report, "a trouble"))
+    [row] = grade([saved(tmp_path, "forged.ipynb")])
+    assert (row.student, row.marks) == ("", ())
+    assert row.reason.startswith("refused: its report")
+
+
+@pytest.mark.parametrize("said", ["b'x' * 10_000_000", "b'[' * 100_000 + b'\\n'", "b'5\\n'"])
+def test_what_a_notebook_says_in_place_of_its_kernel_is_refused(tmp_path, in_own_tmp, said):
+    pipes = (
+        "import os\nfor one in range(3, 50):\n    try: os.write(one, {})\n    except OSError: pass"
+    )
+    [row] = grade([saved(tmp_path, "x.ipynb", OPEN.format("Ida"), pipes.format(said))], 20.0)
+    assert (row.marks, row.reason) == ((), "refused: its kernel said what no chutelab says")
+
+
+def test_of_several_tasks_the_one_with_most_answers_counts_and_terminals_are_spared(
+    monkeypatch, tmp_path
+):
+    right = -lesson("the-bounce", "Jo").given.e * lesson("the-bounce", "Jo").given.v0
+    report = [
+        one(student="Jo", answers={"1": right, "2": float("nan")}),
+        one(student="A\x1b[31mb", answers={"1": 0.5}),
+        one(student=" JO ", answers={"3": 1.0}, revealed=[3, 3]),
+    ]
+    monkeypatch.setattr(grading, "run", lambda *_: Ran(report, "code cell 1: \x1b]0;x\x07"))
+    [row] = grade([saved(tmp_path, "several.ipynb")])
+    assert (row.student, row.marks, row.revealed) == ("Jo", (1, 0, 0, 0), (3,))
+    others = r"also answered the-bounce as A\x1b[31mb"
+    assert row.reason == rf"code cell 1: \x1b]0;x\x07; {others}"
+
+
+HEAD = "file,student,lesson,q1,q2,q3,q4,total,out_of,revealed,reason\r\n"
 
 
 def test_the_csv_has_a_row_each_and_no_formula(tmp_path):
@@ -162,16 +348,116 @@ def test_the_csv_has_a_row_each_and_no_formula(tmp_path):
             "\ud800.ipynb", "=HYPERLINK(1)", "landing", (1, 0, 1, 1), 4, (2, 3), "late, but good"
         ),
         Grade("b.ipynb", reason="not a notebook: not JSON"),
+        Grade("c.ipynb", "a;=1+1"),
     ]
     path = write_csv(grades, tmp_path / "class.csv")
-    with path.open(encoding="utf-8", newline="") as file:
-        rows = list(csv.reader(file))
-    assert rows == [
-        ["file", "student", "lesson", "q1", "q2", "q3", "q4", "total", "out_of", "revealed",
-         "reason"],
-        ["?.ipynb", "'=HYPERLINK(1)", "landing", "1", "0", "1", "1", "3", "4", "2 3",
-         "late, but good"],
-        ["b.ipynb", "", "", "", "", "", "", "0", "0", "", "not a notebook: not JSON"],
-    ]  # fmt: skip
+    assert path.read_bytes().decode() == HEAD + (
+        '?.ipynb,\'=HYPERLINK(1),landing,1,0,1,1,3,4,2 3,"late, but good"\r\n'
+        "b.ipynb,,,,,,,0,0,,not a notebook: not JSON\r\n"
+        "c.ipynb,a;'=1+1,,,,,,0,0,,\r\n"
+    )
+    assert list(tmp_path.iterdir()) == [path]
     with pytest.raises(OSError, match="nowhere"):
         write_csv(grades, tmp_path / "nowhere" / "class.csv")
+
+
+def test_rows_are_on_the_disk_as_they_come_and_a_full_one_tears_none(tmp_path):
+    path, part = tmp_path / "class.csv", tmp_path / "class.csv.part"
+    path.write_text("what was there before", encoding="utf-8")
+    row = Grade("a.ipynb", "Ada", "landing", (1, 0, 1, 1), 4)
+    written = HEAD + "a.ipynb,Ada,landing,1,0,1,1,3,4,,\r\n"
+    seen = []
+
+    def rows():
+        yield Grade("b.ipynb", reason="nothing")
+        yield row
+        seen.append(part.read_bytes().decode())
+        yield replace(row, reason="x" * 2000)
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
+    try:
+        with pytest.raises(OSError, match="too large"):
+            write_csv(rows(), path)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert seen == [written.replace("\na", "\nb.ipynb,,,,,,,0,0,,nothing\r\na")]
+    assert part.read_bytes().decode() == seen[0]
+    assert path.read_text(encoding="utf-8") == "what was there before"
+    # Whoever comes next does not write over it.
+    with pytest.raises(FileExistsError):
+        write_csv([row], path)
+    part.unlink()
+    assert write_csv([row], path).read_bytes().decode() == written
+
+
+def test_rows_without_any_mark_are_not_kept(tmp_path):
+    def rows():
+        yield Grade("b.ipynb", reason="nothing")
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_csv(rows(), tmp_path / "class.csv")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("sent", "code"),
+    [
+        (signal.SIGTERM, 143),
+        (signal.SIGKILL, -signal.SIGKILL),
+        pytest.param(signal.SIGINT, 130, marks=pytest.mark.slow),
+    ],
+)
+def test_whatever_ends_the_grading_keeps_the_marks_so_far(tmp_path, in_own_tmp, sent, code):
+    pids = tmp_path / "pids"
+    hangs = (
+        "import os, subprocess\n"
+        "child = subprocess.Popen(['sleep', '600'], start_new_session=True)\n"
+        f"open({str(pids)!r}, 'w').write(f'{{os.getpid()}} {{os.getppid()}} {{child.pid}}\\n')\n"
+        "while True: pass"
+    )
+    saved(tmp_path, "1.ipynb", OPEN.format("Kim"), first_of("Kim"))
+    saved(tmp_path, "2.ipynb", OPEN.format("Lee"), hangs)
+    with subprocess.Popen(
+        [sys.executable, "-m", "chutelab", "lesson", "grade", ".", "--out", "class.csv"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(Path(chutelab.__file__).parent.parent)},
+    ) as process:
+        until = monotonic() + 60.0
+        while not (pids.exists() and pids.read_text().endswith("\n")) and monotonic() < until:
+            sleep(0.02)
+        process.send_signal(sent)
+        out, said = process.communicate(timeout=60.0)
+    assert process.returncode == code
+    assert (tmp_path / "class.csv.part").read_bytes().decode() == (
+        HEAD + "1.ipynb,Kim,the-bounce,1,0,0,0,1,4,,\r\n"
+    )
+    if sent != signal.SIGKILL:
+        assert "1 of 4 (1 0 0 0)" in out
+        assert said.startswith("the marks of 1 of 2 notebooks are in class.csv.part\n")
+        assert "Traceback" not in said
+    assert all(map(gone, map(int, pids.read_text().split())))
+    names = ["1.ipynb", "2.ipynb", "class.csv.part", "pids", "temporary"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == names
+
+
+def test_no_marks_and_no_notebook_are_written_over(tmp_path):
+    book = saved(tmp_path, "1.ipynb", OPEN.format("Max"))
+    before = book.read_bytes()
+    refused = CliRunner().invoke(main, ["lesson", "grade", str(tmp_path), "--out", str(book)])
+    assert (refused.exit_code, book.read_bytes()) == (2, before)
+    assert "one of the notebooks" in refused.stderr
+    longest = str(tmp_path / ("x" * 252))  # one more than leaves room for .part
+    refused = CliRunner().invoke(main, ["lesson", "grade", str(tmp_path), "--out", longest])
+    assert refused.exit_code == 2
+    assert "name too long" in refused.stderr
+    (tmp_path / "class.csv.part").write_text("marks", encoding="utf-8")
+    out = ["--out", str(tmp_path / "class.csv")]
+    refused = CliRunner().invoke(main, ["lesson", "grade", str(tmp_path), *out])
+    assert refused.exit_code == 2
+    assert "class.csv.part" in refused.stderr
+    assert (tmp_path / "class.csv.part").read_text(encoding="utf-8") == "marks"

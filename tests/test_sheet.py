@@ -66,6 +66,8 @@ def test_text_is_aligned_words_left_and_numbers_right():
 
 def test_html_has_the_same_cells_escaped():
     text = SHEET._repr_html_()
+    # No notebook is to take what is between dollar signs for mathematics.
+    assert text.startswith('<div class="tex2jax_ignore mathjax_ignore">')
     assert "a&lt;b" in text
     assert "What &amp; where" in text
     assert Cells(text).rows == [list(SHEET.columns), *map(list, SHEET.rows + SHEET.foot)]

@@ -18,7 +18,7 @@ from chutelab.pictures.animation import animate
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.design import scan, spread, sweep_figure
 from chutelab.pictures.plots.measured import measured
-from chutelab.scene import from_dict, parse, to_dict, to_toml
+from chutelab.scene import SceneError, from_dict, parse, to_dict, to_toml
 from chutelab.studies.design import solve, uncertainty
 from chutelab.studies.measured import read, residuals
 from chutelab.studies.sweep import sweep
@@ -128,6 +128,29 @@ def test_a_terminal_is_told_nothing_to_obey(monkeypatch, evil, args, colour):
 def test_a_scene_that_is_written_can_be_read_whatever_is_said_of_it():
     again = parse(to_toml(scene(), f"{NAME}: \0\x1b\x7f\r\n\N{LINE SEPARATOR}x = 1"))
     assert again == scene().model_copy(update={"expect": ()})
+
+
+@pytest.mark.parametrize(
+    ("told", "key"),
+    [
+        ({"surface": [{"name": "n\udcff", "from": [-1, -9], "to": [1, -9]}]}, "surface[0].name"),
+        ({"title": "\ud83c"}, "title"),
+        ({"run": {"x\udcff": 1}}, 'run."x\\udcff"'),
+        ({"\udcff": {}}, '"\\udcff"'),
+    ],
+)
+def test_half_a_character_is_refused_with_its_place(told, key):
+    with pytest.raises(SceneError) as raised:
+        from_dict({**to_dict(chutelab.load("free-fall")), **told})
+    assert raised.value.key == key
+    assert "must be Unicode" in str(raised.value)
+
+
+def test_a_scene_without_a_title_has_that_of_its_file_whatever_that_is(tmp_path):
+    told = to_dict(chutelab.load("free-fall"))
+    del told["title"]
+    assert from_dict(told, "a/b\x1b\udcff.toml").title == r"b\x1b\udcff"
+    assert len(from_dict(told, "\udcff" * 250 + ".toml").title) == 200
 
 
 def test_a_recording_prints_nothing_to_obey():

@@ -3,4 +3,5 @@
 - `lessons`: a question, a worksheet, an exercise, a picture, and scenes to run.
 - `exercises`: exercises that answer back, with each student's own numbers.
 - `grading`: marks from returned notebooks.
+- `kernel`: their cells, run in a process of their own, with limits.
 """

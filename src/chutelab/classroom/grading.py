@@ -1,47 +1,44 @@
 """Marks from returned notebooks. It runs students' code: use a container for strangers.
 
-A notebook runs in a kernel of its own, with a time limit. What it prints is not looked at: the
-kernel hands over the numbers that were checked, and they are judged again here, against the numbers
-of the student's name. `write_csv` writes the marks of a class.
+A notebook runs in a kernel of its own (`kernel`), with limits. What it prints is not looked at: the
+kernel hands over the numbers that were checked, and they are judged again here, against right ones
+that are computed here. Each notebook is marked by itself, whatever becomes of the others;
+`write_csv` writes the marks of a class, a row as soon as there is one.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import secrets
-import sys
-import tempfile
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
-from math import ceil, isfinite
+import stat
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+from importlib.util import find_spec
+from math import isfinite
 from pathlib import Path
-from time import monotonic
-from typing import TYPE_CHECKING, Any, Final
+from typing import Any, Final
 
-from chutelab.classroom.exercises import ExerciseError, Task, lesson
-from chutelab.classroom.exercises.catalogue import UNNAMED
-from chutelab.classroom.exercises.exercise import plain
-from chutelab.util.errors import InputError, MissingLibraryError
-from chutelab.util.files import csv_lines, write_lines
+from chutelab.classroom.exercises import EXERCISES
+from chutelab.classroom.exercises.catalogue import LONGEST_NAME, OPENED, UNNAMED
+from chutelab.classroom.exercises.exercise import draw, plain
+from chutelab.classroom.exercises.judging import judge
+from chutelab.classroom.kernel import ForgedError, run
+from chutelab.util.errors import InputError, MissingLibraryError, printable
+from chutelab.util.files import csv_lines
 
-if TYPE_CHECKING:  # of the extra "notebook"
-    from nbclient import NotebookClient
-
-LARGEST: Final = 50 << 20
-"""Bytes; a notebook with its pictures is a tenth of it."""
+LARGEST: Final = 25 << 20
+"""Bytes; a notebook with its pictures is a tenth of it. As JSON it takes up to 30 times that."""
 
 
 class NotebookError(InputError):
     """A file that is no notebook; its text says why."""
 
 
-def code_of(path: Path) -> list[str]:
-    """Return the code cells of a notebook of version 4.
+def code_of(path: Path) -> list[str | None]:
+    """Return the code cells of a notebook of version 4, None for one whose source is no text.
 
     The JSON is read here and not by nbformat: that refuses a notebook with a cell that has lost its
-    metadata or its source, and what was checked in the other cells counts. With it, reading one
-    takes 0.15 s more for the import.
+    metadata or its source, and what was checked in the other cells counts.
 
     Raises
     ------
@@ -49,137 +46,39 @@ def code_of(path: Path) -> list[str]:
         If it cannot be read.
     """
     try:
-        data = path.read_bytes() if path.stat().st_size <= LARGEST else None
-    except OSError as error:
-        raise NotebookError(f"cannot be read: {error.strerror or error}") from None
-    if data is None:
+        # Asked before it is opened, which alone would set off some devices; and not waited for, if
+        # it has become a pipe since then.
+        regular = stat.S_ISREG(path.stat().st_mode)
+        data = b""
+        if regular:
+            flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+            with os.fdopen(os.open(path, flags), "rb") as file:
+                # A size that is told may be wrong.
+                regular = stat.S_ISREG(os.fstat(file.fileno()).st_mode)
+                data = file.read(LARGEST + 1) if regular else b""
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else ""
+        raise NotebookError(f"cannot be read: {reason or error}") from None
+    if not regular:
+        raise NotebookError("not a notebook: not a regular file")
+    if len(data) > LARGEST:
         raise NotebookError(f"too large for a notebook, which has at most {LARGEST >> 20} MB")
     try:
         cells = json.loads(data.decode("utf-8"))["cells"]
-        code = [one.get("source", "") for one in cells if one.get("cell_type") == "code"]
-        # A source is a text, or a list of lines.
-        return ["".join(map(str, source)) for source in code]
+        sources = [one.get("source", "") for one in cells if one.get("cell_type") == "code"]
     except UnicodeDecodeError:
         raise NotebookError("not a notebook: not UTF-8 text") from None
     except (ValueError, RecursionError):
         raise NotebookError("not a notebook: not JSON") from None
     except (AttributeError, LookupError, TypeError):
         raise NotebookError("not a notebook: it has no cells") from None
+    return list(map(_text, sources))
 
 
-PACKAGES: Final = Path(__file__).parents[2]
-"""Where this chutelab lies, for the kernel to find it too."""
-
-LAST_WORD: Final = 5
-"""s for the kernel to hand over the answers after its time is up."""
-
-QUIET: Final = "--IPKernelApp.log_level=40"
-"""Errors only: the kernel would warn of connections that never leave this machine."""
-
-LONGEST: Final = 200
-"""Characters of an error that are told."""
-
-
-def run(code: Sequence[str], time_limit: float) -> tuple[list[Any], str]:
-    """Run code cells in order; what raises an error does not keep the rest from running.
-
-    Parameters
-    ----------
-    code : sequence of str
-        The cells.
-    time_limit : float
-        s for all of them together, the kernel's start not counted.
-
-    Returns
-    -------
-    tasks : list
-        As `report` in `classroom.exercises.catalogue` gives them, unchecked: student's code ran
-        there.
-    trouble : str
-        What went wrong first, or empty.
-    """
-    from nbclient.exceptions import DeadKernelError
-
-    tasks: list[Any] = []
-    trouble = ""
-    # No cell before could know this name.
-    name = f"application/x-chutelab-{secrets.token_hex(8)}+json"
-    handing_over = (
-        "import chutelab.classroom.exercises.catalogue, IPython.display\n"
-        "IPython.display.publish_display_data("
-        f"{{{name!r}: chutelab.classroom.exercises.catalogue.report()}})"
-    )
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        client = _client(folder)
-        with client.setup_kernel(cleanup_kc=True):
-            deadline = monotonic() + time_limit
-            place = ""
-            try:
-                for number, source in enumerate(code, start=1):
-                    place = f"in code cell {number}"
-                    outputs = _execute(client, source, deadline - monotonic())
-                    if monotonic() >= deadline:
-                        trouble = f"stopped after {time_limit:g} s, {place}"
-                        break
-                    errors = [one for one in outputs if one.output_type == "error"]
-                    if errors and not trouble:
-                        said = f"{errors[0].ename}: {errors[0].evalue}"[:LONGEST]
-                        trouble = f"code cell {number}: {said}"
-                else:
-                    place = "after the last cell"
-                for output in _execute(client, handing_over, LAST_WORD):
-                    found = output.get("data", {}).get(name)
-                    tasks = found if isinstance(found, list) else tasks
-            except DeadKernelError:
-                trouble = trouble or f"the kernel died {place}"
-    return tasks, trouble
-
-
-def _client(folder: str) -> NotebookClient:
-    """Return a client whose kernel is this Python with this chutelab, whatever else is installed.
-
-    Start-up files and history of whoever grades are left out.
-    """
-    from jupyter_client.kernelspec import KernelSpec, KernelSpecManager
-    from jupyter_client.manager import AsyncKernelManager
-    from nbclient import NotebookClient
-    from nbformat.v4 import new_notebook
-
-    paths = [str(PACKAGES), *filter(None, [os.environ.get("PYTHONPATH")])]
-    spec = KernelSpec(
-        argv=[sys.executable, "-m", "ipykernel_launcher", "-f", "{connection_file}", QUIET],
-        display_name="chutelab",
-        language="python",
-        env={"PYTHONPATH": os.pathsep.join(paths), "IPYTHONDIR": folder},
-    )
-
-    class Specs(KernelSpecManager):
-        def get_kernel_spec(self, kernel_name: str) -> KernelSpec:
-            return spec
-
-    manager = AsyncKernelManager(kernel_name="python3", kernel_spec_manager=Specs())
-    return NotebookClient(
-        new_notebook(),  # type: ignore[no-untyped-call]
-        km=manager,
-        allow_errors=True,
-        # A cell whose time is up is interrupted and left, whether it stops or not.
-        interrupt_on_timeout=True,
-        error_on_timeout={"ename": "TimeoutError", "evalue": "", "traceback": []},
-        shutdown_kernel="immediate",
-        resources={"metadata": {"path": folder}},
-    )
-
-
-def _execute(client: NotebookClient, source: str, seconds: float) -> list[Any]:
-    """Run one cell; return its outputs."""
-    from nbformat.v4 import new_code_cell
-
-    cell = new_code_cell(source)  # type: ignore[no-untyped-call]
-    client.nb.cells = [cell]
-    client.timeout = max(1, ceil(seconds))
-    client.execute_cell(cell, 0)
-    outputs: list[Any] = cell.outputs
-    return outputs
+def _text(source: Any) -> str | None:
+    """Return the source of a cell: a text, or a list of lines."""
+    lines = source if isinstance(source, list) else [source]
+    return "".join(lines) if all(isinstance(line, str) for line in lines) else None
 
 
 @dataclass(frozen=True)
@@ -200,12 +99,8 @@ class Grade:
         return sum(self.marks)
 
 
-def grade(
-    paths: Iterable[str | Path],
-    time_limit: float = 60.0,
-    progress: Callable[[float], None] | None = None,
-) -> list[Grade]:
-    """Run returned notebooks and mark them. This runs the students' code.
+def grade(paths: Iterable[str | Path], time_limit: float = 60.0) -> Iterator[Grade]:
+    """Run returned notebooks and mark them, one after the other. This runs the students' code.
 
     Parameters
     ----------
@@ -213,103 +108,156 @@ def grade(
         Notebooks.
     time_limit
         s for each. One that hangs is stopped, and marked for what it had answered by then.
-    progress
-        Called with the share that is done, 0 to 1.
 
     Returns
     -------
-    list of Grade
-        One per path, in their order; a notebook that cannot be read, run or marked has its reason.
+    iterator of Grade
+        One per path, in their order, each when it is done; a notebook that cannot be read, run or
+        marked has its reason.
 
     Raises
     ------
     MissingLibraryError
-        Without nbclient, which the extra ``notebook`` brings.
+        Without IPython and psutil, which the extra ``notebook`` brings.
     """
-    try:
-        import nbclient  # noqa: F401 - with it come nbformat and jupyter_client
-    except ModuleNotFoundError as error:
-        message = 'grading needs nbclient: python -m pip install "chutelab[notebook]"'
-        raise MissingLibraryError(message) from error
-    files = [str(path) for path in paths]
-    grades: list[Grade] = []
-    for index, file in enumerate(files):
-        if progress is not None:
-            progress(index / len(files))
-        row = _grade(file, time_limit)
+    missing = [name for name in ("IPython", "psutil") if find_spec(name) is None]
+    if missing:
+        install = 'python -m pip install "chutelab[notebook]"'
+        raise MissingLibraryError(f"grading needs {' and '.join(missing)}: {install}")
+    return _each(list(map(str, paths)), time_limit)
+
+
+def _each(files: list[str], time_limit: float) -> Iterator[Grade]:
+    first: dict[tuple[str, str], str] = {}
+    for file in files:
+        try:
+            row = _grade(file, time_limit)
+        except NotebookError as error:
+            row = Grade(file, reason=str(error))
+        except ForgedError as error:
+            row = Grade(file, reason=f"refused: {error}")
+        except Exception as error:  # the others are marked all the same
+            row = Grade(file, reason=f"cannot be graded: {type(error).__name__}: {error}")
+        row = replace(row, student=printable(row.student), reason=printable(row.reason))
         who = (row.lesson, plain(row.student))
-        twins = [one for one in grades if row.lesson and who == (one.lesson, plain(one.student))]
-        if twins:
-            same = f"same lesson and student as {twins[0].file}"
+        if row.lesson and who in first:
+            same = printable(f"same lesson and student as {first[who]}")
             row = replace(row, reason="; ".join(filter(None, [row.reason, same])))
-        grades.append(row)
-    if progress is not None:
-        progress(1.0)
-    return grades
+        first.setdefault(who, file)
+        yield row
 
 
-def write_csv(grades: Sequence[Grade], path: str | Path) -> Path:
-    """Write a row per grade; the file is whole or not there."""
-    most = max((len(row.marks) for row in grades), default=0)
-    heads = [f"q{i + 1}" for i in range(most)]
-    rows = [["file", "student", "lesson", *heads, "total", "out_of", "revealed", "reason"]]
-    for row in grades:
-        marks = [*map(str, row.marks), *[""] * (most - len(row.marks))]
-        revealed = " ".join(map(str, row.revealed))
-        cells = [row.file, row.student, row.lesson, *marks]
-        rows.append([*cells, str(row.total), str(row.out_of), revealed, row.reason])
-    return write_lines(path, csv_lines(rows, end="\r\n"), errors="replace")
+def write_csv(grades: Iterable[Grade], path: str | Path) -> Path:
+    """Write a row per grade, as soon as it comes; at the end the file is there, whole.
+
+    Until then the rows are in a file beside it, ``NAME.part``. An exception, of `grades` or of the
+    disk, leaves it there if there are marks in it; so does the end of the program. Each row in it
+    is whole.
+
+    Raises
+    ------
+    FileExistsError
+        If ``NAME.part`` is there: somebody's marks, or a grading that still runs.
+    """
+    path = Path(path)
+    part = path.with_name(f"{path.name}.part")
+    heads = [f"q{i + 1}" for i in range(max(len(one.questions) for one in EXERCISES.values()))]
+    marked = False
+
+    def rows() -> Iterator[list[object]]:
+        nonlocal marked
+        yield ["file", "student", "lesson", *heads, "total", "out_of", "revealed", "reason"]
+        for row in grades:
+            marks = [*row.marks, *[None] * (len(heads) - len(row.marks))]
+            revealed = " ".join(map(str, row.revealed))
+            cells = [row.file, row.student, row.lesson, *marks]
+            yield [*cells, row.total, row.out_of, revealed, row.reason]
+            marked = marked or bool(row.marks)
+
+    with part.open("xb", buffering=0) as file:
+        try:
+            for line in csv_lines(rows(), end="\r\n"):
+                size, left = file.tell(), line.encode("utf-8", "replace")
+                try:
+                    while left:
+                        left = left[file.write(left) :]
+                except BaseException:
+                    file.truncate(size)
+                    raise
+            os.fsync(file.fileno())
+        except BaseException:
+            if not marked:
+                part.unlink()
+            raise
+    return part.replace(path)
+
+
+@dataclass
+class _Work:
+    """What a student checked in one lesson, as the kernel reports it."""
+
+    lesson: str
+    student: str
+    answers: dict[int, float] = field(default_factory=dict)
+    revealed: set[int] = field(default_factory=set)
 
 
 def _grade(file: str, time_limit: float) -> Grade:
-    try:
-        tasks, trouble = run(code_of(Path(file)), time_limit)
-    except NotebookError as error:
-        return Grade(file, reason=str(error))
-    except (RuntimeError, OSError) as error:
-        # The kernel could not be started, or was taken away: the next one may do.
-        return Grade(file, reason=f"the kernel failed: {error}")
-    task, notes = _task(tasks)
-    reasons = [*filter(None, [trouble]), *notes]
-    if task is None:
-        return Grade(file, reason=reasons[0])
-    questions = range(1, len(task.questions) + 1)
-    # Checked once more here: a kernel that ran anybody's code is not asked for marks.
-    right = tuple(int(task.check(n, task.answers.get(n)).right) for n in questions)
-    if plain(task.student) == UNNAMED:
+    ran = run(code_of(Path(file)), time_limit)
+    works = _works(ran.tasks)
+    if not works:
+        nothing = "no exercise was opened: lesson(…) was never called"
+        return Grade(file, reason=ran.trouble or nothing)
+    work = max(reversed(works), key=lambda one: len(one.answers))
+    # The right answers come from here, whatever was made of them in the kernel.
+    _, cases = draw(EXERCISES[work.lesson], work.student)
+    right = tuple(
+        int(case.number in work.answers and judge(case, work.answers[case.number]).right)
+        for case in cases
+    )
+    others = (one for one in works if one is not work and one.answers)
+    reasons = [ran.trouble, *(f"also answered {one.lesson} as {one.student}" for one in others)]
+    if plain(work.student) == UNNAMED:
         reasons.append(f"the name was left at {UNNAMED!r}")
     return Grade(
         file=file,
-        student=task.student,
-        lesson=task.exercise.name,
+        student=work.student,
+        lesson=work.lesson,
         marks=right,
         out_of=len(right),
-        revealed=task.revealed,
-        reason="; ".join(reasons),
+        revealed=tuple(sorted(work.revealed)),
+        reason="; ".join(filter(None, reasons)),
     )
 
 
-def _task(reports: list[Any]) -> tuple[Task | None, list[str]]:
-    """Return the task that was worked on, answered anew, and what there is to say about it."""
-    tasks: dict[tuple[str, str], Task] = {}
+def _works(reports: object) -> list[_Work]:
+    """Return what was worked on, each lesson and student once, in the order they were opened.
+
+    Raises
+    ------
+    ForgedError
+        If that is no report of a chutelab: anybody's code ran there.
+    """
+    if not isinstance(reports, list) or len(reports) > (OPENED.maxlen or 0):
+        raise ForgedError("its report is not a list of tasks, or too long a one")
+    works: dict[tuple[str, str], _Work] = {}
     for report in reports:
-        try:
-            task = lesson(str(report["lesson"]), str(report["student"]))
-            task = tasks.setdefault((task.exercise.name, plain(task.student)), task)
-            for number, answer in report["answers"].items():
-                if isfinite(answer):
-                    task.check(int(number), float(answer))
-            for number in report["revealed"]:
-                task.reveal(int(number))
-        except (ExerciseError, ArithmeticError, LookupError, TypeError, ValueError, AttributeError):
-            continue
-    if not tasks:
-        return None, ["no exercise was opened: lesson(…) was never called"]
-    found = list(tasks.values())[::-1]
-    chosen = max(found, key=lambda task: len(task.answers))
-    notes = [
-        f"also answered {task.exercise.name} as {task.student}"
-        for task in found
-        if task is not chosen and task.answers
-    ]
-    return chosen, notes
+        match report:
+            case {
+                "lesson": str(name),
+                "student": str(student),
+                "answers": dict(answers),
+                "revealed": list(revealed),
+            } if name in EXERCISES and 0 < len(student) <= LONGEST_NAME:
+                work = works.setdefault((name, plain(student)), _Work(name, student))
+            case _:
+                raise ForgedError("its report is of no lesson, or of no student")
+        numbers = {str(n): n for n in range(1, len(EXERCISES[name].questions) + 1)}
+        # Answers come as floats and numbers of questions as integers; true is no 1.
+        if not all(key in numbers and type(x) is float for key, x in answers.items()):
+            raise ForgedError("its report has answers to no question, or that are no numbers")
+        if not all(type(n) is int and n in numbers.values() for n in revealed):
+            raise ForgedError("its report has workings of no question")
+        work.answers |= {numbers[key]: x for key, x in answers.items() if isfinite(x)}
+        work.revealed |= set(revealed)
+    return list(works.values())

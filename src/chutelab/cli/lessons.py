@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +17,7 @@ from chutelab.cli.parameters import json_option, out_option
 from chutelab.cli.program import InOrder, RefusedError
 
 if TYPE_CHECKING:
+    from chutelab.classroom.grading import Grade
     from chutelab.classroom.lessons import Lesson
 
 
@@ -206,13 +209,15 @@ def _plain(lesson: Lesson) -> dict[str, object]:
     metavar="FILES...",
     nargs=-1,
     required=True,
-    type=click.Path(exists=True, path_type=Path),
+    # One that cannot be read has its row.
+    type=click.Path(exists=True, readable=False, path_type=Path),
 )
 @click.option(
     "--out",
     metavar="FILE",
     type=click.Path(dir_okay=False, path_type=Path),
-    help="Write the marks into this CSV file, a row for each notebook.",
+    help="Write the marks into this CSV file, a row for each notebook. Until the last is marked,"
+    " the rows are in FILE.part.",
 )
 @click.option(
     "--time-limit",
@@ -229,8 +234,15 @@ def grade(files: tuple[Path, ...], out: Path | None, time_limit: float, quiet: b
     A folder stands for the notebooks in it. What a student checked is judged anew against the
     numbers that belong to that student's name; what a notebook prints does not count.
 
-    THIS RUNS THE STUDENTS' CODE, with all that you may do on this computer. Grade the notebooks of
-    strangers in a container.
+    THIS RUNS THE STUDENTS' CODE, with all that you may do on this computer. Each notebook has
+    processes and a folder of its own, which end with it, and limits of time, memory and processes:
+    that is for accidents. Grade the notebooks of strangers in a container.
+
+    Marks say which numbers were handed in, not how they were found: whoever looks for the right
+    ones finds them, by trying until the replies say so, with chutelab's own theory, or in the
+    exercises' source. Working that was shown in the notebook is in the column "revealed".
+
+    Ctrl-C, or a crash, keeps the marks so far, in FILE.part.
 
     \b
     chutelab lesson grade returned/ --out class.csv
@@ -247,20 +259,50 @@ def grade(files: tuple[Path, ...], out: Path | None, time_limit: float, quiet: b
             raise RefusedError(f"{file}: there is no notebook (*.ipynb) in this folder")
         notebooks += found
     check_file("--out", out)
-    with progress("running the notebooks", quiet=quiet) as update:
-        grades = grade_notebooks(notebooks, time_limit=time_limit, progress=update)
-    if not quiet:
-        rows = []
-        for one in grades:
-            marks = f"{one.total} of {one.out_of} ({' '.join(map(str, one.marks))})"
-            rows.append(
-                (one.file, one.student, one.lesson, marks if one.marks else "-", one.reason)
-            )
-        heads = ("file", "student", "lesson", "marks", "remarks")
-        console.show(Sheet("", heads, tuple(rows), texts=5))
-    if not any(one.marks for one in grades):
-        raise RefusedError("nothing to mark: none of these is a notebook of a lesson's exercise")
     if out is not None:
-        with writing(f"--out {out}"):
-            write_csv(grades, out)
+        part = out.with_name(f"{out.name}.part")
+        with writing(f"--out {out}", instead="another name"):
+            interrupted, there = part.exists(), out.exists()
+        if interrupted:
+            raise RefusedError(
+                f"{part}: has the marks of a grading that was interrupted, or still runs; move or"
+                " remove it first"
+            )
+        if there and any(one.exists() and one.samefile(out) for one in notebooks):
+            raise RefusedError(f"--out {out}: is one of the notebooks; give another name")
+    done: list[Grade] = []
+
+    def rows(update: Callable[[float], None] | None) -> Iterator[Grade]:
+        for row in grade_notebooks(notebooks, time_limit=time_limit):
+            done.append(row)
+            yield row
+            if update is not None:
+                update(len(done) / len(notebooks))
+        if not any(one.marks for one in done):
+            raise RefusedError(
+                "nothing to mark: none of these is a notebook of a lesson's exercise"
+            )
+
+    try:
+        with progress("running the notebooks", quiet=quiet) as update, writing(f"--out {out}"):
+            if out is None:
+                deque(rows(update), maxlen=0)
+            else:
+                write_csv(rows(update), out)
+    finally:
+        if done and not quiet:
+            console.show(Sheet("", HEADS, tuple(map(_cells, done)), texts=5))
+        if out is not None and part.exists():
+            marked = f"{len(done)} of {len(notebooks)} notebooks"
+            console.say(f"the marks of {marked} are in {part}", err=True)
+    if out is not None:
         console.say(f"wrote {out}")
+
+
+HEADS = ("file", "student", "lesson", "marks", "remarks")
+
+
+def _cells(one: Grade) -> tuple[str, ...]:
+    """Return the cells of a notebook's row in the table, see `HEADS`."""
+    marks = f"{one.total} of {one.out_of} ({' '.join(map(str, one.marks))})"
+    return (one.file, one.student, one.lesson, marks if one.marks else "-", one.reason)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import difflib
 import re
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
@@ -20,7 +20,7 @@ from pydantic import ValidationError
 from chutelab.scene.overrides import Override, apply, at_path, joined, rule_at
 from chutelab.scene.rules import ConflictError, Look, conflicts
 from chutelab.scene.schema import Scene
-from chutelab.util.errors import MISSING, Fault, InputError, did_you_mean, printable
+from chutelab.util.errors import MISSING, Fault, InputError, cut, did_you_mean, printable
 
 
 class SceneError(InputError):
@@ -284,7 +284,13 @@ def from_dict(
     faults, given = apply(document, overrides)
     empty = not document
     if source != "<scene>":
-        document.setdefault("title", Path(source).stem)
+        document.setdefault("title", cut(printable(Path(source).stem), 200))
+    # Bytes of a command line that are no UTF-8 come as these; no file could be written with them.
+    halves = [one for one in _texts(document) if not one[1].isascii() and SURROGATE.search(one[1])]
+    if halves:
+        allowed = "must be Unicode, without halves of characters"
+        broken = [Fault(joined(path), text, allowed) for path, text in halves]
+        raise SceneError(source, faults + [_traced(fault, given) for fault in broken])
     scene: Scene | None = None
     try:
         scene = Scene.model_validate(document)
@@ -300,6 +306,25 @@ def from_dict(
         raise SceneError(source, faults, f"The scene is empty. {_STARTER}" if empty else "")
     scene._source = source
     return scene
+
+
+SURROGATE: Final = re.compile("[\ud800-\udfff]")
+
+
+def _texts(
+    value: object, path: tuple[str | int, ...] = ()
+) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    """Yield where the texts of a document are, its keys too, and the texts."""
+    match value:
+        case str():
+            yield path, value
+        case dict():
+            for key, content in value.items():
+                yield (*path, key), key
+                yield from _texts(content, (*path, key))
+        case list():
+            for index, item in enumerate(value):
+                yield from _texts(item, (*path, index))
 
 
 def to_dict(scene: Scene) -> dict[str, Any]:

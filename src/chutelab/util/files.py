@@ -6,9 +6,7 @@ It imports no NumPy: commands that need none answer at once.
 from __future__ import annotations
 
 import csv
-import glob
 import re
-import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -35,14 +33,6 @@ def whole(path: str | Path) -> Iterator[Path]:
         unfinished = Path(folder) / path.name
         yield unfinished
         unfinished.replace(path)
-
-
-def remove_unfinished(path: str | Path) -> None:
-    """Remove what processes that were killed in `whole` left; nobody else may be writing `path`."""
-    path = Path(path)
-    for folder in path.parent.glob(f".{glob.escape(path.name)}-????????"):
-        if folder.is_dir() and {file.name for file in folder.iterdir()} <= {path.name}:
-            shutil.rmtree(folder, ignore_errors=True)
 
 
 _FORMULA: Final = r"((?:\A|[;\t\r\n])[\s\"']*)({}[=+\-@\uff1d\uff0b\uff0d\uff20])"

@@ -131,7 +131,9 @@ class Sheet:
         if foot:
             foot = f'<tfoot style="border-top:1px solid">{foot}</tfoot>'
         notes = "".join(f'<p style="max-width:45em">{escape(note)}</p>' for note in self.notes)
-        return f"<div><table>{caption}{head}<tbody>{body}</tbody>{foot}</table>{notes}</div>"
+        # Notebooks take what is between two dollar signs for mathematics, but not where it says so.
+        table = f"<table>{caption}{head}<tbody>{body}</tbody>{foot}</table>"
+        return f'<div class="tex2jax_ignore mathjax_ignore">{table}{notes}</div>'
 
     _repr_html_ = html
 

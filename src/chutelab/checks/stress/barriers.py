@@ -108,8 +108,6 @@ def overlap(e: Evidence) -> Verdict | None:
     for now in np.concatenate([_instants(e), _some(e, Kind.COLLISION)["t"]]):
         (position,), _ = e.recording.at([now])
         there = np.flatnonzero(np.isfinite(position[:, 0]))
-        if not len(there):
-            continue  # the last has landed, the next is not released
         deep, i, j = closest(position[there], e.machine.particle.radius)
         if deep > 0.0:
             found.append((deep, f"particles {there[i]} and {there[j]} at t = {now:.6g} s"))

@@ -9,7 +9,15 @@ from pathlib import Path
 from typing import Final
 
 from chutelab.classroom.exercises import judging
-from chutelab.classroom.exercises.exercise import TOLERANCE, Case, Exercise, draw, read, shown
+from chutelab.classroom.exercises.exercise import (
+    TOLERANCE,
+    Case,
+    Exercise,
+    Numbers,
+    draw,
+    read,
+    shown,
+)
 from chutelab.classroom.exercises.judging import (
     Passage,
     Progress,
@@ -27,28 +35,39 @@ UNNAMED: Final = "your name"
 """What stands in a notebook in place of the student's name."""
 
 
+LONGEST_NAME: Final = 200
+"""Characters of a student's name."""
+
+
 class Task:
     """One lesson's exercise with a student's own numbers, made by `lesson`.
 
-    None of its methods raises an error for what a student hands over; they answer in words.
+    None of its methods raises an error for what a student hands over; they answer in words. It
+    holds no right answer: that is computed for a reply, and forgotten.
 
     Attributes
     ----------
+    lesson : str
+        Name of the lesson.
+    student : str
+        The student's name.
     given : Values
         The student's parameters, as attributes.
     """
 
     def __init__(self, exercise: Exercise, student: str) -> None:
-        self.exercise = exercise
+        self.lesson = exercise.name
         self.student = student
-        self.given, self._cases = draw(exercise, student)
-        self._standings = [Standing(case.number, case.question.title) for case in self._cases]
+        self.given, _ = draw(exercise, student)
+        self._standings = [
+            Standing(number, asked.title) for number, asked in enumerate(exercise.questions, 1)
+        ]
         OPENED.append(self)
 
     @property
     def questions(self) -> tuple[Passage, ...]:
         """All questions, with this student's numbers."""
-        return tuple(map(_asked, self._cases))
+        return tuple(_asked(_case(self, one.number)) for one in self._standings)
 
     @property
     def answers(self) -> dict[int, float]:
@@ -63,7 +82,7 @@ class Task:
     def question(self, number: object = None) -> Passage | Reply:
         """Show a question with this student's numbers."""
         found = self._found(number)
-        return self._unknown if found is None else _asked(found[0])
+        return self._unknown if found is None else _asked(_case(self, found.number))
 
     def check(self, number: object = None, answer: object = None) -> Reply:
         """Say what becomes of an answer.
@@ -75,29 +94,28 @@ class Task:
         answer : object
             The student's number, or whatever stands in its place.
         """
-        found = self._found(number)
-        if found is None:
+        standing = self._found(number)
+        if standing is None:
             return self._unknown
-        case, standing = found
         value = number_of(answer)
         if value is None:
             text = "Put your number in place of None, and run the cell. Stuck?"
-            return Reply(case.number, Verdict.BLANK, f"{text} task.hint({case.number})")
+            return Reply(standing.number, Verdict.BLANK, f"{text} task.hint({standing.number})")
         if isinstance(value, str):
-            reply = Reply(case.number, Verdict.UNREAD, value)
+            reply = Reply(standing.number, Verdict.UNREAD, value)
         else:
             standing.answer = value
-            reply = judging.judge(case, value)
+            reply = judging.judge(_case(self, standing.number), value)
         standing.tries += 1
         standing.verdict = reply.verdict
         return reply
 
     def hint(self, number: object = None) -> Passage | Reply:
         """Give the next hint to a question; the last one again when there are no more."""
-        found = self._found(number)
-        if found is None:
+        standing = self._found(number)
+        if standing is None:
             return self._unknown
-        case, standing = found
+        case = _case(self, standing.number)
         hints = case.question.hints
         standing.hints = min(standing.hints + 1, len(hints))
         title = f"Hint {standing.hints} of {len(hints)} to question {case.number}"
@@ -108,10 +126,10 @@ class Task:
 
     def reveal(self, number: object = None) -> Passage | Reply:
         """Show the working of a question, with the answer. It is noted that you asked."""
-        found = self._found(number)
-        if found is None:
+        standing = self._found(number)
+        if standing is None:
             return self._unknown
-        case, standing = found
+        case = _case(self, standing.number)
         standing.revealed = True
         asked = case.question
         lines = [case.numbers.text(line) for line in asked.working.splitlines()]
@@ -122,49 +140,56 @@ class Task:
     def progress(self) -> Progress:
         """Draw what is done."""
         rows = tuple(replace(standing) for standing in self._standings)
-        return Progress(f"{self.exercise.title}, {self.student}", rows)
+        return Progress(f"{EXERCISES[self.lesson].title}, {self.student}", rows)
 
-    def _found(self, number: object) -> tuple[Case, Standing] | None:
-        """Return a question and how far the student got with it, None if there is no such one."""
+    def _found(self, number: object) -> Standing | None:
+        """Return how far the student got with a question, None if there is no such one."""
         if isinstance(number, str) and number.isdecimal():
             number = float(number)
         wanted = number_of(number)
-        for case, standing in zip(self._cases, self._standings, strict=True):
-            if case.number == wanted:
-                return case, standing
-        return None
+        return next((one for one in self._standings if one.number == wanted), None)
 
     @property
     def _unknown(self) -> Reply:
         text = (
-            f"This lesson has questions 1 to {len(self._cases)}; ask for one of them, as in"
+            f"This lesson has questions 1 to {len(self._standings)}; ask for one of them, as in"
             " task.check(1, …)."
         )
         return Reply(0, Verdict.UNKNOWN, text)
 
-    @property
-    def _story(self) -> str:
-        return self._cases[0].numbers.text(self.exercise.story)
-
     def _rows(self) -> list[tuple[str, str, str]]:
         return [
-            (parameter.symbol, f"{shown(self.given[parameter.name])} {parameter.unit}".strip(),
-             parameter.meaning)
-            for parameter in self.exercise.parameters
-        ]  # fmt: skip
+            (one.symbol, f"{shown(self.given[one.name])} {one.unit}".strip(), one.meaning)
+            for one in EXERCISES[self.lesson].parameters
+        ]
+
+    def _head(self) -> str:
+        exercise = EXERCISES[self.lesson]
+        return f"Lesson {exercise.number}: {exercise.title}"
 
     def __repr__(self) -> str:
         rows = self._rows()
         left, middle = (max(len(row[i]) for row in rows) for i in (0, 1))
         lines = [f"  {s:<{left}} = {value:<{middle}}  {meaning}" for s, value, meaning in rows]
-        head = f"Lesson {self.exercise.number}: {self.exercise.title}\nNumbers of {self.student}:"
+        head = f"{self._head()}\nNumbers of {self.student}:"
         questions = [f"  {one.number} {one.title}" for one in self._standings]
-        return "\n".join([head, *lines, judging.filled(self._story), "Questions:", *questions])
+        return "\n".join([head, *lines, judging.filled(_story(self)), "Questions:", *questions])
 
     def _repr_html_(self) -> str:
-        head = f"Lesson {self.exercise.number}: {self.exercise.title}, numbers of {self.student}"
+        head = f"{self._head()}, numbers of {self.student}"
         rows = [(f"{s} = {value}", meaning) for s, value, meaning in self._rows()]
-        return f"{judging.box(head, self._story)}{judging.table(rows)}"
+        return f"{judging.box(head, _story(self))}{judging.table(rows)}"
+
+
+def _case(task: Task, number: int) -> Case:
+    """Return a question with a student's numbers, and all that follows from them."""
+    exercise = EXERCISES[task.lesson]
+    given = {name: task.given[name] for name in task.given}
+    return Case(number, exercise.questions[number - 1], Numbers(given, exercise.formulas))
+
+
+def _story(task: Task) -> str:
+    return _case(task, 1).numbers.text(EXERCISES[task.lesson].story)
 
 
 def _asked(case: Case) -> Passage:
@@ -178,12 +203,12 @@ def report() -> list[dict[str, object]]:
     """Return lesson, student, answers and shown workings of all tasks of this process, as JSON."""
     return [
         {
-            "lesson": task.exercise.name,
+            "lesson": task.lesson,
             "student": task.student,
             "answers": {str(number): answer for number, answer in task.answers.items()},
             "revealed": list(task.revealed),
         }
-        for task in OPENED
+        for task in list(OPENED)  # another thread may be opening one
     ]
 
 
@@ -237,7 +262,7 @@ def lesson(name: str | int, student: object = "") -> Task:
     Raises
     ------
     ExerciseError
-        If there is no such lesson.
+        If there is no such lesson, or the name is longer than `LONGEST_NAME`.
 
     Examples
     --------
@@ -245,4 +270,8 @@ def lesson(name: str | int, student: object = "") -> Task:
     >>> task.check(1).verdict
     <Verdict.BLANK: 'not attempted'>
     """
-    return Task(find(name), str(student).strip() or "anybody")
+    who = str(student).strip() or "anybody"
+    if len(who) > LONGEST_NAME:
+        said = f"a name has at most {LONGEST_NAME} characters; this one has {len(who)}"
+        raise ExerciseError(said, "student", who)
+    return Task(find(name), who)

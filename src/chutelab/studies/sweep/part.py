@@ -28,7 +28,6 @@ from chutelab.studies.sweep.plan import Plan
 from chutelab.studies.sweep.result import columns_of, synced, text_of, writing
 from chutelab.studies.sweep.rows import NUMBERS, REASON, Columns
 from chutelab.util.errors import InputError
-from chutelab.util.files import remove_unfinished
 from chutelab.util.versions import version_of
 
 if sys.platform == "win32":
@@ -78,7 +77,6 @@ def unfinished(out: Path, plan: Plan, *, resume: bool) -> Iterator[Part]:
     try:
         with writing(part.path):
             part.take_up(resume=resume)
-            remove_unfinished(out)
         yield part
         complete = True
     finally:
@@ -222,9 +220,9 @@ def _locked(path: Path) -> BinaryIO:
     """Open the file, made if there is none, and lock it; refuse one that is locked."""
     while True:
         with ExitStack() as stack:
-            if path.exists() and not path.is_file():
-                raise InputError(f"{path} is no file of finished rows: remove it")
             with writing(path):
+                if path.exists() and not path.is_file():
+                    raise InputError(f"{path} is no file of finished rows: remove it")
                 number = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666)
             file = stack.enter_context(os.fdopen(number, "r+b"))
             try:

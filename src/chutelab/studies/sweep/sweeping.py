@@ -10,6 +10,7 @@ import multiprocessing
 import os
 import re
 import signal
+import sys
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import (
     FIRST_COMPLETED,
@@ -91,7 +92,8 @@ class Crew:
         while True:
             try:
                 while job is not None and len(running) < self.ahead:
-                    running[self.executor.submit(work, job[1])] = job
+                    with _without_ctrl_c():
+                        running[self.executor.submit(work, job[1])] = job
                     job = again.pop() if again else next(left, None)
                 if not running:
                     return
@@ -160,9 +162,24 @@ def crew(jobs: int = 1, scheduler: str | None = None) -> Iterator[Crew]:
         team.executor.shutdown()
 
 
+@contextmanager
+def _without_ctrl_c() -> Iterator[None]:
+    """Let Ctrl-C wait. Processes that begin meanwhile never get it, not while they import either.
+
+    It goes to all processes of a terminal, of which the first one tells the others to end.
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _serve() -> None:
     """Prepare a worker process: it ends when its parent tells it to, or has died."""
-    # Ctrl-C goes to all processes of a terminal; the first one tells the others.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     Thread(target=_follow, daemon=True).start()

@@ -1,0 +1,476 @@
+"""Cells of a notebook, run in a process of their own: watched, limited, ended with all it started.
+
+Three processes: whoever calls `run`; the watcher, `_watch`; and the kernel, `_work`, which runs the
+cells in a session and a folder of its own. The watcher ends the kernel and its descendants when the
+kernel is through, takes too much, or `run` is gone. A cell that signals its parent hits the
+watcher, which takes no signals. What the cells print goes nowhere. The kernel tells what was
+checked through a pipe, a JSON object a line; students' code can write there too, so nothing of it
+is believed unchecked.
+
+This keeps accidents and clumsy tricks from the computer, not somebody who means harm: the cells run
+with all rights of whoever calls.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import ctypes
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from secrets import token_hex
+from threading import Event, Lock, Thread
+from time import monotonic, sleep
+from typing import IO, Any, Final
+
+MEMORY: Final = 1536 << 20
+"""Bytes that a notebook may take, with all processes it starts; the lessons need 300 MB."""
+
+PROCESSES: Final = 64
+"""Processes that a notebook may have, itself included."""
+
+LARGEST_FILE: Final = 256 << 20
+"""Bytes of a file that a notebook may write."""
+
+START: Final = 60.0
+"""s for the kernel to start: its imports on a slow disk."""
+
+LAST_WORD: Final = 1.0
+"""s for the kernel to hand over the answers after its time is up."""
+
+PATIENCE: Final = 10.0
+"""s for the watcher to end everything and remove the folder; it takes a hundredth of it."""
+
+OFTEN: Final = 0.5
+"""s between two times that the kernel hands over what there is new while a cell runs."""
+
+PERIOD: Final = 0.1
+"""s between two looks of the watcher."""
+
+LONGEST_LINE: Final = 256 << 10
+"""Bytes that the kernel may say at a time: the answers of 64 tasks are 30 kB."""
+
+MOST_SAID: Final = 8 << 20
+"""Bytes that the kernel may say in all."""
+
+LONGEST: Final = 200
+"""Characters of an error that are told."""
+
+PACKAGES: Final = Path(__file__).parents[2]
+"""Where this chutelab lies, for the kernel to find it too."""
+
+NAME: Final = "chutelab.classroom.kernel"
+"""This module, also where it is run as a program."""
+
+ENDS: Final = {
+    0: "",
+    (TOO_MUCH := 3): f"it took more than {MEMORY >> 20} MB of memory",
+    (TOO_MANY := 4): f"it started more than {PROCESSES} processes",
+    (LEFT := 5): "some processes that it started could not be ended",
+    (SIGNALLED := 6): "it sent its parent process a signal",
+}
+"""Exit codes of the watcher, and what they say of the notebook."""
+
+_POSIX: Final = os.name == "posix"
+_PR_SET_PDEATHSIG: Final = 1
+_PR_SET_CHILD_SUBREAPER: Final = 36
+
+
+class ForgedError(ValueError):
+    """What came from the kernel is not what a chutelab there says; the text says why."""
+
+
+@dataclass(frozen=True)
+class Ran:
+    """What became of a notebook.
+
+    Attributes
+    ----------
+    tasks
+        What `report` in `classroom.exercises.catalogue` gave, unchecked: student's code ran there.
+    trouble
+        What went wrong, or empty; of errors the first.
+    """
+
+    tasks: object
+    trouble: str
+
+
+def run(cells: Sequence[str | None], time_limit: float) -> Ran:
+    """Run code cells in order; what raises an error does not keep the rest from running.
+
+    Parameters
+    ----------
+    cells : sequence of str or None
+        None is a cell whose source is no text.
+    time_limit : float
+        s for all of them together, the kernel's start not counted.
+
+    Raises
+    ------
+    ForgedError
+        If the kernel says what no chutelab says.
+    OSError
+        If no process can be started.
+    """
+    paths = [str(PACKAGES), *filter(None, [os.environ.get("PYTHONPATH")])]
+    # Threads of linear algebra take memory each, more of it the more cores there are.
+    alone = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    watcher = subprocess.Popen(
+        [sys.executable, "-P", "-m", NAME, "watch"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, **alone, "PYTHONPATH": os.pathsep.join(paths)},
+        start_new_session=True,
+    )
+    assert watcher.stdin is not None
+    assert watcher.stdout is not None
+    said: SimpleQueue[bytes | None] = SimpleQueue()
+    listener = Thread(target=_listen, args=(watcher.stdout.fileno(), said), daemon=True)
+    listener.start()
+    heard = _Heard(time_limit)
+    try:
+        with suppress(BrokenPipeError):
+            watcher.stdin.write(json.dumps([list(cells), time_limit]).encode() + b"\n")
+            watcher.stdin.flush()
+        heard.follow(said)
+    finally:
+        ended = _end(watcher, heard.folder)
+        listener.join(PERIOD)
+        # Left open where a process that got away still holds the other end.
+        if not listener.is_alive():
+            watcher.stdout.close()
+    troubles = [heard.trouble, ENDS.get(ended, "")]
+    if heard.folder and Path(heard.folder).exists():
+        troubles.append(f"its folder {heard.folder} could not be removed")
+    return Ran(heard.tasks, "; ".join(filter(None, troubles)))
+
+
+def _listen(pipe: int, said: SimpleQueue[bytes | None]) -> None:
+    """Pass on what arrives, line by line, then None; an empty line stands for too much of it."""
+    rest, arrived = b"", 0
+    # Not through a file object: it could not be closed while a thread waits in it.
+    while chunk := os.read(pipe, 1 << 16):
+        arrived += len(chunk)
+        *lines, rest = (rest + chunk).split(b"\n")
+        for line in lines:
+            said.put(line)
+        if len(rest) > LONGEST_LINE or arrived > MOST_SAID:
+            said.put(b"")
+            break
+    said.put(None)
+
+
+class _Heard:
+    """What has been heard of one kernel."""
+
+    def __init__(self, time_limit: float) -> None:
+        self.time_limit = time_limit
+        self.folder = ""
+        self.tasks: object = []
+        self.trouble = ""
+
+    def follow(self, said: SimpleQueue[bytes | None]) -> None:
+        """Listen to what is said, until the end or until the time is up."""
+        until = monotonic() + START
+        cell = -1  # -1 before the kernel has started, 0 before the first cell
+        while True:
+            try:
+                line = said.get(timeout=max(0.0, until - monotonic()))
+            except Empty:
+                line = b'{"end": false}'
+            if line is None:
+                where = f" in code cell {cell}" if cell > 0 else ""
+                died = f"the kernel died{where}" if cell >= 0 else "the kernel did not start"
+                self.trouble = self.trouble or died
+                return
+            match _message(line):
+                case {"folder": str(folder)} if not self.folder:
+                    self.folder = folder
+                case {"cell": 0} if cell < 0:
+                    cell = 0
+                    until = monotonic() + self.time_limit + LAST_WORD
+                case {"cell": int(number)} if number > 0:
+                    cell = number
+                case {"error": str(error)}:
+                    self.trouble = self.trouble or f"code cell {cell}: {error[:LONGEST]}"
+                case {"tasks": tasks}:
+                    self.tasks = tasks
+                case {"end": True}:
+                    return
+                case {"end": False} if cell < 0:
+                    self.trouble = f"the kernel did not start within {START:g} s"
+                    return
+                case {"end": False}:
+                    self.trouble = f"stopped after {self.time_limit:g} s, in code cell {cell}"
+                    return
+                case _:
+                    raise ForgedError("its kernel said what no chutelab says")
+
+
+def _message(line: bytes) -> object:
+    try:
+        return json.loads(line)
+    except (ValueError, RecursionError):
+        return None
+
+
+def _end(watcher: subprocess.Popen[bytes], folder: str) -> int:
+    """Have the watcher end the kernel; return its exit code."""
+    assert watcher.stdin is not None
+    with suppress(BrokenPipeError):
+        watcher.stdin.close()
+    if _POSIX:
+        # The kernel may have stopped it.
+        watcher.send_signal(signal.SIGCONT)
+    with suppress(subprocess.TimeoutExpired):
+        watcher.wait(PATIENCE)
+    if watcher.returncode not in ENDS:
+        watcher.kill()
+        if folder:
+            _sweep(folder)
+    return watcher.wait()
+
+
+def _sweep(folder: str) -> None:
+    """Do what is left to do without a watcher; a folder in the environment tells whose it is."""
+    import psutil
+
+    for process in psutil.process_iter():
+        with suppress(psutil.Error):
+            if process.environ().get("IPYTHONDIR") == folder:
+                process.kill()
+    _remove(folder)
+
+
+def _remove(folder: str) -> None:
+    """Remove a folder, however deep: folders in it move up, and go when they hold no other."""
+    top = Path(folder)
+    with suppress(OSError):
+        top.chmod(0o700)
+        while found := _folders(top):
+            for one in found:
+                one.chmod(0o700)
+                for deeper in _folders(one):
+                    deeper.chmod(0o700)
+                    deeper.rename(top / token_hex(16))
+                shutil.rmtree(one)
+        shutil.rmtree(top)
+
+
+def _folders(folder: Path) -> list[Path]:
+    return [one for one in folder.iterdir() if one.is_dir() and not one.is_symlink()]
+
+
+# The watcher
+
+
+def _watch() -> None:
+    """Run the kernel until it is through, takes too much, or standard input ends."""
+    import psutil
+
+    asked = sys.stdin.buffer.readline()
+    if not asked.endswith(b"\n"):
+        return
+    if _POSIX:
+        # Those that leave the kernel's session, and their parents, still come back here.
+        _prctl(_PR_SET_CHILD_SUBREAPER, 1)
+        signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
+    code = 0
+    gone = Event()
+    Thread(target=_wait_for_end, args=(gone,), daemon=True).start()
+    folder = tempfile.mkdtemp(prefix="chutelab-grade-")
+    try:
+        _say(sys.stdout.buffer, folder=folder)
+        kernel = subprocess.Popen(
+            [sys.executable, "-m", NAME, "work"],
+            cwd=folder,
+            stdin=subprocess.PIPE,
+            # Start-up files and history of whoever grades are left out.
+            env={**os.environ, "IPYTHONDIR": folder},
+            start_new_session=True,
+        )
+        assert kernel.stdin is not None
+        with suppress(BrokenPipeError):
+            kernel.stdin.write(asked)
+            kernel.stdin.close()
+        while kernel.poll() is None and not gone.wait(PERIOD):
+            started = _alive()
+            if len(started) > PROCESSES:
+                code = TOO_MANY
+                break
+            if sum(map(_resident, started)) > MEMORY:
+                code = TOO_MUCH
+                break
+        if _POSIX:
+            # All of them at once, or whoever forks faster than this kills would stay ahead.
+            with suppress(ProcessLookupError):
+                os.killpg(kernel.pid, signal.SIGKILL)
+        until = monotonic() + PATIENCE / 2
+        while alive := _alive():
+            for process in alive:
+                with suppress(psutil.Error):
+                    process.kill()
+            if monotonic() > until:
+                code = LEFT
+                break
+            sleep(PERIOD / 10)
+        if _POSIX and code == 0 and signal.sigpending() - {signal.SIGCHLD, signal.SIGCONT}:
+            code = SIGNALLED
+    finally:
+        _remove(folder)
+        # Not through the interpreter's end: a thread still reads standard input.
+        os._exit(code)
+
+
+def _wait_for_end(gone: Event) -> None:
+    while os.read(0, 1):
+        pass
+    gone.set()
+
+
+def _alive() -> list[Any]:
+    """Return all descendants of this process that are not over."""
+    import psutil
+
+    alive = []
+    for process in psutil.Process().children(recursive=True):
+        with suppress(psutil.Error):
+            if process.status() != psutil.STATUS_ZOMBIE:
+                alive.append(process)
+    return alive
+
+
+def _resident(process: Any) -> int:
+    """Return the bytes of memory that a process holds, 0 if it is over."""
+    import psutil
+
+    try:
+        return int(process.memory_info().rss)
+    except psutil.Error:
+        return 0
+
+
+def _prctl(option: int, value: int) -> None:
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
+
+
+def _say(stream: IO[bytes], **message: object) -> None:
+    stream.write(json.dumps(message).encode() + b"\n")
+    stream.flush()
+
+
+# The kernel
+
+
+def _work() -> None:
+    """Run the cells that standard input holds."""
+    if _POSIX:
+        _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        signal.pthread_sigmask(signal.SIG_SETMASK, [])
+        _limit()
+    cells, time_limit = json.loads(sys.stdin.buffer.read())
+    pipe = os.fdopen(os.dup(1), "wb")
+    nowhere = os.open(os.devnull, os.O_RDWR)
+    for stream in (0, 1, 2):
+        os.dup2(nowhere, stream)
+    from IPython.core.interactiveshell import InteractiveShell
+    from traitlets.config import Config
+
+    from chutelab.classroom.exercises import catalogue
+
+    class Shell(InteractiveShell):
+        def enable_gui(self, gui: str | None = None) -> None:
+            """Do nothing: there are no windows."""
+
+        def ask_exit(self) -> None:
+            """Do nothing: the next cell has its turn."""
+
+    config = Config()
+    config.HistoryManager.enabled = False
+    # Tracebacks take time, and nobody reads them.
+    config.InteractiveShell.xmode = "Minimal"
+    shell = Shell.instance(config=config)
+    turn = Lock()
+    last: list[object] = []
+
+    def tell(**message: object) -> None:
+        with turn:
+            _say(pipe, **message)
+
+    def hand_over() -> None:
+        # It may be bent by the cells, which is theirs to answer for.
+        with suppress(Exception), turn:
+            found = catalogue.report()
+            if last != found:
+                _say(pipe, tasks=found)
+                last[:] = found
+
+    def watch_time() -> None:
+        # Now and then too: a cell may end the kernel, or let no other thread run.
+        until = monotonic() + time_limit
+        while (left := until - monotonic()) > 0.0:
+            sleep(min(left, OFTEN))
+            hand_over()
+        tell(end=False)
+
+    async def go() -> None:
+        for number, source in enumerate(cells, start=1):
+            tell(cell=number)
+            try:
+                error: BaseException | None = TypeError("its source is no text")
+                if source is not None:
+                    code = shell.transform_cell(source)  # type: ignore[no-untyped-call]
+                    ran = await shell.run_cell_async(source, transformed_cell=code)
+                    error = ran.error_before_exec or ran.error_in_exec
+            except BaseException as raised:  # whatever it is, the next cell has its turn
+                error = raised
+            if error is not None:
+                tell(error=_said(error))
+            hand_over()
+
+    tell(cell=0)
+    Thread(target=watch_time, daemon=True).start()
+    # In a loop that runs, as in Jupyter.
+    asyncio.run(go())
+    hand_over()
+    tell(end=True)
+    # Threads and what is registered for the end do not keep it.
+    os._exit(0)
+
+
+def _limit() -> None:
+    import resource
+
+    limits = [
+        (resource.RLIMIT_CORE, 0),
+        (resource.RLIMIT_FSIZE, LARGEST_FILE),
+        # Not the address space: WebAssembly reserves much more than it uses.
+        (resource.RLIMIT_DATA, MEMORY),
+    ]
+    for what, most in limits:
+        with suppress(ValueError, OSError):
+            resource.setrlimit(what, (most, most))
+
+
+def _said(error: BaseException) -> str:
+    """Return name and text of an error, which may fail too."""
+    try:
+        return f"{type(error).__name__}: {error}".removesuffix(": ")[:LONGEST]
+    except BaseException:
+        return type(error).__name__
+
+
+if __name__ == "__main__":
+    {"watch": _watch, "work": _work}[sys.argv[1]]()

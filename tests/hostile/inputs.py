@@ -1,0 +1,260 @@
+"""Cases of each kind: files made from mutants in the folder at hand, and the words of a command.
+
+A kind is a function of a random generator; it writes into the current folder and returns the words.
+Good files to begin with are made once, by `begin`, in the folder beside that one.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import random
+import tomllib
+import zipfile
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+import tomli_w
+
+import chutelab
+from chutelab import scene
+from chutelab.cli import main
+from chutelab.studies.sweep import planned
+from chutelab.studies.sweep.sweeping import Crew, sweep_to
+from hostile.mutants import NUMBERS, TEXTS, changed, garbled, value
+
+GOOD = Path("../good")
+SCENES = sorted(scene.shipped())
+SWEEP = ("sweep", "perpendicular", "--vary", "plate.restitution=0:1:40", "--engine", "pymunk")
+TRACK = "mass_A\nt\tx\ty\n" + "".join(
+    f"{0.01 * n:.2f}\t{0.02 * n:.3f}\t{0.1 - 0.0005 * n * n:.4f}\n" for n in range(30)
+)
+COMMANDS = (
+    "run", "check", "show", "sweep", "solve", "compare", "page", "figure", "scenes", "new",
+    "schema", "tables",
+    "lesson list", "lesson show", "lesson new",
+)  # fmt: skip
+USUAL = {
+    "scene": "perpendicular", "scenes": "inclined-60", "number": "8",
+    "recording": "../good/recording.npz",
+    "names": "the-bounce", "name": "2", "path": "new.toml", "settings": "plate.angle_deg=10",
+    "sets": "plate.restitution=0.3", "vary": "plate.restitution=0:1:3",
+    "varies": "plate.angle_deg=0:20:3",
+    "data": "../good/film.txt", "fit": "plate.restitution", "out": "out", "plot": "out.png",
+    "only": "csv,json",
+    "target": "landing.vx=-1", "targets": "landing.vx=-1", "of": "landing.x", "engine": "exact",
+    "dt": "1e-3",
+    "accuracy": "1e-3", "jobs": "1", "sample": "4", "seed": "3", "points": "9",
+    "max_seconds": "0.3",
+}  # fmt: skip
+"""A good value for what a command takes, by its name there."""
+
+KEYS = (
+    "plate.angle_deg", "plate.restitution", "incoming.speed", "outgoing.drop", "stream.count",
+    "run.dt", "run.until",
+    "run.engine", "particle.radius", "particle.spin", "surface.0.points", "gravity", "title",
+    "plate", "a.b.c", "",
+)  # fmt: skip
+QUANTITIES = ("landing.x", "landing.vx", "impact.t", "d3", "belt_work", "reason", "nothing")
+
+
+def begin() -> None:
+    """Write a good recording, an unfinished sweep and a good notebook into `GOOD`."""
+    GOOD.mkdir()
+    chutelab.simulate(chutelab.load("perpendicular")).save(GOOD / "recording.npz")
+    (GOOD / "film.txt").write_text(TRACK, encoding="utf-8")
+
+    class EnoughError(Exception):
+        pass
+
+    def watch(share: float) -> None:
+        if share > 0.2:
+            raise EnoughError
+
+    plan = planned(chutelab.load("perpendicular"), [SWEEP[3]], engine="pymunk")
+    out = GOOD / "rows.csv"
+    with suppress(EnoughError):
+        sweep_to(plan, out, Crew(), progress=watch)
+    (GOOD / "rows.csv.part").rename(GOOD / "part")
+    sweep_to(plan, out, Crew())
+    cells = [
+        "from chutelab.classroom.exercises import lesson",
+        'task = lesson("the-bounce", student="Ann")',
+    ]
+    found = {
+        "cells": [{"cell_type": "code", "source": cell} for cell in cells],
+        "metadata": {}, "nbformat": 4, "nbformat_minor": 2,
+    }  # fmt: skip
+    (GOOD / "exercise.ipynb").write_text(json.dumps(found), encoding="utf-8")
+
+
+def scenes(rng: random.Random) -> list[str]:
+    """A scene file with mistakes in its text or in its values."""
+    text = scene.shipped()[rng.choice(SCENES)].read_bytes()
+    if rng.random() < 0.25:
+        text = garbled(rng, text)
+    else:
+        tables = tomllib.loads(text.decode())
+        # Work that takes long is no hang.
+        if tables.get("stream", {}).get("count", 1) > 200:
+            tables["stream"]["count"] = 200
+        for _ in range(rng.choice((1, 1, 1, 2, 3))):
+            tables = changed(rng, tables)
+        try:
+            text = tomli_w.dumps(tables).encode("utf-8", "surrogatepass")
+        except (TypeError, AttributeError, ValueError):  # the whole is no table any more
+            text = repr(tables).encode("utf-8", "replace")
+    Path("mutant.toml").write_bytes(text)
+    run = ["run", "mutant.toml", "--max-seconds", "0.3"]
+    return rng.choice(
+        ([*run, "--json"], run, [*run, "--out", "out", "--only", "csv,npz,json,png"], ["check",
+        "mutant.toml"],
+         ["check", "mutant.toml", "--json"])
+    )  # fmt: skip
+
+
+def arguments(rng: random.Random) -> list[str]:
+    """Words that a command knows, most with values that may be, one or two with others."""
+    words = rng.choice(COMMANDS).split()
+    command: Any = main
+    for word in words:
+        command = command.commands[word]
+    for parameter in command.params:
+        needed = parameter.required or isinstance(parameter, click.Argument)
+        if rng.random() > (0.95 if needed else 0.3):
+            continue
+        usual = USUAL.get(str(parameter.name), "")
+        said = usual if usual and rng.random() < 0.8 else _word(rng)
+        if isinstance(parameter, click.Argument):
+            words.append(said)
+        else:
+            words.append(rng.choice(parameter.opts))
+            words += [] if parameter.is_flag else [said]
+    if rng.random() < 0.1:
+        words.insert(
+            rng.randrange(len(words) + 1), rng.choice(("--no-such-thing", "--help", "-q", "--", ""))
+        )
+    if words[0] == "run":
+        words += ["--max-seconds", "0.3"]
+    return [word.replace("\x00", "") for word in words]
+
+
+def _word(rng: random.Random) -> str:
+    key, number = rng.choice(KEYS), rng.choice((*NUMBERS, 2, 3, 20, 1e-3))
+    return str(
+        rng.choice(
+            (number, rng.choice(TEXTS), f"{key}={number}", f"{key}={rng.choice(TEXTS)}",
+            f"{key}=0:1:3",
+             f"{key}={number}:1", f"{key}=0.5±{number}", f"{rng.choice(QUANTITIES)}={number}",
+             rng.choice(QUANTITIES),
+             "out", "rows.csv", "out.png", "no/such/folder/x.csv", "exact", "contact", "pymunk",
+             "png", "../good/recording.npz")
+        )
+    )  # fmt: skip
+
+
+def tracks(rng: random.Random) -> list[str]:
+    """A table of points with mistakes in it."""
+    Path("film.txt").write_bytes(
+        garbled(rng, TRACK.encode(rng.choice(("utf-8", "utf-16", "latin-1"))))
+    )
+    words = ["compare", "perpendicular", "--data", "film.txt"]
+    extra = (
+        [],
+        ["--json"],
+        ["--fit", "plate.restitution"],
+        ["--scale", str(rng.choice(NUMBERS))],
+        ["--t0", str(rng.choice(NUMBERS))],
+    )
+    return [*words, *rng.choice(extra)]
+
+
+def recordings(rng: random.Random) -> list[str]:
+    """A recording whose file is damaged, or whose arrays or header hold something else."""
+    data = (GOOD / "recording.npz").read_bytes()
+    if rng.random() < 0.5:
+        Path("mutant.npz").write_bytes(garbled(rng, data))
+    else:
+        with np.load(io.BytesIO(data)) as found:
+            arrays = dict(found)
+        name = rng.choice(list(arrays))
+        arrays[name] = _array(rng, name, arrays[name])
+        with zipfile.ZipFile("mutant.npz", "w") as archive:
+            for key, array in arrays.items():
+                with archive.open(f"{key}.npy", "w") as file:
+                    np.lib.format.write_array(file, np.asanyarray(array), allow_pickle=True)
+    show = ["show", "mutant.npz"]
+    return rng.choice((show, [*show, "--json"], [*show, "--out", "out", "--only", "csv,json,png"]))
+
+
+def _array(rng: random.Random, name: str, good: Any) -> Any:
+    if name == "about":
+        return np.array(json.dumps(changed(rng, json.loads(str(good)))))
+    other = np.array(good)
+    way = rng.randrange(6)
+    if way == 0:
+        return other[: rng.randrange(len(other) + 1)] if other.ndim else other
+    if way == 1:
+        objects = np.array(value(rng), dtype=object)
+        return rng.choice(
+            (np.zeros(0), np.zeros((2, 2)), objects, np.array("x"), np.zeros(3, "U4"))
+        )
+    fields = other.dtype.names
+    column = other[rng.choice(fields)] if fields else other
+    if not column.size:
+        return other
+    flat = column.reshape(-1)
+    with np.errstate(all="ignore"):
+        some = (
+            rng.choice(NUMBERS[6:])
+            if flat.dtype.kind == "f"
+            else rng.choice((-1, 0, 1, 2, 100, 127))
+        )
+        flat[rng.randrange(len(flat))] = some
+    if not np.shares_memory(flat, other):
+        column[...] = flat.reshape(column.shape)
+    return other
+
+
+def parts(rng: random.Random) -> list[str]:
+    """A damaged file of an unfinished sweep; to go on must be refused, or end in the same rows."""
+    lines = (GOOD / "part").read_bytes().splitlines(keepends=True)
+    way, at = rng.randrange(5), rng.randrange(len(lines))
+    if way == 0:
+        data = garbled(rng, b"".join(lines))
+    else:
+        other = rng.randrange(len(lines))
+        kept = {
+            1: lines[:at] + lines[at + 1 :],
+            2: lines[: at + 1] + lines[at:],
+            3: lines[: at + 1],
+        }
+        lines[at], lines[other] = lines[other], lines[at]
+        data = b"".join(kept.get(way, lines))
+    Path("rows.csv.part").write_bytes(data)
+    return [*SWEEP, "--out", "rows.csv", "--resume", "--json"]
+
+
+def notebooks(rng: random.Random) -> list[str]:
+    """A returned notebook that is damaged, or holds other things than cells."""
+    data = (GOOD / "exercise.ipynb").read_bytes()
+    if rng.random() < 0.5:
+        data = garbled(rng, data)
+    else:
+        data = json.dumps(changed(rng, json.loads(data))).encode("utf-8", "surrogatepass")
+    Path("mutant.ipynb").write_bytes(data)
+    return ["lesson", "grade", "mutant.ipynb", "--out", "marks.csv", "--time-limit", "5"]
+
+
+KINDS: dict[str, Callable[[random.Random], list[str]]] = {
+    "scenes": scenes,
+    "arguments": arguments,
+    "tracks": tracks,
+    "recordings": recordings,
+    "parts": parts,
+    "notebooks": notebooks,
+}

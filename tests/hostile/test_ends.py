@@ -1,0 +1,271 @@
+"""Commands that are stopped, cannot write, have closed descriptors or odd surroundings."""
+
+from __future__ import annotations
+
+import os
+import random
+import resource
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import chutelab
+from hostile.inputs import SWEEP
+from hostile.worker import PATIENCE, fault
+
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals and descriptors of POSIX")
+
+KILLS = int(os.environ.get("CHUTELAB_KILLS", "60"))
+"""Kills in all of a slow run."""
+
+COMMANDS = {
+    "run": ["run", "perpendicular", "--out", "out"],
+    "show": ["show", "good.npz", "--out", "out", "--only", "csv,npz,json,png"],
+    "sweep": [*SWEEP, "--out", "rows.csv", "--plot", "rows.png"],
+    "jobs": [*SWEEP, "--out", "rows.csv", "--jobs", "2"],
+    "solve": ["solve", "perpendicular", "--vary", "plate.restitution=0.1:0.9", "--target",
+    "landing.vx=-1",
+              "--out", "out"],
+    "page": ["page", "inclined-20", "-o", "page.html"],
+    "figure": ["figure", "8", "--out", "out"],
+}  # fmt: skip
+"""A command of each kind that writes."""
+
+
+def environment(**more: str | None) -> dict[str, str]:
+    """Return what commands run in; None takes a name away."""
+    known = {**os.environ, "PYTHONPATH": str(Path(chutelab.__file__).parents[1]), **more}
+    return {name: text for name, text in known.items() if text is not None}
+
+
+def begun(words: list[str], folder: Path, **options: object) -> subprocess.Popen[bytes]:
+    """Begin a command in a session of its own, so that whoever is left over is found."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "chutelab", *words],
+        cwd=folder,
+        start_new_session=True,
+        **{"env": environment(), "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, **options},
+    )
+
+
+def ended(running: subprocess.Popen[bytes], seconds: float = 3.0 * PATIENCE) -> tuple[int, str]:
+    """Wait for a command; return its exit code and what it said."""
+    try:
+        said, _ = running.communicate(timeout=seconds)
+    except subprocess.TimeoutExpired:
+        os.killpg(running.pid, signal.SIGKILL)
+        said, _ = running.communicate()
+        raise AssertionError(f"not done after {seconds:g} s: {said.decode()}") from None
+    return running.returncode, (said or b"").decode("utf-8", "replace")
+
+
+def alive(session: int) -> list[str]:
+    """Return the command lines of the processes of a session; none where there is no /proc."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            fields = (entry / "stat").read_text().rpartition(")")[2].split()
+            if int(fields[3]) == session and fields[0] != "Z":
+                found.append((entry / "cmdline").read_text().replace("\0", " "))
+        except (OSError, ValueError, IndexError):
+            continue
+    return found
+
+
+def there(folder: Path) -> dict[str, bytes]:
+    """Return all files under a folder, by their paths."""
+    files = (path for path in sorted(folder.rglob("*")) if path.is_file())
+    return {str(path.relative_to(folder)): path.read_bytes() for path in files}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """What each command leaves if nobody disturbs it, and how long it takes."""
+    known: dict[str, tuple[dict[str, bytes], float]] = {}
+
+    def of(name: str) -> tuple[dict[str, bytes], float]:
+        if name not in known:
+            folder = prepared(tmp_path_factory.mktemp(name))
+            start = time.monotonic()
+            code, said = ended(begun(COMMANDS[name], folder))
+            assert code == 0, said
+            known[name] = there(folder), time.monotonic() - start
+        return known[name]
+
+    return of
+
+
+def prepared(folder: Path) -> Path:
+    """Put a recording into a folder."""
+    chutelab.simulate(chutelab.load("perpendicular")).save(folder / "good.npz")
+    return folder
+
+
+def check_left(folder: Path, name: str, whole, *, killed: bool = False) -> None:
+    """What is there is whole, by its bytes; besides it there may be a sweep's finished rows."""
+    expected = whole(name)[0]
+    for path, data in there(folder).items():
+        if path.endswith(".part"):
+            continue
+        if killed and any(part.startswith(".") for part in Path(path).parts):
+            continue  # nobody can clean up after KILL
+        assert path in expected, f"{name} left {path}"
+        assert data == expected[path], f"{path} of {name} is torn"
+
+
+def stopped(name: str, number: signal.Signals, after: float, folder: Path, whole) -> None:
+    """Stop a command after a while and look at what there is."""
+    running = begun(COMMANDS[name], prepared(folder))
+    time.sleep(after)
+    running.send_signal(number)
+    code, said = ended(running, PATIENCE)
+    allowed = {0, -9} if number == signal.SIGKILL else {0, 128 + number}
+    assert code in allowed, said
+    assert "Traceback" not in said
+    limit = time.monotonic() + 5.0
+    while (left := alive(running.pid)) and time.monotonic() < limit:
+        time.sleep(0.05)
+    assert not left
+    check_left(folder, name, whole, killed=number == signal.SIGKILL)
+    if (folder / "rows.csv.part").exists():
+        code, said = ended(begun([*COMMANDS[name], "--resume"], folder))
+        assert code == 0, said
+        assert there(folder).items() >= whole(name)[0].items()
+
+
+STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
+
+
+@pytest.mark.parametrize(
+    ("name", "number", "share"),
+    [("run", signal.SIGTERM, 0.8), ("jobs", signal.SIGKILL, 0.6), ("sweep", signal.SIGINT, 0.7)],
+)
+def test_stopped(name, number, share, tmp_path, whole):
+    stopped(name, number, share * whole(name)[1], tmp_path, whole)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kill", range(KILLS))
+def test_stopped_at_any_time(kill, tmp_path, whole):
+    rng = random.Random(kill)
+    name, number = list(COMMANDS)[kill % len(COMMANDS)], STOPS[kill // len(COMMANDS) % 3]
+    stopped(name, number, rng.random() * whole(name)[1], tmp_path, whole)
+
+
+FULL = 2000
+"""Bytes that a file may have where the disk is full."""
+
+
+@pytest.mark.parametrize("name", ["run", "sweep", pytest.param("solve", marks=pytest.mark.slow),
+                                  *(pytest.param(n, marks=pytest.mark.slow) for n in ("show",
+                                  "jobs", "page", "figure"))])  # fmt: skip
+def test_a_full_disk(name, tmp_path):
+    prepared(tmp_path)
+
+    def little() -> None:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (FULL, FULL))
+
+    code, said = ended(begun(COMMANDS[name], tmp_path, preexec_fn=little))
+    assert code in (1, 2)
+    assert "Traceback" not in said
+    assert "please report" not in said
+    left = [path for path in there(tmp_path) if path != "good.npz" and not path.endswith(".part")]
+    assert not left
+
+
+CLOSED = {
+    "no error": "2>&-",
+    "no output": ">&-",
+    "no input": "<&-",
+    "neither": ">&- 2>&-",
+    "a full device": ">/dev/full",
+    "full devices": ">/dev/full 2>/dev/full",
+}
+TOLD = (
+    "run perpendicular --json", "run perpendicular --out out -q", "--help", "check perpendicular",
+    "scenes",
+    "verify inclined-60", "sweep perpendicular --vary plate.restitution=0:1:3 --out rows.csv",
+    "solve perpendicular --vary plate.restitution=0.1:0.9 --target landing.vx=-1",
+    "run no-such-scene",
+)  # fmt: skip
+
+
+def cases():
+    for number, (name, how) in enumerate(CLOSED.items()):
+        for place, words in enumerate(TOLD):
+            # In the default run each way and each command once or twice.
+            marks = () if place in (number, number + 3) else (pytest.mark.slow,)
+            yield pytest.param(how, words, id=f"{name}-{words.split()[0]}-{place}", marks=marks)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
+@pytest.mark.parametrize(("how", "words"), list(cases()))
+def test_closed_descriptors(how, words, tmp_path):
+    line = f'exec "{sys.executable}" -m chutelab {words} {how}'
+    done = subprocess.run(
+        ["sh", "-c", line],
+        cwd=tmp_path, env=environment(), capture_output=True, text=True, check=False,
+        timeout=PATIENCE,
+    )  # fmt: skip
+    said = done.stdout + done.stderr
+    assert "Traceback" not in said
+    wrong = words.startswith("run no")
+    unheard = ">/dev/full" in how and "-q" not in words
+    expected = {2} if wrong else {1} if unheard else {0}
+    if "2>&-" not in how and "2>/dev/full" not in how and expected == {1}:
+        assert done.stderr
+    assert done.returncode in expected | ({0} if wrong is False and ">&-" in how else set()), said
+
+
+ODD = {
+    "C": {"LANG": "C", "LC_ALL": "C"},
+    "ascii": {"PYTHONIOENCODING": "ascii"},
+    "latin": {"PYTHONIOENCODING": "latin-1", "PYTHONUTF8": "0"},
+    "no home": {"HOME": None},
+    "home away": {"HOME": "/no-such-folder"},
+    "odd backend": {"MPLBACKEND": "no-such-thing"},
+    "settings away": {"MPLCONFIGDIR": "/no-such-folder"},
+    "temporary away": {"TMPDIR": "/no-such-folder"},
+    "narrow": {"COLUMNS": "1"},
+    "wide": {"COLUMNS": "100000"},
+    "not a width": {"COLUMNS": "wide"},
+    "optimised": {"PYTHONOPTIMIZE": "2"},
+    "hash": {"PYTHONHASHSEED": "7"},
+    "development": {"PYTHONDEVMODE": "1"},
+    "dumb": {"TERM": "dumb", "NO_COLOR": "1"},
+    "zone": {"TZ": "Nowhere/Land", "SOURCE_DATE_EPOCH": "soon"},
+    "no path": {"PATH": ""},
+    "bytes": {"PYTHONUNBUFFERED": "1", "PYTHONDONTWRITEBYTECODE": "1"},
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "odd"),
+    [pytest.param(k, v, marks=() if n % 6 == 0 else pytest.mark.slow, id=k) for n, (k,
+    v) in enumerate(ODD.items())],
+)  # fmt: skip
+def test_odd_environments(name, odd, tmp_path):
+    prepared(tmp_path)
+    words = ["show", "good.npz", "--out", "out", "--only", "csv,json,png"]
+    code, said = ended(begun(words, tmp_path, env=environment(**odd)))
+    assert fault(code, said, []) == ""
+    assert code == 0, said
+    assert not [path for path in there(tmp_path) if path.startswith(".")]
+
+
+def test_the_folder_at_hand_has_gone(tmp_path):
+    gone = tmp_path / "gone"
+    gone.mkdir()
+    line = f'rmdir "{gone}"; exec "{sys.executable}" -m chutelab run perpendicular --out out'
+    done = subprocess.run(
+        ["sh", "-c", line],
+        cwd=gone, env=environment(), capture_output=True, text=True, check=False, timeout=PATIENCE,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    assert done.stderr.strip()

@@ -1,0 +1,106 @@
+"""Scenes, arguments, tracks, recordings, unfinished sweeps and notebooks with mistakes in them."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import chutelab
+from hostile.inputs import KINDS
+from hostile.worker import PATIENCE, fault
+
+TESTS = Path(__file__).parents[1]
+MEMORY = 2 << 20
+"""kB that a process may have had at its peak."""
+
+SHARES = {
+    "scenes": 0.3,
+    "arguments": 0.3,
+    "tracks": 0.15,
+    "recordings": 0.15,
+    "parts": 0.08,
+    "notebooks": 0.02,
+}
+ASKED = int(os.environ.get("CHUTELAB_HOSTILE", "2000"))
+"""Cases in all of a slow run."""
+
+
+def results(kind: str, seed: int, count: int, folder: Path) -> list[dict]:
+    """Run cases; a case in which the process ended is begun anew after it, and counts as wrong."""
+    paths = [str(Path(chutelab.__file__).parents[1]), str(TESTS)]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+    found: list[dict] = []
+    first = 0
+    while first < count:
+        home = folder / f"{kind}-{seed}-{first}"
+        home.mkdir()
+        command = [sys.executable, "-m", "hostile.worker", kind, str(seed), str(first), str(count)]
+        with (home / "said").open("wb") as said:
+            subprocess.run(
+                command,
+                cwd=home,
+                env=environment,
+                stdout=said,
+                stderr=subprocess.STDOUT,
+                check=False,
+            )
+        lines = (home / "said").read_text("utf-8", "replace").splitlines()
+        rows = [json.loads(line) for line in lines if line.startswith('{"case"')]
+        found += [row for row in rows if "code" in row]
+        assert rows, "\n".join(lines)[-3000:]
+        if "code" in rows[-1]:
+            break
+        found.append({**rows[-1], "wrong": "the process ended", "said": "\n".join(lines)[-2000:]})
+        first = rows[-1]["case"] + 1
+    return found
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_some(kind, tmp_path):
+    check(kind, seed=0, count=max(3, round(150 * SHARES[kind])), folder=tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_as_many_as_asked(kind, tmp_path):
+    check(kind, seed=1, count=round(ASKED * SHARES[kind]), folder=tmp_path)
+
+
+def check(kind, seed, count, folder):
+    found = results(kind, seed, count, folder)
+    assert len(found) == count
+    wrong = [row for row in found if row["wrong"]]
+    told = "\n\n".join(
+        f"{row['case']} {row.get('words')}: {row['wrong']}\n{row['said']}" for row in wrong[:8]
+    )
+    assert not wrong, f"{len(wrong)} of {count} cases, in {folder}:\n{told}"
+    assert max(row["seconds"] for row in found) < PATIENCE
+    # Both what may be and what may not has to occur, or the mutants are too wild or too tame.
+    codes = {row["code"] for row in found}
+    assert 2 in codes
+    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss < MEMORY
+
+
+@pytest.mark.parametrize(
+    ("code", "said", "left", "wrong"),
+    [
+        (0, "done", [], ""),
+        (2, "Error: plate.angle_deg = 95", [], ""),
+        (1, "no solution", [], ""),
+        (1, "chutelab failed: ValueError: x; please report it", [], "a failure of ours"),
+        (1, "Traceback (most recent call last)", [], "a failure of ours"),
+        (1, "oh", [], "exit code 1"),
+        (-11, "", [], "exit code -11"),
+        (2, " \n", [], "no message"),
+        (2, "title = '\x1b[31m'", [], "control characters"),
+        (0, "done", [".chutelab-x"], "left over: .chutelab-x"),
+    ],
+)
+def test_what_is_wrong_is_seen(code, said, left, wrong):
+    assert fault(code, said, left) == wrong

@@ -11,7 +11,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -340,9 +340,8 @@ def test_a_long_slide_does_not_make_all_else_small(runs: dict[str, Recording]) -
     assert window.right > 1.2
 
 
-@given(
-    st.tuples(*[st.floats(-3.0, 3.0)] * 4),
-)
+@given(st.tuples(*[st.floats(-3.0, 3.0)] * 4))
+@example((0.0, 0.0, 0.0, 5e-323))
 def test_clipped_lines_are_those_parts_that_lie_inside(ends: tuple[float, ...]) -> None:
     window = Window(-1.0, 1.5, -0.5, 1.0)
     start, end = np.array(ends[:2]), np.array(ends[2:])

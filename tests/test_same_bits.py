@@ -51,7 +51,10 @@ EVERY = [
     "tables --json",
     "scenes --json",
     "schema",
-    "new mine.toml",
+    "new untitled.toml",
+    "run untitled.toml --out untitled --only npz,json,png -q",
+    "lesson build ./own -q",
+    "lesson page ./mine -o bundle",
     "verify perpendicular stream --json",
     "stress slip --json",
 ]

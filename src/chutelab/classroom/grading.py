@@ -25,6 +25,7 @@ from chutelab.classroom.exercises.judging import judge
 from chutelab.classroom.kernel import ForgedError, run
 from chutelab.util.errors import InputError, MissingLibraryError, printable
 from chutelab.util.files import csv_lines
+from chutelab.util.versions import too_old
 
 LARGEST: Final = 25 << 20
 """Bytes; a notebook with its pictures is a tenth of it. As JSON it takes up to 30 times that."""
@@ -121,7 +122,7 @@ def grade(paths: Iterable[str | Path], time_limit: float = 60.0) -> Iterator[Gra
         Without IPython and psutil, which the extra ``notebook`` brings.
     """
     missing = [name for name in ("IPython", "psutil") if find_spec(name) is None]
-    if missing:
+    if missing := missing or too_old("notebook"):
         install = 'python -m pip install "chutelab[notebook]"'
         raise MissingLibraryError(f"grading needs {' and '.join(missing)}: {install}")
     return _each(list(map(str, paths)), time_limit)

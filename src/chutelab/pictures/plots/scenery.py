@@ -209,7 +209,7 @@ class Window:
         along = end - start
         low, high = 0.0, 1.0
         for axis, (lower, upper) in enumerate(((self.left, self.right), (self.bottom, self.top))):
-            if along[axis] == 0.0:
+            if abs(along[axis]) < 1e-300:  # no way at all, and a division by it may overflow
                 if not lower <= start[axis] <= upper:
                     return None
                 continue

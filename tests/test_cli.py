@@ -517,6 +517,12 @@ def test_a_reader_that_has_gone_is_no_reason_for_a_traceback():
         assert writer.wait(timeout=60) == 1
 
 
+def test_a_backend_that_is_not_there_is_not_asked_for():
+    told = process("run", "slip", "--out", "o", "--only", "png", env={"MPLBACKEND": "nonsense"})
+    assert told.communicate(timeout=60)[1] == ""
+    assert (told.returncode, [path.name for path in Path("o").iterdir()]) == (0, ["overlay.png"])
+
+
 @pytest.mark.parametrize(
     ("name", "says"),
     [

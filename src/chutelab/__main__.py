@@ -3,6 +3,7 @@
 What takes long to import is imported inside `main`, where signals are waited for.
 """
 
+import os
 import sys
 
 from chutelab.util.signals import exit_code, raised
@@ -10,6 +11,8 @@ from chutelab.util.signals import exit_code, raised
 
 def main() -> None:
     """Run the command line; a signal ends it without a traceback, from the first import on."""
+    # Commands open no windows: a backend that does not exist here must not stop them.
+    os.environ["MPLBACKEND"] = "agg"
     with raised(last=True):
         try:
             from chutelab.cli import main as program

@@ -76,7 +76,7 @@ def bounce(seed):
     )
 
 
-def measured(machine, engine):
+def measured(machine):
     """Return the processor time of a run, s, or None if it takes longer than `LONGEST`."""
     begin = process_time()
 
@@ -85,7 +85,7 @@ def measured(machine, engine):
             raise EnoughError
 
     try:
-        recording = follow(machine, engine, watch)
+        recording = follow(machine, None, watch)
     except StalledError:
         return process_time() - begin
     return process_time() - begin if stopped(recording) is None else None
@@ -99,7 +99,7 @@ def judged(machines):
     for name, machine in machines:
         count += 1
         estimate = effort(machine, trial(machine, choose(machine)))
-        took = measured(machine, choose(machine))
+        took = measured(machine)
         real, said = max(FLOOR, took or LONGEST), max(FLOOR, estimate.seconds)
         wrong = False
         if estimate.at_least:

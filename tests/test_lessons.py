@@ -370,3 +370,14 @@ def test_the_template_and_the_lessons_know_the_same_keys():
     assert set(keys) == set(Lesson.model_fields)
     assert set(keys["picture"]) == set(Picture.model_fields)
     assert set(keys["page"]) <= set(Page.model_fields)
+
+
+@pytest.mark.parametrize(
+    ("data", "told"), [(b"# a\xff\n", "not UTF-8 text"), (b"a" * (1 << 20) + b"b", "too large")]
+)
+def test_a_worksheet_that_cannot_be_shown_is_a_fault_of_the_lesson(tmp_path, data, told):
+    folder = start(tmp_path / "mine")
+    (folder / "README.md").write_bytes(data)
+    result = chutelab("lesson", "show", folder)
+    assert result.exit_code == 2
+    assert f"README.md: {told}" in result.output

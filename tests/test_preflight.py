@@ -80,6 +80,22 @@ def test_the_engine_is_the_one_that_will_run(name, overrides, engine, why):
     assert (found.stepping is None) == (engine == "exact")
 
 
+def test_what_the_exact_engine_cannot_follow_is_tried_on_the_contact_engine():
+    corner = {
+        "particle": {"radius": 0.05, "spin": True},
+        "surface": [
+            {"name": "floor", "from": [-1.0, 0.0], "to": [1.0, 0.0], "speed": 1.0, "friction": 0.5},
+            {"name": "wall", "from": [0.5, 0.0], "to": [0.5, 1.0], "friction": 0.5},
+        ],
+        "stream": {"at": [0.0, 0.06], "velocity": [0.0, 0.0]},
+        "run": {"until": 3.0},
+    }
+    found = preflight(sc.from_dict(corner))
+    assert found.engine == "contact"
+    assert "beyond the exact engine" in found.why
+    assert not found.effort.at_least
+
+
 def test_the_end_of_the_run_is_told():
     assert look("slip", "run.until=0.7").ends == "at t = 0.7 s"
     assert look("slip").ends == "each particle when it has landed (or gone), at most at t = 30 s"
@@ -232,7 +248,7 @@ def test_the_bounces_to_come_follow_from_those_that_were(restitution, until, mon
 @pytest.mark.parametrize(
     ("name", "changes"),
     [
-        ("stream", ["stream.count=60", "run.engine=pymunk"]),
+        ("stream", ["stream.count=60", "run.engine=pymunk", "run.until=landed"]),
         ("stream-independent", ["stream.count=6", "run.until=settled", "run.engine=pymunk"]),
         ("stream-independent", ["stream.count=30000", "run.until=settled"]),
     ],

@@ -62,21 +62,21 @@ def trial(machine: Machine, engine: str) -> Trial:
     few = machine
     if engine != "exact" and machine.count > MOST:
         few = build(scene.with_values({"stream.count": MOST, "expect": None}))
-    found = _timed(few, engine, PATIENCE)
+    found = _timed(few, PATIENCE)
     if found.whole and found.seconds <= WARMING:
-        warm = _timed(few, engine, PATIENCE)
+        warm = _timed(few, PATIENCE)
         found = replace(warm, warming=max(0.0, found.seconds - warm.seconds))
     if engine == "exact":
         return found
     alone = {"stream.count": 1, "stream.interact": False, "run.engine": "auto", "expect": None}
     try:
-        lone = _timed(build(scene.with_values(alone)), "auto", LONE_PATIENCE).recording
+        lone = _timed(build(scene.with_values(alone)), LONE_PATIENCE).recording
     except SceneError:
         lone = None
     return replace(found, lone=lone)
 
 
-def _timed(machine: Machine, engine: str, patience: float) -> Trial:
+def _timed(machine: Machine, patience: float) -> Trial:
     begin = process_time()
     marks: list[tuple[float, float]] = []
 
@@ -91,7 +91,7 @@ def _timed(machine: Machine, engine: str, patience: float) -> Trial:
 
     recording, trouble = None, ""
     try:
-        recording = follow(machine, engine, watch)
+        recording = follow(machine, None, watch)
     except StalledError as stalled:
         recording, trouble = stalled.recording, str(stalled)
     seconds = process_time() - begin
@@ -159,13 +159,17 @@ def effort(machine: Machine, tried: Trial) -> Effort:
         seconds = tried.seconds + tried.warming
         how = "until it gets stuck" if tried.trouble else "timed in a run of it all"
         return Effort(recording.contacts, seconds, False, how, _memory(recording, machine, 1.0))
-    one_by_one = not machine.interact and (machine.align or recording.engine != "pymunk")
+    together = _together(recording)
     took = float(tried.marks[-1, 0])
     if recording.engine == "exact":
         guesses = [took * grown for grown in _bounces(recording, len(tried.marks))]
         share = took / max(guesses)
     elif some == count:
-        guesses, share = _paces(tried, recording, one_by_one=one_by_one)
+        guesses, share = _paces(tried, recording, _shares(tried, recording), together)
+        if together and machine.until == "settled":
+            # It may also take all the time that the scene allows.
+            later, _ = _paces(tried, recording, tried.marks[:, 1], together)
+            guesses += later
     else:
         guesses, share = [took * count / some], 0.0
     spread = max(guesses) / min(guesses)
@@ -176,23 +180,33 @@ def effort(machine: Machine, tried: Trial) -> Effort:
     seconds = min(guesses) * spread**LATE if known else max(took, min(guesses) / 2.0)
     grown = seconds / took
     contacts = round(recording.contacts * grown)
+    if known and tried.lone is not None and stopped(tried.lone) is None:
+        contacts = max(contacts, tried.lone.contacts * count)  # the first may have met nothing yet
     return Effort(contacts, seconds, not known, how, _memory(recording, machine, grown))
 
 
-def _paces(tried: Trial, recording: Recording, *, one_by_one: bool) -> tuple[list[float], float]:
+def _together(recording: Recording) -> bool:
+    """Tell whether particles are stepped together; otherwise they run one after the other."""
+    machine = recording.machine
+    return machine.interact or (recording.engine == "pymunk" and not machine.align)
+
+
+def _paces(
+    tried: Trial, recording: Recording, shares: Floats, together: bool
+) -> tuple[list[float], float]:
     """Return how long a run takes, s, at the pace of all the trial and of the second half of it.
 
-    The latter grows with the number of particles that are there, unless they run one by one. And
-    the share of the run that the trial got through.
+    The latter grows with the number of particles that are there, if they are stepped together. And
+    the share of the run that the trial got through; `shares` are those at its marks.
     """
-    spent, shares = tried.marks[:, 0], _shares(tried, recording, one_by_one=one_by_one)
+    spent = tried.marks[:, 0]
     took, share = float(spent[-1] - spent[0]), float(shares[-1])
     if share <= shares[0]:
         return [tried.seconds, inf], 0.0
     half = int(np.searchsorted(spent - spent[0], 0.5 * took, side="right")) - 1
     gained, grown = float(share - shares[half]), 1.0
     now = float(recording.knots["t"].max(initial=0.0))
-    if not one_by_one and now > 0.0:
+    if together and now > 0.0:
         first, last = recording.offsets[:-1], recording.offsets[1:] - 1
         gone = recording.released & (recording.ended != REASONS.index("stopped"))
         t, due = recording.knots["t"], recording.machine.releases.t
@@ -214,7 +228,7 @@ def _paces(tried: Trial, recording: Recording, *, one_by_one: bool) -> tuple[lis
     return [float(spent[-1]) + early, float(spent[-1]) + late], share
 
 
-def _shares(tried: Trial, recording: Recording, *, one_by_one: bool) -> Floats:
+def _shares(tried: Trial, recording: Recording) -> Floats:
     """Return the shares of the run that were done at the marks of a trial.
 
     An engine with steps counts in time up to the end that the scene allows. Where particles end
@@ -224,7 +238,7 @@ def _shares(tried: Trial, recording: Recording, *, one_by_one: bool) -> Floats:
     if machine.until == "time" or lone is None or stopped(lone) is not None:
         return shares
     life, end = float(np.ptp(lone.knots["t"])), machine.end_time
-    if one_by_one:
+    if not _together(recording):
         done = np.floor(shares * machine.count).clip(max=machine.count - 1).astype(np.int64)
         part = (shares * machine.count - done) * (end - machine.releases.t[done])
         return np.minimum(1.0, (done + np.minimum(1.0, part / max(life, 1e-9))) / machine.count)

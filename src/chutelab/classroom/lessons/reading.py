@@ -144,7 +144,7 @@ def shipped_lessons() -> list[Lesson]:
 PLAN: Final = "lesson.toml"
 
 LARGEST: Final = 1 << 20
-"""Bytes of it."""
+"""Bytes of it, and characters of a worksheet."""
 
 
 class LessonError(SceneError):
@@ -195,9 +195,24 @@ def read(folder: str | Path) -> Lesson:
     lesson._folder = source.parent.resolve()
     if "scenes" in sound:
         faults += _misfits(lesson)
+    faults += _unread(lesson.worksheet)
     if faults:
         raise LessonError(str(source), faults)
     return lesson
+
+
+def _unread(worksheet: Path) -> Iterator[Fault]:
+    """Yield why a worksheet, if there is one, cannot be shown."""
+    if not worksheet.is_file():
+        return
+    try:
+        with worksheet.open(encoding="utf-8") as file:
+            if len(file.read(LARGEST + 1)) > LARGEST:
+                yield Fault(worksheet.name, None, f"too large: it has at most {LARGEST} characters")
+    except OSError as error:
+        yield Fault(worksheet.name, None, f"cannot be read: {error.strerror or error}")
+    except UnicodeDecodeError:
+        yield Fault(worksheet.name, None, "not UTF-8 text; save the file as UTF-8")
 
 
 def _strays(folder: Path) -> list[Fault]:

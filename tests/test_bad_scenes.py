@@ -43,6 +43,9 @@ def test_a_broken_file_is_refused_with_file_key_and_what_is_allowed(case, tmp_pa
         (b"\xff\xfe\xfd", "line 1: not UTF-8 text"),
         (b"# filler\n" * 200_000, "too large for a scene"),
         (b"x = " + b"[" * 20_000, "nested too deep"),
+        (b"a." * 150 + b"b = 1", "nested too deep"),
+        (b"[" + b"a." * 100_000 + b"b]", "nested too deep"),
+        (b"[plate]\n" + b"a = {" * 50 + b"}" * 50, "nested too deep"),
         (b"x = " + b"9" * 20_000, "too large"),
         (b"x = 2020-13-45", "not TOML"),
     ],
@@ -54,6 +57,24 @@ def test_rubbish_is_refused_with_the_file_and_the_reason(content, says, tmp_path
     assert said.startswith(f"{file}: ")
     assert says in said
     assert len(said.splitlines()) == 1
+
+
+@pytest.mark.parametrize("levels", [500, 100_000])
+def test_mappings_nested_too_deep_are_refused(levels):
+    """As JSON gives them, and one that holds itself."""
+    table, lists = {}, []
+    for _ in range(levels):
+        table, lists = {"a": table}, [lists]
+    endless = {}
+    endless["a"] = endless
+    for found in (table, {"surface": lists}, {"surface": [{"from": lists}]}, endless):
+        assert "nested too deep" in message(scene.from_dict, found)
+
+
+@pytest.mark.parametrize("place", ["{}", "plate.{}"])
+def test_a_key_that_is_no_text_is_refused(place):
+    said = message(scene.load, "perpendicular", [f"{place.format(chr(0xD800))}=1"])
+    assert f'{place.format("")}"\\ud800" = ' in said
 
 
 @pytest.mark.parametrize(

@@ -94,7 +94,7 @@ def test_a_bundle_is_not_put_in_place_of_a_file(tmp_path):
     (tmp_path / "web").write_text("mine")
     result = chutelab("lesson", "page", "2", "-o", tmp_path / "web")
     assert result.exit_code == 2
-    assert "it is a file, not a folder" in result.stderr
+    assert "web is a file, not a folder" in result.stderr
     assert (tmp_path / "web").read_text() == "mine"
 
 

@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+from importlib import import_module
 from io import StringIO
 from pathlib import Path
 
@@ -369,7 +370,9 @@ def test_a_destination_that_cannot_be_is_refused_before_the_run(monkeypatch):
 
     monkeypatch.setattr("chutelab.engines.simulation.simulate", never)
     Path("file").write_text("", encoding="utf-8")
-    assert "--out file: file is a file, not a folder" in refused("run", "slip", "--out", "file")
+    assert "--out file: cannot be written to: file is a file, not a folder" in refused(
+        "run", "slip", "--out", "file"
+    )
     assert "file is a file" in refused("run", "slip", "--out", "file/inside/it")
     assert "name of a folder is empty" in refused("run", "slip", "--out", "")
     Path("out/overlay.png").mkdir(parents=True)
@@ -512,6 +515,90 @@ def test_a_reader_that_has_gone_is_no_reason_for_a_traceback():
         writer.stdout.close()
         assert writer.stderr.read() == ""
         assert writer.wait(timeout=60) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("x" * 300, "xxx...': File name too long"),
+        ("a\0b", "'a\\x00b': no file can have this name"),
+        ("\ud800", "'\\ud800': no file can have this name"),
+        ("d/" * 1000, "more than 200 folders deep"),
+    ],
+)
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        "run slip --out",
+        "page slip -o",
+        "sweep slip --vary plate.angle_deg=0,1 --plot",
+        "compare slip --data",
+        "show",
+        "new",
+        "lesson show",
+        "lesson new",
+        "lesson page -o",
+        "lesson grade",
+    ],
+)
+def test_a_name_that_no_file_can_have_is_refused(arguments, name, says):
+    assert says in refused(*arguments.split(), name)
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="there is no /proc")
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        "run slip --out /proc/x",
+        "sweep slip --vary incoming.speed=1,2 --out /proc/x.csv",
+        "sweep slip --vary incoming.speed=1,2 --plot /proc/x.png",
+        "sweep slip --uncertainty incoming.speed=2±0.1 --plot /proc/x.png",
+        "page slip -o /proc/x.html",
+        "solve slip --vary incoming.speed=1:2 --minimize belt_work --out /proc/x",
+        "compare slip --data perpendicular-track --out /proc/x",
+        "bench slip --out /proc/x",
+        "figure 6 --out /proc/x",
+        "lesson build 1 --force --out /proc/x",
+        "lesson page 1 -o /proc/x",
+        "lesson new /proc/x",
+        "lesson grade mine.ipynb --out /proc/x.csv",
+        "new /proc/x.toml",
+    ],
+)
+def test_what_cannot_be_written_to_is_refused_before_the_work(arguments, monkeypatch):
+    """Nothing is simulated, searched, drawn or marked."""
+    Path("mine.ipynb").write_text("{}", encoding="utf-8")
+
+    def worked(*_arguments, **_options):
+        pytest.fail("the work has begun")
+
+    works = (
+        "engines.simulation.simulate",
+        "studies.sweep.swept_by",
+        "studies.sweep.sweep_to",
+        "studies.design.uncertainty",
+        "studies.design.minimize",
+        "studies.measured.residuals",
+        "checks.workprecision.measure",
+        "pictures.live.page.study",
+        "classroom.grading.grade",
+        "pictures.plots.figure.paper_figure",
+        "classroom.lessons.building.simulate",
+        "classroom.lessons.building._lesson",
+    )
+    # All imported first: one that is imported later would keep what stands for another's.
+    modules = [import_module(f"chutelab.{work.rpartition('.')[0]}") for work in works]
+    for module, work in zip(modules, works, strict=True):
+        monkeypatch.setattr(module, work.rpartition(".")[2], worked)
+    said = refused(*arguments.split())
+    name = next(word for word in arguments.split() if word.startswith("/proc"))
+    assert re.fullmatch(rf"Error: .*{name}\S*: cannot be written.*: No such file .*\n", said)
+
+
+def test_a_pipe_that_nobody_writes_to_is_not_waited_for():
+    os.mkfifo("pipe")
+    assert "pipe: cannot be read: it is a pipe, not a file" in refused("run", "pipe")
+    assert "it is a pipe, not a file" in refused("compare", "slip", "--data", "pipe")
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
@@ -750,7 +837,7 @@ def test_new_writes_a_scene_that_runs_and_overwrites_nothing():
 def test_new_says_why_it_cannot_write():
     Path("folder").mkdir()
     assert "folder is a folder" in refused("new", "folder")
-    assert "cannot be written: there is no such folder" in refused("new", "nowhere/my.toml")
+    assert "cannot be written: there is no folder nowhere" in refused("new", "nowhere/my.toml")
 
 
 def test_show_prints_the_summary_of_the_run_and_makes_its_files_again():

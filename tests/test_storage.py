@@ -20,7 +20,7 @@ from chutelab import scene
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind, Recording, storage
 from chutelab.results.storage import RecordingError
-from chutelab.util.files import whole
+from chutelab.util.files import aside, whole
 
 ARRAYS = ("knots", "offsets", "ended", "events", "by_surface")
 
@@ -120,9 +120,52 @@ def test_a_file_appears_only_when_it_is_whole(tmp_path):
         assert reader.read() == "some"
     assert path.read_text() == "more"
     assert listing(tmp_path) == ["new.txt"]
-    with pytest.raises(FileNotFoundError, match="no such folder") as error, whole(tmp_path / "a/b"):
+    with pytest.raises(FileNotFoundError, match="no folder") as error, whole(tmp_path / "a/b"):
         pass
-    assert error.value.filename == str(tmp_path / "a")
+    assert error.value.filename == str(tmp_path / "a/b")
+
+
+def test_only_files_are_replaced_and_links_stay(tmp_path):
+    (tmp_path / "real.txt").write_text("old")
+    (tmp_path / "link.txt").symlink_to("real.txt")
+    with whole(tmp_path / "link.txt") as unfinished:
+        unfinished.write_text("new")
+    assert (tmp_path / "link.txt").is_symlink()
+    assert (tmp_path / "real.txt").read_text() == "new"
+    os.mkfifo(tmp_path / "pipe")
+    for name, says in (("pipe", "is a device or a pipe"), (".", "is a folder, not a file")):
+        with pytest.raises(OSError, match=says), whole(tmp_path / name):
+            pytest.fail("nothing is made for it")
+    assert (tmp_path / "pipe").is_fifo()
+    assert listing(tmp_path) == ["link.txt", "pipe", "real.txt"]
+
+
+def test_an_error_of_a_file_that_is_made_names_the_one_that_was_meant(tmp_path):
+    """What is copied is not to blame for a full disk, nor a folder nobody has heard of."""
+
+    def fail(*names):
+        with whole(tmp_path / "a.txt") as unfinished:
+            raise OSError(28, "No space left", *names, *([str(unfinished)] if names else []))
+
+    for names in ((), ("source.txt", None)):
+        with pytest.raises(OSError, match="No space left") as found:
+            fail(*names)
+        assert found.value.filename == str(tmp_path / "a.txt")
+    assert listing(tmp_path) == []
+
+
+def test_what_a_killed_program_left_is_removed_by_the_next_and_nothing_else(tmp_path):
+    """Old and held by nobody: a program that is killed loses its locks, one that runs has them."""
+    with aside(tmp_path) as running:
+        old = [running, tmp_path / f"{running.name[:-8]}abcdefgh", tmp_path / ".chutelab-notes"]
+        for folder in old[1:]:
+            folder.mkdir()
+        (fresh := tmp_path / f"{running.name[:-8]}ijklmnop").mkdir()
+        for folder in old:
+            os.utime(folder, (0.0, 0.0))
+        with whole(tmp_path / "a.txt") as unfinished:
+            unfinished.touch()
+        assert sorted(tmp_path.iterdir()) == sorted([running, fresh, old[2], tmp_path / "a.txt"])
 
 
 def altered(path, change_header=None, **arrays):

@@ -8,7 +8,7 @@ import click
 
 from chutelab.cli.console import progress, tell
 from chutelab.cli.output import destination, write_json
-from chutelab.cli.parameters import json_option, out_option, scene_argument, set_option
+from chutelab.cli.parameters import FileName, json_option, out_option, scene_argument, set_option
 
 FILES = ("compare.png", "points.csv", "fit.json")
 
@@ -27,7 +27,7 @@ def _point(text: str) -> tuple[float, float]:
     "--data",
     metavar="FILE",
     required=True,
-    type=click.Path(),
+    type=FileName(),
     help="A table with columns t, x, y, such as Tracker exports, or a shipped track.",
 )
 @click.option("--track", metavar="NAME", help="Which track, of a file that holds several.")

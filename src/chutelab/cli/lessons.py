@@ -13,7 +13,7 @@ from click.shell_completion import CompletionItem
 from chutelab.cli import console
 from chutelab.cli.console import progress
 from chutelab.cli.output import check_file, writing
-from chutelab.cli.parameters import json_option, out_option
+from chutelab.cli.parameters import FileName, json_option, out_option
 from chutelab.cli.program import InOrder, RefusedError
 
 if TYPE_CHECKING:
@@ -33,6 +33,11 @@ def complete_lesson(
         for name in (lesson.name, lesson.folder.name)
         if name.startswith(incomplete)
     ]
+
+
+lessons_argument = click.argument(
+    "wanted", metavar="[LESSON]...", nargs=-1, type=FileName(), shell_complete=complete_lesson
+)
 
 
 @click.group(
@@ -66,7 +71,7 @@ def list_lessons(as_json: bool) -> None:
 
 
 @lesson.command(short_help="Show one lesson, with its worksheet.")
-@click.argument("wanted", metavar="LESSON", shell_complete=complete_lesson)
+@click.argument("wanted", metavar="LESSON", type=FileName(), shell_complete=complete_lesson)
 @json_option()
 def show(wanted: str, as_json: bool) -> None:
     """Show one lesson: its question, scenes and quantities, its files, and the worksheet.
@@ -103,7 +108,7 @@ def show(wanted: str, as_json: bool) -> None:
 
 
 @lesson.command(short_help="Make the picture of each lesson that changed.")
-@click.argument("wanted", metavar="[LESSON]...", nargs=-1, shell_complete=complete_lesson)
+@lessons_argument
 @out_option(
     "Write each picture into a folder NN-name in here, not into the lesson's own: for an"
     " installed chutelab, whose folders cannot be written to."
@@ -135,10 +140,11 @@ def build(wanted: tuple[str, ...], out: Path | None, force: bool, quiet: bool) -
 
 
 @lesson.command(short_help="Start a lesson of your own.")
-@click.argument("name", type=click.Path(path_type=Path))
+@click.argument("name", type=FileName(path_type=Path))
 @click.option(
     "--from",
     "model",
+    type=FileName(),
     metavar="LESSON",
     shell_complete=complete_lesson,
     help="Begin with a copy of this lesson: worksheet, exercise, scenes and all.",
@@ -165,7 +171,7 @@ def new(name: Path, model: str | None) -> None:
 
 
 @lesson.command(short_help="Bundle the lessons as web pages that need no server.")
-@click.argument("wanted", metavar="[LESSON]...", nargs=-1, shell_complete=complete_lesson)
+@lessons_argument
 @out_option("The folder; files that are there are replaced.", "-o", required=True)
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing, and show no progress bar.")
 def page(wanted: tuple[str, ...], out: Path, quiet: bool) -> None:
@@ -210,12 +216,12 @@ def _plain(lesson: Lesson) -> dict[str, object]:
     nargs=-1,
     required=True,
     # One that cannot be read has its row.
-    type=click.Path(exists=True, readable=False, path_type=Path),
+    type=FileName(exists=True, readable=False, path_type=Path),
 )
 @click.option(
     "--out",
     metavar="FILE",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=FileName(dir_okay=False, path_type=Path),
     help="Write the marks into this CSV file, a row for each notebook. Until the last is marked,"
     " the rows are in FILE.part.",
 )

@@ -6,7 +6,6 @@ A folder's files are made in one of their own, then moved in.
 from __future__ import annotations
 
 import json
-import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -20,6 +19,7 @@ from click.shell_completion import CompletionItem
 from chutelab.cli.console import progress, say, show, show_json
 from chutelab.cli.parameters import json_option, out_option
 from chutelab.cli.program import RefusedError
+from chutelab.util.files import aside, check, refuse_other
 from chutelab.util.tables import plain
 
 if TYPE_CHECKING:
@@ -59,20 +59,17 @@ def destination(folder: Path | None, names: Iterable[str] = ()) -> Iterator[Path
         yield None
         return
     try:
-        anchor = folder
-        while not anchor.exists():
-            anchor = anchor.parent
-        if not anchor.is_dir():
-            raise RefusedError(f"--out {folder}: {anchor} is a file, not a folder")
         for name in names:
-            if (folder / name).is_dir():
-                raise RefusedError(f"--out {folder}: {folder / name} is a folder, not a file")
-        with tempfile.TemporaryDirectory(prefix=".chutelab-", dir=anchor) as unfinished:
-            yield Path(unfinished)
+            refuse_other(folder / name)
+        with aside(folder) as unfinished:
+            yield unfinished
             folder.mkdir(parents=True, exist_ok=True)
-            for file in sorted(Path(unfinished).iterdir()):
+            for file in sorted(unfinished.iterdir()):
                 file.replace(folder / file.name)
     except OSError as error:
+        named = Path(error.filename or folder)
+        if named not in (folder, *folder.parents) and folder not in named.parents:
+            raise
         reason = error.strerror or str(error)
         raise RefusedError(f"--out {folder}: cannot be written to: {reason}") from error
 
@@ -80,16 +77,14 @@ def destination(folder: Path | None, names: Iterable[str] = ()) -> Iterator[Path
 def check_file(option: str, path: Path | None, suffixes: Sequence[str] = ()) -> None:
     """Refuse, before anything runs, the file of an option if it cannot be written.
 
-    So if it is a folder, is in none, or does not end in one of `suffixes`, if there are some.
+    So if it does not end in one of `suffixes`, if there are some.
     """
     if path is None:
         return
     if suffixes and path.suffix.lower() not in suffixes:
         raise RefusedError(f"{option} {path}: give a name that ends in {' or '.join(suffixes)}")
-    if path.is_dir():
-        raise RefusedError(f"{option} {path}: it is a folder, not a file")
-    if not path.parent.is_dir():
-        raise RefusedError(f"{option} {path}: there is no folder {path.parent}")
+    with writing(f"{option} {path}".strip()):
+        check(path)
 
 
 @contextmanager
@@ -97,11 +92,12 @@ def writing(what: str = "", instead: str = "") -> Iterator[None]:
     """Turn the OSError of a file that cannot be written into a `RefusedError`.
 
     It calls the file `what`, by default what the error does, and says what to give `instead`.
+    Of an error that names two files, such as one in copying, the second is the one that is written.
     """
     try:
         yield
     except OSError as error:
-        name = what or error.filename
+        name = what or error.filename2 or error.filename
         advice = f"; give {instead}" if instead else ""
         said = f"cannot be written: {error.strerror or error}{advice}"
         raise RefusedError(f"{name}: {said}" if name else said) from error

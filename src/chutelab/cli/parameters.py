@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
+from errno import EINVAL, ELOOP, ENAMETOOLONG
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 from click.shell_completion import CompletionItem
+
+from chutelab.util.errors import cut, printable
 
 if TYPE_CHECKING:
     from chutelab.scene import Scene
@@ -29,6 +33,28 @@ def complete_scene(
     return [*names, CompletionItem(incomplete, type="file")]
 
 
+DEEPEST = 200
+"""Folders inside each other in a name; each made needs a call inside the one before."""
+
+
+class FileName(click.Path):
+    """The name of a file or folder, refused where the system can have none that is called so."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the name as `click.Path` does."""
+        said = cut(printable(str(value)), 60)
+        try:
+            os.lstat(value)
+        except ValueError:
+            self.fail(f"'{said}': no file can have this name.", param, ctx)
+        except OSError as error:
+            if error.errno in (EINVAL, ELOOP, ENAMETOOLONG):
+                self.fail(f"'{said}': {error.strerror}.", param, ctx)
+        if len(Path(value).parts) > DEEPEST:
+            self.fail(f"'{said}': more than {DEEPEST} folders deep.", param, ctx)
+        return super().convert(value, param, ctx)
+
+
 def _folder(_ctx: click.Context, _parameter: click.Parameter, value: str | None) -> Path | None:
     if value == "":
         raise click.BadParameter("the name of a folder is empty")
@@ -42,7 +68,7 @@ def out_option(text: str, *names: str, required: bool = False) -> Decorator:
         "--out",
         metavar="DIR",
         required=required,
-        type=click.Path(),
+        type=FileName(),
         callback=_folder,
         help=text,
     )
@@ -50,7 +76,7 @@ def out_option(text: str, *names: str, required: bool = False) -> Decorator:
 
 def file_option(*names: str, text: str) -> Decorator:
     """Return an option that takes the name of a file to write."""
-    return click.option(*names, metavar="FILE", type=click.Path(path_type=Path), help=text)
+    return click.option(*names, metavar="FILE", type=FileName(path_type=Path), help=text)
 
 
 def json_option(text: str = "Print one JSON object.") -> Decorator:

@@ -37,18 +37,25 @@ class Program(InOrder):
     """The commands of ``chutelab``, which never show a traceback."""
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
-        """Run the program, and exit; what goes wrong becomes a message and an exit code."""
-        asked = {"debug": False}
+        """Run the program, and exit; what goes wrong becomes a message and an exit code.
+
+        Without `standalone_mode` neither, as in click.
+        """
+        asked, ends = {"debug": False}, kwargs.get("standalone_mode", True)
         kwargs |= {"obj": asked, "standalone_mode": False}
         with raised():
             try:
                 open_streams()
                 code = super().main(*args, **kwargs)
             except (KeyboardInterrupt, Exception) as error:
+                if not ends:
+                    raise
                 if asked["debug"] and not isinstance(error, EXPECTED) and not exit_code(error):
                     raise
                 code = _told(error)
-            sys.exit(code or 0)
+            if ends:
+                sys.exit(code or 0)
+            return code
 
 
 EXPECTED = (click.ClickException, InputError, MissingLibraryError)

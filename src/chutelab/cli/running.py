@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import click
 
 from chutelab.cli.console import progress, say
-from chutelab.cli.output import KINDS, Output, destination, output_options, writing
+from chutelab.cli.output import KINDS, Output, check_file, destination, output_options, writing
 from chutelab.cli.parameters import (
+    FileName,
     dt_option,
     engine_option,
     file_option,
@@ -119,7 +120,7 @@ def run(
 
 
 @click.command(short_help="Print the summary of a recording.npz; make its files again.")
-@click.argument("recording", type=click.Path(path_type=Path))
+@click.argument("recording", type=FileName(path_type=Path))
 @output_options
 def show(recording: Path, output: Output) -> None:
     """Print the summary of RECORDING, a recording.npz; with --out make its files again."""
@@ -176,12 +177,9 @@ def page(
     from chutelab.scene.variants import parse
 
     sliders = [parse(text) for text in varies]
-    path = output or Path(f"{Path(scene).name.removesuffix('.toml')}.html")
-    if path.is_dir():
-        raise RefusedError(f"{path} is a folder; give the name of a file, such as {path}/page.html")
-    if not path.parent.is_dir():
-        raise RefusedError(f"{path}: there is no folder {path.parent}")
     loaded = load(scene, overrides)
+    path = output or Path(f"{Path(scene).name.removesuffix('.toml')}.html")
+    check_file("-o" if output else "", path)
     with writing(str(path)), progress(f"simulating {scene}", quiet=quiet) as update:
         written = write(loaded, sliders, path, progress=update)
     if not quiet:

@@ -14,8 +14,8 @@ from typing import Literal
 import click
 
 from chutelab.cli import console
-from chutelab.cli.output import destination, writing
-from chutelab.cli.parameters import json_option, out_option
+from chutelab.cli.output import check_file, destination, writing
+from chutelab.cli.parameters import FileName, json_option, out_option
 from chutelab.cli.program import RefusedError
 
 STANDARD_OUTPUT = Path("-")
@@ -43,7 +43,7 @@ def schema() -> None:
 
 
 @click.command(short_help="Write a complete, commented scene to start from.")
-@click.argument("path", default="scene.toml", type=click.Path(path_type=Path, allow_dash=True))
+@click.argument("path", default="scene.toml", type=FileName(path_type=Path, allow_dash=True))
 @click.option("--force", is_flag=True, help="Overwrite a file that is there.")
 def new(path: Path, force: bool) -> None:
     """Write a complete, commented scene to start from (scene.toml, or PATH; - prints it)."""
@@ -53,8 +53,7 @@ def new(path: Path, force: bool) -> None:
     if path == STANDARD_OUTPUT:
         console.say(template(), end="")
         return
-    if path.is_dir():
-        raise RefusedError(f"{path} is a folder; give the name of a file.")
+    check_file("", path)
     if path.exists() and not force:
         raise RefusedError(f"{path} is there already; --force overwrites it.")
     with writing(str(path)), whole(path) as unfinished:

@@ -157,6 +157,7 @@ def sweep(
     if column not in NUMBERS:
         raise RefusedError(f"--of {column}: one of {', '.join(NUMBERS)}")
     check_file("--plot", plot, PICTURES)
+    check_file("--out", out)
     try:
         plan = planned(loaded, varies, sample=sample, design=design, seed=seed, engine=engine)
         varied = sum(len(set(vary.values)) > 1 for vary in plan.varies)
@@ -181,7 +182,8 @@ def sweep(
     if plot is not None:
         from chutelab.pictures.plots.design import sweep_figure
 
-        sweep_figure(found, column).write(plot)
+        with writing(f"--plot {plot}"):
+            sweep_figure(found, column).write(plot)
     told = {"scene": found.title, "variants": len(found), "columns": found.columns}
     console.tell(told, found, as_json=as_json, quiet=quiet, wrote=wrote)
 

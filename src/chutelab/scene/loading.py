@@ -21,6 +21,7 @@ from chutelab.scene.overrides import Override, apply, at_path, joined, rule_at
 from chutelab.scene.rules import ConflictError, Look, conflicts
 from chutelab.scene.schema import Scene
 from chutelab.util.errors import MISSING, Fault, InputError, cut, did_you_mean, printable
+from chutelab.util.files import first_bytes
 
 
 class SceneError(InputError):
@@ -228,6 +229,12 @@ def _keys(table: Sequence[str | int]) -> list[str]:
 _LARGEST_FILE: Final = 1 << 20
 """Bytes; a scene of a few tables is a thousandth of it, /dev/zero has more."""
 
+_DEEPEST: Final = 20
+"""Levels of keys and lists; a scene has four, and what is deeper by much cannot even be copied."""
+
+_MOST_DOTS: Final = 200
+"""Dots between two signs that end a key or a value."""
+
 _STARTER: Final = "`chutelab new` writes a complete scene to start from."
 
 
@@ -258,6 +265,9 @@ def parse(text: str, source: str = "<scene>", overrides: Sequence[str | Override
     SceneError
         With all faults, or with the place of a syntax error.
     """
+    # For a key of many parts tomllib takes time with their number squared.
+    if any(part.count(".") > _MOST_DOTS for part in re.split(r"[][{},=\n]", text)):
+        raise SceneError(source, [Fault("", None, "not TOML to be read: a key is nested too deep")])
     try:
         document = tomllib.loads(text.removeprefix("\N{ZERO WIDTH NO-BREAK SPACE}"))
     except tomllib.TOMLDecodeError as error:
@@ -280,7 +290,10 @@ def from_dict(
     SceneError
         With all faults.
     """
-    document: dict[str, Any] = plain(mapping)
+    try:
+        document: dict[str, Any] = plain(mapping)
+    except RecursionError as error:
+        raise SceneError(source, [Fault("", None, str(error))]) from None
     faults, given = apply(document, overrides)
     empty = not document
     if source != "<scene>":
@@ -360,13 +373,18 @@ def to_toml(scene: Scene, comment: str = "") -> str:
     return f"{remark}\n{text}" if remark else text
 
 
-def plain(value: object) -> Any:
-    """Copy a value as `tomllib` would have made it: of dicts, lists and Python's own numbers."""
+def plain(value: object, levels: int = _DEEPEST) -> Any:
+    """Copy a value as `tomllib` would have made it: of dicts, lists and Python's own numbers.
+
+    A RecursionError if there are more levels than `levels`.
+    """
+    if levels < 0:
+        raise RecursionError(f"nested too deep: more than {_DEEPEST} levels of keys and lists")
     match value:
         case Mapping():
-            return {str(key): plain(content) for key, content in value.items()}
+            return {str(key): plain(content, levels - 1) for key, content in value.items()}
         case list() | tuple():
-            return [plain(item) for item in value]
+            return [plain(item, levels - 1) for item in value]
     # NumPy's numbers and arrays, without its import.
     return value.tolist() if hasattr(value, "tolist") else value
 
@@ -385,8 +403,7 @@ def _traced(fault: Fault, given: Mapping[str, str]) -> Fault:
 def _read(path: Path) -> str:
     source = str(path)
     try:
-        with path.open("rb") as file:
-            data = file.read(_LARGEST_FILE + 1)
+        data = first_bytes(path, _LARGEST_FILE)
     except OSError as error:
         reason = error.strerror or str(error)
         raise SceneError(source, [Fault("", None, f"cannot be read: {reason}")]) from None

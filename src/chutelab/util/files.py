@@ -6,33 +6,133 @@ It imports no NumPy: commands that need none answer at once.
 from __future__ import annotations
 
 import csv
+import os
 import re
+import shutil
 import tempfile
+import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import fields
-from errno import ENOENT
+from errno import EINVAL, EISDIR, ENOENT, ENOTDIR
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Final
 
 from chutelab.util.errors import printable
 
+_ASIDE: Final = ".chutelab-unfinished-"
+"""Beginning of the names of folders in which files are made before they get their place."""
+
+_OLD: Final = 3600.0
+"""s after which a folder that nobody holds is taken for one that a killed program left."""
+
+
+@contextmanager
+def aside(folder: Path, target: Path | None = None) -> Iterator[Path]:
+    """Give an empty folder to make files in that shall be moved to `folder`; removed at the end.
+
+    It lies in there, or in what there is of the folders above, so that a move is an atomic rename.
+    To be entered before long work: what cannot be written to is refused at once. KILL and power
+    cuts leave it behind; the next one in the same place removes it, see `_remove_left_over`.
+
+    Raises
+    ------
+    OSError
+        One of a file in here, or without a name, has the name of `target`, by default `folder`.
+    """
+    made = ""
+    try:
+        anchor = next((path for path in (folder, *folder.parents) if path.exists()), folder)
+        if not anchor.is_dir():
+            raise NotADirectoryError(ENOTDIR, f"{anchor} is a file, not a folder", str(folder))
+        _remove_left_over(anchor)
+        with tempfile.TemporaryDirectory(prefix=_ASIDE, dir=anchor) as made, _held(Path(made)):
+            yield Path(made)
+    except OSError as error:
+        names = [str(name) for name in (error.filename, error.filename2) if name is not None]
+        if not names or any(_ASIDE in name for name in names):
+            raise OSError(
+                error.errno, error.strerror or str(error), str(target or folder)
+            ) from error
+        raise
+
+
+def first_bytes(path: Path, most: int) -> bytes:
+    """Read a file, up to one byte more than `most`, so that larger ones show.
+
+    A named pipe is refused: perhaps nobody ever writes to it.
+    """
+    if path.is_fifo() and Path(os.path.realpath(path)).exists():
+        raise OSError(EINVAL, "it is a pipe, not a file", str(path))
+    with path.open("rb") as file:
+        return file.read(most + 1)
+
+
+@contextmanager
+def _held(folder: Path) -> Iterator[bool]:
+    """Hold a folder's lock, which ends with the process however that ends; tell if it was free."""
+    try:
+        import fcntl
+    except ImportError:  # Windows
+        yield False
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:  # somebody holds it, or the file system has no locks
+            yield False
+        else:
+            yield True
+    finally:
+        os.close(descriptor)
+
+
+def _remove_left_over(anchor: Path) -> None:
+    """Remove folders of programs that were killed: old ones whose lock is free. Not on Windows."""
+    for path in anchor.glob(f"{_ASIDE}????????"):
+        with suppress(OSError):
+            if time.time() - path.lstat().st_mtime > _OLD and not path.is_symlink():
+                with _held(path) as free:
+                    if free:
+                        shutil.rmtree(path)
+
 
 @contextmanager
 def whole(path: str | Path) -> Iterator[Path]:
     """Give a path to write to; it becomes `path` at the end, or is removed after an exception.
 
-    It lies in the same directory, so that the last step is one atomic rename.
+    A link stays, and what it leads to is written. Only files are replaced: a rename would put one
+    in the place of a device, such as /dev/null, or a pipe.
     """
-    path = Path(path)
-    if not path.parent.exists():
-        # Else the error would name the temporary folder.
-        raise FileNotFoundError(ENOENT, "there is no such folder", str(path.parent))
-    with tempfile.TemporaryDirectory(prefix=f".{path.name}-", dir=path.parent) as folder:
-        unfinished = Path(folder) / path.name
+    with _beside(Path(path)) as unfinished:
         yield unfinished
-        unfinished.replace(path)
+        unfinished.replace(os.path.realpath(path))
+
+
+def check(path: str | Path) -> None:
+    """Raise the OSError that `whole` would raise at once; write nothing."""
+    with _beside(Path(path)):
+        pass
+
+
+def refuse_other(path: Path) -> None:
+    """Raise an OSError if something is there that is no file."""
+    if path.is_dir():
+        raise IsADirectoryError(EISDIR, f"{path} is a folder, not a file", str(path))
+    if path.exists() and not path.is_file():
+        raise OSError(EINVAL, f"{path} is a device or a pipe, not a file", str(path))
+
+
+@contextmanager
+def _beside(path: Path) -> Iterator[Path]:
+    refuse_other(path)
+    real = Path(os.path.realpath(path))
+    if not real.parent.exists():
+        raise FileNotFoundError(ENOENT, f"there is no folder {path.parent}", str(path))
+    with aside(real.parent, path) as folder:
+        yield folder / real.name
 
 
 _FORMULA: Final = r"((?:\A|[;\t\r\n])[\s\"']*)({}[=+\-@\uff1d\uff0b\uff0d\uff20])"

@@ -75,7 +75,7 @@ def _obey(signum: int, _frame: object) -> None:
 
 
 def _end_at_once(signum: int, _frame: object) -> None:
-    os._exit(128 + signum)
+    os._exit(exit_code(None) or 128 + signum)
 
 
 def exit_code(error: BaseException | None) -> int | None:

@@ -12,7 +12,6 @@ import json
 import os
 import re
 import shutil
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from errno import ELOOP, ENOTDIR
@@ -31,6 +30,7 @@ from PIL.GifImagePlugin import GifImageFile
 from chutelab.classroom.lessons.reading import Lesson, LessonError, read, scene_of, split, unusable
 from chutelab.engines.simulation import simulate
 from chutelab.scene import Fault, to_dict
+from chutelab.util.files import aside, refuse_other
 from chutelab.util.versions import own_version, version_of
 
 _HERE: Final = Path(__file__).parent
@@ -84,10 +84,12 @@ def build(
     if made:
         from chutelab.pictures.animation import animate
 
-        path.parent.mkdir(parents=True, exist_ok=True)
+        with aside(path.parent, path):
+            refuse_other(path)
         scene = scene_of(lesson, lesson.picture.scene, lesson.picture.set)
         recording = simulate(scene, progress=progress)
         settings = lesson.picture.model_dump(exclude={"scene", "set"})
+        path.parent.mkdir(parents=True, exist_ok=True)
         animate(recording, path, question=lesson.question, comment=wanted, **settings)
     return Built(path, path.stat().st_size, made)
 
@@ -202,9 +204,8 @@ def start(path: str | Path, model: Lesson | None = None) -> Path:
         raise LessonError(str(path), [Fault("name", path.name, text)])
     if path.exists() or path.is_symlink():
         raise unusable(path, "is there already; choose another name")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=f".{path.name}-", dir=path.parent) as made:
-        unfinished = Path(made) / path.name
+    with aside(path.parent, path) as made:
+        unfinished = made / path.name
         unfinished.mkdir()
         if model is None:
             title = split(path)[1].replace("-", " ").capitalize()
@@ -216,6 +217,7 @@ def start(path: str | Path, model: Lesson | None = None) -> Path:
             for file in files_of(model):
                 shutil.copyfile(file, unfinished / file.name)
         read(unfinished)
+        path.parent.mkdir(parents=True, exist_ok=True)
         unfinished.rename(path)
     return path
 
@@ -263,11 +265,12 @@ def bundle(
     """
     folder = Path(folder)
     _check_places(lessons, folder)
-    if folder.exists() and not folder.is_dir():
-        raise NotADirectoryError(ENOTDIR, "it is a file, not a folder", str(folder))
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(prefix=".chutelab-", dir=folder.parent) as unfinished:
-        made = Path(unfinished)
+    for name in (INDEX, *_SHARED):
+        refuse_other(folder / name)
+    for lesson in lessons:
+        if (there := folder / lesson.folder.name).exists() and not there.is_dir():
+            raise NotADirectoryError(ENOTDIR, "it is a file, not a folder", str(there))
+    with aside(folder) as made:
         cards = ""
         for i, lesson in enumerate(lessons):
 

@@ -22,6 +22,7 @@ import numpy as np
 from chutelab.scene import Fault, shipped
 from chutelab.studies.measured.track import LEAST, MeasuredError, Placement, Track
 from chutelab.util.errors import did_you_mean
+from chutelab.util.files import first_bytes
 
 LARGEST_FILE: Final = 20_000_000
 """Bytes; an hour of film at 50 frames a second is a quarter of it."""
@@ -38,8 +39,7 @@ _EMPTY: Final = ("", "nan", "null", "na", "n/a", "-", "--")
 def lines_of(path: Path) -> list[str]:
     """Return the lines of a text file; a `MeasuredError` if it is none."""
     try:
-        with path.open("rb") as file:
-            data = file.read(LARGEST_FILE + 1)
+        data = first_bytes(path, LARGEST_FILE)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise refused(path, "", f"cannot be read: {reason}") from None

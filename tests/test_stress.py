@@ -15,6 +15,7 @@ from click.testing import CliRunner
 
 import chutelab
 from chutelab import scene
+from chutelab.checks import agreement  # noqa: F401 - or it would keep what a test puts in
 from chutelab.checks.stress import LAWS, Verdict
 from chutelab.cli import main
 from chutelab.engines.simulation import simulate

@@ -20,7 +20,7 @@ from chutelab.checks.stress import LAWS, Verdict
 from chutelab.cli import main
 from chutelab.engines.simulation import simulate
 from chutelab.results.recorder import StalledError
-from chutelab.util.signals import raised
+from chutelab.util.signals import held, raised
 from stress.runs import HOP
 
 SOURCES = str(Path(chutelab.__file__).parent.parent)
@@ -255,6 +255,21 @@ def test_a_signal_during_the_imports_is_no_traceback(tmp_path, module, sent, cod
         out, said = process.communicate(timeout=60.0)
     assert (process.returncode, out) == (code, "")
     assert said == ("" if module == "click" else f"\n{told}\n")
+
+
+def test_a_signal_waits_until_all_files_are_in_their_place():
+    done = []
+
+    def move():
+        with held():
+            signal.raise_signal(signal.SIGTERM)
+            done.append("first")
+            signal.raise_signal(signal.SIGINT)
+            done.append("second")
+
+    with raised(), pytest.raises(KeyboardInterrupt):
+        move()
+    assert done == ["first", "second"]
 
 
 def test_what_is_ignored_or_somebody_elses_is_left_alone():

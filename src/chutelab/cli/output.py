@@ -20,6 +20,7 @@ from chutelab.cli.console import progress, say, show, show_json
 from chutelab.cli.parameters import json_option, out_option
 from chutelab.cli.program import RefusedError
 from chutelab.util.files import aside, check, refuse_other
+from chutelab.util.signals import held
 from chutelab.util.tables import plain
 
 if TYPE_CHECKING:
@@ -64,8 +65,9 @@ def destination(folder: Path | None, names: Iterable[str] = ()) -> Iterator[Path
         with aside(folder) as unfinished:
             yield unfinished
             folder.mkdir(parents=True, exist_ok=True)
-            for file in sorted(unfinished.iterdir()):
-                file.replace(folder / file.name)
+            with held():
+                for file in sorted(unfinished.iterdir()):
+                    file.replace(folder / file.name)
     except OSError as error:
         named = Path(error.filename or folder)
         if named not in (folder, *folder.parents) and folder not in named.parents:

@@ -66,7 +66,27 @@ def raised(*, last: bool = False) -> Iterator[None]:
                 signal.signal(number, _end_at_once if last else handler)
 
 
+_kept: list[int] | None = None
+"""Signals that came during `held`; None where nothing holds them."""
+
+
+@contextmanager
+def held() -> Iterator[None]:
+    """Let what happens here happen whole: a signal that comes is raised afterwards."""
+    global _kept
+    _kept = kept = []
+    try:
+        yield
+    finally:
+        _kept = None
+    if kept:
+        _obey(kept[0], None)
+
+
 def _obey(signum: int, _frame: object) -> None:
+    if _kept is not None:
+        _kept.append(signum)
+        return
     now = monotonic()
     if _obeyed and now - _obeyed[-1][1] < GRACE:
         return

@@ -74,7 +74,8 @@ _kept: list[int] | None = None
 def held() -> Iterator[None]:
     """Let what happens here happen whole: a signal that comes is raised afterwards."""
     global _kept
-    _kept = kept = []
+    kept: list[int] = []
+    _kept = kept
     try:
         yield
     finally:

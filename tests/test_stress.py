@@ -257,6 +257,23 @@ def test_a_signal_during_the_imports_is_no_traceback(tmp_path, module, sent, cod
     assert said == ("" if module == "click" else f"\n{told}\n")
 
 
+def test_a_signal_that_python_would_pass_over_is_raised_again(capsys):
+    class Thing:
+        def __del__(self):
+            signal.raise_signal(signal.SIGTERM)
+            time.sleep(0.0)
+
+    def wait():
+        del things[0]
+        time.sleep(5.0)
+
+    things = [Thing()]
+    with raised(), pytest.raises(KeyboardInterrupt) as told:
+        wait()
+    assert told.value.signum == signal.SIGTERM
+    assert capsys.readouterr().err == ""
+
+
 def test_a_signal_waits_until_all_files_are_in_their_place():
     done = []
 

@@ -8,9 +8,13 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
+from threading import Timer
 from time import monotonic
+from typing import Any
 
 INTERRUPTED = 128 + signal.SIGINT
 """Exit code, as shells have it."""
@@ -53,14 +57,17 @@ def raised(*, last: bool = False) -> Iterator[None]:
     usual = (signal.SIG_DFL, signal.default_int_handler)
     known = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
     before = {number: now for number in known if (now := signal.getsignal(number)) in usual}
+    ignored = sys.unraisablehook
     if before:
         _obeyed.clear()
+        sys.unraisablehook = partial(_ignored, ignored)
     try:
         for number in before:
             with suppress(ValueError):
                 signal.signal(number, _obey)
         yield
     finally:
+        sys.unraisablehook = ignored
         for number, handler in before.items():
             with suppress(ValueError):
                 signal.signal(number, _end_at_once if last else handler)
@@ -93,6 +100,18 @@ def _obey(signum: int, _frame: object) -> None:
         return
     _obeyed.append((signum, now))
     raise Terminated(signum)
+
+
+def _ignored(usual: Callable[[Any], object], about: Any) -> None:
+    """Raise a signal again that came where Python passes over errors: in a finalizer, say."""
+    if not isinstance(about.exc_value, Terminated):
+        usual(about)
+        return
+    signum, now = about.exc_value.signum, monotonic()
+    _obeyed[-1:] = [(signum, now - GRACE)]
+    again = Timer(0.01, signal.raise_signal, [signum])
+    again.daemon = True
+    again.start()
 
 
 def _end_at_once(signum: int, _frame: object) -> None:

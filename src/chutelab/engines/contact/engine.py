@@ -184,7 +184,7 @@ class Job:
 
     def run(self, progress: Progress | None) -> tuple[int, float, tuple[float, float]] | None:
         """Run to the end, or until a particle stalls: return which one, when and where."""
-        steps, status = 8, Status.PAUSED
+        steps, status = 64, Status.PAUSED
         with suppress(EnoughError):
             while status not in (Status.DONE, Status.STALLED):
                 begin = perf_counter()

@@ -1012,7 +1012,7 @@ def test_a_run_that_takes_too_long_ends_with_what_is_recorded():
     run = ("run", "stream", "--max-seconds", "1e-9", "--out", "out")
     text = " ".join(call(*run).stdout.split())
     assert re.search(r"ended: 200 stopped .* STOPPED before it was over, with \d+ particles", text)
-    assert "under way and 19" in text
+    assert re.search(r"under way and 1\d\d", text)
     assert sorted(path.name for path in Path("out").iterdir()) == FILES
     told = json.loads(Path("out/summary.json").read_text())
     assert told["ended"]["reason"] == 200 * ["stopped"]

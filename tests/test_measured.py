@@ -522,6 +522,7 @@ def test_draws_points_tracks_and_residuals(found):
     [
         (("--data", "nowhere.csv"), "nowhere.csv: no such file, and no shipped track"),
         (("--scale", "0"), "scale = 0.0: must be a number > 0"),
+        (("--scale", "1e308"), "scale = 1e+308: must be a number > 0 and <= 1e+09"),
         (("--scale", "x"), "'x' is not a valid float"),
         (("--origin", "1"), "two numbers X,Y"),
         (("--fit", "plate.restitutoin"), "did you mean plate.restitution"),

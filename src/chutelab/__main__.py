@@ -3,8 +3,10 @@
 What takes long to import is imported inside `main`, where signals are waited for.
 """
 
+import atexit
 import os
 import sys
+from contextlib import suppress
 
 from chutelab.util.signals import exit_code, raised
 
@@ -19,11 +21,14 @@ def main() -> None:
 
             program()
         except BaseException as error:
-            # What `program` raises is a SystemExit, with the code that it should be.
-            code = None if isinstance(error, SystemExit) else exit_code(error)
+            code = exit_code(error)
             if code is None:
                 raise
-            sys.exit(code)
+            # At once: what was interrupted midway may bring down the interpreter's own end.
+            with suppress(OSError, ValueError):
+                sys.stdout.flush()
+            atexit._run_exitfuncs()
+            os._exit(code)
 
 
 if __name__ == "__main__":

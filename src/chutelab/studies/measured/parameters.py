@@ -10,11 +10,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from chutelab.scene import MISSING, Fault, Scene, shown
 from chutelab.scene.overrides import at_path, joined, limits_of, parts_of, rule_at
-from chutelab.studies.measured.track import MeasuredError, Track
+from chutelab.studies.measured.track import LARGEST, MeasuredError, Track
 from chutelab.util.errors import did_you_mean
 
 
@@ -46,10 +44,10 @@ class Parameter:
 
 def placements(track: Track) -> dict[str, Parameter]:
     """Return what can be fitted of a track's `Placement`."""
-    place, anything = track.placement, (-np.inf, np.inf)
+    place, anything = track.placement, (-LARGEST, LARGEST)
     found = (
         Parameter("t0", "s", place.t0, *anything),
-        Parameter("scale", "m per unit", place.scale, 0.0, np.inf),
+        Parameter("scale", "m per unit", place.scale, 0.0, LARGEST),
         Parameter("origin.x", "file units", place.origin[0], *anything),
         Parameter("origin.y", "file units", place.origin[1], *anything),
     )

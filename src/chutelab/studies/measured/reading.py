@@ -20,7 +20,7 @@ from typing import Final
 import numpy as np
 
 from chutelab.scene import Fault, shipped
-from chutelab.studies.measured.track import LEAST, MeasuredError, Placement, Track
+from chutelab.studies.measured.track import LARGEST, LEAST, MeasuredError, Placement, Track
 from chutelab.util.errors import did_you_mean
 from chutelab.util.files import first_bytes
 
@@ -95,9 +95,6 @@ def refused(source: object, place: str, allowed: str, value: object = None) -> M
 LENGTHS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "km": 1e3, "in": 0.0254, "ft": 0.3048}
 TIMES: Final = {"s": 1.0, "sec": 1.0, "ms": 1e-3}
 PIXELS: Final = ("px", "pixel", "pixels")
-
-LARGEST: Final = 1e9
-"""Bound on a number of the file: far from overflow when residuals are squared."""
 
 _COLUMN: Final = re.compile(
     r"(time|t|x|y)(?:\s*[(\[/]\s*(?P<bracket>[a-z]+)\s*[)\]]?|(?:\s+in\s+|_)(?P<plain>[a-z]+))?"

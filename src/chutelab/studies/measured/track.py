@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import isfinite
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -18,6 +17,10 @@ from chutelab.util.tables import Sheet, Shown
 
 class MeasuredError(SceneError):
     """A measured track, or a fit to it, that cannot be used; its text says where and why."""
+
+
+LARGEST: Final = 1e9
+"""Bound on numbers of a file and its placement: far from overflow when residuals are squared."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +43,7 @@ class Placement:
     Raises
     ------
     MeasuredError
-        If the scale is not above 0, or a number is not finite.
+        If the scale is not above 0, or a number is not finite or beyond `LARGEST`.
     """
 
     scale: float = 1.0
@@ -50,12 +53,15 @@ class Placement:
 
     def __post_init__(self) -> None:
         faults = []
-        if not (isfinite(self.scale) and self.scale > 0.0):
-            faults.append(Fault("scale", self.scale, "must be a number > 0, metres per unit"))
-        if len(self.origin) != 2 or not all(isfinite(value) for value in self.origin):
-            faults.append(Fault("origin", self.origin, "must be two numbers, X and Y"))
-        if not isfinite(self.t0):
-            faults.append(Fault("t0", self.t0, "must be a number, seconds"))
+        most = f"{LARGEST:g}"
+        if not 0.0 < self.scale <= LARGEST:
+            allowed = f"must be a number > 0 and <= {most}, metres per unit"
+            faults.append(Fault("scale", self.scale, allowed))
+        if len(self.origin) != 2 or not all(abs(value) <= LARGEST for value in self.origin):
+            allowed = f"must be two numbers, X and Y, from -{most} to {most}"
+            faults.append(Fault("origin", self.origin, allowed))
+        if not abs(self.t0) <= LARGEST:
+            faults.append(Fault("t0", self.t0, f"must be a number from -{most} to {most}, seconds"))
         if faults:
             raise MeasuredError("placement", faults)
 

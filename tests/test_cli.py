@@ -478,7 +478,7 @@ def test_a_failure_of_ours_ends_with_1_one_line_and_nothing_written(monkeypatch)
     def broken(*_arguments, **_options):
         raise ZeroDivisionError("two\nlines")
 
-    monkeypatch.setattr(sys.modules["chutelab.results.storage"], "to_csv", broken)
+    monkeypatch.setattr("chutelab.results.storage.to_csv", broken)
     arguments = ("run", "perpendicular", "--out", "out", "--only", "csv,npz,json")
     result = call(*arguments, code=1)
     assert result.stdout == ""
@@ -496,7 +496,7 @@ def test_a_full_disk_is_refused_in_words(monkeypatch):
     def full(*_arguments, **_options):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(sys.modules["chutelab.results.storage"], "save", full)
+    monkeypatch.setattr("chutelab.results.storage.save", full)
     said = refused("run", "perpendicular", "--out", "out", "--only", "npz")
     assert "--out out: cannot be written to: No space left on device" in said
 

@@ -630,6 +630,7 @@ def test_collisions_of_lesson_7_begin_where_it_says():
     assert 3.0 < lost["restitution_loss"] + lost["friction_loss"] < 9.0
 
 
+@pytest.mark.slow
 def test_impacts_of_lesson_8_are_late_by_a_step_or_a_part_of_one_as_it_says():
     # After 0.5 s on the belt, a whole number of steps in each case.
     for dt in (2e-4, 1e-4, 5e-5, 2e-5):

@@ -155,7 +155,7 @@ STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
 
 @pytest.mark.parametrize(
     ("name", "number", "share"),
-    [("run", signal.SIGTERM, 0.8), ("jobs", signal.SIGKILL, 0.6), ("sweep", signal.SIGINT, 0.7)],
+    [("run", signal.SIGTERM, 0.8), ("sweep", signal.SIGKILL, 0.7)],
 )
 def test_stopped(name, number, share, tmp_path, whole):
     stopped(name, number, share * whole(name)[1], tmp_path, whole)

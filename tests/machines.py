@@ -20,6 +20,17 @@ distance = 0.5
 drop = 0.5
 """
 
+MOVING_CORNER = {
+    "particle": {"radius": 0.05, "spin": True},
+    "surface": [
+        {"name": "floor", "from": [-1.0, 0.0], "to": [1.0, 0.0], "speed": 1.0, "friction": 0.5},
+        {"name": "wall", "from": [0.5, 0.0], "to": [0.5, 1.0], "friction": 0.5},
+    ],
+    "stream": {"at": [0.0, 0.06], "velocity": [0.0, 0.0]},
+    "run": {"until": 3.0},
+}
+"""A spinning disk held between a moving surface and another: beyond the exact engine."""
+
 SCENE = {
     "particle": {"radius": 0.01, "mass": 0.1, "spin": True},
     "stream": {"at": [0.0, 1.0], "velocity": [0.0, 0.0]},

@@ -1026,6 +1026,7 @@ def test_a_run_that_takes_too_long_ends_with_what_is_recorded():
 def test_a_time_limit_is_a_number_above_0(seconds):
     result = call("run", "perpendicular", "--max-seconds", seconds, code=2)
     assert "--max-seconds" in result.stderr
+    assert "float" not in result.stderr
     assert "--accuracy" in call(
         "run", "slip", "--max-seconds", "1", "--accuracy", "1mm", code=2
     ).stderr  # fmt: skip

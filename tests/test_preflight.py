@@ -16,7 +16,7 @@ from chutelab.machine import build
 from chutelab.results import REASONS
 from chutelab.results.quantities import QUANTITIES
 from chutelab.results.recorder import StalledError
-from machines import PERPENDICULAR
+from machines import MOVING_CORNER, PERPENDICULAR
 
 LONE = [name for name in sc.shipped() if "stream" not in name]
 
@@ -81,16 +81,7 @@ def test_the_engine_is_the_one_that_will_run(name, overrides, engine, why):
 
 
 def test_what_the_exact_engine_cannot_follow_is_tried_on_the_contact_engine():
-    corner = {
-        "particle": {"radius": 0.05, "spin": True},
-        "surface": [
-            {"name": "floor", "from": [-1.0, 0.0], "to": [1.0, 0.0], "speed": 1.0, "friction": 0.5},
-            {"name": "wall", "from": [0.5, 0.0], "to": [0.5, 1.0], "friction": 0.5},
-        ],
-        "stream": {"at": [0.0, 0.06], "velocity": [0.0, 0.0]},
-        "run": {"until": 3.0},
-    }
-    found = preflight(sc.from_dict(corner))
+    found = preflight(sc.from_dict(MOVING_CORNER))
     assert found.engine == "contact"
     assert "beyond the exact engine" in found.why
     assert not found.effort.at_least

@@ -15,6 +15,7 @@ from chutelab.results.ledger import ledger
 from chutelab.results.quantities import stopped, waits
 from chutelab.results.recorder import EnoughError
 from chutelab.results.summary import summary
+from machines import MOVING_CORNER
 
 ARRAYS = ("knots", "offsets", "ended", "events", "by_surface")
 
@@ -67,18 +68,9 @@ def test_what_an_engine_cannot_do_is_refused_with_file_and_keys(name, overrides,
 
 
 def test_a_disk_held_in_a_moving_corner_goes_to_contact_unless_exact_was_asked_for():
-    corner = {
-        "particle": {"radius": 0.05, "spin": True},
-        "surface": [
-            {"name": "floor", "from": [-1.0, 0.0], "to": [1.0, 0.0], "speed": 1.0, "friction": 0.5},
-            {"name": "wall", "from": [0.5, 0.0], "to": [0.5, 1.0], "friction": 0.5},
-        ],
-        "stream": {"at": [0.0, 0.06], "velocity": [0.0, 0.0]},
-        "run": {"until": 3.0},
-    }
-    assert simulate(scene.from_dict(corner, "mine.toml")).engine == "contact"
+    assert simulate(scene.from_dict(MOVING_CORNER, "mine.toml")).engine == "contact"
     with pytest.raises(scene.SceneError, match=r"mine\.toml: run\.engine.*contact"):
-        simulate(scene.from_dict(corner, "mine.toml"), engine="exact")
+        simulate(scene.from_dict(MOVING_CORNER, "mine.toml"), engine="exact")
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,8 @@ import click
 from chutelab.cli.console import progress, tell
 from chutelab.cli.output import destination
 from chutelab.cli.parameters import (
+    Count,
+    Number,
     json_option,
     loaded_as_told,
     out_option,
@@ -39,14 +41,14 @@ REPEATS = 9
     "--dt",
     "steps",
     metavar="S",
-    type=click.FloatRange(1e-7, 0.1),
+    type=Number(1e-7, 0.1),
     multiple=True,
     help="A step of the engines that step, in place of the usual ones. May be repeated.",
 )
 @click.option(
     "--repeats",
     metavar="N",
-    type=click.IntRange(1, 1000),
+    type=Count(1, 1000),
     default=REPEATS,
     show_default=True,
     help="Timed runs after the first, at most; fewer of what takes long.",

@@ -13,7 +13,7 @@ from click.shell_completion import CompletionItem
 from chutelab.cli import console
 from chutelab.cli.console import progress
 from chutelab.cli.output import check_file, writing
-from chutelab.cli.parameters import FileName, json_option, out_option
+from chutelab.cli.parameters import FileName, Number, json_option, out_option
 from chutelab.cli.program import InOrder, RefusedError
 
 if TYPE_CHECKING:
@@ -230,7 +230,7 @@ def _plain(lesson: Lesson) -> dict[str, object]:
     metavar="S",
     default=60.0,
     show_default=True,
-    type=click.FloatRange(1.0, 3600.0),
+    type=Number(1.0, 3600.0),
     help="Seconds that a notebook may run.",
 )
 @click.option("--quiet", "-q", is_flag=True, help="Print no table, and show no progress bar.")

@@ -33,6 +33,18 @@ def complete_scene(
     return [*names, CompletionItem(incomplete, type="file")]
 
 
+class Number(click.FloatRange):
+    """A number in a range, called so in what click says of anything else."""
+
+    name = "number"
+
+
+class Count(click.IntRange):
+    """A whole number in a range, called so in what click says of anything else."""
+
+    name = "whole number"
+
+
 DEEPEST = 200
 """Folders inside each other in a name; each made needs a call inside the one before."""
 

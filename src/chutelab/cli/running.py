@@ -12,6 +12,7 @@ from chutelab.cli.console import progress, say
 from chutelab.cli.output import KINDS, Output, check_file, destination, output_options, writing
 from chutelab.cli.parameters import (
     FileName,
+    Number,
     dt_option,
     engine_option,
     file_option,
@@ -49,7 +50,7 @@ def _accuracy(text: str) -> Wanted:
 @click.option(
     "--max-seconds",
     metavar="S",
-    type=click.FloatRange(min=0.0, min_open=True),
+    type=Number(min=0.0, min_open=True),
     help="End the simulation after S seconds with what is recorded; the summary says so.",
 )
 @set_option

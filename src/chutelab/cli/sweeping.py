@@ -14,6 +14,7 @@ from click.shell_completion import CompletionItem
 from chutelab.cli import console
 from chutelab.cli.output import PICTURES, check_file, writing
 from chutelab.cli.parameters import (
+    Count,
     engine_option,
     file_option,
     json_option,
@@ -90,7 +91,7 @@ def _complete_column(
 @click.option(
     "--jobs",
     metavar="N",
-    type=click.IntRange(min=0),
+    type=Count(min=0),
     default=1,
     help="Spread the work over N processes; 0 is one for each processor.",
 )

@@ -58,7 +58,7 @@ def difference(one, other, unit="relative"):
 )
 def test_an_accuracy_is_a_share_or_a_length(text, size, unit):
     found = parse(text)
-    assert (found.size, found.unit) == (pytest.approx(size, rel=1e-15), unit)
+    assert (found.size, found.unit) == (pytest.approx(size, rel=1e-15, abs=0.0), unit)
 
 
 @pytest.mark.parametrize(
@@ -128,7 +128,7 @@ def test_the_scene_that_was_promised_too_much():
     assert found.against == "theory"
     true = compare(recording).max
     assert found.met is (true <= 1e-4)
-    assert found.reached == pytest.approx(true, rel=1e-12)
+    assert found.reached == pytest.approx(true, rel=1e-12, abs=0.0)
 
 
 @pytest.mark.parametrize("order", [1.0, 2.0])
@@ -285,7 +285,7 @@ def test_a_distance_in_metres_is_that_of_places():
         simulate(sc.load("perpendicular", overrides)) for overrides in ([], ["outgoing.drop=0.501"])
     )
     down, up = (run.select(Kind.LANDING)[0]["position"] for run in (one, other))
-    assert difference(one, other, "m") == pytest.approx(np.hypot(*(down - up)), rel=1e-12)
+    assert difference(one, other, "m") == pytest.approx(np.hypot(*(down - up)), rel=1e-12, abs=0.0)
     # 1 mm of 0.6 m; times and velocities change by less.
     assert difference(one, other) == pytest.approx(np.hypot(*(down - up)) / 0.6, rel=0.5)
 

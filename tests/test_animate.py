@@ -225,7 +225,7 @@ def test_a_long_stream_is_filmed_for_three_lives_of_particle_0() -> None:
     recording = simulate(scene.parse(text))
     begin, end = span(recording, laid_out(recording).window)
     life = recording.track(0)["t"][-1] - begin
-    assert end - begin == pytest.approx(3.0 * life, rel=1e-12)
+    assert end - begin == pytest.approx(3.0 * life, rel=1e-12, abs=0.0)
     assert end < recording.knots["t"].max()
 
 
@@ -511,16 +511,18 @@ def test_bars_add_up_to_the_energies_at_all_times() -> None:
     push = min(MU * MASS * G * t_landing(), MASS * V * (1.0 + EPS))
     for i in range(4):
         put_in, is_now = blocks_of(stage, i)
-        assert sum(put_in.values()) == pytest.approx(sum(is_now.values()), rel=1e-12)
-        assert put_in["start"] == pytest.approx(at_release, rel=1e-12)
+        assert sum(put_in.values()) == pytest.approx(sum(is_now.values()), rel=1e-12, abs=0.0)
+        assert put_in["start"] == pytest.approx(at_release, rel=1e-12, abs=0.0)
         assert figures(stage, i)["start"] == f"{at_release:.1f}"
-    assert put_in["belt_work"] == pytest.approx(1e3 * push * V, rel=1e-12)
+    assert put_in["belt_work"] == pytest.approx(1e3 * push * V, rel=1e-12, abs=0.0)
     assert is_now["kinetic"] == pytest.approx(
-        1e3 * 0.5 * MASS * (push / MASS - EPS * V) ** 2, rel=1e-12
+        1e3 * 0.5 * MASS * (push / MASS - EPS * V) ** 2, rel=1e-12, abs=0.0
     )
     fall = 0.5 * G * 0.2**2
     _, is_now = blocks_of(stage, 1)
-    assert is_now["kinetic"] == pytest.approx(1e3 * 0.5 * MASS * (V**2 + (0.2 * G) ** 2), rel=1e-12)
+    assert is_now["kinetic"] == pytest.approx(
+        1e3 * 0.5 * MASS * (V**2 + (0.2 * G) ** 2), rel=1e-12, abs=0.0
+    )
     assert is_now["potential"] == pytest.approx(
         1e3 * MASS * G * (R + PARTICLE - fall - lowest), rel=1e-11
     )
@@ -544,7 +546,7 @@ def test_bars_are_painted_one_on_the_other_to_equal_heights(t: float) -> None:
 def test_bars_add_up_with_the_residual_in_sight(planted: float) -> None:
     stage = stage_of(by_hand(residual=planted), moments_at([BELT_TIME + t_landing()]))
     put_in, is_now = blocks_of(stage, 0)
-    assert sum(put_in.values()) == pytest.approx(sum(is_now.values()), rel=1e-12)
+    assert sum(put_in.values()) == pytest.approx(sum(is_now.values()), rel=1e-12, abs=0.0)
     shown = put_in["residual"] - is_now["residual"]
     assert shown == pytest.approx(-1e3 * planted, rel=1e-9)
     assert figures(stage, 0)["residual"] == ("−3e−3 J" if planted > 0 else "3e−3 J")
@@ -576,7 +578,7 @@ def test_pulley_turns_and_belt_marks_run_with_the_belt() -> None:
     holes, marks = (np.asarray(drawn[name].get_xydata()) for name in ("holes", "marks"))
     angle = V * 0.6 / R
     assert holes[0] == pytest.approx(0.6 * R * np.array([np.sin(angle), np.cos(angle)]), abs=1e-14)
-    assert np.hypot(*holes.T) == pytest.approx(0.6 * R, rel=1e-12)
+    assert np.hypot(*holes.T) == pytest.approx(0.6 * R, rel=1e-12, abs=0.0)
     assert holes.sum(axis=0) == pytest.approx([0.0, 0.0], abs=1e-14)
     later = np.asarray(moved(stage, 1)["marks"].get_xydata())
     shift = np.abs(later[:, None, 0] - marks[None, :, 0] - V * 0.01).min(axis=1)

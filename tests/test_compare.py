@@ -104,7 +104,7 @@ def test_an_error_is_a_difference_over_the_larger_of_theory_and_scale(engine, na
         / max(abs(float(getattr(predicted, key))), scale)
         for key, scale in scales.items()
     }
-    assert compared.errors == pytest.approx(expected, rel=1e-12)
+    assert compared.errors == pytest.approx(expected, rel=1e-12, abs=0.0)
     assert compared.max == max(compared.errors.values())
     assert compared.reason == ""
     if engine == "exact":
@@ -172,10 +172,12 @@ def test_a_stream_takes_its_power_steadily():
     vx = recording.select(Kind.LANDING)["velocity_before"][:, 0]
     power = M * 50.0 * 3.0 * (3.0 - vx.mean())
     work = ledger(recording).by_surface["outgoing"]["belt_work"]
-    assert work / (100 / 50.0) == pytest.approx(power, rel=1e-13)
+    assert work / (100 / 50.0) == pytest.approx(power, rel=1e-13, abs=0.0)
     # and the theory's dEk over the time per particle, Eq. (15)
     predicted = recording.prediction
-    assert float(predicted.P) == pytest.approx(0.5 * M * (vx[0] ** 2 + 9.0) * 50.0, rel=1e-13)
+    assert float(predicted.P) == pytest.approx(
+        0.5 * M * (vx[0] ** 2 + 9.0) * 50.0, rel=1e-13, abs=0.0
+    )
     # the books of many are no particle's own
     assert isnan(compare(recording).simulated["belt_work"])
 

@@ -104,7 +104,7 @@ def check_gas(collisions, within):
     machine, side = gas(collisions)
     recording = run(machine)
     first, last = (recording.energies(knots)[0].sum() for knots in recording.ends())
-    assert last == pytest.approx(first, rel=1e-12)
+    assert last == pytest.approx(first, rel=1e-12, abs=0.0)
     met, walls = recording.select(Kind.COLLISION), recording.select(Kind.IMPACT)
     assert len(met) == pytest.approx(collisions, rel=0.1)
     # Virial theorem: p a² = N kT + ½ Σ σ J/t, where a = side - 2 r is the box of the centres.
@@ -528,11 +528,11 @@ def test_a_ride_by_adhesion_ends_where_gravity_takes_it():
     v, rho = machine.releases.velocity[0, 0], machine.pulley.radius + machine.particle.radius
     cosine = v**2 / (machine.gravity * rho)
     assert cosine < 1.0
-    assert left["position"][1] == pytest.approx(rho * cosine, rel=1e-12)
-    assert np.hypot(*left["velocity_after"]) == pytest.approx(v, rel=1e-12)
+    assert left["position"][1] == pytest.approx(rho * cosine, rel=1e-12, abs=0.0)
+    assert np.hypot(*left["velocity_after"]) == pytest.approx(v, rel=1e-12, abs=0.0)
     angle = np.arccos(cosine)
     start = machine.releases.position[0, 0]
-    assert left["t"] == pytest.approx((rho * angle - start) / v, rel=1e-12)
+    assert left["t"] == pytest.approx((rho * angle - start) / v, rel=1e-12, abs=0.0)
     track = recording.track(0)
     work = track["entries"][track["t"] <= left["t"]][-1, 0]
     lift = machine.particle.mass * machine.gravity * rho * (cosine - 1.0)

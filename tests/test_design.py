@@ -232,7 +232,7 @@ def test_minimum_inside_the_range():
     found = design.minimize(inclined(), "plate.restitution=0:1", "dEk", points=15)
     assert found.answer.place == "inside"
     assert found.answer.values[0] == pytest.approx(restitution(0.0), abs=1e-7)
-    assert found.answer.found[0] == pytest.approx(energy(0.0), rel=1e-12)
+    assert found.answer.found[0] == pytest.approx(energy(0.0), rel=1e-12, abs=0.0)
 
 
 @pytest.mark.parametrize(("goal", "restitution"), [(design.minimize, 0.0), (design.maximize, 1.0)])
@@ -241,7 +241,7 @@ def test_belt_work_is_least_and_most_at_the_ends(goal, restitution):
     vx = forward(TILT, restitution, d1=R + 0.1)
     assert found.answer.values == (restitution,)
     assert found.answer.place == "end"
-    assert found.answer.found[0] == pytest.approx(M * V * (V - vx), rel=1e-12)
+    assert found.answer.found[0] == pytest.approx(M * V * (V - vx), rel=1e-12, abs=0.0)
 
 
 def test_power_is_the_belt_work_of_a_stream():
@@ -250,7 +250,7 @@ def test_power_is_the_belt_work_of_a_stream():
     assert (name.unit, name.ending) == ("W", "settled")
     found = design.maximize(given, "plate.restitution=0:1", "power", points=5)
     vx = forward(TILT, 1.0, d1=R + 0.1)
-    assert found.answer.found[0] == pytest.approx(200.0 * M * V * (V - vx), rel=1e-12)
+    assert found.answer.found[0] == pytest.approx(200.0 * M * V * (V - vx), rel=1e-12, abs=0.0)
 
 
 def test_what_does_not_depend_on_the_key_has_no_minimum():
@@ -267,7 +267,7 @@ def test_slopes_are_the_derivatives():
     assert slope.derivative == pytest.approx(-into * cos(TILT), rel=1e-9)
     assert slope.step == pytest.approx(0.01 * value)
     expected = forward(TILT, 1.01 * value, d1=R + 0.1)
-    assert slope.upper == pytest.approx(expected, rel=1e-12)
+    assert slope.upper == pytest.approx(expected, rel=1e-12, abs=0.0)
 
 
 def test_a_slope_next_to_a_jump_does_not_reach_over_it():
@@ -494,14 +494,14 @@ def linear():
 
 def test_uncertainty_of_a_linear_quantity(linear):
     deviation = sqrt(SR**2 + SD**2)
-    assert linear.nominal[0] == pytest.approx(R + D, rel=1e-12)
+    assert linear.nominal[0] == pytest.approx(R + D, rel=1e-12, abs=0.0)
     assert linear.mean[0] == pytest.approx(R + D, abs=0.002 * deviation)
     assert linear.deviation[0] == pytest.approx(deviation, rel=0.005)
     low, high = norm.interval(0.95, R + D, deviation)
-    np.testing.assert_allclose(linear.interval[0], [low, high], atol=0.05 * deviation)
+    np.testing.assert_allclose(linear.interval[0], [low, high], rtol=0, atol=0.05 * deviation)
     shares = np.array([SR**2, SD**2]) / deviation**2
-    np.testing.assert_allclose(linear.indices[0].first, shares, atol=0.01)
-    np.testing.assert_allclose(linear.indices[0].total, shares, atol=0.01)
+    np.testing.assert_allclose(linear.indices[0].first, shares, rtol=0, atol=0.01)
+    np.testing.assert_allclose(linear.indices[0].total, shares, rtol=0, atol=0.01)
     assert linear.runs == 1024 * 4 + 1
 
 
@@ -526,8 +526,10 @@ def test_sobol_indices_of_ishigamis_function():
     variance = v1 + v2 + v13
     points = pi * (2.0 * sensitivity.sampled(3, 4096, seed=0) - 1.0)
     found = sensitivity.indices(f(points), seed=0)
-    np.testing.assert_allclose(found.first, np.array([v1, v2, 0.0]) / variance, atol=0.01)
-    np.testing.assert_allclose(found.total, np.array([v1 + v13, v2, v13]) / variance, atol=0.01)
+    np.testing.assert_allclose(found.first, np.array([v1, v2, 0.0]) / variance, rtol=0, atol=0.01)
+    np.testing.assert_allclose(
+        found.total, np.array([v1 + v13, v2, v13]) / variance, rtol=0, atol=0.01
+    )
     assert (found.first_interval[:, 0] < found.first + 1e-12).all()
     assert (found.first_interval[:, 1] > found.first - 1e-12).all()
 
@@ -643,8 +645,8 @@ def test_sweep_writes_samples_and_picture_of_uncertainties(tmp_path):
     # Upright plate: vx = -ε v, and the fall to the belt does not depend on ε.
     falls = G * (R + D) / V
     t3 = (sqrt(falls**2 + 2.0 * G * DROP) - falls) / G
-    assert x == pytest.approx(R + D - epsilon * V * t3, rel=1e-12)
-    assert work == pytest.approx(M * V * (V + epsilon * V), rel=1e-12)
+    assert x == pytest.approx(R + D - epsilon * V * t3, rel=1e-12, abs=0.0)
+    assert work == pytest.approx(M * V * (V + epsilon * V), rel=1e-12, abs=0.0)
     told = json.loads(propagate(tmp_path, "plate.restitution=0.5±0.05", "--json").stdout)
     assert told["quantities"]["landing.x"]["first"][0] == pytest.approx(1.0, abs=1e-6)
 

@@ -75,7 +75,7 @@ def test_what_is_no_size_is_refused(text):
 @pytest.mark.parametrize("number", [1.0, 0.25, 4.4e-3, 3e-5, 7.5e-9, 0.0, 1e-16])
 @pytest.mark.parametrize("unit", ["m", "s", "J", "m/s", "degrees", ""])
 def test_a_size_that_was_written_is_read_back(number, unit):
-    assert read_size(write_size(number, unit)) == (pytest.approx(number, rel=1e-15), unit)
+    assert read_size(write_size(number, unit)) == (pytest.approx(number, rel=1e-15, abs=0.0), unit)
 
 
 # What can be expected: the names are those of the JSON summary.
@@ -124,7 +124,7 @@ def test_statistics_are_over_all_particles_it_happened_to():
         "vx_after.mean": landed["velocity_after"][:, 0].sum() / len(x),
     }.items():
         found = measure(recording, f"landing.{statistic}")
-        assert found == pytest.approx(value, rel=1e-13)
+        assert found == pytest.approx(value, rel=1e-13, abs=0.0)
     assert measure(recording, "ended.landed") == len(x)
     assert measure(recording, "ended.exit") == 40 - len(x)
     assert measure(recording, "ended.settled") == 0
@@ -144,7 +144,7 @@ def test_stored_energies_have_a_start_and_an_end():
     assert measure(recording, "ledger.kinetic.start") == 0.5 * 0.008 * 2.0**2
     last = recording.track(0)[-1]
     end = 0.008 * G * last["position"][1]
-    assert measure(recording, "ledger.potential.end") == pytest.approx(end, rel=1e-15)
+    assert measure(recording, "ledger.potential.end") == pytest.approx(end, rel=1e-15, abs=0.0)
 
 
 # Tolerances.
@@ -174,7 +174,7 @@ def test_a_number_is_relative_and_a_string_absolute(value, tolerance, holds):
     found = verify(expecting("x2", value, tolerance))
     row = only(found, "exact")
     assert row.holds is holds
-    assert row.simulated == pytest.approx(0.596, rel=1e-15)
+    assert row.simulated == pytest.approx(0.596, rel=1e-15, abs=0.0)
     assert found.failures == sum(not row.holds for row in found.findings)
     assert bool(found.failures) is not holds
 
@@ -183,16 +183,16 @@ def test_angles_are_degrees_but_relative_to_a_radian():
     machine = PERPENDICULAR.replace("0.1", "0.5")
     angle = degrees(acos(4.0 / (G * 0.504)))
     row = only(verify(expecting("phi1_deg", angle + 1.0, "1.0", machine=machine)), "exact")
-    assert row.error == pytest.approx(np.pi / 180.0, rel=1e-12)
+    assert row.error == pytest.approx(np.pi / 180.0, rel=1e-12, abs=0.0)
     row = only(verify(expecting("phi1_deg", angle + 1.0, '"1°"', machine=machine)), "exact")
-    assert row.error == pytest.approx(1.0, rel=1e-12)
+    assert row.error == pytest.approx(1.0, rel=1e-12, abs=0.0)
     assert row.unit == "degrees"
 
 
 def test_a_ledger_entry_is_measured_by_itself_and_the_residual_by_what_was_turned_over():
     # The plate takes ½ m v² (1 - ε²) = 12 mJ.
     row = only(verify(expecting("ledger.restitution_loss", 0.1, 1)), "exact")
-    assert row.error == pytest.approx(abs(row.simulated - 0.1) / 0.1, rel=1e-12)
+    assert row.error == pytest.approx(abs(row.simulated - 0.1) / 0.1, rel=1e-12, abs=0.0)
     _, recording = shipped("perpendicular")
     turned_over = measure(recording, "ledger.turned_over")
     row = only(verify(expecting("ledger.residual", 0.01, 1)), "exact")
@@ -310,23 +310,29 @@ def value_of(name, quantity, which=0):
 def test_the_closed_forms_among_the_expectations_are_what_they_say():
     """Computed here anew: the engines are not asked."""
     m, r, v = 0.008, 0.004, 2.0
-    assert value_of("perpendicular", "x2") == pytest.approx(0.1 + 0.5 - r, rel=1e-15)
+    assert value_of("perpendicular", "x2") == pytest.approx(0.1 + 0.5 - r, rel=1e-15, abs=0.0)
     assert value_of("perpendicular", "v3x") == 0.5 * v
-    assert value_of("perpendicular", "dEk") == pytest.approx(0.5 * m * (1.0 + v * v), rel=1e-15)
+    assert value_of("perpendicular", "dEk") == pytest.approx(
+        0.5 * m * (1.0 + v * v), rel=1e-15, abs=0.0
+    )
     loss = 0.5 * m * v**2 * (1 - 0.5**2)
     entry = "ledger.by_surface.plate.restitution_loss"
-    assert value_of("perpendicular", entry) == pytest.approx(loss, rel=1e-15)
-    assert value_of("stream-independent", entry) == pytest.approx(10_000 * loss, rel=1e-15)
-    assert value_of("perpendicular-fast", "t2") == pytest.approx(0.596 / 4.0, rel=1e-15)
-    assert value_of("perpendicular-fast", "dEk") == pytest.approx(0.08, rel=1e-15)
+    assert value_of("perpendicular", entry) == pytest.approx(loss, rel=1e-15, abs=0.0)
+    assert value_of("stream-independent", entry) == pytest.approx(10_000 * loss, rel=1e-15, abs=0.0)
+    assert value_of("perpendicular-fast", "t2") == pytest.approx(0.596 / 4.0, rel=1e-15, abs=0.0)
+    assert value_of("perpendicular-fast", "dEk") == pytest.approx(0.08, rel=1e-15, abs=0.0)
     rc = 0.5 + r
     assert value_of("low-speed", "phi1_deg") == pytest.approx(degrees(acos(v * v / (G * rc))))
     lowered = m * (v * v - G * rc)
     entry = "ledger.by_surface.incoming.belt_work"
-    assert value_of("low-speed", entry) == pytest.approx(lowered, rel=1e-14)
-    assert value_of("belt-landing", "belt_work") == pytest.approx(m * v * (v + 1.0), rel=1e-15)
-    assert value_of("belt-landing", "slip_heat") == pytest.approx(0.5 * m * 9.0, rel=1e-15)
-    assert value_of("free-fall", "ledger.potential.end") == pytest.approx(5 * m * G * r, rel=1e-12)
+    assert value_of("low-speed", entry) == pytest.approx(lowered, rel=1e-14, abs=0.0)
+    assert value_of("belt-landing", "belt_work") == pytest.approx(
+        m * v * (v + 1.0), rel=1e-15, abs=0.0
+    )
+    assert value_of("belt-landing", "slip_heat") == pytest.approx(0.5 * m * 9.0, rel=1e-15, abs=0.0)
+    assert value_of("free-fall", "ledger.potential.end") == pytest.approx(
+        5 * m * G * r, rel=1e-12, abs=0.0
+    )
 
 
 def test_the_end_of_the_slip_follows_from_its_whole_impulse():
@@ -335,14 +341,14 @@ def test_the_end_of_the_slip_follows_from_its_whole_impulse():
     v3y = sqrt(fallen**2 + 2 * G * 0.5)
     landing = 0.5 + 0.298 + (v3y - fallen) / G
     end = landing + ((2.0 + 1.0) / 0.08 - v3y) / G
-    assert value_of("belt-landing", "ended.t") == pytest.approx(end, rel=1e-14)
+    assert value_of("belt-landing", "ended.t") == pytest.approx(end, rel=1e-14, abs=0.0)
 
 
 def test_the_ramp_is_met_a_radius_before_its_line():
     cosine = 0.8 / hypot(0.8, 0.3)
     above = 0.8 - (0.6 - 0.3 * 0.3 / 0.8)
     expected = sqrt(2.0 * (above - 0.004 / cosine) / G)
-    assert value_of("free-fall", "impact.ramp.t") == pytest.approx(expected, rel=1e-14)
+    assert value_of("free-fall", "impact.ramp.t") == pytest.approx(expected, rel=1e-14, abs=0.0)
 
 
 def test_the_mean_landing_point_is_an_integral_over_the_bed():

@@ -78,7 +78,7 @@ def test_the_engine_sides_with_the_corrected_equations(found, number):
         recording = chutelab.simulate(given, engine="exact")
         landing = recording.first(recording.select(Kind.LANDING))[0]
         _, _, back, _ = paper(scene.incoming.speed, radius, 0.5, printed=False)
-        assert -landing["velocity_before"][0] == pytest.approx(back, rel=1e-12)
+        assert -landing["velocity_before"][0] == pytest.approx(back, rel=1e-12, abs=0.0)
 
 
 @pytest.mark.parametrize("number", [11, 12, 13])
@@ -100,14 +100,16 @@ def test_a_path_obeys_the_equations_at_an_inclined_plate(form, along, into):
     away = np.array([-np.cos(angle), -np.sin(angle)])
     before, after = first["velocity"][-1], second["velocity"][0]
     if form == "corrected":
-        assert after @ down == pytest.approx(along * (before @ down), rel=1e-12)
-        assert after @ away == pytest.approx(-into * (before @ away), rel=1e-12)
+        assert after @ down == pytest.approx(along * (before @ down), rel=1e-12, abs=0.0)
+        assert after @ away == pytest.approx(-into * (before @ away), rel=1e-12, abs=0.0)
     else:
         # Printed: size from the swapped sine and cosine, direction from Eq. (8).
         size = np.hypot(-before @ away, EPSILON * (before @ down))
-        assert np.hypot(*after) == pytest.approx(size, rel=1e-12)
+        assert np.hypot(*after) == pytest.approx(size, rel=1e-12, abs=0.0)
         tangent = (after @ away) / (after @ down)
-        assert tangent == pytest.approx(EPSILON * (-before @ away) / (before @ down), rel=1e-12)
+        assert tangent == pytest.approx(
+            EPSILON * (-before @ away) / (before @ down), rel=1e-12, abs=0.0
+        )
     # The plate's line goes through the pivot, 0.1 m ahead at the height of the belt.
     meet = first["position"][-1] - np.array([0.1, 0.1])
     assert meet @ away == pytest.approx(0.0, abs=1e-15)

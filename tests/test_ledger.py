@@ -33,12 +33,12 @@ def test_the_books_close_on_every_shipped_scene(name):
     books = ledger(recording)
     first, last = (np.array(list(knots)) for knots in zip(*tracks(recording), strict=True))
     start, end = energies(first, recording.particle), energies(last, recording.particle)
-    assert books.kinetic == pytest.approx((start[0], end[0]), rel=1e-13)
+    assert books.kinetic == pytest.approx((start[0], end[0]), rel=1e-13, abs=0.0)
     assert books.potential == pytest.approx((start[1], end[1]), rel=1e-12, abs=1e-16)
     brought = books.belt_work - books.restitution_loss - books.friction_loss
     turned_over = books.kinetic[0] + abs(books.potential[1] - books.potential[0])
     turned_over += sum(abs(getattr(books, entry)) for entry in ENTRIES)
-    assert books.turned_over == pytest.approx(turned_over, rel=1e-15)
+    assert books.turned_over == pytest.approx(turned_over, rel=1e-15, abs=0.0)
     assert sum(end) - sum(start) - brought == pytest.approx(books.residual, abs=1e-13 * turned_over)
     assert abs(books.residual) <= 1e-14 * turned_over
     assert books.relative_residual == abs(books.residual) / books.turned_over
@@ -67,11 +67,11 @@ def test_the_entries_are_what_the_impacts_and_the_ride_say():
     books = ledger(recording).by_surface
     left, plate, landing = (recording.select(kind)[0] for kind in (1, 3, 4))
     drop = 0.504 - left["position"][1]
-    assert books["incoming"]["belt_work"] == pytest.approx(-M * G * drop, rel=1e-13)
+    assert books["incoming"]["belt_work"] == pytest.approx(-M * G * drop, rel=1e-13, abs=0.0)
     normal = plate["velocity_before"][0]
     lost = 0.5 * M * normal**2 * (1.0 - 0.5**2)
     assert books["plate"] == pytest.approx(
-        {"belt_work": 0.0, "restitution_loss": lost, "friction_loss": 0.0}, rel=1e-14
+        {"belt_work": 0.0, "restitution_loss": lost, "friction_loss": 0.0}, rel=1e-14, abs=0.0
     )
     (vx, vy), belt = landing["velocity_before"], 2.0
     pull = min(0.5 * M * abs(vy), M * abs(belt - vx))
@@ -82,6 +82,7 @@ def test_the_entries_are_what_the_impacts_and_the_ride_say():
             "friction_loss": pull * (belt - vx) - 0.5 * pull**2 / M,
         },
         rel=1e-14,
+        abs=0.0,
     )
 
 
@@ -107,7 +108,7 @@ def test_a_wrong_entry_moves_the_residual_as_well():
     knots = recording.knots.copy()
     knots["entries"][-1] += (0.0, 0.0, 1e-3)
     moved = ledger(replace(recording, knots=knots)).residual - ledger(recording).residual
-    assert moved == pytest.approx(1e-3, rel=1e-12)
+    assert moved == pytest.approx(1e-3, rel=1e-12, abs=0.0)
 
 
 def test_nothing_turned_over_is_no_error():

@@ -140,11 +140,13 @@ def test_curves_and_books_are_python_s_at_any_time(tab, recordings, position):
     found = tab.page.evaluate("ts => ts.map((t) => window.chutelab.at(t))", times.tolist())
     where, velocity = recording.at(times)
     np.testing.assert_allclose([[s["x"], s["y"]] for s in found], where[:, 0], rtol=0, atol=1e-12)
-    np.testing.assert_allclose([[s["vx"], s["vy"]] for s in found], velocity[:, 0], atol=1e-11)
+    np.testing.assert_allclose(
+        [[s["vx"], s["vy"]] for s in found], velocity[:, 0], rtol=0, atol=1e-11
+    )
     books = tab.page.evaluate("ts => ts.map((t) => window.chutelab.energyAt(t))", times.tolist())
     expected = recording.energy_at(times)
     for name in ("kinetic", "belt_work", "restitution_loss", "friction_loss"):
-        np.testing.assert_allclose([b[name] for b in books], expected[name], atol=1e-15)
+        np.testing.assert_allclose([b[name] for b in books], expected[name], rtol=0, atol=1e-15)
     for b in books:
         put_in = b["start"] + b["belt_work"] + b["residual"]
         is_now = b["kinetic"] + b["potential"] + b["restitution_loss"] + b["friction_loss"]
@@ -166,7 +168,9 @@ def test_riding_slipping_and_many_particles_are_python_s_too(browser, tmp_path):
         books = tab.page.evaluate("ts => ts.map(window.chutelab.energyAt)", times.tolist())
         expected = recording.energy_at(times)
         for entry in ("kinetic", "belt_work", "restitution_loss", "friction_loss", "residual"):
-            np.testing.assert_allclose([b[entry] for b in books], expected[entry], atol=1e-14)
+            np.testing.assert_allclose(
+                [b[entry] for b in books], expected[entry], rtol=0, atol=1e-14
+            )
         last = recording.count - 1
         where, _ = recording.at(times)
         found = tab.page.evaluate(
@@ -176,6 +180,7 @@ def test_riding_slipping_and_many_particles_are_python_s_too(browser, tmp_path):
         np.testing.assert_allclose(
             [[s["x"], s["y"]] for s, seen in zip(found, there, strict=True) if seen],
             where[there, last],
+            rtol=0,
             atol=1e-12,
         )
         assert tab.trouble == []

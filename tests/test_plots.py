@@ -94,8 +94,8 @@ def test_arcs_are_the_parabolas_of_a_perpendicular_plate(
     t3 = (sqrt(down**2 + 2.0 * G * 0.5) - down) / G
     first, second = parts
     assert (first.begin, second.begin) == (0.0, first.end)
-    assert first.end == pytest.approx(t2, rel=1e-12)
-    assert second.end == pytest.approx(t2 + t3, rel=1e-12)
+    assert first.end == pytest.approx(t2, rel=1e-12, abs=0.0)
+    assert second.end == pytest.approx(t2 + t3, rel=1e-12, abs=0.0)
     for share in (0.0, 0.3, 1.0):
         t = share * first.end
         (where,), (speed,) = first.at([t])
@@ -113,7 +113,7 @@ def test_arcs_are_the_parabolas_of_a_perpendicular_plate(
 def test_arcs_stop_where_the_theory_does() -> None:
     no_belt = scene.parse(TEXT[: TEXT.index("[outgoing]")])
     (only,) = plots.arcs(theory.predict(no_belt), no_belt)
-    assert only.end == pytest.approx(t_impact(), rel=1e-13)
+    assert only.end == pytest.approx(t_impact(), rel=1e-13, abs=0.0)
     falling = scene.load(scene.find("free-fall"))
     assert plots.arcs(theory.predict(falling), falling) == ()
 
@@ -212,7 +212,7 @@ def test_residual_is_the_distance_planted() -> None:
     residual = line(ax, "residual")
     assert residual[:, 1] == pytest.approx(1e-6, rel=1e-8)
     assert residual[0, 0] == 0.0
-    assert residual[-1, 0] == pytest.approx(t_landing(), rel=1e-13)
+    assert residual[-1, 0] == pytest.approx(t_landing(), rel=1e-13, abs=0.0)
     assert ax.get_yscale() == "log"
     low, high = ax.get_ylim()
     assert low == 1e-17
@@ -277,16 +277,16 @@ def test_ledger_stack_reaches_the_line_and_both_are_the_energies() -> None:
     at_release = 0.5 * MASS * V**2 + MASS * G * (R + PARTICLE - lowest)
     speed = -G * t_landing()
     work = V * min(MU * MASS * abs(speed), MASS * V * (1.0 + EPS))
-    assert supplied[0, 1] == pytest.approx(1e3 * at_release, rel=1e-12)
-    assert supplied[-1, 1] == pytest.approx(1e3 * (at_release + work), rel=1e-12)
+    assert supplied[0, 1] == pytest.approx(1e3 * at_release, rel=1e-12, abs=0.0)
+    assert supplied[-1, 1] == pytest.approx(1e3 * (at_release + work), rel=1e-12, abs=0.0)
     top = stack(ax)[-1]
     upper = {x: max(y for at, y in top if at == x) for x in top[:, 0]}
-    assert [upper[x] for x in supplied[:, 0]] == pytest.approx(supplied[:, 1], rel=1e-12)
+    assert [upper[x] for x in supplied[:, 0]] == pytest.approx(supplied[:, 1], rel=1e-12, abs=0.0)
     kinetic = stack(ax)[0]
     mid = supplied[:, 0][np.searchsorted(supplied[:, 0], BELT_TIME + 0.2)]
     drawn = max(y for x, y in kinetic if x == mid)
     assert drawn == pytest.approx(
-        1e3 * 0.5 * MASS * (V**2 + (G * (mid - BELT_TIME)) ** 2), rel=1e-12
+        1e3 * 0.5 * MASS * (V**2 + (G * (mid - BELT_TIME)) ** 2), rel=1e-12, abs=0.0
     )
 
 
@@ -314,8 +314,8 @@ def test_round_step_is_round_and_close(span: float, wanted: int) -> None:
 
 
 def test_round_times_are_multiples_within_the_bounds() -> None:
-    assert scenery.round_times(0.1, 0.3, 0.1) == pytest.approx([0.1, 0.2, 0.3], rel=1e-15)
-    assert scenery.round_times(0.11, 0.29, 0.1) == pytest.approx([0.2], rel=1e-15)
+    assert scenery.round_times(0.1, 0.3, 0.1) == pytest.approx([0.1, 0.2, 0.3], rel=1e-15, abs=0.0)
+    assert scenery.round_times(0.11, 0.29, 0.1) == pytest.approx([0.2], rel=1e-15, abs=0.0)
 
 
 # The scene
@@ -363,7 +363,7 @@ def test_clipped_lines_are_those_parts_that_lie_inside(ends: tuple[float, ...]) 
 def test_fitted_window_has_the_aspect_and_holds_the_window(aspect: float) -> None:
     window = Window(-1.0, 2.0, 0.0, 1.0)
     fitted = window.fitted(aspect)
-    assert fitted.width / fitted.height == pytest.approx(aspect, rel=1e-12)
+    assert fitted.width / fitted.height == pytest.approx(aspect, rel=1e-12, abs=0.0)
     assert fitted.left <= -1.0 + 1e-12
     assert fitted.top >= 1.0 - 1e-12
     assert min(fitted.width - 3.0, fitted.height - 1.0) == pytest.approx(0.0, abs=1e-12)
@@ -525,7 +525,7 @@ drop_from = "top"
     fall = y - (0.1 - 0.8 + 0.004)
     t = (vy + np.sqrt(vy**2 + 2.0 * 9.81 * fall)) / 9.81
     landing = simulate(thrown).select(Kind.LANDING)[0]
-    assert arc.end == pytest.approx(t, rel=1e-12)
+    assert arc.end == pytest.approx(t, rel=1e-12, abs=0.0)
     position, velocity = arc.at([arc.end])
     assert position[0] == pytest.approx(landing["position"], abs=1e-12)
     assert velocity[0] == pytest.approx(landing["velocity_before"], abs=1e-12)

@@ -56,8 +56,8 @@ def left_at(recording):
 
 def test_a_carried_particle_leaves_where_its_weight_no_longer_holds_it():
     phi, speed = left_at(run(transfer()))
-    assert phi == pytest.approx(acos(2.0**2 / (G * 0.504)), rel=1e-13)
-    assert speed == pytest.approx(2.0, rel=1e-13)
+    assert phi == pytest.approx(acos(2.0**2 / (G * 0.504)), rel=1e-13, abs=0.0)
+    assert speed == pytest.approx(2.0, rel=1e-13, abs=0.0)
 
 
 def test_a_slipping_particle_obeys_the_law_of_the_finite_friction():
@@ -71,8 +71,8 @@ def test_a_slipping_particle_obeys_the_law_of_the_finite_friction():
     c = (u0 - particular(onset)) * exp(-2 * mu * onset)
     leaves = brentq(lambda p: particular(p) + c * exp(2 * mu * p) - cos(p), onset, 1.0, xtol=1e-15)
     phi, speed = left_at(run(transfer(incoming={"friction": mu})))
-    assert phi == pytest.approx(leaves, rel=1e-12)
-    assert speed == pytest.approx(sqrt(G * 0.504 * cos(leaves)), rel=1e-12)
+    assert phi == pytest.approx(leaves, rel=1e-12, abs=0.0)
+    assert speed == pytest.approx(sqrt(G * 0.504 * cos(leaves)), rel=1e-12, abs=0.0)
 
 
 def test_a_free_disk_with_all_grip_leaves_at_four_sevenths():
@@ -89,12 +89,12 @@ def test_a_disk_slides_until_its_slip_is_used_up(spin, lever):
     found = run(thrown((0.0, 0.01), (v0, 0.0), 0.5, floor(friction=mu), spin=spin))
     (held,) = found.select(Kind.STICK)
     t = v0 / (lever * mu * G)
-    assert held["t"] == pytest.approx(t, rel=1e-13)
+    assert held["t"] == pytest.approx(t, rel=1e-13, abs=0.0)
     assert held["velocity_after"][0] == pytest.approx(v0 - mu * G * t, abs=1e-13)
-    assert held["position"][0] == pytest.approx(v0 * t - 0.5 * mu * G * t * t, rel=1e-13)
+    assert held["position"][0] == pytest.approx(v0 * t - 0.5 * mu * G * t * t, rel=1e-13, abs=0.0)
     # ½ m v0² less ½ m v² less ½ I ω²: ½ (m*) v0², m* = m / lever.
     books = ledger(found)
-    assert books.friction_loss == pytest.approx(0.5 * 0.008 / lever * v0**2, rel=1e-12)
+    assert books.friction_loss == pytest.approx(0.5 * 0.008 / lever * v0**2, rel=1e-12, abs=0.0)
     assert books.relative_residual < 1e-14
 
 
@@ -104,7 +104,7 @@ def test_bounces_end_after_2u_over_g_1_minus_epsilon():
     found = run(tables)
     down = sqrt(2.0 * fall / G)
     expected = down + 2.0 * epsilon * G * down / (G * (1.0 - epsilon))
-    assert found.track(0)["t"][-1] == pytest.approx(expected, rel=1e-12)
+    assert found.track(0)["t"][-1] == pytest.approx(expected, rel=1e-12, abs=0.0)
     assert REASONS[found.ended[0]] == "settled"
 
 

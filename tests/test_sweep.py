@@ -264,13 +264,13 @@ def test_a_stream_has_means_and_spreads():
         flights = down["t"] - down["particle"] / scene.stream.rate
         x, vx = down["position"][:, 0], down["velocity_before"][:, 0]
         found = {name: swept.columns[name][row] for name in NUMBERS}
-        assert found["landing.x"] == pytest.approx(x.mean(), rel=1e-14)
-        assert found["landing.x_spread"] == pytest.approx(x.std(), rel=1e-12)
+        assert found["landing.x"] == pytest.approx(x.mean(), rel=1e-14, abs=0.0)
+        assert found["landing.x_spread"] == pytest.approx(x.std(), rel=1e-12, abs=0.0)
         assert found["landing.vx_spread"] == pytest.approx(vx.std(), rel=1e-12, abs=1e-15)
-        assert found["landing.t"] == pytest.approx(flights.mean(), rel=1e-13)
+        assert found["landing.t"] == pytest.approx(flights.mean(), rel=1e-13, abs=0.0)
         work = ledger(recording).by_surface["outgoing"]["belt_work"]
         assert found["belt_work"] == work
-        assert found["power"] == pytest.approx(work / 40 * scene.stream.rate, rel=1e-15)
+        assert found["power"] == pytest.approx(work / 40 * scene.stream.rate, rel=1e-15, abs=0.0)
         assert found["misses"] == 40 - len(down)
 
 
@@ -281,12 +281,14 @@ def test_what_the_belt_pays_is_that_of_solve_and_theory_only_where_runs_go_on_un
     down = sqrt((9.81 * 0.298) ** 2 + 2.0 * 9.81 * 0.5)
     landed = sweep(load("perpendicular"), ["plate.restitution=0.5"])
     settled = sweep(load("perpendicular", ["run.until=settled"]), ["plate.restitution=0.5"])
-    assert landed.columns["belt_work"][0] == pytest.approx(m * vb * mu * down, rel=1e-12)
-    assert settled.columns["belt_work"][0] == pytest.approx(m * vb * (vb - vx), rel=1e-12)
-    assert settled.columns["slip_heat"][0] == pytest.approx(0.5 * m * (vb - vx) ** 2, rel=1e-12)
+    assert landed.columns["belt_work"][0] == pytest.approx(m * vb * mu * down, rel=1e-12, abs=0.0)
+    assert settled.columns["belt_work"][0] == pytest.approx(m * vb * (vb - vx), rel=1e-12, abs=0.0)
+    assert settled.columns["slip_heat"][0] == pytest.approx(
+        0.5 * m * (vb - vx) ** 2, rel=1e-12, abs=0.0
+    )
     for name in ("belt_work", "slip_heat", "power"):
         expected = value(load("perpendicular"), name)
-        assert settled.columns[name][0] == pytest.approx(expected, rel=1e-12)
+        assert settled.columns[name][0] == pytest.approx(expected, rel=1e-12, abs=0.0)
     assert "counted up to run.until" in str(landed)
     assert "counted up to run.until" not in str(settled)
 

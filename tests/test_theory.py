@@ -82,8 +82,8 @@ class TestSeparation:
             speed=speed, pulley_radius=pulley, particle_radius=r, friction=friction, spin=spin
         )
         phi, v, rim = disk_or_point_leaves(speed, pulley + r, friction, spin=spin)
-        assert found.phi1 == pytest.approx(phi, rel=2e-12)
-        assert found.v1 == pytest.approx(v, rel=1e-12)
+        assert found.phi1 == pytest.approx(phi, rel=2e-12, abs=0.0)
+        assert found.v1 == pytest.approx(v, rel=1e-12, abs=0.0)
         assert found.omega1 * r == pytest.approx(rim, abs=2e-12)
 
     def test_half_a_metre_pulley_at_friction_one_half(self) -> None:
@@ -98,7 +98,7 @@ class TestSeparation:
         found = leave(
             speed=speed, pulley_radius=pulley, particle_radius=0.01, friction=0.0, spin=spin
         )
-        assert math.cos(found.phi1) == pytest.approx((2.0 + ratio) / 3.0, rel=4e-16)
+        assert math.cos(found.phi1) == pytest.approx((2.0 + ratio) / 3.0, rel=4e-16, abs=0.0)
         assert found.omega1 == 0.0
 
     def test_endless_grip_is_adhesion_for_a_point_and_rolling_for_a_disk(self) -> None:
@@ -175,7 +175,7 @@ class TestPaperEquations:
         for speed, energy in [(2.0, 0.020), (4.0, 0.080)]:
             right = transfer(speed=speed, pulley_radius=radii, distance=0.5)
             wrong = transfer(speed=speed, pulley_radius=radii, distance=0.5, rebound="as-printed")
-            assert right.dEk == pytest.approx(np.full(10, energy), rel=1e-14)
+            assert right.dEk == pytest.approx(np.full(10, energy), rel=1e-14, abs=0.0)
             assert (np.diff(wrong.dEk) < 0.0).all()
 
     def test_x3_of_the_first_row(self) -> None:
@@ -192,8 +192,8 @@ class TestPaperEquations:
             transfer(speed=v, pulley_radius=pulley, distance=d, restitution=1.0, rebound=form)
             for form in ("corrected", "as-printed")
         )
-        assert right.v2r == pytest.approx(float(right.v2), rel=1e-15)
-        assert wrong.x3 == pytest.approx(float(right.x3), rel=1e-14)
+        assert right.v2r == pytest.approx(float(right.v2), rel=1e-15, abs=0.0)
+        assert wrong.x3 == pytest.approx(float(right.x3), rel=1e-14, abs=0.0)
 
 
 class TestInclinedPlate:
@@ -300,11 +300,11 @@ class TestInclinedPlate:
         assert (rim < -0.1).all()  # turns forward, clockwise
         down = found.v2r * np.cos(found.phi2r)
         limit = 0.001 * 1.5 * found.v2x[0]
-        assert down[0] == pytest.approx(found.v2y[0] - limit, rel=1e-14)
+        assert down[0] == pytest.approx(found.v2y[0] - limit, rel=1e-14, abs=0.0)
         # Gripped: a third of the slip v2y - r ω1 goes from the centre, two thirds to the rim.
         slip = found.v2y[1] - rim[1]
-        assert down[1] == pytest.approx(found.v2y[1] - slip / 3.0, rel=1e-14)
-        assert r * found.omega2[1] == pytest.approx(down[1], rel=1e-14)
+        assert down[1] == pytest.approx(found.v2y[1] - slip / 3.0, rel=1e-14, abs=0.0)
+        assert r * found.omega2[1] == pytest.approx(down[1], rel=1e-14, abs=0.0)
 
     @pytest.mark.parametrize("share", [0.999, 1.001])
     def test_the_unbounded_plate_objects_exactly_from_its_line_on(self, share: float) -> None:
@@ -351,8 +351,8 @@ class TestOutgoingBelt:
             spin=True, belt_speed=3.0, mass=1.0,
         )  # fmt: skip
         assert found.v3x == 0.0
-        assert found.belt_work == pytest.approx(3.0 * 3.0 / 3.0, rel=1e-15)
-        assert found.slip_heat == pytest.approx(9.0 / 6.0, rel=1e-15)
+        assert found.belt_work == pytest.approx(3.0 * 3.0 / 3.0, rel=1e-15, abs=0.0)
+        assert found.slip_heat == pytest.approx(9.0 / 6.0, rel=1e-15, abs=0.0)
 
     def test_equation_14_loses_the_sign_that_the_belt_pays_for(self) -> None:
         back, forth = (
@@ -360,8 +360,8 @@ class TestOutgoingBelt:
             for a in (20.0, 40.0)
         )
         for found in (back, forth):
-            assert found.dEk == pytest.approx(0.5 * (found.v3x**2 + 4.0), rel=1e-15)
-            assert found.belt_work == pytest.approx(2.0 * (2.0 + found.v3x), rel=1e-15)
+            assert found.dEk == pytest.approx(0.5 * (found.v3x**2 + 4.0), rel=1e-15, abs=0.0)
+            assert found.belt_work == pytest.approx(2.0 * (2.0 + found.v3x), rel=1e-15, abs=0.0)
         assert back.dEk < forth.dEk
         assert back.belt_work > forth.belt_work
 
@@ -417,7 +417,7 @@ class TestDomain:
         assert [Reason.of(reason) for reason in straight.reason] == [
             Reason.MISSES, None, Reason.MISSES,
         ]  # fmt: skip
-        assert straight.t3[1] == pytest.approx(0.5 / straight.v3y[1], rel=1e-15)
+        assert straight.t3[1] == pytest.approx(0.5 / straight.v3y[1], rel=1e-15, abs=0.0)
 
     def test_one_bad_entry_does_not_spoil_the_others(self) -> None:
         many = leave(speed=[[2.0], [-2.0]], distance=[0.5, 0.6, 0.7])
@@ -474,7 +474,7 @@ class TestPredict:
             )
         )
         assume(found.reason == "")
-        assert found.d3 == pytest.approx(drop, rel=1e-15)
+        assert found.d3 == pytest.approx(drop, rel=1e-15, abs=0.0)
         fall = drop - 0.304 * (1 - math.cos(found.phi1)) - found.y2
         assert found.y3 == pytest.approx(float(fall), abs=1e-15)
 
@@ -650,4 +650,4 @@ def test_the_slipping_disks_spin_against_a_plain_quadrature() -> None:
     marks = [onset + (found.phi1 - onset) * 0.5**k for k in range(12, 0, -1)]
     integral = quad(slope, onset, found.phi1, points=marks, epsabs=1e-14, epsrel=1e-13, limit=500)
     rolled = speed - math.sqrt(G * radius * u0)
-    assert r * found.omega1 == pytest.approx(rolled + integral[0], rel=1e-12)
+    assert r * found.omega1 == pytest.approx(rolled + integral[0], rel=1e-12, abs=0.0)

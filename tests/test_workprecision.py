@@ -83,12 +83,12 @@ def test_the_reference_of_a_transfer(index):
     distance = case.scenes[index].plate.distance
     expected = flight(distance)
     assert {name: float(value[0]) for name, value in found.values.items()} == pytest.approx(
-        expected, rel=1e-14
+        expected, rel=1e-14, abs=0.0
     )
     v2 = sqrt(V**2 + (G * expected["t2"]) ** 2)
-    assert found.sizes["x3"] == pytest.approx(R + distance, rel=1e-15)
-    assert found.sizes["v3x"] == pytest.approx(v2, rel=1e-14)
-    assert found.sizes["t3"] == pytest.approx(expected["t2"] + expected["t3"], rel=1e-14)
+    assert found.sizes["x3"] == pytest.approx(R + distance, rel=1e-15, abs=0.0)
+    assert found.sizes["v3x"] == pytest.approx(v2, rel=1e-14, abs=0.0)
+    assert found.sizes["t3"] == pytest.approx(expected["t2"] + expected["t3"], rel=1e-14, abs=0.0)
 
 
 def test_the_machines_of_a_case_differ_in_where_contacts_fall():
@@ -105,8 +105,10 @@ def test_the_reference_of_a_belt_landing():
     down = flight(0.5)
     after = -down["v3x"] + MU * down["v3y"]
     assert after < V
-    assert found["t_grip"][0] == pytest.approx((V - after) / (MU * G), rel=1e-13)
-    assert found["x_grip"][0] == pytest.approx((V**2 - after**2) / (2.0 * MU * G), rel=1e-13)
+    assert found["t_grip"][0] == pytest.approx((V - after) / (MU * G), rel=1e-13, abs=0.0)
+    assert found["x_grip"][0] == pytest.approx(
+        (V**2 - after**2) / (2.0 * MU * G), rel=1e-13, abs=0.0
+    )
 
 
 def test_the_reference_of_a_bounce_is_the_sum_of_all_bounces():
@@ -115,7 +117,7 @@ def test_the_reference_of_a_bounce_is_the_sum_of_all_bounces():
         speed = sqrt(2.0 * G * (scene.stream.at[1] - RADIUS))
         time = speed / G + sum(2.0 * speed * EPS**k / G for k in range(1, 80))
         found = case.reference(scene)
-        assert found.values["t_rest"][0] == pytest.approx(time, rel=1e-14)
+        assert found.values["t_rest"][0] == pytest.approx(time, rel=1e-14, abs=0.0)
         assert found.values["y_rest"][0] == RADIUS
 
 
@@ -127,7 +129,7 @@ def test_the_reference_of_many_is_that_of_each():
     for i in (0, 1, 499, 999):
         expected = flight(0.5, heights[i])
         assert {name: float(value[i]) for name, value in found.items()} == pytest.approx(
-            expected, rel=1e-13
+            expected, rel=1e-13, abs=0.0
         )
 
 
@@ -164,8 +166,8 @@ def test_overlaps_are_those_of_all_pairs():
                     expected.append(2.0 - distance / RADIUS)
     found = overlaps(frames, RADIUS)
     assert len(expected) > 20
-    assert np.sort(found) == pytest.approx(np.sort(expected), rel=1e-12)
-    assert typical(np.linspace(0.0, 1.0, 101)) == pytest.approx(0.99, rel=1e-12)
+    assert np.sort(found) == pytest.approx(np.sort(expected), rel=1e-12, abs=0.0)
+    assert typical(np.linspace(0.0, 1.0, 101)) == pytest.approx(0.99, rel=1e-12, abs=0.0)
     assert typical(np.empty(0)) == 0.0
 
 
@@ -323,7 +325,9 @@ def test_mean_places_are_compared_with_the_finest_run():
 
 def test_a_slope_is_the_exponent():
     x = np.array([1e-5, 1e-4, 1e-2])
-    assert slope(list(zip(x, 3.0 * x**-1.5, strict=True))) == pytest.approx(-1.5, rel=1e-12)
+    assert slope(list(zip(x, 3.0 * x**-1.5, strict=True))) == pytest.approx(
+        -1.5, rel=1e-12, abs=0.0
+    )
     assert slope([(1.0, 1.0)]) is None
     assert slope([(1.0, 1.0), (2.0, 5.0)]) is None
     assert slope([(0.0, 1.0), (2.0, 5.0)]) is None
@@ -340,8 +344,8 @@ def rows_of(method, law, steps=(1e-2, 1e-3, 1e-4), case="transfer"):
 def test_orders_and_slopes_leave_rounding_out():
     rows = rows_of("plain", lambda dt: (5.0 * dt**2, 1e-3 / dt))
     rows.append(Record("transfer", "plain", "dt", 1e-9, median=9e9, error=1e-15))
-    assert order(rows, "transfer", "plain") == pytest.approx(2.0, rel=1e-12)
-    assert work_slope(rows, "transfer", "plain") == pytest.approx(-0.5, rel=1e-12)
+    assert order(rows, "transfer", "plain") == pytest.approx(2.0, rel=1e-12, abs=0.0)
+    assert work_slope(rows, "transfer", "plain") == pytest.approx(-0.5, rel=1e-12, abs=0.0)
     assert work_slope(rows, "transfer", "fixed") is None
 
 
@@ -351,20 +355,22 @@ def test_an_exponent_is_that_of_the_large_sizes():
         Size("independent", "exact", n, median=1e-6 * n**1.1 if n > 100 else 1e-3, memory=170 * n)
         for n in counts
     ]
-    assert exponent(sizes, "independent", "exact") == pytest.approx(1.1, rel=1e-12)
-    assert exponent(sizes, "independent", "exact", "memory") == pytest.approx(1.0, rel=1e-12)
+    assert exponent(sizes, "independent", "exact") == pytest.approx(1.1, rel=1e-12, abs=0.0)
+    assert exponent(sizes, "independent", "exact", "memory") == pytest.approx(
+        1.0, rel=1e-12, abs=0.0
+    )
     assert exponent(sizes, "interacting", "exact") is None
 
 
 def test_the_time_at_an_error():
     law = [(2.0 * dt, 1e-3 / dt) for dt in (1e-2, 1e-3, 1e-4)]
     # error 2 dt and time 1e-3 / dt: time = 2e-3 / error.
-    assert time_at(law, 5e-4) == pytest.approx(4.0, rel=1e-12)
-    assert time_at(law, 2e-4) == pytest.approx(10.0, rel=1e-12)
+    assert time_at(law, 5e-4) == pytest.approx(4.0, rel=1e-12, abs=0.0)
+    assert time_at(law, 2e-4) == pytest.approx(10.0, rel=1e-12, abs=0.0)
     # A run that another beats in both does not count.
-    assert time_at([*law, (1e-1, 5.0)], 5e-4) == pytest.approx(4.0, rel=1e-12)
+    assert time_at([*law, (1e-1, 5.0)], 5e-4) == pytest.approx(4.0, rel=1e-12, abs=0.0)
     # The fastest is accurate enough; nobody is.
-    assert time_at(law, 0.5) == pytest.approx(0.1, rel=1e-12)
+    assert time_at(law, 0.5) == pytest.approx(0.1, rel=1e-12, abs=0.0)
     assert time_at(law, 1e-6) is None
     assert time_at([], 1.0) is None
     assert time_at([(1e-2, 1.0), (0.0, 2.0)], 1e-3) == pytest.approx(1.0, rel=0.01)

@@ -70,7 +70,7 @@ def test_bounces_end_after_the_sum_of_the_series(restitution):
     fall = sqrt(2.0 * height / G)
     series = 2.0 * restitution * G * fall / (G * (1.0 - restitution))
     assert recording.ended[0] == 2
-    assert recording.select(Kind.SETTLE)["t"][0] == pytest.approx(fall + series, rel=1e-9)
+    assert recording.select(Kind.SETTLE)["t"][0] == pytest.approx(fall + series, rel=1e-13)
     assert ledger(recording).restitution_loss == pytest.approx(0.1 * G * height, rel=1e-12, abs=0.0)
 
 
@@ -205,7 +205,7 @@ def test_off_the_edge_of_a_table_slower_than_it_would_fly():
         rtol=1e-12,
         atol=1e-14,
     )
-    assert parting["t"] == pytest.approx(0.5 / v + turn.t[-1], rel=1e-10)
+    assert parting["t"] == pytest.approx(0.5 / v + turn.t[-1], rel=1e-12)
 
 
 @pytest.mark.parametrize("nudge", [1e-3, 1e-7, 1e-12])
@@ -392,11 +392,11 @@ def test_a_ride_over_the_tip_of_a_belt_feels_the_rim_turn_round(upward, spin):
         riding(-speed), [rise.t[-1], 1.0], [0.0, *rise.y[1:, -1]], events=stop(lifts), **precise
     )
     parting = recording.select(Kind.SEPARATION)[0]
-    assert parting["t"] == pytest.approx(fall.t[-1], rel=1e-10)
+    assert parting["t"] == pytest.approx(fall.t[-1], rel=1e-12)
     phi, w, z = fall.y[:, -1]
-    assert np.arctan2(*parting["position"]) == pytest.approx(phi, abs=1e-10)
-    assert hypot(*parting["velocity_after"]) == pytest.approx(w, rel=1e-10)
-    assert r * parting["omega_after"] == pytest.approx(z, abs=1e-10)
+    assert np.arctan2(*parting["position"]) == pytest.approx(phi, abs=1e-11)
+    assert hypot(*parting["velocity_after"]) == pytest.approx(w, rel=1e-11)
+    assert r * parting["omega_after"] == pytest.approx(z, abs=1e-11)
     assert ledger(recording).relative_residual < 1e-13
 
 
@@ -455,9 +455,9 @@ def test_a_gripped_particle_slips_before_it_leaves(friction):
     began = recording.select(Kind.SLIP)[0]
     assert np.arctan2(*began["position"]) == pytest.approx(onset, abs=1e-12)
     angle, speed, event = separation_of(recording)
-    assert radians(angle) == pytest.approx(slide.y[0, -1], abs=1e-9)
-    assert speed == pytest.approx(slide.y[1, -1], rel=1e-9)
-    assert event["t"] == pytest.approx(0.5 + onset * ride / v + slide.t[-1], rel=1e-9)
+    assert radians(angle) == pytest.approx(slide.y[0, -1], abs=1e-11)
+    assert speed == pytest.approx(slide.y[1, -1], rel=1e-11)
+    assert event["t"] == pytest.approx(0.5 + onset * ride / v + slide.t[-1], rel=1e-11)
     assert ledger(recording).relative_residual < 1e-14
 
 
@@ -494,9 +494,9 @@ def test_a_free_disk_rolls_then_slips_then_leaves(friction):
     )
     recording = conveyor(speed=v, friction=friction, spin=True)
     angle, speed, event = separation_of(recording)
-    assert radians(angle) == pytest.approx(slide.y[0, -1], abs=1e-9)
-    assert speed == pytest.approx(slide.y[1, -1], rel=1e-9)
-    assert event["omega_after"] * 0.004 == pytest.approx(slide.y[2, -1], abs=1e-9)
+    assert radians(angle) == pytest.approx(slide.y[0, -1], abs=1e-11)
+    assert speed == pytest.approx(slide.y[1, -1], rel=1e-11)
+    assert event["omega_after"] * 0.004 == pytest.approx(slide.y[2, -1], abs=1e-11)
     assert ledger(recording).relative_residual < 1e-13
 
 

@@ -85,7 +85,7 @@ def test_friction_on_the_belt_leaves_at_the_top_without_a_hit():
         assert not len(got.select(Kind.IMPACT, surface="incoming"))
         hit = got.select(Kind.IMPACT, surface="plate")[0]
         t = (0.6 - 0.004) / 2.0
-        assert hit["position"][1] == pytest.approx(0.104 - 0.5 * 9.81 * t * t, abs=1e-9)
+        assert hit["position"][1] == pytest.approx(0.104 - 0.5 * 9.81 * t * t, abs=1e-11)
 
 
 def test_slides_until_it_settles():
@@ -132,7 +132,7 @@ speed = 1.5
 """
     hit = run(build(parse(text))).select(Kind.IMPACT)[0]
     assert hit["t"] == pytest.approx(0.2, abs=1e-12 if align == "true" else 1.1e-3)
-    assert hit["normal_impulse"] == pytest.approx(2.0 * 3.0, rel=1e-9)
+    assert hit["normal_impulse"] == pytest.approx(2.0 * 3.0, rel=1e-12)
     assert hit["tangential_impulse"] == pytest.approx(2.0 * 1.5, rel=1e-9)
 
 
@@ -185,7 +185,7 @@ friction = {friction}
         got = run(build(parse(text)))
         a = max(9.81 * (np.sin(beta) - friction * np.cos(beta)), 0.0)
         gone = np.hypot(*(got.knots["position"][-1] - got.knots["position"][0]))
-        assert gone == pytest.approx(0.5 * a * 0.25, abs=1e-9)
+        assert gone == pytest.approx(0.5 * a * 0.25, abs=1e-11)
         assert ledger(got).friction_loss == pytest.approx(
             0.008 * friction * 9.81 * np.cos(beta) * gone if a else 0.0, abs=1e-9
         )
@@ -247,7 +247,7 @@ def test_steps_all_alike_leave_at_the_time_of_their_own_flight():
     hit = got.track(0)[-2]
     late = left["t"] - hit["t"]
     y = hit["position"][1] + hit["velocity"][1] * late - 0.5 * 9.81 * late**2
-    assert y == pytest.approx(-1.75, abs=1e-9)
+    assert y == pytest.approx(-1.75, abs=1e-12)
     assert (late / 1e-3) % 1.0 == pytest.approx(0.5, abs=0.49)
 
 
@@ -297,8 +297,8 @@ def test_a_wall_ends_the_ride_on_a_belt_that_holds(low, high, align):
     x = -0.3 - r * sqrt(1.0 - max(1.0 - high, 0.0) ** 2)
     left = got.select(Kind.SEPARATION, surface="incoming")[0]
     belt = m.releases
-    assert left["position"] == pytest.approx([x, 0.1 + r], abs=1e-10)
-    assert left["t"] == pytest.approx((x - belt.position[0, 0]) / belt.velocity[0, 0], abs=1e-10)
+    assert left["position"] == pytest.approx([x, 0.1 + r], abs=1e-13)
+    assert left["t"] == pytest.approx((x - belt.position[0, 0]) / belt.velocity[0, 0], abs=1e-13)
     hit = got.select(Kind.IMPACT, surface="wall")[0]
     assert hit["t"] == pytest.approx(left["t"], abs=1e-10 if align == "true" else 2e-3)
 
@@ -359,12 +359,12 @@ restitution = 1.0
     got = run(build(parse(text)))
     hit = got.select(Kind.COLLISION)[0]
     # Head-on at ±1 m/s: J = m (1 + ε) · 2/2.
-    assert abs(hit["normal_impulse"]) == pytest.approx(0.5 * 1.6, rel=1e-6)
+    assert abs(hit["normal_impulse"]) == pytest.approx(0.5 * 1.6, rel=1e-12)
     books = ledger(got)
     assert books.by_surface["particles"]["restitution_loss"] == pytest.approx(
         0.25 * 0.5 * 4.0 * (1.0 - 0.36), rel=1e-6
     )
-    assert books.relative_residual < 1e-6
+    assert books.relative_residual < 1e-12
 
 
 def test_a_fault_in_the_formulas_does_not_reach_it(monkeypatch):

@@ -175,6 +175,7 @@ class Shared:
                 reason = "stopped"
                 break
         for i in np.flatnonzero(self.inside).tolist():
+            self._tell_calm(i)
             self._end(i, reason)
         faces = slice(self.count, None)
         np.add.at(self.recorder.by_surface, self.surface[faces], self.entries.T[faces])
@@ -377,14 +378,16 @@ class Shared:
         together = self.machine.interact and (self.waiting or (self.inside & ~calm).any())
         if until == "settled" and not together:
             for i in np.flatnonzero(calm).tolist():
-                if i not in self.rides:
-                    # It was calm at the end of this step first.
-                    late, place, speed = self.calm[i] - self.h, *self.state[1, :4, i].reshape(2, 2)
-                    self.recorder.events(
-                        Kind.STICK, i, self.t - late, place - late * speed, speed,
-                        surface=self.on[i],
-                    )  # fmt: skip
+                self._tell_calm(i)
                 self._end(i, "settled", self.t, Kind.SETTLE)
+
+    def _tell_calm(self, i: int) -> None:
+        """Tell since when a particle lies calm, if it does: at the end of that step it did first."""
+        if i not in self.rides and self.calm[i] >= CALM:
+            late, place, speed = self.calm[i] - self.h, *self.state[1, :4, i].reshape(2, 2)
+            self.recorder.events(
+                Kind.STICK, i, self.t - late, place - late * speed, speed, surface=self.on[i]
+            )
 
     def _end(self, i: int, reason: str, t: float | None = None, kind: Kind | None = None) -> None:
         """End a track, by default now."""

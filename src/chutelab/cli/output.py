@@ -1,7 +1,4 @@
-"""What commands leave: files of ``--out``, all of them or none, and a recording's summary.
-
-A folder's files are made in one of their own, then moved in.
-"""
+"""What commands leave: files of ``--out``, all of them or none, and a recording's summary."""
 
 from __future__ import annotations
 
@@ -19,8 +16,7 @@ from click.shell_completion import CompletionItem
 from chutelab.cli.console import progress, say, show, show_json
 from chutelab.cli.parameters import json_option, out_option
 from chutelab.cli.program import RefusedError
-from chutelab.util.files import aside, check, refuse_other
-from chutelab.util.signals import held
+from chutelab.util.files import check, refuse_other, together
 from chutelab.util.tables import plain
 
 if TYPE_CHECKING:
@@ -62,12 +58,8 @@ def destination(folder: Path | None, names: Iterable[str] = ()) -> Iterator[Path
     try:
         for name in names:
             refuse_other(folder / name)
-        with aside(folder) as unfinished:
+        with together(folder) as unfinished:
             yield unfinished
-            folder.mkdir(parents=True, exist_ok=True)
-            with held():
-                for file in sorted(unfinished.iterdir()):
-                    file.replace(folder / file.name)
     except OSError as error:
         named = Path(error.filename or folder)
         if named not in (folder, *folder.parents) and folder not in named.parents:

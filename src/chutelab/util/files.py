@@ -20,6 +20,7 @@ from types import SimpleNamespace
 from typing import Any, Final
 
 from chutelab.util.errors import printable
+from chutelab.util.signals import held
 
 _ASIDE: Final = ".chutelab-unfinished-"
 """Beginning of the names of folders in which files are made before they get their place."""
@@ -56,6 +57,30 @@ def aside(folder: Path, target: Path | None = None) -> Iterator[Path]:
                 error.errno, error.strerror or str(error), str(target or folder)
             ) from error
         raise
+
+
+@contextmanager
+def together(folder: Path) -> Iterator[Path]:
+    """Give an empty folder to make files and folders in; at the end its files move to `folder`.
+
+    That is made if need be; what else is in it stays. A signal waits until all have moved.
+
+    Raises
+    ------
+    OSError
+        As `aside`, or if something that is no file is where one should go: none is moved then.
+    """
+    with aside(folder) as made:
+        yield made
+        files = sorted(path.relative_to(made) for path in made.rglob("*") if path.is_file())
+        for file in files:
+            refuse_other(folder / file)
+        with held():
+            folder.mkdir(parents=True, exist_ok=True)
+            for file in files:
+                target = folder / file
+                target.parent.mkdir(parents=True, exist_ok=True)
+                (made / file).replace(target)
 
 
 def first_bytes(path: Path, most: int) -> bytes:

@@ -16,7 +16,7 @@ from click.shell_completion import CompletionItem
 from chutelab.cli.console import progress, say, show, show_json
 from chutelab.cli.parameters import json_option, out_option
 from chutelab.cli.program import RefusedError
-from chutelab.util.files import check, refuse_other, together
+from chutelab.util.files import check, refuse_other, together, writing
 from chutelab.util.tables import plain
 
 if TYPE_CHECKING:
@@ -79,22 +79,6 @@ def check_file(option: str, path: Path | None, suffixes: Sequence[str] = ()) -> 
         raise RefusedError(f"{option} {path}: give a name that ends in {' or '.join(suffixes)}")
     with writing(f"{option} {path}".strip()):
         check(path)
-
-
-@contextmanager
-def writing(what: str = "", instead: str = "") -> Iterator[None]:
-    """Turn the OSError of a file that cannot be written into a `RefusedError`.
-
-    It calls the file `what`, by default what the error does, and says what to give `instead`.
-    Of an error that names two files, such as one in copying, the second is the one that is written.
-    """
-    try:
-        yield
-    except OSError as error:
-        name = what or error.filename2 or error.filename
-        advice = f"; give {instead}" if instead else ""
-        said = f"cannot be written: {error.strerror or error}{advice}"
-        raise RefusedError(f"{name}: {said}" if name else said) from error
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Final
 
-from chutelab.util.errors import printable
+from chutelab.util.errors import InputError, printable
 from chutelab.util.signals import held
 
 _ASIDE: Final = ".chutelab-unfinished-"
@@ -140,6 +140,22 @@ def check(path: str | Path) -> None:
     """Raise the OSError that `whole` would raise at once; write nothing."""
     with _beside(Path(path)):
         pass
+
+
+@contextmanager
+def writing(what: object = "", instead: str = "") -> Iterator[None]:
+    """Turn the OSError of a file that cannot be written into a `InputError`.
+
+    It calls the file `what`, by default what the error does, and says what to give `instead`.
+    Of an error that names two files, such as one in copying, the second is the one that is written.
+    """
+    try:
+        yield
+    except OSError as error:
+        name = str(what or error.filename2 or error.filename or "")
+        advice = f"; give {instead}" if instead else ""
+        said = f"cannot be written: {error.strerror or error}{advice}"
+        raise InputError(said, file=name) from error
 
 
 def refuse_other(path: Path) -> None:

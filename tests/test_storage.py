@@ -20,7 +20,7 @@ from chutelab import scene
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind, Recording, storage
 from chutelab.results.storage import RecordingError
-from chutelab.util.files import aside, whole
+from chutelab.util.files import aside, together, whole
 
 ARRAYS = ("knots", "offsets", "ended", "events", "by_surface")
 
@@ -138,6 +138,20 @@ def test_only_files_are_replaced_and_links_stay(tmp_path):
             pytest.fail("nothing is made for it")
     assert (tmp_path / "pipe").is_fifo()
     assert listing(tmp_path) == ["link.txt", "pipe", "real.txt"]
+
+
+def test_files_move_together_or_not_at_all(tmp_path):
+    (tmp_path / "page" / "index.html").mkdir(parents=True)
+
+    def move():
+        with together(tmp_path) as made:
+            (made / "page").mkdir()
+            for name in ("a.txt", "page/index.html"):
+                (made / name).write_text("new")
+
+    with pytest.raises(OSError, match="is a folder, not a file"):
+        move()
+    assert listing(tmp_path) == ["page"]
 
 
 def test_an_error_of_a_file_that_is_made_names_the_one_that_was_meant(tmp_path):

@@ -20,7 +20,8 @@ from chutelab.checks.stress import LAWS, Verdict
 from chutelab.cli import main
 from chutelab.engines.simulation import simulate
 from chutelab.results.recorder import StalledError
-from chutelab.util.signals import held, raised
+from chutelab.util.files import together
+from chutelab.util.signals import raised
 from stress.runs import HOP
 
 SOURCES = str(Path(chutelab.__file__).parent.parent)
@@ -274,19 +275,21 @@ def test_a_signal_that_python_would_pass_over_is_raised_again(capsys):
     assert capsys.readouterr().err == ""
 
 
-def test_a_signal_waits_until_all_files_are_in_their_place():
-    done = []
+def test_a_signal_waits_until_all_files_are_in_their_place(tmp_path, monkeypatch):
+    def interrupted(self, target, move=Path.replace):
+        signal.raise_signal(signal.SIGTERM)
+        move(self, target)
 
-    def move():
-        with held():
-            signal.raise_signal(signal.SIGTERM)
-            done.append("first")
-            signal.raise_signal(signal.SIGINT)
-            done.append("second")
+    def make():
+        with together(tmp_path / "out") as made:
+            (made / "lesson").mkdir()
+            for name in ("a", "b", "lesson/c"):
+                (made / name).write_text(name)
 
+    monkeypatch.setattr(Path, "replace", interrupted)
     with raised(), pytest.raises(KeyboardInterrupt):
-        move()
-    assert done == ["first", "second"]
+        make()
+    assert sum(path.is_file() for path in tmp_path.rglob("*")) == 3
 
 
 def test_what_is_ignored_or_somebody_elses_is_left_alone():

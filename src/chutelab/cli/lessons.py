@@ -12,9 +12,10 @@ from click.shell_completion import CompletionItem
 
 from chutelab.cli import console
 from chutelab.cli.console import progress
-from chutelab.cli.output import check_file, writing
+from chutelab.cli.output import check_file
 from chutelab.cli.parameters import FileName, Number, json_option, out_option
 from chutelab.cli.program import InOrder, RefusedError
+from chutelab.util.files import writing
 
 if TYPE_CHECKING:
     from chutelab.classroom.grading import Grade

@@ -1,7 +1,4 @@
-"""What commands leave: files of ``--out``, all of them or none, and a recording's summary.
-
-A folder's files are made in one of their own, then moved in.
-"""
+"""What commands leave: files of ``--out``, all of them or none, and a recording's summary."""
 
 from __future__ import annotations
 
@@ -19,8 +16,7 @@ from click.shell_completion import CompletionItem
 from chutelab.cli.console import progress, say, show, show_json
 from chutelab.cli.parameters import json_option, out_option
 from chutelab.cli.program import RefusedError
-from chutelab.util.files import aside, check, refuse_other
-from chutelab.util.signals import held
+from chutelab.util.files import check, refuse_other, together, writing
 from chutelab.util.tables import plain
 
 if TYPE_CHECKING:
@@ -62,12 +58,8 @@ def destination(folder: Path | None, names: Iterable[str] = ()) -> Iterator[Path
     try:
         for name in names:
             refuse_other(folder / name)
-        with aside(folder) as unfinished:
+        with together(folder) as unfinished:
             yield unfinished
-            folder.mkdir(parents=True, exist_ok=True)
-            with held():
-                for file in sorted(unfinished.iterdir()):
-                    file.replace(folder / file.name)
     except OSError as error:
         named = Path(error.filename or folder)
         if named not in (folder, *folder.parents) and folder not in named.parents:
@@ -87,22 +79,6 @@ def check_file(option: str, path: Path | None, suffixes: Sequence[str] = ()) -> 
         raise RefusedError(f"{option} {path}: give a name that ends in {' or '.join(suffixes)}")
     with writing(f"{option} {path}".strip()):
         check(path)
-
-
-@contextmanager
-def writing(what: str = "", instead: str = "") -> Iterator[None]:
-    """Turn the OSError of a file that cannot be written into a `RefusedError`.
-
-    It calls the file `what`, by default what the error does, and says what to give `instead`.
-    Of an error that names two files, such as one in copying, the second is the one that is written.
-    """
-    try:
-        yield
-    except OSError as error:
-        name = what or error.filename2 or error.filename
-        advice = f"; give {instead}" if instead else ""
-        said = f"cannot be written: {error.strerror or error}{advice}"
-        raise RefusedError(f"{name}: {said}" if name else said) from error
 
 
 @dataclass(frozen=True)

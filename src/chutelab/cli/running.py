@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from chutelab.cli.console import progress, say
-from chutelab.cli.output import KINDS, Output, check_file, destination, output_options, writing
+from chutelab.cli.output import KINDS, Output, check_file, destination, output_options
 from chutelab.cli.parameters import (
     FileName,
     Number,
@@ -22,6 +22,7 @@ from chutelab.cli.parameters import (
 )
 from chutelab.cli.program import RefusedError
 from chutelab.util.errors import InputError
+from chutelab.util.files import writing
 
 if TYPE_CHECKING:
     from chutelab.studies.accuracy import Accuracy, Wanted

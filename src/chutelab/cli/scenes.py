@@ -14,9 +14,10 @@ from typing import Literal
 import click
 
 from chutelab.cli import console
-from chutelab.cli.output import check_file, destination, writing
+from chutelab.cli.output import check_file, destination
 from chutelab.cli.parameters import FileName, json_option, out_option
 from chutelab.cli.program import RefusedError
+from chutelab.util.files import whole, writing
 
 STANDARD_OUTPUT = Path("-")
 
@@ -48,7 +49,6 @@ def schema() -> None:
 def new(path: Path, force: bool) -> None:
     """Write a complete, commented scene to start from (scene.toml, or PATH; - prints it)."""
     from chutelab.scene import template
-    from chutelab.util.files import whole
 
     if path == STANDARD_OUTPUT:
         console.say(template(), end="")

@@ -12,7 +12,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from chutelab.cli import console
-from chutelab.cli.output import PICTURES, check_file, writing
+from chutelab.cli.output import PICTURES, check_file
 from chutelab.cli.parameters import (
     Count,
     engine_option,
@@ -22,6 +22,7 @@ from chutelab.cli.parameters import (
     set_option,
 )
 from chutelab.cli.program import RefusedError
+from chutelab.util.files import write_lines, writing
 
 if TYPE_CHECKING:
     from chutelab.scene import Scene
@@ -201,7 +202,6 @@ def _propagated(
     """Propagate uncertain inputs; write all samples as CSV, and a picture, where asked for."""
     from chutelab.studies import design
     from chutelab.studies.design.uncertainty import SAMPLES
-    from chutelab.util.files import write_lines
 
     check_file("--out", out, (".csv",))
     check_file("--plot", plot, PICTURES)

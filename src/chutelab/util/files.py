@@ -19,7 +19,8 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Final
 
-from chutelab.util.errors import printable
+from chutelab.util.errors import InputError, printable
+from chutelab.util.signals import held
 
 _ASIDE: Final = ".chutelab-unfinished-"
 """Beginning of the names of folders in which files are made before they get their place."""
@@ -56,6 +57,30 @@ def aside(folder: Path, target: Path | None = None) -> Iterator[Path]:
                 error.errno, error.strerror or str(error), str(target or folder)
             ) from error
         raise
+
+
+@contextmanager
+def together(folder: Path) -> Iterator[Path]:
+    """Give an empty folder to make files and folders in; at the end its files move to `folder`.
+
+    That is made if need be; what else is in it stays. A signal waits until all have moved.
+
+    Raises
+    ------
+    OSError
+        As `aside`, or if something that is no file is where one should go: none is moved then.
+    """
+    with aside(folder) as made:
+        yield made
+        files = sorted(path.relative_to(made) for path in made.rglob("*") if path.is_file())
+        for file in files:
+            refuse_other(folder / file)
+        with held():
+            folder.mkdir(parents=True, exist_ok=True)
+            for file in files:
+                target = folder / file
+                target.parent.mkdir(parents=True, exist_ok=True)
+                (made / file).replace(target)
 
 
 def first_bytes(path: Path, most: int) -> bytes:
@@ -115,6 +140,22 @@ def check(path: str | Path) -> None:
     """Raise the OSError that `whole` would raise at once; write nothing."""
     with _beside(Path(path)):
         pass
+
+
+@contextmanager
+def writing(what: object = "", instead: str = "") -> Iterator[None]:
+    """Turn the OSError of a file that cannot be written into a `InputError`.
+
+    It calls the file `what`, by default what the error does, and says what to give `instead`.
+    Of an error that names two files, such as one in copying, the second is the one that is written.
+    """
+    try:
+        yield
+    except OSError as error:
+        name = str(what or error.filename2 or error.filename or "")
+        advice = f"; give {instead}" if instead else ""
+        said = f"cannot be written: {error.strerror or error}{advice}"
+        raise InputError(said, file=name) from error
 
 
 def refuse_other(path: Path) -> None:

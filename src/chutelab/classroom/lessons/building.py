@@ -30,7 +30,7 @@ from PIL.GifImagePlugin import GifImageFile
 from chutelab.classroom.lessons.reading import Lesson, LessonError, read, scene_of, split, unusable
 from chutelab.engines.simulation import simulate
 from chutelab.scene import Fault, to_dict
-from chutelab.util.files import aside, refuse_other
+from chutelab.util.files import aside, refuse_other, together
 from chutelab.util.versions import own_version, version_of
 
 _HERE: Final = Path(__file__).parent
@@ -270,7 +270,7 @@ def bundle(
     for lesson in lessons:
         if (there := folder / lesson.folder.name).exists() and not there.is_dir():
             raise NotADirectoryError(ENOTDIR, "it is a file, not a folder", str(there))
-    with aside(folder) as made:
+    with together(folder) as made:
         cards = ""
         for i, lesson in enumerate(lessons):
 
@@ -285,13 +285,8 @@ def bundle(
         (made / INDEX).write_text(_page("index.html", cards=cards, count=many), encoding="utf-8")
         for name in _SHARED:
             shutil.copyfile(_HERE / "assets" / name, made / name)
-        written = []
-        for file in sorted(path for path in made.rglob("*") if path.is_file()):
-            target = folder / file.relative_to(made)
-            target.parent.mkdir(parents=True, exist_ok=True)
-            file.replace(target)
-            written.append(target)
-        return written
+        files = [path.relative_to(made) for path in made.rglob("*") if path.is_file()]
+    return [folder / file for file in sorted(files)]
 
 
 def _check_places(lessons: Sequence[Lesson], folder: Path) -> None:

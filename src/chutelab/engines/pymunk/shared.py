@@ -382,7 +382,7 @@ class Shared:
                 self._end(i, "settled", self.t, Kind.SETTLE)
 
     def _tell_calm(self, i: int) -> None:
-        """Tell since when a particle lies calm, if it does: at the end of that step it did first."""
+        """Tell since when a particle lies calm, if it does: since the end of that step."""
         if i not in self.rides and self.calm[i] >= CALM:
             late, place, speed = self.calm[i] - self.h, *self.state[1, :4, i].reshape(2, 2)
             self.recorder.events(

@@ -25,9 +25,10 @@ import numpy as np
 
 from chutelab.scene import to_dict
 from chutelab.studies.sweep.plan import Plan
-from chutelab.studies.sweep.result import columns_of, synced, text_of, writing
+from chutelab.studies.sweep.result import columns_of, synced, text_of
 from chutelab.studies.sweep.rows import NUMBERS, REASON, Columns
 from chutelab.util.errors import InputError
+from chutelab.util.files import writing
 from chutelab.util.versions import version_of
 
 if sys.platform == "win32":

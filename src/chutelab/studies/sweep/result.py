@@ -9,8 +9,8 @@ import csv
 import io
 import os
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import chain
 from math import isnan
@@ -64,15 +64,6 @@ def write(columns: Rows, path: str | Path, form: str) -> Path:
 def write_csv(names: Sequence[str], texts: Iterable[str], path: str | Path) -> Path:
     """Write a head and texts of rows as a CSV file."""
     return write_lines(path, chain(csv_lines([names]), texts))
-
-
-@contextmanager
-def writing(path: Path) -> Iterator[None]:
-    """Turn the OSError of a file that cannot be written into an `InputError`."""
-    try:
-        yield
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
 def synced(path: Path) -> None:

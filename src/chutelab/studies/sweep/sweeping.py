@@ -34,10 +34,11 @@ from chutelab.scene.variants import Vary
 from chutelab.studies.sweep.batch import swept
 from chutelab.studies.sweep.part import unfinished
 from chutelab.studies.sweep.plan import Plan, planned
-from chutelab.studies.sweep.result import Sweep, format_of, synced, write, write_csv, writing
+from chutelab.studies.sweep.result import Sweep, format_of, synced, write, write_csv
 from chutelab.studies.sweep.rows import NUMBERS, REASON, Columns, joined
 from chutelab.util.arrays import Progress
 from chutelab.util.errors import InputError
+from chutelab.util.files import writing
 from chutelab.util.versions import library
 
 Job = tuple[int, Any]

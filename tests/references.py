@@ -164,8 +164,8 @@ def first_impacts(machine, t_end):
             approach = -(v[i] - v[j]) @ n
             slip = (v[i] - v[j]) @ along + r * (spin[i] + spin[j])
             # Per mass; each takes half of what changes.
-            normal = 0.5 * (1.0 + machine.pair_restitution) * approach
-            most = machine.pair_friction * normal
+            normal = 0.5 * (1.0 + machine.pair_restitution[0, 0]) * approach
+            most = machine.pair_friction[0, 0] * normal
             rub = np.clip(-0.5 * slip / (1.0 + turning), -most, most)
             v[i] += normal * n + rub * along
             v[j] -= normal * n + rub * along

@@ -556,11 +556,11 @@ def test_particles_may_have_surfaces_of_their_own():
     }
     releases = [
         np.concatenate([getattr(m.releases, name) for m in built])
-        for name in ("t", "position", "velocity", "carried")
+        for name in ("t", "position", "velocity", "carried", "stream", "kind")
     ]
     batch = replace(
         built[0],
-        segments=machine.Segments(**rows, surface=each[0].surface.copy()),
+        segments=replace(each[0], **rows),
         releases=Releases(*releases),
     )
     together = exact.run(batch)

@@ -9,23 +9,27 @@
 from chutelab.machine.builder import RefusedError, build
 from chutelab.machine.parts import (
     DRIVE_PULLEY,
+    Arcs,
     Caution,
     Machine,
     Particle,
     Pulley,
     Segments,
+    Thread,
     moved,
     origin,
 )
 
 __all__ = [
     "DRIVE_PULLEY",
+    "Arcs",
     "Caution",
     "Machine",
     "Particle",
     "Pulley",
     "RefusedError",
     "Segments",
+    "Thread",
     "build",
     "moved",
     "origin",

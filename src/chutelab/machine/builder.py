@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chutelab.machine.nominal import plate_hit
-from chutelab.machine.parts import Caution, Machine, Particle, Pulley, Segments
+from chutelab.machine.parts import Arcs, Caution, Machine, Particle, Pulley, Segments
 from chutelab.machine.releases import Releases, draw, release_point
 from chutelab.scene import Fault, Scene, SceneError
 from chutelab.scene.rules import ON_BELT
@@ -168,6 +168,18 @@ def build(scene: Scene) -> Machine:
             restitution=restitution.T,
             friction=friction.T,
             surface=np.array(owner, dtype=np.int64),
+            appears=np.full(segments, -inf),
+            vanishes=np.full(segments, inf),
+        ),
+        arcs=Arcs(
+            center=np.empty((*scene.shape, 0, 2)),
+            **{
+                name: np.empty((*scene.shape, 0))
+                for name in ("radius", "begin", "extent", "speed", "restitution", "friction")
+            },
+            surface=np.empty(0, dtype=np.int64),
+            appears=np.empty(0),
+            vanishes=np.empty(0),
         ),
         pulley=None
         if belt is None
@@ -179,8 +191,12 @@ def build(scene: Scene) -> Machine:
         dt=scene.run.dt,
         align=scene.run.align,
         interact=scene.stream.crowded,
-        pair_restitution=scene.stream.restitution,
-        pair_friction=scene.stream.friction,
+        pair_restitution=np.full((1, 1), scene.stream.restitution),
+        pair_friction=np.full((1, 1), scene.stream.friction),
+        rolling=np.zeros(1),
+        outlines=(None,),
+        threads=(),
+        streams=("stream",),
         engine=scene.run.engine,
         plate_warnings=tuple(warnings),
     )

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
-from math import ceil, inf, isnan, log2, nan
+from math import ceil, inf, isnan, log2, nan, pi
 from typing import Literal
 
 import numpy as np
@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from chutelab.machine.releases import Releases
 from chutelab.scene import Scene
-from chutelab.util.arrays import Floats, Ints
+from chutelab.util.arrays import Bools, Floats, Ints
 
 DRIVE_PULLEY = "the drive pulley"
 
@@ -91,23 +91,28 @@ EXIT_MARGIN = 1.0
 """m below the lowest surface, or outside the box of all without gravity, where a track ends."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Particle:
-    """The one kind of particle of a machine and its recording.
+    """The particles of a machine and its recording: numbers if all are alike, else arrays (N,).
 
     Attributes
     ----------
-    radius : float
-        r, m; 0 for a mass point.
-    mass : float
+    radius : float or ndarray, (N,)
+        r, m; 0 for a mass point; of a box or polygon that of the circle round it.
+    mass : float or ndarray, (N,)
         m, kg.
-    inertia : float
+    inertia : float or ndarray, (N,)
         Moment of inertia about the centre, kg m²; 0 for a particle that does not turn.
     """
 
     radius: float
     mass: float
     inertia: float
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Particle):
+            return NotImplemented
+        return all(np.array_equal(vars(self)[name], vars(other)[name]) for name in vars(self))
 
     def kinetic(self, vx: ArrayLike, vy: ArrayLike, omega: ArrayLike) -> Floats:
         """Return ½ m v² + ½ I ω² (J) for arrays of any one shape (m/s, rad/s)."""
@@ -119,16 +124,20 @@ class Particle:
 class Segments:
     """Straight two-sided surfaces, world frame, SI units.
 
-    Arrays have shape (S,) or (S, 2); or (N, S) and (N, S, 2) where each particle has its own.
+    Arrays have shape (S,) or (S, 2); in a family (N, S) and (N, S, 2).
 
     Attributes
     ----------
     start, tangent : ndarray, (..., S, 2)
         First end, and unit vector towards the second.
-    length, speed, restitution, friction : ndarray, (..., S)
-        Length (m), speed of the surface along the tangent (m/s), pair values with a particle.
+    length, speed : ndarray, (..., S)
+        Length (m), and speed of the surface along the tangent (m/s).
+    restitution, friction : ndarray, (..., S)
+        Of the pair with a particle; (K, S) where there are several kinds of particles.
     surface : ndarray, (S,)
         Index of the surface a segment belongs to, into `Machine.surfaces`.
+    appears, vanishes : ndarray, (S,)
+        From when to when it is there, s; -inf and inf if always.
     """
 
     start: Floats
@@ -138,6 +147,8 @@ class Segments:
     restitution: Floats
     friction: Floats
     surface: Ints
+    appears: Floats
+    vanishes: Floats
 
     def __post_init__(self) -> None:
         for array in vars(self).values():
@@ -149,11 +160,79 @@ class Segments:
         return self.start + self.length[..., None] * self.tangent
 
 
+@dataclass(frozen=True, eq=False)
+class Arcs:
+    """Two-sided surfaces bent round a centre, and whole circles, world frame, SI units.
+
+    Arrays have shape (A,) or (A, 2); in a family (N, A) and (N, A, 2).
+
+    Attributes
+    ----------
+    center : ndarray, (..., A, 2)
+        m.
+    radius : ndarray, (..., A)
+        m; a particle may be inside or outside.
+    begin, extent : ndarray, (..., A)
+        Angle of the first end from the x axis, counterclockwise, and how far the arc reaches
+        from there, counterclockwise, rad; 2π for a whole circle, which has no ends.
+    speed : ndarray, (..., A)
+        Speed of the surface, clockwise, m/s.
+    restitution, friction : ndarray, (..., A)
+        Of the pair with a particle; (K, A) where there are several kinds of particles.
+    surface : ndarray, (A,)
+        Index of the surface an arc belongs to, into `Machine.surfaces`.
+    appears, vanishes : ndarray, (A,)
+        From when to when it is there, s; -inf and inf if always.
+    """
+
+    center: Floats
+    radius: Floats
+    begin: Floats
+    extent: Floats
+    speed: Floats
+    restitution: Floats
+    friction: Floats
+    surface: Ints
+    appears: Floats
+    vanishes: Floats
+
+    def __post_init__(self) -> None:
+        for array in vars(self).values():
+            array.flags.writeable = False
+
+    @property
+    def whole(self) -> Bools:
+        """Which are circles all round, (..., A)."""
+        return np.asarray(self.extent >= 2.0 * pi)
+
+    def point(self, angle: ArrayLike) -> Floats:
+        """Return the points of the arcs at angles (..., A) from the x axis, (..., A, 2), m."""
+        direction = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        return np.asarray(self.center + self.radius[..., None] * direction)
+
+    @property
+    def ends(self) -> tuple[Floats, Floats]:
+        """First and last point of each, counterclockwise, (..., A, 2), m."""
+        return self.point(self.begin), self.point(self.begin + self.extent)
+
+    @property
+    def corners(self) -> Floats:
+        """Points of each that its box goes through, (..., 6 A, 2), m."""
+        quarters = 0.5 * pi * np.arange(4)[:, None]
+        reach = np.mod(quarters - self.begin[..., None, :], 2.0 * pi)
+        # Where a quarter is not on the arc, its first end instead.
+        inside = reach <= self.extent[..., None, :]
+        angle = np.where(inside, self.begin[..., None, :] + reach, self.begin[..., None, :])
+        points = [*np.moveaxis(angle, -2, 0), self.begin, self.begin + self.extent]
+        return np.concatenate([self.point(angle) for angle in points], axis=-2)
+
+
 @dataclass(frozen=True)
 class Pulley:
     """The drive pulley, axis at the origin, turning clockwise (its top moves forward).
 
-    The incoming belt is segment 0 of the machine and ends on its top.
+    The incoming belt is segment 0 of the machine and ends on it, where it is tangential: `incline`
+    before its top. It is none of the arcs.
 
     Attributes
     ----------
@@ -163,8 +242,11 @@ class Pulley:
         Pair values; friction is inf with adhesion.
     surface : int
         Index into `Machine.surfaces`.
+    incline : float
+        Angle β at which the incoming belt rises, rad.
 
-    Numbers are arrays (N,) in a family, see `Machine`.
+    Numbers are arrays (N,) in a family, see `Machine`; the pair values (K,) where there are several
+    kinds of particles.
     """
 
     radius: float
@@ -172,13 +254,23 @@ class Pulley:
     friction: float
     restitution: float
     surface: int
+    incline: float = 0.0
+
+
+@dataclass(frozen=True)
+class Thread:
+    """A string without mass from a point to the centre of a particle; it pulls, but cannot push."""
+
+    anchor: tuple[float, float]  # m
+    particle: int
+    length: float  # m
 
 
 @dataclass(frozen=True, eq=False)
 class Machine:
     """Everything an engine needs to run.
 
-    A family of machines, one for each particle, is one machine in which segments, gravity, radius
+    A family of machines, one for each particle, is one machine in which surfaces, gravity, radius
     and mass of the particle, the pulley's numbers and the end time have a value for each, (N,).
     """
 
@@ -187,6 +279,7 @@ class Machine:
     gravity: float  # m/s², pointing down
     particle: Particle
     segments: Segments  # all straight surfaces; the incoming belt is the first if there is one
+    arcs: Arcs
     pulley: Pulley | None  # None without an incoming conveyor
     releases: Releases
     landing: int  # surface index of the outgoing belt, -1 without one
@@ -195,8 +288,12 @@ class Machine:
     dt: float  # s; step of lasting contacts (contact), longest step (pymunk)
     align: bool  # whether the pymunk engine's steps of a lone particle end at contacts
     interact: bool  # whether particles meet each other
-    pair_restitution: float  # of two particles
-    pair_friction: float
+    pair_restitution: Floats  # (K, K), of two particles by their kinds, see `Releases.kind`
+    pair_friction: Floats
+    rolling: Floats  # (K,), rolling friction of a kind on everything: its arm over the radius
+    outlines: tuple[Floats | None, ...]  # (K); of boxes and polygons corners (n, 2)
+    threads: tuple[Thread, ...]
+    streams: tuple[str, ...]  # names; `Releases.stream` tells whose a particle is
     engine: str  # what the scene asks for: "auto", "exact", "contact" or "pymunk"
     plate_warnings: tuple[Caution, ...]  # of a nominal particle that misses the plate
 
@@ -204,6 +301,14 @@ class Machine:
     def count(self) -> int:
         """Number of particles."""
         return len(self.releases.t)
+
+    @property
+    def corners(self) -> Floats:
+        """Points round which the box of all segments and arcs goes, (..., C, 2), m."""
+        parts = [self.segments.start, self.segments.end]
+        if len(self.arcs.surface):
+            parts.append(self.arcs.corners)
+        return np.concatenate(parts, axis=-2)
 
     @cached_property
     def warnings(self) -> tuple[Caution, ...]:
@@ -220,11 +325,8 @@ class Machine:
         With gravity only the bottom is finite: what flies up comes back. In a family these are
         arrays (N,), and all have gravity or none.
         """
-        start, end = self.segments.start, self.segments.end
-        if not start.size:
-            start = end = self.releases.position
         wheel = self.pulley.radius if self.pulley is not None else -inf
-        ends = np.concatenate([start, end], axis=-2)
+        ends = self.corners if self.corners.size else self.releases.position
         low, high = ends.min(axis=-2), ends.max(axis=-2)
         left, bottom = (np.minimum(low[..., axis], -wheel) for axis in (0, 1))
         right, top = (np.maximum(high[..., axis], wheel) for axis in (0, 1))
@@ -243,12 +345,11 @@ def origin(machine: Machine) -> tuple[float, float]:
     It is (0, 0) unless the machine is many times its own size away from there; and so round a
     number that taking it off a coordinate loses no digit.
     """
-    start, end = machine.segments.start, machine.segments.end
-    if machine.pulley is not None or not start.size:
+    corners = machine.corners
+    if machine.pulley is not None or not corners.size:
         return 0.0, 0.0
-    low, high = np.minimum(start, end), np.maximum(start, end)
-    axes = tuple(range(low.ndim - 1))
-    low, high = low.min(axis=axes), high.max(axis=axes)
+    axes = tuple(range(corners.ndim - 1))
+    low, high = corners.min(axis=axes), corners.max(axis=axes)
     extent = float((high - low).max())
     middle = 0.5 * (low + high)
     if np.abs(middle).max() <= REMOTE * extent:
@@ -267,5 +368,10 @@ def moved(machine: Machine, x: float, y: float) -> Machine:
     return replace(
         machine,
         segments=replace(segments, start=segments.start + by),
+        arcs=replace(machine.arcs, center=machine.arcs.center + by),
         releases=replace(releases, position=releases.position + by),
+        threads=tuple(
+            replace(thread, anchor=(thread.anchor[0] + x, thread.anchor[1] + y))
+            for thread in machine.threads
+        ),
     )

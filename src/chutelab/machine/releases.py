@@ -9,7 +9,7 @@ import numpy as np
 
 from chutelab.scene import Scene
 from chutelab.scene.rules import ON_BELT
-from chutelab.util.arrays import Bools, Floats
+from chutelab.util.arrays import Bools, Floats, Ints
 from chutelab.util.tables import number
 
 TRIES = 1000
@@ -32,12 +32,18 @@ class Releases:
         m, m/s.
     carried : ndarray of bool, (N,)
         Rides the incoming belt by adhesion, at radius R + r + h round the pulley, until separation.
+    stream : ndarray of int, (N,)
+        Whose it is: particles of the first stream come first, then those of the next.
+    kind : ndarray of int, (N,)
+        Its row in the machine's tables of pairs; of a family each has a row of its own.
     """
 
     t: Floats
     position: Floats
     velocity: Floats
     carried: Bools
+    stream: Ints
+    kind: Ints
 
     def __post_init__(self) -> None:
         for array in vars(self).values():
@@ -177,7 +183,9 @@ def draw(scene: Scene) -> Releases:
     position[:, 1] = low + height
     carried = np.zeros(count, dtype=bool)
     carried[:] = adheres
-    return Releases(t, position, velocity, carried)
+    stream_of = np.zeros(count, dtype=np.int64)
+    kind = np.arange(count) if scene.shape else stream_of.copy()
+    return Releases(t, position, velocity, carried, stream_of, kind)
 
 
 def _spread_apart(

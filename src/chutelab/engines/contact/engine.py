@@ -177,8 +177,8 @@ class Job:
             restitution = np.append(restitution, wheel.restitution)
             friction = np.append(friction, wheel.friction)
         pairs = module.array("pairs", dtype("Pair"), 1 + self.surface_count)
-        pairs["restitution"][0] = machine.pair_restitution
-        pairs["friction"][0] = machine.pair_friction
+        pairs["restitution"][0] = machine.pair_restitution[0, 0]
+        pairs["friction"][0] = machine.pair_friction[0, 0]
         pairs["restitution"][1:], pairs["friction"][1:] = restitution, friction
         np.minimum(pairs["friction"], GREATEST, out=pairs["friction"])
 

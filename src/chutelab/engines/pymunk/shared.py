@@ -115,7 +115,8 @@ class Shared:
         space.collision_slop = SLOP * self.r + self.world.hair
         # What Chipmunk remembers longer it reports in the impulse when two meet again, unapplied.
         space.collision_persistence = 1
-        own, grip = (sqrt(max(v, SMALLEST)) for v in (m.pair_restitution, m.pair_friction))
+        pairs = m.pair_restitution[0, 0], m.pair_friction[0, 0]
+        own, grip = (sqrt(max(value, SMALLEST)) for value in pairs)
         space.on_collision(PARTICLE, ROLLER, pre_solve=self._round_end)
         for face in self.world.faces:
             shapes = [face.shape]

@@ -20,7 +20,7 @@ void describe(Contact *c, int i, int j) {
         c->owner = s->owner;
         c->other[0] = 0;
         c->other[1] = surface_speed(s, c->nx, c->ny, a->x, a->y);
-        c->other[2] = s->shape == CIRCLE ? -s->speed / s->radius : 0;
+        c->other[2] = s->shape != SEGMENT ? -s->speed / s->radius : 0;
     } else {
         const Disk *b = W.disks + j;
         double x = a->x - b->x, y = a->y - b->y, d = sqrt(x * x + y * y);

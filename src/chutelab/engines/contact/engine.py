@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
+from dataclasses import replace
 from math import inf, pi
 from time import perf_counter
 from typing import Any
@@ -94,9 +95,19 @@ def run(machine: Machine, progress: Progress | None = None) -> Recording:
 def pieces(machine: Machine) -> NDArray[Any]:
     """Return the pieces of all surfaces, segments, pulley and arcs, as rows of the core."""
     seg, arcs, wheel = machine.segments, machine.arcs, machine.pulley
-    s, w, a = len(seg.length), int(wheel is not None), len(arcs.radius)
+    s, w = len(seg.length), int(wheel is not None)
+    # A piece is met in one place at a time: an arc of which a disk can touch both ends is two.
+    half, r = 0.5 * arcs.extent, np.max(machine.particle.radius)
+    narrow = (arcs.radius <= r) | ((half > 0.5 * pi) & (arcs.radius * np.sin(half) <= r))
+    parts = np.where(narrow & ~arcs.whole, 2, 1)
+    which = np.repeat(np.arange(len(parts)), parts)
+    arcs = replace(arcs, **{name: values[which] for name, values in vars(arcs).items()
+                            if name not in ("restitution", "friction")})  # fmt: skip
+    a, half = len(which), half[which] / parts[which]
+    second = np.append(False, which[1:] == which[:-1])[:a]
+    arcs = replace(arcs, begin=arcs.begin + np.where(second, 2.0 * half, 0.0), extent=2.0 * half)
     rows = np.zeros(s + w + a, dtype("Surface"))
-    rows["material"] = np.arange(len(rows))
+    rows["material"] = np.append(np.arange(s + w), s + w + which)
     rows["opens"], rows["closes"], rows["mates"] = -inf, inf, -1
     shapes = constants("Shape")
     flat, bent = rows[:s], rows[s + w :]
@@ -113,7 +124,6 @@ def pieces(machine: Machine) -> NDArray[Any]:
         rows["owner"][s] = wheel.surface
         rows["box"][s] = -wheel.radius, -wheel.radius, wheel.radius, wheel.radius
     if a:
-        half = 0.5 * arcs.extent
         bent["shape"] = np.where(arcs.whole, shapes["CIRCLE"], shapes["ARC"])
         bent["x"], bent["y"] = arcs.center.T
         bent["tx"], bent["ty"] = np.cos(arcs.begin + half), np.sin(arcs.begin + half)
@@ -177,6 +187,7 @@ class Job:
         self.pieces = pieces(machine)
         count = self.surface_count = len(self.pieces)
         self.kinds = len(machine.rolling)
+        self.materials = int(self.pieces["material"].max(initial=-1)) + 1
         gates = int(self.pieces["gate"].max(initial=-1)) + 1
         self.owners = len(machine.surfaces)
         buckets = 1 << (4 * n + 16).bit_length() if machine.interact else 1
@@ -184,7 +195,7 @@ class Job:
         module.place(
             ("disks", dtype("Disk"), n), ("tracks", dtype("Track"), n),
             ("surfaces", dtype("Surface"), count),
-            ("pairs", dtype("Pair"), self.kinds * (self.kinds + count)),
+            ("pairs", dtype("Pair"), self.kinds * (self.kinds + self.materials)),
             ("books", REAL, 3 * (self.owners + 1)), ("cells", dtype("Cell"), cells),
             ("heads", INTEGER, buckets), ("heap", INTEGER, n), ("queue", INTEGER, n + 1),
             ("moved", INTEGER, n), ("found", INTEGER, 2 * n),
@@ -209,7 +220,7 @@ class Job:
         left, right, bottom, top = machine.exit_box
         for name, value in (
             ("disk_count", machine.count), ("surface_count", self.surface_count),
-            ("kind_count", self.kinds), ("material_count", self.surface_count),
+            ("kind_count", self.kinds), ("material_count", self.materials),
             ("gate_count", gates),
             ("owner_count", self.owners), ("bucket_count", buckets), ("cell_room", cells),
             ("interact", machine.interact),
@@ -244,7 +255,7 @@ class Job:
             disks["ride_rho"][carried] = y * cosine - x * sine
             disks["ride_speed"][carried] = vx * cosine + vy * sine
         module.array("surfaces", dtype("Surface"), self.surface_count)[:] = self.pieces
-        pairs = module.array("pairs", dtype("Pair"), self.kinds * (self.kinds + self.surface_count))
+        pairs = module.array("pairs", dtype("Pair"), self.kinds * (self.kinds + self.materials))
         pairs = pairs.reshape(self.kinds, -1)
         own, wheel = pairs[:, : self.kinds], machine.pulley
         own["restitution"], own["friction"] = machine.pair_restitution, machine.pair_friction

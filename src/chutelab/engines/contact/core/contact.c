@@ -97,6 +97,26 @@ void share_out(const Contact *c, const double *u, const double *v, double f, dou
     given[1] = given[2] = 0;
 }
 
+/* By how much more than gravity the way inside an arc presses a disk that lies there on a surface,
+   that arc or what goes on from it, m/s2. */
+double pressed_inside(const Disk *d, int surface) {
+    double most = 0;
+    for (int n = 0; n < d->held_count; n++) {
+        const Surface *s = W.surfaces + d->held[n];
+        if (s->shape == SEGMENT || s->radius <= d->radius) continue;
+        if (square(d->x - s->x) + square(d->y - s->y) >= s->radius * s->radius) continue;
+        if (!goes_on(-1 - d->held[n], -1 - surface)) continue;
+        most = MAX(most, (d->vx * d->vx + d->vy * d->vy) / (s->radius - d->radius));
+    }
+    return most;
+}
+
+/* Time in which a disk that slides inside an arc is turned by TURN, INFINITY on what is not hollow. */
+double turning_time(const Disk *d, const Surface *s) {
+    double bends = -bending(s, d->x, d->y, d->radius) * sqrt(d->vx * d->vx + d->vy * d->vy);
+    return bends > 0 ? TURN / bends : INFINITY;
+}
+
 /* How hard gravity and the curved way press a disk on a surface, m/s2. */
 double press_on(const Disk *d, const Surface *s, double nx, double ny) {
     double along = d->vx * ny - d->vy * nx;

@@ -44,6 +44,8 @@ extern World W;
 #define GRAZE 1e-6
 /* Impacts of a disk in a step that no collapse needs: something is wrong, the run stops. */
 #define STALL 20000
+/* rad; within it the inside of an arc counts as flat: steps of a disk by itself turn it by no more. */
+#define TURN 0.2
 /* Blows that one impact may pass on at its instant, per lasting contact; the rest are foreseen. */
 #define SHOCKS 4
 
@@ -122,6 +124,8 @@ void relative(const Contact *c, int earlier, double *out);
 void push(const Contact *c, const double *impulse);
 void share_out(const Contact *c, const double *u, const double *v, double f, double *entries,
                double *given);
+double pressed_inside(const Disk *d, int surface);
+double turning_time(const Disk *d, const Surface *s);
 double press_on(const Disk *d, const Surface *s, double nx, double ny);
 
 /* impacts.c */

@@ -68,8 +68,7 @@ double left_over(const Disk *d, int impacts, int surface, double radius) {
         if (!goes_on(-1 - d->held[n], -1 - surface)) continue;
         const Surface *s = W.surfaces + surface;
         if (gap_to(s, d->x, d->y, d->radius, &nx, &ny) <= -SUNK * radius) continue;
-        double inwards = MIN(bending(s, d->x, d->y, d->radius), 0) * square(d->vx * ny - d->vy * nx);
-        least = MAX(least, 1.000001 * (W.g - inwards) * W.step);
+        least = MAX(least, 1.000001 * (W.g + pressed_inside(d, surface)) * W.step);
     }
     /* Surfaces do not give way: with them it grows only if jams do not help. */
     int many = surface >= 0 ? 2 * JAM : MANY;
@@ -370,7 +369,7 @@ static void strike(int i, int j, double t) {
     int jammed = impacts >= (j >= 0 ? CROWDED : c.rest < 1 ? JAM : CROWDED);
     if (jammed || (c.rest < 1 && impacts >= FEW && -u[0] < SLOW * W.g * W.dt)) back = 0;
     double press = j < 0 ? press_on(a, W.surfaces + (-1 - j), c.nx, c.ny) : 0, later = 0;
-    int rests = j < 0 && back <= press * W.step;
+    int rests = j < 0 && back <= press * MIN(W.step, turning_time(a, W.surfaces + (-1 - j)));
     if (rests) {
         /* The bounces that are left out, infinitely many, would have taken so long. */
         if (back > 0 && c.rest < 1) later = 2 * back / (press * (1 - c.rest));

@@ -291,6 +291,9 @@ static int begin_step(void) {
     double next = set_gates(W.t), h = W.dt, stride = 0;
     if (W.g > 0)
         for (int i = W.low; i < W.high; i++) h = MIN(h, sqrt(8 * HOP * W.disks[i].radius / W.g));
+    if (!W.interact)
+        for (int n = 0; n < W.disks[W.low].held_count; n++)
+            h = MIN(h, turning_time(W.disks + W.low, W.surfaces + W.disks[W.low].held[n]));
     W.step = h;
     W.soft = 2 * W.g * h;
     W.skip = SKIP / h;

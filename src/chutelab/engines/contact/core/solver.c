@@ -187,8 +187,11 @@ int find_contacts(double h, int *woke) {
         int first = W.contact_count;
         double bound = d->impacts > CROWDED ? INFINITY : left_over(d, d->impacts, -1, d->radius);
         if (d->supports) bound = MAX(bound, W.interact ? MAX(W.soft, W.skip * d->radius) : W.soft);
-        for (int k = 0; k < W.surface_count; k++)
-            if (is_near(W.surfaces + k, d) && !add(i, -1 - k, d->radius, bound, h)) return 0;
+        for (int k = 0; k < W.surface_count; k++) {
+            if (!is_near(W.surfaces + k, d)) continue;
+            double inside = pressed_inside(d, k), most = MAX(bound, inside ? W.soft + 2 * h * inside : 0);
+            if (!add(i, -1 - k, d->radius, most, h)) return 0;
+        }
         if (W.contact_count > first) carry_to_end(i, first, h);
     }
     return 1;
@@ -448,7 +451,9 @@ static int lies(const Disk *d, const Contact *c, double h) {
     if (s->speed != 0 && c->owner != W.landing) return 0;
     if (bending(s, d->x, d->y, d->radius) != 0 && (speed > STOPPED || c->other[1] != 0)) return 0;
     if (c->arm > 0 && fabs(d->spin - c->other[2]) * d->radius > STOPPED) return 0;
-    return d->inertia == 0 || c->pull == 0 || (c->arm > 0 && speed <= STOPPED);
+    /* Its arm may have stopped it for a moment, or holds it. */
+    int held = speed <= STOPPED && fabs(c->pull) * d->radius <= c->arm * press_on(d, s, c->nx, c->ny);
+    return d->inertia == 0 || c->pull == 0 || held;
 }
 
 /* End the track of a disk that came to rest on one surface, when its slip was used up: `d->since`.
@@ -594,8 +599,12 @@ void close_step(double h) {
             relative(only, 1, u);
             relative(only, 0, v);
             note_grip(d, only, u, v, h);
-            if (!W.interact && W.until == UNTIL_SETTLED && !d->slips && d->since <= d->t + h && lies(d, only, h))
+            if (!W.interact && W.until == UNTIL_SETTLED && !d->slips && d->since <= d->t + h
+                    && lies(d, only, h)) {
+                /* What rolled stops now, not when it began to. */
+                if (only->arm > 0 && d->inertia > 0) d->since = MAX(d->since, d->t);
                 settle(i, only, h);
+            }
         } else {
             /* On several; of a surface it lies on, if any, it may still part. */
             int ground = -1;

@@ -109,7 +109,8 @@ class Step(NamedTuple):
         """Which way friction acts where it is used up, 0 if it is nowhere."""
         for c in self.contacts:
             if abs(c.rub) >= c.face.friction * c.push * (1.0 - SLACK):
-                return 1 if c.rub >= 0.0 else -1
+                # Without friction its sign is rounding.
+                return 1 if c.rub >= 0.0 or not c.face.friction else -1
         return 0
 
 

@@ -150,9 +150,11 @@ class Bend(Face):
         return self.shape.body.position
 
     def put(self, x: Vec2d) -> None:
-        """Put the foot where the circle is nearest to a place (m)."""
+        """Put the foot where the arc is nearest to a place (m), or out of reach beside an arc."""
         assert self.foot.body is not None
-        self.foot.body.position = self.shape.point_query(x).point
+        beside = self.gap(x)[0] == inf
+        away = x + Vec2d(4.0 * self.radius, 0.0)
+        self.foot.body.position = away if beside else self.shape.point_query(x).point
 
     def gap(self, x: Vec2d) -> tuple[float, Vec2d]:
         """Return the gap (m) and the normal; inf where an end is nearer than all between them."""
@@ -308,6 +310,8 @@ class World:
         )
         body = pymunk.Body(body_type=pymunk.Body.STATIC)
         body.position = center
+        # A shape that is not in the Space does not keep its body.
+        self.space.add(body)
         circle = pymunk.Circle(body, radius)
         circle.cache_bb()
         foot = pymunk.Circle(pymunk.Body(body_type=pymunk.Body.KINEMATIC), 0.0)

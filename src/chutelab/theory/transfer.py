@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chutelab.theory.results import STAGES, Reason, Transfer
-from chutelab.theory.separation import separation
+from chutelab.theory.separation import FAULTS, separation
 from chutelab.util.arrays import Bools, Floats
 
 Rebound = Literal["corrected", "as-printed"]
@@ -55,6 +55,9 @@ def transfer(
     gravity: ArrayLike = 9.81,
     friction: ArrayLike = np.inf,
     spin: ArrayLike = False,
+    inertia: ArrayLike = 0.5,
+    incline: ArrayLike = 0.0,
+    ride_length: ArrayLike = 0.0,
     plate_friction: ArrayLike = 0.0,
     interval: ArrayLike | None = None,
     rebound: Rebound = "corrected",
@@ -88,7 +91,14 @@ def transfer(
     friction : array_like
         µ of particle and incoming belt or pulley; infinite is adhesion, Eq. (1).
     spin : array_like of bool
-        True: a free disk, I = m r²/2; needs r > 0.
+        True: a body that turns freely, such as a disk; needs r > 0.
+    inertia : array_like
+        I/(m r²) of one that does, 0 < I/(m r²) <= 1: 1/2 of a disk, 2/5 of a sphere.
+    incline : array_like
+        Angle β at which the incoming belt rises towards the pulley, rad, within ±π/2.
+    ride_length : array_like
+        Way on the belt before it meets the pulley, m, >= 0. It matters on an incline only, with
+        finite friction, where particles slide or roll.
     interval : array_like, optional
         Time per particle, s, the t that Eq. (15) leaves open; without it P is NaN.
     rebound : {"corrected", "as-printed"}
@@ -134,6 +144,9 @@ def transfer(
         "mass": mass,
         "gravity": gravity,
         "friction": friction,
+        "inertia": inertia,
+        "incline": incline,
+        "ride_length": ride_length,
         "plate_friction": plate_friction,
         "interval": np.nan if interval is None else interval,
     }
@@ -166,6 +179,9 @@ def stages(
     mass: Floats,
     gravity: Floats,
     friction: Floats,
+    inertia: Floats,
+    incline: Floats,
+    ride_length: Floats,
     plate_friction: Floats,
     interval: Floats,
     spin: Bools,
@@ -189,10 +205,16 @@ def stages(
     found.require("particle_radius > 0 with spin", ~spin | (particle_radius > 0.0))
     found.require("0 <= gravity < inf", (gravity >= 0.0) & (gravity < np.inf))
     found.require("friction >= 0", friction >= 0.0)
+    found.require("0 < inertia <= 1", (inertia > 0.0) & (inertia <= 1.0))
+    found.require("|incline| < π/2", np.abs(incline) < 0.5 * np.pi)
+    found.require("0 <= ride_length < inf", (ride_length >= 0.0) & (ride_length < np.inf))
     ride_radius = pulley_radius + particle_radius
     left = separation(
-        speed=speed, ride_radius=ride_radius, gravity=gravity, friction=friction, spin=spin
-    )
+        speed=speed, ride_radius=ride_radius, gravity=gravity, friction=friction, spin=spin,
+        inertia=inertia, incline=incline, ride_length=ride_length,
+    )  # fmt: skip
+    for fault in range(1, len(FAULTS)):
+        found.fail(left.fault == fault, Reason.OUTSIDE.because(FAULTS[fault]))
     found.keep(phi1=left.phi1, v1=left.v1, omega1=turning(left.rim))
 
     # Fly to the plate: the gap between disk and plate's line is a quadratic in time.
@@ -201,7 +223,7 @@ def stages(
     cos, sin = np.cos(angle), np.sin(angle)
     to_pivot = (pulley_radius + distance) * cos + pivot_height * sin - particle_radius
     # The gap on the pulley is least where the centre's radius is square to the plate.
-    closest = np.clip(0.5 * np.pi - angle, 0.0, left.phi1)
+    closest = np.clip(0.5 * np.pi - angle, -incline, left.phi1)
     behind = to_pivot < ride_radius * np.sin(closest + angle)
     behind &= found.fine
     if unbounded_plate:
@@ -213,13 +235,17 @@ def stages(
     gap = to_pivot - ride_radius * (left.sin * cos + left.cos * sin)
     closing = left.v1 * (left.cos * cos - left.sin * sin)
     discriminant = closing**2 - 2.0 * gravity * sin * gap
-    found.fail(closing <= 0.0, Reason.NO_IMPACT.because("the velocity points off the plate"))
+    normal = np.sqrt(discriminant)
+    t2 = 2.0 * gap / (closing + normal)  # Eq. (5)
+    # Thrown up steeply, it meets a plate that leans away when it comes down again.
+    parts = (closing <= 0.0) & (sin >= 0.0)
+    comes_down = np.isfinite(left.again) & ~(~parts & (t2 <= left.again))
+    found.fail(comes_down, Reason.EARLY.because("pulley: the flight comes down on it again"))
+    found.fail(parts, Reason.NO_IMPACT.because("the velocity points off the plate"))
     found.fail(
         discriminant <= 0.0,
         Reason.NO_IMPACT.because("the flight turns away before it reaches the plate's line"),
     )
-    normal = np.sqrt(discriminant)
-    t2 = 2.0 * gap / (closing + normal)  # Eq. (5)
     x2 = left.v1 * t2 * left.cos  # Eq. (3)
     y2 = 0.5 * gravity * t2**2 + left.v1 * t2 * left.sin  # Eq. (4)
     v2x = left.v1 * left.cos
@@ -244,9 +270,10 @@ def stages(
         # Coulomb: the impulse that stops the slip, or as much of it as friction can give.
         slip = tangential - left.rim
         limit = plate_friction * (1.0 + restitution) * normal
-        impulse = np.clip(slip * np.where(spin, 1.0 / 3.0, 1.0), -limit, limit)
+        share = np.where(spin, inertia / (1.0 + inertia), 1.0)  # m*/m
+        impulse = np.clip(slip * share, -limit, limit)
         down = tangential - impulse
-        rim = left.rim + np.where(spin, 2.0 * impulse, 0.0)
+        rim = left.rim + np.where(spin, impulse / inertia, 0.0)
         away = restitution * normal
         v2r = np.hypot(away, down)  # Eq. (9) corrected
         phi2r = np.arctan2(away, down)  # Eq. (8)
@@ -273,7 +300,9 @@ def stages(
         )
     dEk = 0.5 * mass * (v3x**2 + belt_speed**2)  # noqa: N806 - Eq. (14)
     slip = belt_speed + v3x - rim
-    carried = np.where(spin, mass / 3.0, mass)  # effective mass at the contact point
+    carried = np.where(
+        spin, mass / ((1.0 + inertia) / inertia), mass
+    )  # effective mass at the contact point
     lost_height = left.sin**2 / (1.0 + left.cos)  # 1 - cos φ1
     found.keep(
         t3=t3,

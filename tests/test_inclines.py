@@ -119,7 +119,8 @@ def test_inclined_conveyor_against_an_ode(seed: int, kind: str) -> None:
     beta = draw.uniform(-0.45, 0.45)
     rider = Rider(
         v0=draw.uniform(0.5, 2.5), radius=draw.uniform(0.2, 0.8),
-        mu=draw.choice([0.1, 0.3, 0.5, 0.8]) * draw.uniform(0.8, 1.2), k=INERTIA.get(kind), beta=beta,
+        mu=draw.choice([0.1, 0.3, 0.5, 0.8]) * draw.uniform(0.8, 1.2), k=INERTIA.get(kind),
+        beta=beta,
     )  # fmt: skip
     length, r = draw.uniform(0.0, 0.6), 0.01
     found = transfer(

@@ -1,7 +1,7 @@
 """The paper's equations (2) to (16) in closed form, vectorised, with their generalisations.
 
 Any plate angle, finite particles, friction and spin; the printed Eq. (9) beside the right one.
-`transfer` is what others call, `stages` has the equations.
+`transfer` is what others call, `stages` has the equations; `belt_power` speaks of a steady stream.
 """
 
 from __future__ import annotations
@@ -163,6 +163,41 @@ def transfer(
         )
     answers = {name: values.reshape(turning.shape) for name, values in found.values.items()}
     return Transfer(reason=found.reason.astype(np.str_).reshape(turning.shape), **answers)
+
+
+def belt_power(
+    *,
+    rate_t_h: ArrayLike,
+    belt_speed: ArrayLike,
+    feed_speed: ArrayLike = 0.0,
+    lift: ArrayLike = 0.0,
+    gravity: ArrayLike = 9.81,
+) -> Floats:
+    """Return the power, W, that a belt needs to carry a steady stream, beside that to run empty.
+
+    P = ṁ v_b (v_b - v_x) + ṁ g H: the load is brought to the belt's speed, slip heat included,
+    and lifted.
+
+    Parameters
+    ----------
+    rate_t_h : array_like
+        ṁ in tonnes an hour, 3.6 t/h = 1 kg/s.
+    belt_speed, feed_speed : array_like
+        v_b of the belt, and v_x of the load along the belt as it comes on it, m/s. It must not roll
+        on the belt.
+    lift : array_like
+        H, by which the belt rises, m; negative where it falls.
+    gravity : array_like
+        g, m/s².
+
+    Examples
+    --------
+    >>> float(belt_power(rate_t_h=360.0, belt_speed=2.0, feed_speed=-1.0, lift=5.0))
+    5505.0
+    """
+    flow, v_b, v_x = (np.asarray(part) for part in (rate_t_h, belt_speed, feed_speed))
+    height = np.multiply(gravity, lift)
+    return np.asarray(flow / 3.6 * (v_b * (v_b - v_x) + height), dtype=np.float64)
 
 
 def stages(

@@ -18,6 +18,9 @@ from chutelab.util.arrays import Bools, Floats
 HALVINGS = 64
 """Bisections of an angle: they exhaust a double's digits."""
 
+LEAST = 1e-18
+"""rad; a shorter motion is what bisection leaves of one that stands at once."""
+
 LARGEST = 700.0
 """Largest exponent: what grows so far has left the chute, or come to rest, long before."""
 
@@ -177,9 +180,8 @@ def slide(
     reached = fine & (why == "")
     angle = np.where(reached, end, np.where(fine, angle, np.nan))
     reason = np.where(fine, why, reason)
-    found = (angle, speed, omega, time, load)
-    values = (np.where(fine, part, np.nan).reshape(shape) for part in found)
-    return Slide(*values, reason=reason.astype(np.str_).reshape(shape))
+    found = (np.where(fine, part, np.nan) for part in (angle, speed, omega, time, load))
+    return Slide(*(part.reshape(shape) for part in (*found, reason.astype(np.str_))))
 
 
 class _Leg:
@@ -264,8 +266,8 @@ class _Leg:
             if share > 0.5:
                 near, at, step = high, speeds[1:], -length * rest
             there = self.u(near, at, step)
-            # What stands at once has a piece of no more than rounding.
-            each = np.where((length > 0.0) & (there > 0.0), weight * length / np.sqrt(there), 0.0)
+            moves = (length > LEAST) & (there > 0.0)
+            each = np.where(moves, weight * length / np.sqrt(there), 0.0)
             load = self.side * (there - np.sin(self.start + self.sense * (near + step)))
             time += each.sum(axis=0)
             pressed += (load * each).sum(axis=0)

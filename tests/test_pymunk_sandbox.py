@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import acos, atan2, cos, degrees, hypot, inf, pi, radians, sin, sqrt, tan
+from math import acos, cos, hypot, inf, pi, radians, sin, sqrt, tan
 
 import numpy as np
 import pytest
 
 from chutelab.engines.pymunk import run
-from chutelab.machine import Arcs, Thread
+from chutelab.machine import Arcs
 from chutelab.results import Kind
 from machines import face, scene_of, thrown
 

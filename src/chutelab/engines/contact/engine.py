@@ -11,7 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.engines.contact.module import Module, Status, borrow, constants, dtype, give_back
+from chutelab.engines.contact.module import (
+    Module,
+    Status,
+    borrow,
+    constants,
+    dtype,
+    give_back,
+    number,
+)
 from chutelab.machine import Machine, moved, origin
 from chutelab.results import EVENT, KNOT, REASONS, Recording
 from chutelab.results.recorder import EnoughError, Recorder, StalledError
@@ -199,6 +207,7 @@ class Job:
             ("books", REAL, 3 * (self.owners + 1)), ("cells", dtype("Cell"), cells),
             ("heads", INTEGER, buckets), ("heap", INTEGER, n), ("queue", INTEGER, n + 1),
             ("moved", INTEGER, n), ("found", INTEGER, 2 * n),
+            ("nearby", INTEGER, number("MAX_NEARBY") * n), ("everything", INTEGER, count),
             ("spared", INTEGER, n * gates),
         )  # fmt: skip
         self.make_room("knot", (100 if machine.releases.carried.any() else 30) * n + 200)
@@ -255,6 +264,7 @@ class Job:
             disks["ride_rho"][carried] = y * cosine - x * sine
             disks["ride_speed"][carried] = vx * cosine + vy * sine
         module.array("surfaces", dtype("Surface"), self.surface_count)[:] = self.pieces
+        module.array("everything", INTEGER, self.surface_count)[:] = np.arange(self.surface_count)
         pairs = module.array("pairs", dtype("Pair"), self.kinds * (self.kinds + self.materials))
         pairs = pairs.reshape(self.kinds, -1)
         own, wheel = pairs[:, : self.kinds], machine.pulley

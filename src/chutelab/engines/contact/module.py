@@ -67,6 +67,13 @@ def constants(enum: str) -> dict[str, int]:
     return values
 
 
+@cache
+def number(name: str) -> int:
+    """Return a number that layout.h defines."""
+    value: int = _layout()["constants"][name]
+    return value
+
+
 class Status(IntEnum):
     """Why the core came back, as in layout.h."""
 

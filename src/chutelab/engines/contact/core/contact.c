@@ -67,6 +67,13 @@ void relative(const Contact *c, int earlier, double *out) {
     }
 }
 
+/* The root of the island of a disk, in `W.queue`. */
+int island_of(int i) {
+    int *parent = W.queue;
+    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    return i;
+}
+
 /* Give an impulse to disk i, and the opposite one to a free partner. */
 void push(const Contact *c, const double *J) {
     Disk *a = W.disks + c->i;

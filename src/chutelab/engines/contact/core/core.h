@@ -102,6 +102,7 @@ double free_span(const Disk *d, double least);
 int list_near(double end);
 int enter_again(int i, double end);
 int reachable(int i);
+int surfaces_near(int i, const int **list);
 int place_is_free(int i, double x, double y, double t);
 
 /* record.c */
@@ -122,6 +123,7 @@ void book(double *first, double *second, int owner, const double *entries);
 void describe(Contact *c, int i, int j);
 void relative(const Contact *c, int earlier, double *out);
 void push(const Contact *c, const double *impulse);
+int island_of(int i);
 void share_out(const Contact *c, const double *u, const double *v, double f, double *entries,
                double *given);
 double pressed_inside(const Disk *d, int surface);

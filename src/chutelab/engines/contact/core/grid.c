@@ -6,6 +6,8 @@
 /* Most cells that one box is entered in. A larger box (a fast disk among slow ones) is asked by all:
    the `W.wide_count` last entries of `W.found`, which has two for each disk. */
 #define MOST_CELLS 256
+/* Radii round the box of a disk for which the surfaces near it are listed. */
+#define ROOM 1.0
 
 static int bucket(int ix, int iy) {
     unsigned h = (unsigned)ix * 73856093u ^ (unsigned)iy * 19349663u;
@@ -129,6 +131,32 @@ int enter_again(int i, double end) {
 
 /* Put the disks that disk i may meet in what is left of the step into `W.found`. */
 int reachable(int i) { return W.interact ? query(i, &W.disks[i].left) : 0; }
+
+/* List the surfaces that a disk may reach in this step, and maybe some more, ascending. They are looked
+   for again when it leaves its zone only: of a hundred pegs a disk is near three. */
+int surfaces_near(int i, const int **list) {
+    Disk *d = W.disks + i;
+    double *zone = d->zone;
+    *list = W.everything;
+    if (W.surface_count <= MAX_NEARBY) return W.surface_count;
+    if (!(zone[0] <= d->left && zone[1] <= d->bottom && zone[2] >= d->right && zone[3] >= d->top)) {
+        double room = ROOM * d->radius;
+        zone[0] = d->left - room;
+        zone[1] = d->bottom - room;
+        zone[2] = d->right + room;
+        zone[3] = d->top + room;
+        d->nearby_count = 0;
+        for (int k = 0; k < W.surface_count && d->nearby_count <= MAX_NEARBY; k++) {
+            const double *box = W.surfaces[k].box;
+            if (box[0] >= zone[2] || box[2] <= zone[0] || box[1] >= zone[3] || box[3] <= zone[1]) continue;
+            if (d->nearby_count < MAX_NEARBY) W.nearby[i * MAX_NEARBY + d->nearby_count] = k;
+            d->nearby_count++;
+        }
+    }
+    if (d->nearby_count > MAX_NEARBY) return W.surface_count;
+    *list = W.nearby + i * MAX_NEARBY;
+    return d->nearby_count;
+}
 
 /* Whether a disk released at (x, y) would overlap no other, and no gate that is shut. */
 int place_is_free(int i, double x, double y, double t) {

@@ -93,8 +93,11 @@ static void foresee_pair(int i, int j, double *due, int *partner) {
 
 static void foresee_surfaces(int i, double *due, int *partner) {
     const Disk *d = W.disks + i;
-    for (int k = 0; k < W.surface_count; k++) {
+    const int *list;
+    int count = surfaces_near(i, &list);
+    for (int n = 0; n < count; n++) {
         double approach;
+        int k = list[n];
         if (W.surfaces[k].there != THERE || !is_near(W.surfaces + k, d)) continue;
         double t = d->t + meet_surface(W.surfaces + k, d, W.step_end - d->t, &approach);
         if (t < *due && t < W.step_end && approach > left_over(d, d->impacts, k, d->radius)) {
@@ -263,10 +266,13 @@ static void jam(Contact *struck, double t) {
             W.disks[last].jam_next = k;
             last = k;
         }
-        for (int k = 0; k < W.surface_count; k++)
-            if (W.surfaces[k].there == THERE && is_near(W.surfaces + k, a)
-                    && face_at(W.surfaces + k, a->x, a->y) == W.surfaces + k)
-                add_touching(m, -1 - k, a->radius, &count);
+        const int *nearby;
+        int most = surfaces_near(m, &nearby);
+        for (int n = 0; n < most; n++) {
+            const Surface *s = W.surfaces + nearby[n];
+            if (s->there == THERE && is_near(s, a) && face_at(s, a->x, a->y) == s)
+                add_touching(m, -1 - nearby[n], a->radius, &count);
+        }
     }
     for (int n = 0; n < count; n++) {
         /* No approach afterwards but what would be left to the next step; separating is allowed. */

@@ -9,6 +9,7 @@
 #define LAYOUT_H
 
 #define MAX_HELD 4 /* surfaces that one disk can lie on at a time; a fifth is met as an impact */
+#define MAX_NEARBY 12 /* surfaces that are listed for a disk; where there are more, it asks all */
 
 /* What a disk is doing. Free disks move on parabolas; riders and sleepers on a prescribed path. */
 enum Mode { WAITING, RIDING, FREE, ASLEEP, GONE };
@@ -44,6 +45,7 @@ typedef struct {
     double ride_speed;          /* [in] m/s */
     double ride_from, ride_to;  /* s; when the ride began and ends */
     double left, bottom, right, top; /* box that it can reach in this step */
+    double zone[4];             /* the box, and room round it, for which `World.nearby` is right */
     double due;                 /* s; its next event, INFINITY if none is foreseen in this step */
     double since;               /* s; latest impact */
     double calm;                /* s; since when nothing at its contacts slips or moves apart */
@@ -64,6 +66,7 @@ typedef struct {
     int queued, moved, mark, jam; /* marks of the shock, of queries, and of the latest jam */
     int jam_next;               /* the next disk in that jam, or -1 */
     int island;
+    int nearby_count;           /* surfaces whose boxes meet its zone; MAX_NEARBY + 1: too many */
     int held_count;
     int held[MAX_HELD];         /* surfaces it lies on */
     int ride_met;               /* surface where a ride ends, or -1 */
@@ -138,6 +141,7 @@ typedef struct {
     int i, j;
     int two;                /* whether j is a free disk, which feels the impulse too */
     int owner;              /* of the ledger entries */
+    int island;             /* a disk by which it is known */
     int next;               /* of the contacts of disk i in the step before */
     int leaves;             /* it parts in this step */
 } Contact;
@@ -171,6 +175,8 @@ typedef struct {
     int *queue;          /* (disks + 1) */
     int *moved;          /* (disks) */
     int *found;          /* (2 disks) */
+    int *nearby;         /* (disks, MAX_NEARBY) surfaces near each, ascending */
+    int *everything;     /* (surfaces) [in] 0, 1, ... */
     int *spared;         /* (disks, gates) 1: what shut on this disk, and does not touch it yet */
     /* sizes */
     int disk_count, surface_count, kind_count, material_count, owner_count;

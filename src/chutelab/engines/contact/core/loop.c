@@ -29,16 +29,13 @@ static void ride_at(const Disk *d, double t, double *place) {
     place[3] = 0 - d->ride_speed * s;
 }
 
-/* Note which gates shut on a disk at t. What lasts in a crowd may have sunk into others so far. */
-static void spare(Disk *d, double t) {
+/* Note at t whether a gate shuts on a disk, or that it has got clear of one that did. What lasts in a
+   crowd may have sunk into others so far. */
+static void spare(Disk *d, const Surface *s, double t) {
     double place[4] = {d->x, d->y, 0, 0}, nx, ny, deep = (W.interact ? SUNK : 1e-9) * d->radius;
+    if (s->opens != t && (s->opens > t || !is_spared(s, d))) return;
     if (d->mode == RIDING) ride_at(d, t, place);
-    for (int k = 0; k < W.surface_count; k++) {
-        const Surface *s = W.surfaces + k;
-        if (s->opens == t) *spared_by(s, d) = gap_to(s, place[0], place[1], d->radius, &nx, &ny) < -deep;
-        else if (is_spared(s, d) && s->opens < t)
-            *spared_by(s, d) = gap_to(s, place[0], place[1], d->radius, &nx, &ny) < 0;
-    }
+    *spared_by(s, d) = gap_to(s, place[0], place[1], d->radius, &nx, &ny) < (s->opens == t ? -deep : 0);
 }
 
 /* When the next surface comes or goes, s. */
@@ -80,7 +77,8 @@ static void plan_ride(Disk *d, double from) {
     if (v <= 0) return;
     d->ride_to = from + (MAX(-d->ride_x, 0) + rho * turn) / v;
     for (double safe = from; t < d->ride_to;) {
-        if (W.gate_count) spare(d, t);
+        for (int k = 0; k < W.surface_count; k++)
+            if (W.surfaces[k].gate >= 0) spare(d, W.surfaces + k, t);
         double gap = ride_gap(d, t, &which);
         if (gap <= 0) {
             /* Bisect to the last place that is free. */
@@ -260,11 +258,10 @@ static double set_gates(double t) {
             for (int i = W.low; i < W.high; i++)
                 if (W.disks[i].mode == ASLEEP) wake(i, W.t);
         s->there = there;
+        for (int i = W.low; i < W.high && s->gate >= 0; i++)
+            if (is_live(W.disks + i)) spare(W.disks + i, s, t);
     }
-    if (!W.gate_count) return INFINITY;
-    for (int i = W.low; i < W.high; i++)
-        if (is_live(W.disks + i)) spare(W.disks + i, t);
-    return next_gate(t);
+    return W.gate_count ? next_gate(t) : INFINITY;
 }
 
 /* A sleeper that rides a belt wakes where that ends. */

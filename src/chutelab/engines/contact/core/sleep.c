@@ -6,12 +6,6 @@
 /* s; so long an island has to be at rest. */
 #define CALM_DOWN 0.1
 
-static int root(int i) {
-    int *parent = W.queue;
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-}
-
 /* Wake the island of a disk at t. Within a step its disks hop like all that lies, for what is left
    of it: half of what gravity takes until then they get from what they lie on. */
 void wake(int i, double t) {
@@ -70,7 +64,7 @@ void fall_asleep(void) {
     if (!ready || !W.sleeps) return;
     for (int n = 0; n < W.contact_count; n++) {
         const Contact *c = W.contacts + n;
-        if (c->two) parent[root(c->i)] = root(c->j);
+        if (c->two) parent[island_of(c->i)] = island_of(c->j);
     }
     /* Of each island, at its root: may it sleep, and how do its surfaces move? `found` counts who
        may not, `ux`, `uy` are free to hold the velocity once the step is closed. */
@@ -80,22 +74,22 @@ void fall_asleep(void) {
     }
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
-        if (d->mode == FREE && d->rest < CALM_DOWN) W.found[root(i)]++;
+        if (d->mode == FREE && d->rest < CALM_DOWN) W.found[island_of(i)]++;
     }
     for (int n = 0; n < W.contact_count; n++) {
         const Contact *c = W.contacts + n;
-        int k = root(c->i);
+        int k = island_of(c->i);
         if (c->impulse[0] == 0 || c->two) continue;
         if (c->j >= 0 || !joins(c, &W.tracks[k].past[4], W.moved + k)) W.found[k]++;
     }
     for (int i = W.low; i < W.high; i++) {
-        int k = root(i);
+        int k = island_of(i);
         if (W.disks[i].mode == FREE && !W.found[k] && W.moved[k] >= 0) take_back(i);
     }
     for (int i = W.low; i < W.high; i++) {
         Disk *d = W.disks + i;
         Track *track = W.tracks + i;
-        int k = root(i);
+        int k = island_of(i);
         if (d->mode != FREE || W.found[k] || W.moved[k] < 0) continue;
         const double *s = track->held, *u = &W.tracks[k].past[4];
         double x = u[0] - s[3], y = u[1] - s[4];
@@ -114,7 +108,7 @@ void fall_asleep(void) {
     }
     for (int i = W.low; i < W.high; i++) {
         Disk *d = W.disks + i;
-        int k = root(i);
+        int k = island_of(i);
         if (d->mode != FREE || W.found[k] || W.moved[k] < 0) continue;
         d->mode = ASLEEP;
         d->vx -= 0.5 * W.gx * W.step;

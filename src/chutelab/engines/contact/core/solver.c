@@ -150,11 +150,14 @@ static void carry_to_end(int i, int first, double h) {
     relative(last, 0, u);
     double x = d->x + (d->vx - u[0] * last->nx) * h + fall * W.gx;
     double y = d->y + (d->vy - u[0] * last->ny) * h + fall * W.gy;
-    for (int k = 0; k < W.surface_count; k++)
-        if (is_near(W.surfaces + k, d)
-                && gap_to(W.surfaces + k, x, y, d->radius, &nx, &ny)
-                    < MIN(0, gap_to(W.surfaces + k, d->x, d->y, d->radius, &nx, &ny)))
+    const int *list;
+    int count = surfaces_near(i, &list);
+    for (int n = 0; n < count; n++) {
+        const Surface *s = W.surfaces + list[n];
+        if (is_near(s, d) && gap_to(s, x, y, d->radius, &nx, &ny)
+                < MIN(0, gap_to(s, d->x, d->y, d->radius, &nx, &ny)))
             return;
+    }
     double press = press_on(d, W.surfaces + (-1 - last->j), last->nx, last->ny);
     last->need += 0.5 * MAX(press, 0) * until;
 }
@@ -187,7 +190,10 @@ int find_contacts(double h, int *woke) {
         int first = W.contact_count;
         double bound = d->impacts > CROWDED ? INFINITY : left_over(d, d->impacts, -1, d->radius);
         if (d->supports) bound = MAX(bound, W.interact ? MAX(W.soft, W.skip * d->radius) : W.soft);
-        for (int k = 0; k < W.surface_count; k++) {
+        const int *list;
+        int count = surfaces_near(i, &list);
+        for (int n = 0; n < count; n++) {
+            int k = list[n];
             if (!is_near(W.surfaces + k, d)) continue;
             double inside = pressed_inside(d, k), most = MAX(bound, inside ? W.soft + 2 * h * inside : 0);
             if (!add(i, -1 - k, d->radius, most, h)) return 0;
@@ -391,10 +397,45 @@ static void turn_slip(Contact *c) {
     c->impulse[1] += change[1];
 }
 
+/* Sort the contacts by islands of disks that touch each other, in the order in which these begin;
+   within one they keep theirs. What the contacts of the step before were is not needed any more. */
+static void sort_by_islands(void) {
+    int *parent = W.queue, *first = W.moved, *next = W.links;
+    for (int i = W.low; i < W.high; i++) {
+        parent[i] = i;
+        first[i] = -1;
+    }
+    for (int n = 0; n < W.contact_count; n++)
+        if (W.contacts[n].two) parent[island_of(W.contacts[n].i)] = island_of(W.contacts[n].j);
+    /* Of each island a list of its contacts, which begins with its last. */
+    for (int n = W.contact_count - 1; n >= 0; n--) {
+        int k = island_of(W.contacts[n].i);
+        next[n] = first[k];
+        first[k] = n;
+    }
+    int count = 0;
+    for (int n = 0; n < W.contact_count; n++) {
+        int k = island_of(W.contacts[n].i);
+        for (int m = first[k]; m >= 0; m = next[m]) {
+            W.earlier[count] = W.contacts[m];
+            W.earlier[count++].island = k;
+        }
+        first[k] = -1;
+    }
+    Contact *c = W.contacts;
+    W.contacts = W.earlier;
+    W.earlier = c;
+}
+
 void solve_contacts(void) {
+    if (W.interact) sort_by_islands();
     for (int n = 0; n < W.contact_count; n++) push(W.contacts + n, W.contacts[n].impulse);
-    sweep_contacts(W.contacts, W.contact_count, W.sweeps, W.interact ? PLAIN : W.sweeps, W.accurate,
-                   W.interact ? 1e300 : MAX(W.accurate, 1e-9));
+    for (int from = 0, to = 0; from < W.contact_count; from = to) {
+        Contact *list = W.contacts + from;
+        while (to < W.contact_count && (!W.interact || W.contacts[to].island == list->island)) to++;
+        sweep_contacts(list, to - from, W.sweeps, W.interact ? PLAIN : W.sweeps, W.accurate,
+                       W.interact ? 1e300 : MAX(W.accurate, 1e-9));
+    }
     for (int n = 0; n < W.contact_count; n++) {
         /* Rounding presses nobody; with endless friction even that would pull. */
         Contact *c = W.contacts + n;

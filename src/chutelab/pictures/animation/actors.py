@@ -160,8 +160,8 @@ def crowd(
     said = f"{len(particles) + 1} of {of_all}" if thinned else f"{of_all} particles"
     streams, stream = recording.machine.streams, recording.machine.releases.stream
     if len(streams) == 1:
-        dot = {"ls": "none", "marker": "o", "ms": 6.0, "color": style.STREAM, "label": said}
-        handles = [Line2D([], [], **dot)] if recording.count > 1 else []
+        dot: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6.0, "color": style.STREAM}
+        handles = [Line2D([], [], **dot, label=said)] if recording.count > 1 else []
     else:
         handles = stream_handles(recording.machine)
     if not len(particles):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -103,7 +104,7 @@ class Bodies:
         self._outlines = [outline for outline in outlines if outline is not None]
         self._round, self._angular = np.flatnonzero(~angular), np.flatnonzero(angular)
         self.artists: list[Line2D | EllipseCollection | PolyCollection] = []
-        look = {"zorder": zorder, "animated": animated}
+        look: dict[str, Any] = {"zorder": zorder, "animated": animated}
         self._disks: Line2D | EllipseCollection | None = None
         self._polygons: PolyCollection | None = None
         if len(self._round):
@@ -210,7 +211,7 @@ def draw_bodies(ax: Axes, recording: Recording, t: float) -> Axes:
     ]
     drawn.append(("particle 0", style.STRIKE, released[released == 0]))
     for gid, color, particles in drawn:
-        look = {"least": LEAST, "edge": WHITE, "zorder": 4.0}
+        look: dict[str, Any] = {"least": LEAST, "edge": WHITE, "zorder": 4.0}
         position, angle = motion(recording, particles, np.array([t]))
         Bodies(ax, recording, particles, gid, color, **look).move(position[0], angle[0])
     for path in strings(recording, np.array([t]))(0):

@@ -166,7 +166,7 @@ def bodily(recording: Recording) -> bool:
 
 def stays(recording: Recording) -> Bools:
     """Tell which particles are still to be seen after their end, (N,): those of many that lie."""
-    return (recording.ended == REASONS.index("settled")) & (recording.count > MANY)
+    return np.asarray((recording.ended == REASONS.index("settled")) & (recording.count > MANY))
 
 
 def places(recording: Recording, particles: Sequence[int] | Ints, times: Floats) -> Floats:

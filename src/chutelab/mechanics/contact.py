@@ -41,7 +41,7 @@ def rim_share(radius: Floats, mass: Floats, inertia: Floats) -> Floats:
     turns = np.greater(inertia, 0.0)
     share = np.where(turns, inertia / np.where(turns, inertia + mass * radius**2, 1.0), 1.0)
     # That of a disk is not to depend on the rounding of its I.
-    return np.where(np.abs(share - DISK_SHARE) < 1e-15, DISK_SHARE, share)
+    return np.asarray(np.where(np.abs(share - DISK_SHARE) < 1e-15, DISK_SHARE, share))
 
 
 def impulses(

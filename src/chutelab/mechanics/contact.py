@@ -77,7 +77,8 @@ def impulses(
 def limited(slip: ArrayLike, normal: Floats, friction: Floats, share: ArrayLike) -> Floats:
     """Return the impulse per mass that stops the slip, or the most that friction allows."""
     most = grip_limit(friction, normal)
-    return np.minimum(np.maximum(-np.asarray(share) * np.asarray(slip), -most), most)
+    wanted = -np.asarray(share) * np.asarray(slip)
+    return np.asarray(np.minimum(np.maximum(wanted, -most), most))
 
 
 def grip_limit(friction: Floats, normal: Floats) -> Floats:

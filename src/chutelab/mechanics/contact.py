@@ -30,15 +30,16 @@ DISK_SHARE = 1.0 / 3.0
 much as it would a particle that does not turn."""
 
 
-def rim_share(radius: Floats, mass: Floats, inertia: Floats) -> Floats:
+def rim_share(radius: ArrayLike, mass: ArrayLike, inertia: ArrayLike) -> Floats:
     """Return m*/m = I/(I + m r²) at the rim of particles, (...); 1 of those that do not turn.
 
     Examples
     --------
-    >>> rim_share(0.1, 2.0, 0.4 * 2.0 * 0.1**2).round(12) == round(2 / 7, 12)
+    >>> abs(float(rim_share(0.1, 2.0, 0.4 * 2.0 * 0.1**2)) - 2.0 / 7.0) < 1e-15
     True
     """
-    turns = np.greater(inertia, 0.0)
+    radius, mass, inertia = (np.asarray(given) for given in (radius, mass, inertia))
+    turns = inertia > 0.0
     share = np.where(turns, inertia / np.where(turns, inertia + mass * radius**2, 1.0), 1.0)
     # That of a disk is not to depend on the rounding of its I.
     return np.asarray(np.where(np.abs(share - DISK_SHARE) < 1e-15, DISK_SHARE, share))

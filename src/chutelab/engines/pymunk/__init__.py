@@ -73,7 +73,8 @@ def run(machine: Machine, progress: Progress | None = None) -> Recording:
 
     world = World(machine)
     try:
-        if machine.interact or not machine.align:
+        boxes = any(outline is not None for outline in machine.outlines)
+        if machine.interact or not machine.align or boxes or machine.threads:
             shared = Shared(machine, world, recorder)
             try:
                 shared.run(report)

@@ -22,7 +22,7 @@ import numpy as np
 import pymunk
 from pymunk import Vec2d, batch
 
-from chutelab.engines.pymunk.shapes import SLOP, Shapes
+from chutelab.engines.pymunk.shapes import Shapes
 from chutelab.engines.pymunk.world import Bend, Carriage, Flight, Tracks, World
 from chutelab.machine import Machine
 from chutelab.results import REASONS, Kind
@@ -126,11 +126,12 @@ class Shared:
         self.spin[count:] = [face.spin for face in faces]
         self.bent = np.array([False] * count + [isinstance(face, Bend) for face in faces])
         self.bends = bool(self.bent.any())
+        self.before = np.zeros(0, dtype=np.int64)
         self.center = np.zeros((2, rows))
         for row, face in enumerate(faces, count):
             if isinstance(face, Bend):
                 self.center[:, row] = face.center
-        # Of those who turn: 1/I, and rolling friction's arm as a share of the radius, if any has it.
+        # Of those who turn: 1/I, and rolling friction's arm over the radius, if any has it.
         self.ease, share = np.zeros((2, rows))
         inertia = np.broadcast_to(p.inertia, count)
         np.divide(1.0, inertia, out=self.ease[:count], where=inertia > 0.0)
@@ -215,15 +216,7 @@ class Shared:
         if not len(others):
             return False
         if self.corners:
-            body, shape = self.bodies[i]
-            body.position = x + late * v
-            shape.cache_bb()
-            touch = SLOP * self.shapes.smallest + 2.0 * self.world.hair
-            return any(
-                point.distance < -touch
-                for k in others
-                for point in shape.shapes_collide(self.bodies[k][1]).points
-            )
+            return self.shapes.taken(i, x + late * v)
         now = self.state[1, :2, others] - (x + late * v)
         apart = now, now - late * (self.state[1, 2:4, others] - v)
         near = 4.0 * self.r**2
@@ -339,6 +332,9 @@ class Shared:
         sums[0], sums[1] = rub * belt, -0.5 * push * (rate[0] + rate[1])
         sums[2] = -0.5 * rub * (slip[0] + slip[1])
         sums[3] = (np.abs(rate[1]) < STILL) & (np.abs(slip[1]) < STILL) & ~self.throws[other]
+        if self.arm is not None:
+            rolls = self.radius[one] * np.abs(mine[1, 2] - others[1, 2] - self.spin[other])
+            sums[3] *= (self.arm[one] == 0.0) | (rolls < STILL)
         pair = other < self.count
         self.recorder.by_surface[-1] += sums[:3] @ pair
         for k in np.flatnonzero(pair) if self.rides else ():
@@ -363,6 +359,11 @@ class Shared:
         surface = self.surface[other]
         self._riding(one[~pair], surface[~pair])
         lands = (surface == self.machine.landing) & ~self.landed[one]
+        if self.bends:
+            # From one link of a chain to the next is no blow.
+            contact = one * rows + other
+            first &= ~np.isin(contact, self.before)
+            self.before = contact
         told = np.flatnonzero(lands | first & (rate[0] < -self.g * self.h))
         if self.corners and len(told):
             # Of all points of a contact one event.

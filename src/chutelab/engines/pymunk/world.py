@@ -310,7 +310,7 @@ class World:
             float(values[n]) for values in (arcs.radius, arcs.begin, arcs.extent)
         )
         whole = extent >= 2.0 * pi
-        body = pymunk.Body(body_type=pymunk.Body.KINEMATIC if whole else pymunk.Body.STATIC)
+        body = pymunk.Body(body_type=pymunk.Body.STATIC)
         body.position = center
         # A shape that is not in the Space does not keep its body.
         self.space.add(body)
@@ -318,7 +318,7 @@ class World:
         circle.cache_bb()
         foot = pymunk.Circle(pymunk.Body(body_type=pymunk.Body.KINEMATIC), 0.0)
         if whole:
-            about["spin"] = body.angular_velocity = -about["speed"] / radius
+            about["spin"] = -about["speed"] / radius
             self._add(Bend(circle, tangent=None, foot=foot, begin=0.0, extent=inf, **about))
             return
         more = sqrt(2.0 * JOINT * self.hair / radius)

@@ -523,7 +523,7 @@ def test_a_box_slides_down_an_incline_where_it_is_steeper_than_friction(degrees,
         assert abs(turned(got, 0)) < 5e-4
         assert residual(got) < 1e-5
     assert errors[-1] < 2e-5
-    assert errors[0] / errors[-1] > 1.9
+    assert errors[0] / errors[-1] > 1.9 or errors[0] < 1e-12
 
 
 @pytest.mark.parametrize(("degrees", "tips"), [(25.0, False), (28.0, True)])

@@ -12,6 +12,7 @@ from pymunk import Vec2d
 
 from chutelab.engines.pymunk.world import GRIP, PARTICLE, SURFACE, Bend, Face, World
 from chutelab.machine import Machine
+from chutelab.util.arrays import Floats
 
 SLOP, BIAS = 1e-3, 1e-97
 """Overlap that Chipmunk leaves alone, as a share of the radius, and the share of what is beyond it
@@ -21,6 +22,11 @@ rebound, a step late, stay where they sank: in `stream` at 1 ms 1 % of all conta
 46 % of the radius, with these by 1.4 %. The residual is 3e-4 either way, as all of it is pushed out
 at last: that work is no contact's impulse, and the ledger shows it as residual. Without any slop
 disks that lie still lose contact every few steps."""
+
+ROUND = 3e-3
+"""Share of its smallest half-width by which a polygon's corners are rounded: `SLOP` and more. How
+two faces lie on each other Chipmunk tells from a distance above 0 between what is not rounded; at
+0 its normal may be anything."""
 
 FACES = 30
 """Iterations of Chipmunk's solver where particles have corners: the two points of a face share
@@ -44,7 +50,7 @@ class Shapes:
     Attributes
     ----------
     smallest : float
-        Radius of the smallest particle, m.
+        Radius of the smallest particle, or a polygon's smallest half-width, m.
     corners : bool
         Whether some particles are no disks.
     bodies : list
@@ -62,7 +68,11 @@ class Shapes:
     def __init__(self, machine: Machine, world: World) -> None:
         self.machine, self.world = machine, world
         m, space = machine, world.space
-        self.smallest = float(np.min(m.particle.radius))
+        sizes = np.broadcast_to(m.particle.radius, m.count).astype(float)
+        for kind, outline in enumerate(m.outlines):
+            if outline is not None:
+                sizes[m.releases.kind == kind] = self._faces(outline)[0]
+        self.smallest = float(sizes.min())
         self.corners = any(outline is not None for outline in m.outlines)
         space.gravity, space.collision_bias = Vec2d(0.0, -m.gravity), BIAS
         space.collision_slop = SLOP * self.smallest + world.hair
@@ -110,11 +120,27 @@ class Shapes:
         body, shape = self.world.disk(i)
         outline = self.machine.outlines[self.machine.releases.kind[i]]
         if outline is not None:
-            shape = pymunk.Poly(body, outline.tolist(), radius=self.world.hair)
+            width, out = self._faces(outline)
+            by = ROUND * width
+            # Corners of the polygon whose faces are further in by as much as it is rounded.
+            back = np.roll(out, 1, axis=0)
+            share = 1.0 + (out * back).sum(axis=1, keepdims=True)
+            inner = outline - by * (out + back) / share
+            shape = pymunk.Poly(body, inner.tolist(), radius=by + self.world.hair)
             shape.collision_type = PARTICLE
         if not self.machine.interact:
             shape.filter = pymunk.ShapeFilter(group=1)
         return body, shape
+
+    @staticmethod
+    def _faces(outline: Floats) -> tuple[float, Floats]:
+        """Return a polygon's smallest distance from centre to face (m), and its faces' normals."""
+        along = np.roll(outline, -1, axis=0) - outline
+        out = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
+        distance = (outline * out).sum(axis=1)
+        # Corners may go round either way.
+        out *= np.sign(distance)[:, None]
+        return float(np.abs(distance).min()), out
 
     def _pairs(self) -> None:
         """Give particles values of which Chipmunk's products are those of pairs.

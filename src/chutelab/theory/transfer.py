@@ -165,6 +165,28 @@ def transfer(
     return Transfer(reason=found.reason.astype(np.str_).reshape(turning.shape), **answers)
 
 
+def rebound(
+    *,
+    normal: Floats,
+    tangential: Floats,
+    rim: Floats,
+    restitution: Floats,
+    friction: Floats,
+    spin: Bools,
+    inertia: Floats,
+) -> tuple[Floats, Floats, Floats]:
+    """Return velocities off the plate and down along it, and the rim's, after an impact, m/s.
+
+    Before it they are `normal`, into the plate, `tangential` and `rim`.
+    """
+    # Coulomb: the impulse that stops the slip, or as much of it as friction can give.
+    slip = tangential - rim
+    limit = friction * (1.0 + restitution) * normal
+    share = np.where(spin, inertia / (1.0 + inertia), 1.0)  # m*/m
+    impulse = np.clip(slip * share, -limit, limit)
+    return restitution * normal, tangential - impulse, rim + np.where(spin, impulse / inertia, 0.0)
+
+
 def belt_power(
     *,
     rate_t_h: ArrayLike,
@@ -302,14 +324,10 @@ def stages(
         away, down = v2r * np.sin(phi2r), v2r * np.cos(phi2r)
         rim = left.rim
     else:
-        # Coulomb: the impulse that stops the slip, or as much of it as friction can give.
-        slip = tangential - left.rim
-        limit = plate_friction * (1.0 + restitution) * normal
-        share = np.where(spin, inertia / (1.0 + inertia), 1.0)  # m*/m
-        impulse = np.clip(slip * share, -limit, limit)
-        down = tangential - impulse
-        rim = left.rim + np.where(spin, impulse / inertia, 0.0)
-        away = restitution * normal
+        away, down, rim = rebound(
+            normal=normal, tangential=tangential, rim=left.rim, restitution=restitution,
+            friction=plate_friction, spin=spin, inertia=inertia,
+        )  # fmt: skip
         v2r = np.hypot(away, down)  # Eq. (9) corrected
         phi2r = np.arctan2(away, down)  # Eq. (8)
     found.keep(phi2r=phi2r, v2r=v2r, omega2=turning(rim))

@@ -8,9 +8,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from chutelab.engines.exact.contacts import end_slip, face_force, rest_on, settle_law, strike
+from chutelab.engines.exact.contacts import (
+    end_slip,
+    face_force,
+    load_on,
+    rest_on,
+    strike,
+)
 from chutelab.engines.exact.detect import FEW, Motion, bounds, first_contact
-from chutelab.engines.exact.obstacles import NONE, dot, pick, rows_of
+from chutelab.engines.exact.joints import NONE
+from chutelab.engines.exact.obstacles import dot, pick, rows_of
 from chutelab.engines.exact.particle_state import Mode, State
 from chutelab.mechanics.ballistics import descent
 from chutelab.mechanics.contact import STEP_ANGLE, Circle, Outcome, advance, normal_force
@@ -18,67 +25,67 @@ from chutelab.results import Kind
 from chutelab.util.arrays import Bools, Floats, Ints
 
 
-def ride_on(s: State, index: Ints, circle: Ints) -> None:
-    """Go on from the end of a face round a circle, or fly if it curves away too fast."""
+def go_on(s: State, index: Ints, obstacle: Ints, side: Floats) -> None:
+    """Go on from the end of a face or an arc on what follows, or fly if nothing holds there."""
     if not len(index):
         return
-    left, side, surface = s.on[index].copy(), s.side[index].copy(), s.obstacles.surface[s.on[index]]
-    c = s.contact(index, circle, np.zeros_like(side))
-    rho = pick(s.obstacles.rho, index, circle - s.obstacles.segments)
-    w = dot(s.v.take(index, axis=1), c.tangent)
-    stays = s.weight_on(index, c.normal) - w**2 / rho > 0.0
-    rest_on(s, index[stays], circle[stays], np.zeros_like(side[stays]), np.zeros(int(stays.sum())))
+    o, left, face = s.obstacles, s.on[index], s.side[index]
+    ends = obstacle == NONE
+    obstacle, side = np.where(ends, left, obstacle), np.where(ends, face, side)
+    stays = ~ends & (load_on(s, index, obstacle, s.contact(index, obstacle, side)) > 0.0)
     off = ~stays
-    s.part(index[off], surface[off])
-    # From the pulley it flies tangentially, above it for good; from an end it leaves the face.
-    from_pulley = circle[off] == s.obstacles.pulley
-    s.fly(
-        index[off],
-        np.where(from_pulley, circle[off], left[off]),
-        np.where(from_pulley, 0, side[off]),
-        2,
-    )
+    s.part(index[off], o.surface[left[off]])
+    # From a tangential joint it flies off what follows; from an end it leaves what ends.
+    flush = ends | (obstacle < o.segments) | (obstacle >= o.first_arc)
+    last, last_side = np.where(flush, obstacle, left), np.where(flush, side, face)
+    s.fly(index[off], last[off], last_side[off], 2)
+    rest_on(s, index[stays], obstacle[stays], side[stays], np.zeros(np.count_nonzero(stays)))
 
 
-def carry_round(s: State, index: Ints) -> None:
-    """Carry particles by adhesion from the top of the pulley until cos φ1 = v²/(g ρ)."""
+def carry_round(s: State, index: Ints, start: Floats, v: Floats) -> None:
+    """Carry particles by adhesion round the pulley, from an angle until cos φ1 = v²/(g ρ)."""
     if not len(index):
         return
     o = s.obstacles
-    s.p[0, index] = 0.0
-    rho, v = s.p[1, index], s.v[0, index]
+    up = np.empty((2, len(index)))
+    up[0], up[1] = np.sin(start), np.cos(start)
+    rho = dot(s.p[:, index], up)
+    s.p[:, index] = rho * up
     left = s.stop[index] - s.age[index]
     cosine = np.minimum(v**2 / (s.gravity[index] * rho), 1.0)
-    end, struck, found = np.zeros(len(index)), np.zeros(len(index), dtype=bool), None
-    if np.count_nonzero(cosine < 1.0):
-        end = np.arctan2(np.sqrt((1.0 - cosine) * (1.0 + cosine)), cosine)
+    end, struck, found = start.copy(), np.zeros(len(index), dtype=bool), None
+    stays = cosine < up[1]
+    if np.count_nonzero(stays):
+        last = np.arctan2(np.sqrt((1.0 - cosine) * (1.0 + cosine)), cosine)
+        end = np.where(stays, last, start)
         pulley = np.full(len(index), o.pulley - o.segments)
-        top, clockwise = np.zeros(len(index)), np.ones(len(index))
-        found = bounds(o, index, pulley, clockwise, rho, top, s.radius[index])[1]
+        clockwise = np.ones(len(index))
+        found = bounds(o, index, pulley, clockwise, rho, start, s.radius[index])[1]
         struck = ~found["handover"] & (found["angle"] < end)
         end = np.where(struck, found["angle"], end)
-        end = np.where(end * rho / v > left, left * v / rho, end)
-        _ease_round(s, index, rho, v, end)
+        end = np.where((end - start) * rho / v > left, start + left * v / rho, end)
+        _ease_round(s, index, rho, v, start, end)
     over = s.age[index] >= s.stop[index]
     hit, free = struck & ~over, ~struck & ~over
     s.finish(index[over], "time")
     s.part(index[free], 0)
-    s.fly(index[free], o.pulley, 0, 2 + (end[free] > 0.0))
+    s.fly(index[free], o.pulley, 0, 2 + (end[free] > start[free]))
     if found is not None and np.count_nonzero(hit):
         strike(s, index[hit], found["obstacle"][hit], found["side"][hit])
 
 
-def _ease_round(s: State, index: Ints, rho: Floats, v: Floats, end: Floats) -> None:
-    """Carry particles from the top of the pulley to an angle, knot by knot."""
+def _ease_round(s: State, index: Ints, rho: Floats, v: Floats, first: Floats, end: Floats) -> None:
+    """Carry particles from an angle of the pulley to another, knot by knot."""
     surface = s.obstacles.surface[s.obstacles.pulley]
-    start, above = s.age[index], rho.copy()
-    pieces = np.ceil(end / STEP_ANGLE)
+    start, above, way = s.age[index], rho * np.cos(first), end - first
+    pieces = np.ceil(way / STEP_ANGLE)
     for n in range(1, int(pieces.max()) + 1):
         on = (pieces >= n).nonzero()[0]
-        riders, part = index[on], end[on] * (n / pieces[on])
+        riders, turn = index[on], way[on] * (n / pieces[on])
+        part = first[on] + turn
         _place(s, riders, rho[on], part, v[on])
-        s.age[riders] = start[on] + rho[on] * part / v[on]
-        # The belt lets the particle down: F v = -m g v sin φ, summed from the last knot.
+        s.age[riders] = start[on] + rho[on] * turn / v[on]
+        # The belt lifts the particle, or lets it down: F v = -m g v sin φ, from the last knot on.
         height = rho[on] * np.cos(part)
         work = -s.mass[riders] * s.gravity[riders] * (above[on] - height)
         s.book(riders, np.full(len(riders), surface), work)
@@ -91,8 +98,11 @@ def ride(s: State, index: Ints) -> None:
     circle = s.on[index]
     c = s.contact(index, circle, s.side[index])
     rho = pick(s.obstacles.rho, index, circle - s.obstacles.segments)
+    phi = np.arctan2(c.normal[0], c.normal[1])
+    # The angle goes on where a turn is complete.
+    phi += 2.0 * np.pi * np.rint((s.angle[index] - phi) / (2.0 * np.pi))
     state = Circle(
-        phi=np.arctan2(c.normal[0], c.normal[1]),
+        phi=phi,
         w=dot(s.v.take(index, axis=1), c.tangent),
         z=s.z[index],
         rho=rho,
@@ -100,7 +110,7 @@ def ride(s: State, index: Ints) -> None:
         friction=c.friction,
         belt=c.belt,
         slip=s.slip[index],
-        turns=np.full(len(index), s.spins),
+        share=s.share[index],
         low=s.bounds["angle"][0, index],
         high=s.bounds["angle"][1, index],
     )
@@ -112,6 +122,7 @@ def ride(s: State, index: Ints) -> None:
     s.age[index[go]] += step.dt[go]
     center = s.p.take(index, axis=1) - rho * c.normal
     _place(s, index[go], rho[go], step.phi[go], step.w[go], center[:, go])
+    s.angle[index[go]] = step.phi[go]
     s.z[index[go]] = step.z[go]
     mass = s.mass[index]
     s.book(
@@ -138,7 +149,7 @@ def ride(s: State, index: Ints) -> None:
         there = s.bounds[way, index]
         obstacle, side = there["obstacle"], there["side"]
         joins = at & there["handover"]
-        rest_on(s, index[joins], obstacle[joins], side[joins], np.zeros(np.count_nonzero(joins)))
+        go_on(s, index[joins], obstacle[joins], side[joins])
         hit = at & ~joins
         if hit.any():
             strike(s, index[hit], obstacle[hit], side[hit])
@@ -152,9 +163,6 @@ def _place(
     s.p[:, index] = center + rho * np.stack([sine, cosine])
     s.v[:, index] = w * np.stack([cosine, -sine])
 
-
-COLLINEAR = 1e-12
-"""Sine of the angle at a joint below which one segment simply goes on as the next."""
 
 CLEAR = 16.0
 """Way, in `Obstacles.touch`, after which a point has been away from what it touches."""
@@ -192,15 +200,22 @@ def carry(s: State, index: Ints) -> None:
     """Move particles that the belt carries on to the pulley, or to what is in the way."""
     motion = _motion(s, index, AT_REST)
     motion.never = s.obstacles.under_belt
-    v = motion.velocity[0]
-    ends, stops = -motion.position[0] / v, s.stop[index] - s.age[index]
+    before, up_belt = motion.position, rows_of(s.up_belt, index)
+    v, stops = dot(motion.velocity, up_belt), s.stop[index] - s.age[index]
+    ends = -dot(before, up_belt) / v
     ends[~(v > 0.0)] = np.inf
     dt, hits, obstacle, side = _next(s, motion, np.minimum(ends, stops))
     _move(s, motion, dt)
+    tilted = np.count_nonzero(up_belt[1]) > 0
+    if tilted:
+        lifted = s.mass[index] * s.gravity[index] * (s.p[1, index] - before[1])
+        s.book(index, s.obstacles.surface[np.zeros(len(index), dtype=np.int64)], lifted)
     s.knots(index)
     free = ~hits
     _stop(s, index[free & (stops < ends)])
-    carry_round(s, index[free & (ends <= stops)])
+    onto = free & (ends <= stops)
+    start = np.arctan2(-up_belt[1], up_belt[0]) if tilted else np.zeros(len(index))
+    carry_round(s, index[onto], start[onto], v[onto])
     _strike(s, index, hits, obstacle, side)
 
 
@@ -210,10 +225,10 @@ def slide(s: State, index: Ints) -> None:
     c = s.contact(index, on, face)
     pull, force = face_force(s, index, c)
     motion = _motion(s, index, pull)
-    motion.on = on
+    motion.on, motion.on_side = on, face
     # The slip is linear in time, while there is one.
     slip = dot(motion.velocity, c.tangent) + s.z[index] - c.belt
-    rate = dot(pull, c.tangent) + (2.0 * force if s.spins else 0.0)
+    rate = dot(pull, c.tangent) + (s.lever[index] * force if s.spins else 0.0)
     fading = s.slip[index] * rate < 0.0
     grips = np.where(fading, np.maximum(-slip / np.where(fading, rate, 1.0), 0.0), np.inf)
     ends = _end(s, motion)
@@ -225,7 +240,7 @@ def slide(s: State, index: Ints) -> None:
     _move(s, motion, dt)
     s.snap(index, on, face)
     if s.spins:
-        s.z[index] += 2.0 * force * dt
+        s.z[index] += s.lever[index] * force * dt
     # What was left at the beginning is some way off now.
     s.left[index[dt > 0.0]] = NONE
     s.knots(index)
@@ -324,17 +339,6 @@ def _leave_face(s: State, index: Ints) -> None:
         s.p.take(index, axis=1) - pick(o.start, index, segment), pick(o.tangent, index, segment)
     )
     end = (foot > 0.5 * pick(o.length, index, segment)).astype(np.int64)
-    following, circle = o.follow[segment, end], o.end_circle[segment, end]
-    normal = side * pick(o.normal, index, segment)
-    next_normal = pick(o.normal, index, np.maximum(following, 0))
-    sine = normal[0] * next_normal[1] - normal[1] * next_normal[0]
-    smooth = (following != NONE) & (np.abs(sine) <= COLLINEAR)
-    onto = index[smooth]
-    s.on[onto] = following[smooth]
-    s.side[onto] = np.where(dot(normal[:, smooth], next_normal[:, smooth]) > 0.0, 1.0, -1.0)
-    settle_law(s, onto)
-    round_ = ~smooth & (circle != NONE)
-    ride_on(s, index[round_], circle[round_])
-    off = ~smooth & (circle == NONE)
-    s.part(index[off], o.surface[segment[off]])
-    s.fly(index[off], segment[off], side[off], 2)
+    onward, onward_side = o.joints.onward
+    face = (side < 0.0).astype(np.int64)
+    go_on(s, index, onward[segment, end, face], onward_side[segment, end, face])

@@ -117,6 +117,7 @@ class Shapes:
 
     def _body(self, i: int) -> tuple[pymunk.Body, pymunk.Shape]:
         """Return a particle's body with its shape, not yet in the Space."""
+        shape: pymunk.Shape
         body, shape = self.world.disk(i)
         outline = self.machine.outlines[self.machine.releases.kind[i]]
         if outline is not None:
@@ -169,6 +170,7 @@ class Shapes:
         shape, space = face.shape, self.world.space
         assert shape.body is not None
         if isinstance(face, Bend):
+            assert face.foot.body is not None
             space.remove(face.foot, face.foot.body)
             return self._chain(face)
         if not isinstance(shape, pymunk.Segment):
@@ -217,7 +219,7 @@ class Shapes:
         else:
             goes = float(face.speed != 0.0)
             before, after = a + goes * (a - points[1]), b + goes * (b - points[-2])
-        chain = []
+        chain = list[pymunk.Shape]()
         for k, (start, end) in enumerate(pairwise(points)):
             link = pymunk.Segment(body, start, end, 0.0)
             link.set_neighbors(points[k - 1] if k else before, (*points, after)[k + 2])

@@ -10,6 +10,11 @@ step's end. A ride that friction drives hops, ever longer towards its end, which
 surface pushed last. A disk rises from a rim like a t³/6, with a some 50 m/s³, so a place that is
 off by δ shifts the last push by (6 δ/a)^(1/3): in `slip` it is 21, 12, 5 and 4 ms early at 2, 1,
 0.5 and 0.25 ms, and no less at shorter steps, as `SLOP`, 4 µm there, stays.
+
+A pendulum's string keeps its length to v² h²/(2 L), and its period is of order 2. A string takes
+nothing while it is tight; what a jerk takes is a restitution loss of the particles. Balls that hang
+side by side hand a blow on one by one only if there are gaps between them, of 1e-4 r or more:
+contacts that touch Chipmunk solves all at once, and all balls move.
 """
 
 from __future__ import annotations

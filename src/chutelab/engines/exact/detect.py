@@ -429,13 +429,14 @@ def bounds(
             tilt = np.arctan2(outward[0], outward[1])
             angle = tilt - 0.5 * np.pi if (face > 0) == (end > 0) else tilt + 0.5 * np.pi
             closing = facing * np.sin(angle - tilt)
-            n = FACES.index(face)
-            obstacle, face_there = joints.obstacle(piece, face), np.float64(face)
-            goes = (here == this) & obstacles.present[epoch, obstacle]
-            if not onto:
-                closing = -closing
-                obstacle, face_there = (array[epoch, piece, end, n] for array in joints.onward)
-            narrow(angle, closing, goes, obstacle, face_there, True)
+            number = joints.obstacle(piece, face)
+            goes = (here == this) & obstacles.present[epoch, number]
+            if onto:
+                narrow(angle, closing, goes, number, face, True)
+            else:
+                at = (epoch, piece, end, FACES.index(face))
+                obstacle, side_there = (array[at] for array in joints.onward)
+                narrow(angle, -closing, goes, obstacle, side_there, True)
     crown = pick(joints.crown, rows, circle)
     tilt = np.arctan2(crown[0], crown[1])
     moves = (crown != 0.0).any(axis=0) & (pick(obstacles.material, rows, here)[0] != 0.0)

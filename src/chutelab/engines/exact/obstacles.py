@@ -282,10 +282,10 @@ def obstacles(machine: Machine, far: float = 0.0) -> Obstacles:
     flat, arcs = len(length), len(bends.order)
 
     owner = [*kept, *(len(seg.surface) + bends.order).tolist()]
-    first_to_stay = range(len(spots))
+    first_to_stay = list(range(len(spots)))
     if len(changes):
         stays = (np.isinf(came) & np.isinf(went))[owner]
-        first_to_stay = sorted(first_to_stay, key=lambda s: not stays[s])
+        first_to_stay.sort(key=lambda s: not stays[s])
     # Each place where pieces of disks end is a circle; a point meets it with probability zero. An
     # end that lies on an arc, or that of the belt on the pulley, cannot be met.
     rests = np.full((len(spots), 2), NONE)

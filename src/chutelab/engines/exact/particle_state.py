@@ -190,7 +190,7 @@ class State:
             return np.asarray(self.stop[index])
         later = self.changes[:, index]
         later = np.where(later > self.age[index], later, np.inf).min(axis=0)
-        return np.minimum(self.stop[index], later)
+        return np.asarray(np.minimum(self.stop[index], later))
 
     def vanish(self, index: Ints) -> Floats:
         """Return the ages at which what the particles are on vanishes, (k,), s."""

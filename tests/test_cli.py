@@ -36,7 +36,8 @@ FILES = [
 # The contract of section 4, copied by hand.
 KEYS = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
-    "impact", "landing", "ended", "stopped", "rolling", "waited", "squeezed", "ledger", "theory",
+    "impact", "landing", "ended", "stopped", "rolling", "waited", "squeezed", "drag",
+    "ledger", "theory",
     "theory_as_printed", "error", "accuracy",
 ]  # fmt: skip
 THEORY = [
@@ -972,6 +973,7 @@ def test_help_lists_the_commands():
         "figure",
         "tables",
         "scenes",
+        "materials",
         "new",
         "schema",
         "verify",
@@ -1007,6 +1009,7 @@ def test_shells_complete_scenes_and_kinds():
     expected = ["plain,perpendicular", "plain,perpendicular-fast", "file,perp"]
     assert sorted(completed("run", "perp")) == sorted(expected)
     assert completed("run", "slip", "--only", "png,c") == ["plain,png,csv"]
+    assert completed("materials", "g") == ["plain,gravel", "plain,glass"]
 
 
 def test_a_run_that_takes_too_long_ends_with_what_is_recorded():

@@ -158,6 +158,17 @@ def test_a_gate_is_dashed_and_faded_and_says_when_it_moves() -> None:
     }  # fmt: skip
 
 
+def test_the_name_of_a_gate_is_not_where_it_lets_fall() -> None:
+    hopper = [Line("hopper", (s * 0.3, 0.4), (s * 0.05, 0.0)) for s in (-1.0, 1.0)]
+    gate = Line("gate", (-0.05, 0.0), (0.05, 0.0), vanishes=0.4)
+    bin_ = Line("bin", (-0.4, -0.5), (0.4, -0.5))
+    ax = drawn(machine_of(*hopper, gate, bin_))
+    (name,) = [text for text in ax.texts if text.get_text().startswith("gate")]
+    box = name.get_window_extent()
+    (left, low), (right, high) = ax.transData.transform([(-0.05, -0.25), (0.05, 0.0)])
+    assert box.x1 < left or box.x0 > right or box.y1 < low or box.y0 > high
+
+
 PLACES = st.tuples(st.floats(-1.0, 1.0), st.floats(-0.7, 0.7))
 
 

@@ -189,6 +189,9 @@ LOOKED_AT = 8
 BEFORE = 0.3
 """Share of the window's width by which the incoming belt's name may stand before the belt."""
 
+FALL = 0.3
+"""Share of the window's height below a gate in which a name would be in the way of what falls."""
+
 FARTHER = (1.0, 2.5, 4.0)
 """Gaps between a surface and its name, the best first."""
 
@@ -222,6 +225,12 @@ class _Names:
             for parts in self.parts.values()
             for piece, _ in parts
         ]
+        # What a gate lets through falls.
+        fall = np.array([[0.0, 0.0], [0.0, -FALL * shown.height]])
+        for piece in found:
+            if piece.gate:
+                below = piece.points[len(piece.points) // 2 - 1 :][:2].mean(axis=0) + fall
+                self.lines.append((Path(ax.transData.transform(below)), False))
         if machine.pulley is not None:
             rim = Path.circle((0.0, 0.0), machine.pulley.radius)
             self.lines.append((rim.transformed(ax.transData), True))

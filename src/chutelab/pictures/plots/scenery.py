@@ -130,8 +130,7 @@ def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
     order = np.argsort(first["t"], kind="stable")
     at_release = np.concatenate([[0.0], np.cumsum(sum(recording.energies(first[order])))])
     released = np.searchsorted(first["t"][order], times, side="right")
-    mass = np.broadcast_to(recording.particle.mass, recording.count)[recording.released][order]
-    weight = np.concatenate([[0.0], np.cumsum(mass)])[released] * recording.gravity
+    weight = released * recording.particle.mass * recording.gravity
     heights = recording.knots["position"][:, 1]
     stays = recording.ended != REASONS.index("exit")
     staying = heights[np.repeat(stays, np.diff(recording.offsets))]
@@ -311,7 +310,9 @@ def _crowd(recording: Recording) -> Floats:
     Where they are released counts too if no belt carries them from there.
     """
     events = recording.events
-    carried = np.isin(events["particle"], recording.select(Kind.SEPARATION)["particle"])
+    left = recording.select(Kind.SEPARATION)
+    left = left[left["surface"] == recording.surface_index("incoming")]
+    carried = np.isin(events["particle"], left["particle"])
     counts = np.isin(events["kind"], STRUCK)
     counts |= ~carried & (events["kind"] == Kind.RELEASE)
     others = events[counts & (events["particle"] != 0)]

@@ -153,6 +153,10 @@ def note(ax: Axes, text: str) -> None:
 
 def legend_above(ax: Axes, columns: int, handles: list[Any] | None = None) -> None:
     """Add a legend right above axes, in one line if it fits; by default of all that has a label."""
+    if handles is not None and len(handles) > columns:
+        legend_above(ax, len(handles), handles)
+        if ax.get_legend().get_window_extent().x1 <= ax.get_window_extent().x1:
+            return
     ax.legend(
         handles=handles,
         loc="lower left",

@@ -92,10 +92,13 @@ def separation(
     never, sound = np.full(count, np.inf), np.zeros(count, dtype=np.int64)
     left = Separation(np.arctan2(sin, cos), cos, sin, speed.copy(), np.zeros(count), never, sound)
     slips = (start < 1.0) & np.isfinite(friction)
-    ride = _Ride(np.zeros(count), start, belt, np.zeros(count, dtype=np.bool_), start, left.rim)
+    tilted = np.not_equal(incline, 0.0)
+    if not (slips.any() or tilted.any()):
+        return left
     more = (np.asarray(part, dtype=np.float64) for part in (inertia, incline, ride_length))
     inertia, incline, ride_length = (np.broadcast_to(part, (count,)) for part in more)
-    tilted = incline != 0.0
+    tilted = np.broadcast_to(tilted, (count,))
+    ride = _Ride(np.zeros(count), start, belt, np.zeros(count, dtype=np.bool_), start, left.rim)
     if tilted.any():
         given = (speed, gravity, ride_radius, friction, spin, inertia, incline, ride_length)
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):

@@ -4,7 +4,7 @@ One round resolves the next event of all particles of a block at once. There is 
 particles.
 
 - `obstacles`: a machine's surfaces as faces and circles to meet.
-- `joints`: how they join, and what goes on where one ends.
+- `joints`: how the pieces of a machine join: what goes on where one ends.
 - `detect`: the next contact: of flight and slide, and of a ride round a circle.
 - `particle_state`: the state of a block of particles, and what it leaves behind.
 - `contacts`: what a contact does: blows, rest, grip and slip.

@@ -11,12 +11,14 @@ chute with the damping plate", Mech. Sci. 7, 167-177, 2016, doi:10.5194/ms-7-167
 - `obstacles`: first contacts of a disk with finite surfaces.
 - `prediction`: `predict`, particle 0 of a scene, or the reason why the closed form does not hold
   for it; `unbounded`, the same without looking at the finite machine.
+- `drag`: what air drag, left out everywhere else, would do.
 - `paper`: the paper's tables beside what the equations give.
 - `figures`: its figures.
 
 Only NumPy, `chutelab.scene` and `chutelab.util` are imported.
 """
 
+from chutelab.theory.drag import Drag, drag
 from chutelab.theory.paper import TABLES, Table, table
 from chutelab.theory.prediction import predict, unbounded
 from chutelab.theory.results import STAGES, Reason, Transfer
@@ -26,12 +28,14 @@ from chutelab.theory.transfer import Rebound, belt_power, transfer
 __all__ = [
     "STAGES",
     "TABLES",
+    "Drag",
     "Reason",
     "Rebound",
     "Slide",
     "Table",
     "Transfer",
     "belt_power",
+    "drag",
     "predict",
     "slide",
     "table",

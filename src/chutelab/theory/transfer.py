@@ -28,12 +28,15 @@ class Answers:
 
     def fail(self, where: Bools, reason: str) -> None:
         """State a reason where there is none yet."""
+        if not where.any():
+            return
         self.reason[where & self.fine] = reason
         self.fine &= ~where
 
     def require(self, what: str, holds: Bools) -> None:
         """Object to parameters; NaN never holds."""
-        self.fail(~holds, Reason.OUTSIDE.because(f"{what} is required"))
+        if not holds.all():
+            self.fail(~holds, Reason.OUTSIDE.because(f"{what} is required"))
 
     def keep(self, **values: Floats) -> None:
         """Store results of a stage where nothing has gone wrong up to now."""
@@ -165,6 +168,28 @@ def transfer(
     return Transfer(reason=found.reason.astype(np.str_).reshape(turning.shape), **answers)
 
 
+def rebound(
+    *,
+    normal: Floats,
+    tangential: Floats,
+    rim: Floats,
+    restitution: Floats,
+    friction: Floats,
+    spin: Bools,
+    inertia: Floats,
+) -> tuple[Floats, Floats, Floats]:
+    """Return velocities off the plate and down along it, and the rim's, after an impact, m/s.
+
+    Before it they are `normal`, into the plate, `tangential` and `rim`.
+    """
+    # Coulomb: the impulse that stops the slip, or as much of it as friction can give.
+    slip = tangential - rim
+    limit = friction * (1.0 + restitution) * normal
+    share = np.where(spin, inertia / (1.0 + inertia), 1.0)  # m*/m
+    impulse = np.clip(slip * share, -limit, limit)
+    return restitution * normal, tangential - impulse, rim + np.where(spin, impulse / inertia, 0.0)
+
+
 def belt_power(
     *,
     rate_t_h: ArrayLike,
@@ -248,8 +273,9 @@ def stages(
         speed=speed, ride_radius=ride_radius, gravity=gravity, friction=friction, spin=spin,
         inertia=inertia, incline=incline, ride_length=ride_length,
     )  # fmt: skip
-    for fault in range(1, len(FAULTS)):
-        found.fail(left.fault == fault, Reason.OUTSIDE.because(FAULTS[fault]))
+    if left.fault.any():
+        for fault in range(1, len(FAULTS)):
+            found.fail(left.fault == fault, Reason.OUTSIDE.because(FAULTS[fault]))
     found.keep(phi1=left.phi1, v1=left.v1, omega1=turning(left.rim))
 
     # Fly to the plate: the gap between disk and plate's line is a quadratic in time.
@@ -302,14 +328,10 @@ def stages(
         away, down = v2r * np.sin(phi2r), v2r * np.cos(phi2r)
         rim = left.rim
     else:
-        # Coulomb: the impulse that stops the slip, or as much of it as friction can give.
-        slip = tangential - left.rim
-        limit = plate_friction * (1.0 + restitution) * normal
-        share = np.where(spin, inertia / (1.0 + inertia), 1.0)  # m*/m
-        impulse = np.clip(slip * share, -limit, limit)
-        down = tangential - impulse
-        rim = left.rim + np.where(spin, impulse / inertia, 0.0)
-        away = restitution * normal
+        away, down, rim = rebound(
+            normal=normal, tangential=tangential, rim=left.rim, restitution=restitution,
+            friction=plate_friction, spin=spin, inertia=inertia,
+        )  # fmt: skip
         v2r = np.hypot(away, down)  # Eq. (9) corrected
         phi2r = np.arctan2(away, down)  # Eq. (8)
     found.keep(phi2r=phi2r, v2r=v2r, omega2=turning(rim))

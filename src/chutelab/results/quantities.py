@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.machine.releases import Squeeze, schedule, squeeze
+from chutelab.machine.releases import Squeeze, squeeze
 from chutelab.results.ledger import ledger
 from chutelab.results.recording import ENTRIES, EVENT, REASONS, Kind, Recording
 from chutelab.scene import Scene
@@ -241,7 +241,7 @@ def stopped(recording: Recording) -> Stopped | None:
     if not recording.machine.interact:
         # Each by itself: some are ahead of others.
         last = recording.knots["t"][recording.offsets[1:][under_way] - 1]
-        due = schedule(recording.scene)[halted & ~recording.released]
+        due = recording.machine.releases.t[halted & ~recording.released]
         t = min(float(last.min(initial=t)), float(due.min(initial=t)))
     released = int(np.count_nonzero(under_way))
     return Stopped(released, int(np.count_nonzero(halted)) - released, t)
@@ -275,7 +275,7 @@ class Waits:
 
 def waits(recording: Recording) -> Waits | None:
     """Return who waited for its place; None if nobody did."""
-    due, dt = schedule(recording.scene), recording.scene.run.dt
+    due, dt = recording.machine.releases.t, recording.machine.dt
     # The pymunk engine releases at the beginning of a step: up to a step late is not waiting.
     least = (1.0 + 1e-6) * dt if recording.engine == "pymunk" else 1e-9
     released = recording.select(Kind.RELEASE)
@@ -293,7 +293,9 @@ def waits(recording: Recording) -> Waits | None:
 def squeezed(recording: Recording) -> Squeeze | None:
     """Return who rode into others by adhesion, see `machine.releases.squeeze`; None if nobody."""
     released = recording.select(Kind.RELEASE)
-    return squeeze(recording.scene, released["t"], released["position"])
+    released = released[recording.machine.releases.carried[released["particle"]]]
+    radius = np.broadcast_to(recording.particle.radius, recording.count)[released["particle"]]
+    return squeeze(recording.scene, released["t"], released["position"], radius)
 
 
 @dataclass(frozen=True)

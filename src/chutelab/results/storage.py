@@ -173,7 +173,7 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Recording:
         raise _UnfitError("steps and contacts in the header have to be whole numbers")
     scene = from_dict(json.loads(about["scene"]), about["title"])
     # Of particles that were never released, any number is packed into next to nothing.
-    room = 8 * (scene.stream.count + 1)
+    room = 8 * (scene.count + 1)
     arrays: dict[str, Any] = {name: _array(archive, name, room) for name in ARRAYS}
     about.pop("seconds", None)  # earlier files tell how long the run took
     told = {name: about[name] for name in ("engine", "steps", "contacts")}

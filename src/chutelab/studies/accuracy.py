@@ -382,7 +382,7 @@ class Search:
         known = self.by_theory(found)
         if known is not None:
             return known
-        if self.scene.stream.crowded:
+        if self.scene.crowded:
             return self.crowd(found)
         if found.engine not in self.witnesses:
             self.witnesses[found.engine] = self.witness(found)

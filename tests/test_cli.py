@@ -972,6 +972,7 @@ def test_help_lists_the_commands():
         "figure",
         "tables",
         "scenes",
+        "materials",
         "new",
         "schema",
         "verify",
@@ -1007,6 +1008,7 @@ def test_shells_complete_scenes_and_kinds():
     expected = ["plain,perpendicular", "plain,perpendicular-fast", "file,perp"]
     assert sorted(completed("run", "perp")) == sorted(expected)
     assert completed("run", "slip", "--only", "png,c") == ["plain,png,csv"]
+    assert completed("materials", "g") == ["plain,gravel", "plain,glass"]
 
 
 def test_a_run_that_takes_too_long_ends_with_what_is_recorded():

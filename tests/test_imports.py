@@ -57,6 +57,7 @@ def loaded_by(*arguments, cwd=None):
         (["--version"], {"click"}),
         (["run", "--help"], {"click"}),
         (["scenes", "--json"], {"click", "pydantic"}),
+        (["materials", "coal", "--json"], {"click", "pydantic"}),
         (["schema"], {"click", "pydantic"}),
         (["new", "-"], {"click", "pydantic"}),
         (["check", "perpendicular"], {"click", "pydantic", "numpy", "rich"}),

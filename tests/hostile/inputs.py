@@ -34,12 +34,12 @@ TRACK = "mass_A\nt\tx\ty\n" + "".join(
     f"{0.01 * n:.2f}\t{0.02 * n:.3f}\t{0.1 - 0.0005 * n * n:.4f}\n" for n in range(30)
 )
 COMMANDS = (
-    "run", "check", "show", "sweep", "solve", "compare", "page", "figure", "scenes", "new",
-    "schema", "tables",
+    "run", "check", "show", "sweep", "solve", "compare", "page", "figure", "scenes",
+    "materials", "new", "schema", "tables",
     "lesson list", "lesson show", "lesson new",
 )  # fmt: skip
 USUAL = {
-    "scene": "perpendicular", "scenes": "inclined-60", "number": "8",
+    "scene": "perpendicular", "scenes": "inclined-60", "material": "coal", "number": "8",
     "recording": "../good/recording.npz",
     "names": "the-bounce", "name": "2", "path": "new.toml", "settings": "plate.angle_deg=10",
     "sets": "plate.restitution=0.3", "vary": "plate.restitution=0:1:3",

@@ -1,7 +1,7 @@
-"""What one needs to write a scene, and the paper: five commands.
+"""What one needs to write a scene, and the paper: six commands.
 
-``scenes``, ``schema`` and ``new``; ``tables`` and ``figure``, the paper's tables and figures as
-printed beside computed.
+``scenes``, ``materials``, ``schema`` and ``new``; ``tables`` and ``figure``, the paper's tables and
+figures as printed beside computed.
 """
 
 from __future__ import annotations
@@ -9,15 +9,20 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import click
+from click.shell_completion import CompletionItem
 
 from chutelab.cli import console
 from chutelab.cli.output import check_file, destination
 from chutelab.cli.parameters import FileName, json_option, out_option
 from chutelab.cli.program import RefusedError
 from chutelab.util.files import whole, writing
+
+if TYPE_CHECKING:
+    from chutelab.scene.materials import Preset
+    from chutelab.util.tables import Sheet
 
 STANDARD_OUTPUT = Path("-")
 
@@ -33,6 +38,154 @@ def scenes(as_json: bool) -> None:
     rows = [(s.name, f"{s.title}\n{s.look[0] if s.look else ''}") for s in about()]
     table = Sheet("", ("scene", "what it shows"), tuple(rows), texts=2)
     console.tell({"scenes": listed}, table, as_json=as_json)
+
+
+def complete_material(
+    _ctx: click.Context, _parameter: click.Parameter, incomplete: str
+) -> list[CompletionItem]:
+    """Offer the materials that begin so."""
+    from chutelab.scene.materials import PRESETS
+
+    return [
+        CompletionItem(name, help=preset.about)
+        for name, preset in PRESETS.items()
+        if name.startswith(incomplete)
+    ]
+
+
+@click.command(short_help="List the materials of particles: density, bounce, friction.")
+@click.argument("material", required=False, metavar="[MATERIAL]", shell_complete=complete_material)
+@json_option()
+def materials(material: str | None, as_json: bool) -> None:
+    """List the materials that a scene may name, or show MATERIAL alone, to copy and change.
+
+    The density is that of the solid, without the voids of a heap. A coefficient of restitution (how
+    much of the normal velocity a blow gives back, 0 to 1) or friction belongs to a pair: each
+    material has three, with itself, with steel (plates, chutes) and with the rubber of a belt.
+
+    Behind each number is how far it usually spreads, and its source. Where a result depends on
+    one, run both ends of its spread, and measure your own material.
+
+    \b
+    chutelab materials
+    chutelab materials coal
+    """  # noqa: D301 - click wants the backspace
+    from chutelab.scene.materials import PRESETS
+    from chutelab.util.errors import InputError, did_you_mean
+
+    if material is not None and material not in PRESETS:
+        known = f"there are {', '.join(PRESETS)}"
+        raise InputError(did_you_mean(material, PRESETS, known), "material", material)
+    shown = list(PRESETS.values()) if material is None else [PRESETS[material]]
+    texts = dict.fromkeys(text for one in shown for row in one.sources.values() for text in row)
+    numbers = {text: number for number, text in enumerate(texts, 1)}
+    told = [
+        {
+            "about": one.about,
+            "material": one.material.model_dump(),
+            "spread": one.spread,
+            "sources": {key: [numbers[text] for text in row] for key, row in one.sources.items()},
+        }
+        for one in shown
+    ]
+    console.tell(
+        {"materials": told, "sources": list(numbers)},
+        *(_of_all(shown, numbers) if material is None else [_alone(shown[0], numbers)]),
+        as_json=as_json,
+        wrote="" if material is None else _to_copy(shown[0]),
+    )
+
+
+def _of_all(presets: list[Preset], numbers: dict[str, int]) -> list[Sheet]:
+    """Return tables of densities, restitutions and frictions, with the sources below the last."""
+    from chutelab.util.tables import Sheet
+
+    def pairs(title: str, kind: str, notes: tuple[str, ...] = ()) -> Sheet:
+        keys = (kind, f"{kind}_steel", f"{kind}_rubber")
+        rows = tuple(
+            (
+                one.material.name,
+                *("  ".join(_number(one, key)) for key in keys),
+                _cited(one, keys, numbers),
+            )
+            for one in presets
+        )
+        heads = ("", "with itself", "with steel", "with rubber", "source")
+        return Sheet(title, heads, rows, tail=1, notes=notes)
+
+    densities = tuple(
+        (
+            one.material.name,
+            one.about,
+            *_number(one, "density"),
+            _cited(one, ("density",), numbers),
+        )
+        for one in presets
+    )
+    heads = ("", "", "kg/m³", "spread", "source")
+    return [
+        Sheet("Materials, and their density", heads, densities, texts=2, tail=1),
+        pairs("Coefficient of restitution e", "restitution"),
+        pairs("Coefficient of friction µ", "friction", _listed(numbers)),
+    ]
+
+
+def _alone(one: Preset, numbers: dict[str, int]) -> Sheet:
+    """Return a table of one material, a row for each of its keys."""
+    from chutelab.scene.materials import VALUES
+    from chutelab.util.tables import Sheet
+
+    return Sheet(
+        f"{one.material.name}: {one.about}",
+        ("", "value", "usual spread", "source"),
+        tuple(
+            (
+                f"{key}, kg/m³" if key == "density" else key,
+                *_number(one, key),
+                _cited(one, (key,), numbers),
+            )
+            for key in VALUES
+        ),
+        tail=1,
+        notes=_listed(numbers),
+    )
+
+
+def _to_copy(one: Preset) -> str:
+    """Return how a material gets into a scene, as it is and changed."""
+    from chutelab.scene.materials import VALUES
+
+    name = one.material.name
+    lines = [
+        "",
+        "In a scene:",
+        "",
+        "[particle]",
+        f'material = "{name}"',
+        "",
+        f'Or with what you measured, as material = "my-{name}":',
+        "",
+        "[[material]]",
+        f'name = "my-{name}"',
+        *(f"{key} = {getattr(one.material, key)!r}" for key in VALUES),
+    ]
+    return "\n".join(lines)
+
+
+def _number(one: Preset, key: str) -> tuple[str, str]:
+    """Return a number and its spread, as cells."""
+    digits = "g" if key == "density" else ".2f"
+    low, high = one.spread[key]
+    return f"{getattr(one.material, key):{digits}}", f"{low:{digits}}-{high:{digits}}"
+
+
+def _cited(one: Preset, keys: tuple[str, ...], numbers: dict[str, int]) -> str:
+    cited = {numbers[text] for key in keys for text in one.sources[key]}
+    return " ".join(map(str, sorted(cited)))
+
+
+def _listed(numbers: dict[str, int]) -> tuple[str, ...]:
+    return tuple(f"[{number}] {text}" for text, number in numbers.items())
 
 
 @click.command(short_help="Print the JSON Schema of scene files, for editors.")

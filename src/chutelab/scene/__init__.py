@@ -1,6 +1,7 @@
 """Scene files: from TOML text to a frozen, validated `Scene`.
 
 - `units`: sizes with their units, and what a key may hold: strict types and ranges.
+- `materials`: ``[[material]]``, and presets with their spread and sources.
 - `rules`: conflicts between keys and between tables; ``[[expect]]``.
 - `schema`: the tables of a scene as frozen Pydantic models, with the defaults.
 - `overrides`: keys by their full path: JSON Schema, limits, ``KEY=VALUE`` texts.

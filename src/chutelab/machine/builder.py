@@ -211,9 +211,8 @@ def build(scene: Scene) -> Machine:
         surface.
     """
     parts, warnings = _conveyors(scene)
-    parts += [_hanging(plate, str(plate.name)) for plate in scene.hanging]
-    parts += [_conveyor(belt) for belt in scene.conveyor]
-    parts += [_free(surface) for surface in scene.surface]
+    lay: Any = {Plate: _hanging, Conveyor: _conveyor, Surface: _free}
+    parts += [lay[type(table)](table) for table in scene.free]
     names = [part.name for part in parts]
     lines: list[tuple[int, tuple[float, float], tuple[Numbers, ...]]] = []
     bends: list[tuple[int, tuple[float, float], Bend]] = []
@@ -228,7 +227,7 @@ def build(scene: Scene) -> Machine:
     along = columns[2:4] - columns[0:2]
     length = np.hypot(along[0], along[1])
     kinds = range(1 if scene.shape else len(scene.particles))
-    met = [[scene.met(kind, name) for name in names] for kind in kinds]
+    met = [[_with_grip(*scene.met(kind, name)) for name in names] for kind in kinds]
     segments = Segments(
         start=columns[0:2].T,
         tangent=(along / length).T,
@@ -248,14 +247,14 @@ def build(scene: Scene) -> Machine:
     bound = releases.t.max().item() + scene.run.max_time
     pulley = None
     if belt is not None:
-        grips = np.array([_grip(friction) for friction in _first(met, 1)])
+        bounce, grip = zip(*(row[0] for row in met), strict=True)
         pulley = Pulley(
-            belt.pulley_radius,
-            belt.speed,
-            grips if len(met) > 1 else grips[0],
-            np.array(_first(met, 0)) if len(met) > 1 else met[0][0][0],
-            0,
-            np.radians(belt.incline_deg),
+            radius=belt.pulley_radius,
+            speed=belt.speed,
+            friction=np.array(grip) if len(grip) > 1 else grip[0],
+            restitution=np.array(bounce) if len(grip) > 1 else bounce[0],
+            surface=0,
+            incline=np.radians(belt.incline_deg),
         )
     every = range(len(particles))
     pairs = np.array([[scene.met(a, b) for b in every] for a in every])
@@ -303,7 +302,7 @@ def _values(scene: Scene, met: Met, owner: Ints) -> dict[str, Floats]:
     found = {}
     for n, name in enumerate(("restitution", "friction")):
         table = [
-            _columns(scene, [[_grip(row[surface][n])] for surface in owner.tolist()], 1)[0].T
+            _columns(scene, [[row[surface][n]] for surface in owner.tolist()], 1)[0].T
             for row in met
         ]
         found[name] = np.stack(table) if len(table) > 1 else table[0]
@@ -353,10 +352,6 @@ def _threads(scene: Scene, releases: Releases) -> tuple[Thread, ...]:
     return tuple(threads)
 
 
-def _first(met: Met, n: int) -> list[Any]:
-    return [row[0][n] for row in met]
-
-
 def _turned(x: Numbers, y: Numbers, alpha: Numbers, below: Numbers, above: Numbers) -> list[Point]:
     """Return the ends of a plate that hangs from a pivot (m), at an angle (rad) from upright."""
     # Upwards, so that the struck face (-cos α, -sin α) lies to the left of the tangent.
@@ -364,15 +359,15 @@ def _turned(x: Numbers, y: Numbers, alpha: Numbers, below: Numbers, above: Numbe
     return [(x - reach * sine, y + reach * cosine) for reach in (-below, above)]
 
 
-def _hanging(plate: Plate, name: str) -> Part:
+def _hanging(plate: Plate) -> Part:
     assert plate.pivot is not None
     below = REACH_HANGING if plate.below is None else plate.below
     ends = _turned(*plate.pivot, np.radians(plate.angle_deg), below, plate.above)
-    return Part(name, [(ends, 0.0)])
+    return Part(str(plate.name), [(ends, 0.0)])
 
 
 def _conveyor(belt: Conveyor) -> Part:
-    """Lay a belt round two pulleys: forward on top, back below, clockwise if it runs to the right."""
+    """Lay a belt round two pulleys: forward on top, which is clockwise to the right, and back."""
     (x0, y0), (x1, y1), r = belt.from_, belt.to, belt.pulley_radius
     way = hypot(x1 - x0, y1 - y0)
     dx, dy = (x1 - x0) / way, (y1 - y0) / way
@@ -399,10 +394,13 @@ def _free(surface: Surface) -> Part:
     if surface.center is None:
         lines = [([(x + a, y + b) for x, y in surface.points], surface.speed) for a, b in shifts]
         return Part(surface.name, lines, gates=gates)
-    (x, y), begin, end = surface.center, *np.radians([surface.from_deg, surface.to_deg]).tolist()
-    speed = surface.speed if end < begin else -surface.speed
-    bend = surface.radius, min(begin, end), abs(end - begin), speed
-    return Part(surface.name, bends=[(x + a, y + b, *bend) for a, b in shifts], gates=gates)
+    assert surface.radius is not None
+    (x, y), r = surface.center, surface.radius
+    first, last = np.radians(surface.from_deg), np.radians(surface.to_deg)
+    speed = surface.speed if surface.to_deg < surface.from_deg else -surface.speed
+    begin, extent = np.minimum(first, last), np.abs(last - first)
+    bends = [(x + a, y + b, r, begin, extent, speed) for a, b in shifts]
+    return Part(surface.name, bends=bends, gates=gates)
 
 
 def _conveyors(scene: Scene) -> tuple[list[Part], list[Caution]]:
@@ -428,7 +426,6 @@ def _conveyors(scene: Scene) -> tuple[list[Part], list[Caution]]:
         _refuse(scene, missed, "outgoing.drop_from", "impact", lambda _: text)
         height = hit[1] - out.drop - r
     if plate is not None:
-        assert plate.distance is not None
         alpha = np.radians(plate.angle_deg)
         sine, cosine = np.sin(alpha), np.cos(alpha)
         x, y = top + plate.distance, plate.pivot_height
@@ -494,5 +491,6 @@ def _at(scene: Scene, value: ArrayLike, place: int) -> Any:
     return np.broadcast_to(value, scene.shape).flat[place].item()
 
 
-def _grip(friction: Any) -> Any:
-    return inf if isinstance(friction, str) else friction
+def _with_grip(restitution: Any, friction: Any) -> tuple[Any, Any]:
+    """Return restitution and friction, where adhesion is friction without a bound."""
+    return restitution, inf if isinstance(friction, str) else friction

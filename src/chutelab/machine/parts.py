@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 from math import ceil, inf, isnan, log2, nan, pi
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -105,9 +105,9 @@ class Particle:
         Moment of inertia about the centre, kg m²; 0 for a particle that does not turn.
     """
 
-    radius: float
-    mass: float
-    inertia: float
+    radius: Any
+    mass: Any
+    inertia: Any
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Particle):
@@ -251,8 +251,8 @@ class Pulley:
 
     radius: float
     speed: float
-    friction: float
-    restitution: float
+    friction: Any
+    restitution: Any
     surface: int
     incline: float = 0.0
 

@@ -51,11 +51,13 @@ class Releases:
             array.flags.writeable = False
 
 
-def up_belt(scene: Scene) -> tuple[Numbers, Numbers]:
+def up_belt(scene: Scene) -> tuple[float, float]:
     """Return the direction in which the incoming belt runs, (cos β, sin β)."""
     assert scene.incoming is not None
-    incline = np.radians(scene.incoming.incline_deg)
-    return np.cos(incline), np.sin(incline)
+    incline: float = np.radians(scene.incoming.incline_deg)
+    cosine: float = np.cos(incline)
+    sine: float = np.sin(incline)
+    return cosine, sine
 
 
 def release_point(scene: Scene, stream: int = 0) -> tuple[float, float]:
@@ -81,8 +83,9 @@ def release_velocity(scene: Scene, stream: int = 0) -> tuple[float, float]:
     if its.fill is not None:
         return 0.0, 0.0
     assert scene.incoming is not None
-    cosine, sine = up_belt(scene)
-    return scene.incoming.speed * cosine, scene.incoming.speed * sine
+    speed, (cosine, sine) = scene.incoming.speed, up_belt(scene)
+    # 0 is a number, also where the speeds of a family are an array.
+    return speed * cosine, speed * sine if np.any(sine) else 0.0
 
 
 def on_belt(scene: Scene, stream: int = 0) -> bool:
@@ -210,11 +213,11 @@ def draw(scene: Scene, clear: Clear) -> tuple[Releases, Floats | None]:
         If a box has not room for all.
     """
     drawn: list[Draw] = []
-    for number, stream in enumerate(scene.streams):
+    for n, stream in enumerate(scene.streams):
         if stream.fill is None:
-            drawn.append(_draw(scene, number))
+            drawn.append(_draw(scene, n))
         else:
-            drawn.append(_pour(scene, number, drawn, clear))
+            drawn.append(_pour(scene, n, drawn, clear))
     counts = [len(one.t) for one in drawn]
     kinds = np.arange(counts[0]) if scene.shape else np.repeat(scene.kinds, counts)
     first, *others = drawn
@@ -237,24 +240,24 @@ def draw(scene: Scene, clear: Clear) -> tuple[Releases, Floats | None]:
     return releases, np.concatenate(radii)
 
 
-def _dice(scene: Scene, number: int) -> np.random.Generator:
-    seed = scene.streams[number].seed
-    return np.random.default_rng([seed, number] if number else seed)
+def _dice(scene: Scene, n: int) -> np.random.Generator:
+    seed = scene.streams[n].seed
+    return np.random.default_rng([seed, n] if n else seed)
 
 
-def _radii(scene: Scene, number: int, rng: np.random.Generator) -> Floats | None:
+def _radii(scene: Scene, n: int, rng: np.random.Generator) -> Floats | None:
     """Draw radii from the range of a stream's kind, m; the first has the mean."""
-    particle = scene.particles[scene.kinds[number]]
+    particle = scene.particles[scene.kinds[n]]
     if particle.span is None:
         return None
-    radii = rng.uniform(*particle.span, scene.streams[number].count)
+    radii = rng.uniform(*particle.span, scene.streams[n].count)
     radii[0] = particle.radius
     return radii
 
 
-def _draw(scene: Scene, number: int) -> Draw:
+def _draw(scene: Scene, n: int) -> Draw:
     """Draw the releases of one stream, at a point or along a line."""
-    stream, particle = scene.streams[number], scene.particles[scene.kinds[number]]
+    stream, particle = scene.streams[n], scene.particles[scene.kinds[n]]
     every = stream.count * prod(scene.shape)
     # Those of each scene of a family follow another.
     t = np.tile(np.arange(stream.count), prod(scene.shape)) / stream.rate
@@ -263,21 +266,21 @@ def _draw(scene: Scene, number: int) -> Draw:
     if stream.start:
         t += stream.start
     position, velocity = np.empty((2, every, 2))
-    velocity[:, 0], velocity[:, 1] = release_velocity(scene, number)
+    velocity[:, 0], velocity[:, 1] = release_velocity(scene, n)
     height, radii, faster = np.zeros(every), None, np.zeros(every)
     crowded = scene.crowded and stream.count > 1
     # The first one has no spread. Making a generator takes as long as all other preparations.
     drawn = stream.bed_height > 0.0 or stream.speed_spread > 0.0 or stream.to or particle.span
     if stream.count > 1 and (drawn or crowded):
-        rng = _dice(scene, number)
+        rng = _dice(scene, n)
         height = stream.bed_height * rng.random(every)
         height[0] = 0.0
         faster = stream.speed_spread * rng.uniform(-1.0, 1.0, every)
         faster[0] = 0.0
-        x, y = release_velocity(scene, number)
+        x, y = release_velocity(scene, n)
         speed = float(np.hypot(x, y))
         velocity += faster[:, None] * ((x / speed, y / speed) if speed > 0.0 else (1.0, 0.0))
-        radii = _radii(scene, number, rng)
+        radii = _radii(scene, n, rng)
     if stream.to is not None:
         assert stream.at is not None
         share = np.linspace(0.0, 1.0, every)
@@ -285,7 +288,7 @@ def _draw(scene: Scene, number: int) -> Draw:
             share[1:] = rng.random(every - 1)
         begin, end = np.array(stream.at), np.array(stream.to)
         return Draw(t, begin + share[:, None] * (end - begin), velocity, False, radii)
-    rides = on_belt(scene, number)
+    rides = on_belt(scene, n)
     adheres = rides and scene.incoming is not None and isinstance(scene.incoming.friction, str)
     cosine, sine = up_belt(scene) if rides else (1.0, 0.0)
     if crowded:
@@ -300,7 +303,7 @@ def _draw(scene: Scene, number: int) -> Draw:
         _spread_apart(stream, t, height, along, each, fall, lowest, rng)
     if rides and radii is not None:
         height += radii - particle.radius
-    x, low = release_point(scene, number)
+    x, low = release_point(scene, n)
     position[:, 0], position[:, 1] = x - sine * height, low + cosine * height
     return Draw(t, position, velocity, adheres, radii)
 
@@ -312,13 +315,13 @@ JITTER = 0.01
 """How far a place in it is moved at random each way, in the same unit: no pile is that even."""
 
 
-def _pour(scene: Scene, number: int, before: Sequence[Draw], clear: Clear) -> Draw:
+def _pour(scene: Scene, n: int, before: Sequence[Draw], clear: Clear) -> Draw:
     """Pack a stream's box from below: rows of places, every other one shifted by half a pitch."""
-    stream, particle = scene.streams[number], scene.particles[scene.kinds[number]]
+    stream, particle = scene.streams[n], scene.particles[scene.kinds[n]]
     assert stream.fill is not None
     (left, bottom), (right, top) = stream.fill
-    rng = _dice(scene, number)
-    radii = _radii(scene, number, rng)
+    rng = _dice(scene, n)
+    radii = _radii(scene, n, rng)
     largest = particle.radius if particle.span is None else particle.span[1]
     pitch, room = PITCH * largest, largest * (1.0 + JITTER)
     rise = pitch * sqrt(0.75)
@@ -336,7 +339,7 @@ def _pour(scene: Scene, number: int, before: Sequence[Draw], clear: Clear) -> Dr
             free &= np.hypot(*(places - place).T) >= largest + r
     places = places[free]
     if len(places) < stream.count:
-        several = f"[{number}]" * (len(scene.streams) > 1)
+        several = f"[{n}]" * (len(scene.streams) > 1)
         allowed = (
             f"a larger box, or stream{several}.count = {len(places)} at most: so many of radius"
             f" {largest:.4g} m have room in it, away from all surfaces"
@@ -344,7 +347,7 @@ def _pour(scene: Scene, number: int, before: Sequence[Draw], clear: Clear) -> Dr
         value = [list(corner) for corner in stream.fill]
         raise SceneError(scene.source, [Fault(f"stream{several}.fill", value, allowed)])
     velocity = np.empty((stream.count, 2))
-    velocity[:] = release_velocity(scene, number)
+    velocity[:] = release_velocity(scene, n)
     t = np.full(stream.count, stream.start)
     return Draw(t, places[: stream.count].copy(), velocity, False, radii)
 

@@ -20,7 +20,7 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
 from chutelab.scene.rules import EITHER
-from chutelab.scene.schema import Scene
+from chutelab.scene.schema import Scene, as_written
 from chutelab.util.errors import MISSING, Fault, InputError, printable
 
 
@@ -93,14 +93,13 @@ def parts_of(path: str, names: Mapping[str, Sequence[object]] = NOBODY) -> list[
     return parts
 
 
-def names_in(scene: Scene) -> dict[str, list[object]]:
-    """Return the names of tables of which there are several in a scene."""
-    found = {}
-    for table in NAMED:
-        rows = getattr(scene, EITHER.get(table, table))
-        if table not in EITHER or len(rows) > 1:
-            found[table] = [row.name for row in rows]
-    return found
+def names_of(document: Mapping[str, Any]) -> dict[str, list[object]]:
+    """Return the names of tables of which there are several in a scene's file."""
+    return {
+        table: [row.get("name") if isinstance(row, Mapping) else None for row in rows]
+        for table in NAMED
+        if isinstance(rows := document.get(table), list | tuple)
+    }
 
 
 def joined(parts: Sequence[str | int]) -> str:
@@ -133,7 +132,7 @@ def value_at(scene: Scene, path: str) -> Any:
     `MISSING` if there is no such thing; an array for a varied key of a family of scenes.
     """
     try:
-        parts = parts_of(path, names_in(scene))
+        parts = parts_of(path, names_of(as_written(scene)))
     except InputError:
         return MISSING
     if len(parts) > 1 and isinstance(parts[1], int):
@@ -155,12 +154,14 @@ def rule_at(parts: Sequence[str | int]) -> Mapping[str, Any] | None:
 
 def _below(rule: Mapping[str, Any], part: str | int) -> Mapping[str, Any] | None:
     """Return what a rule says of a key, or of an entry of a list."""
+    below: Mapping[str, Any] | None
     if isinstance(part, str):
-        return rule.get("properties", {}).get(part)
-    if part < len(rule.get("prefixItems", [])):
-        found: Mapping[str, Any] = rule["prefixItems"][part]
-        return found
-    return rule.get("items")
+        below = rule.get("properties", {}).get(part)
+    elif part < len(rule.get("prefixItems", [])):
+        below = rule["prefixItems"][part]
+    else:
+        below = rule.get("items")
+    return below
 
 
 def limits_of(rule: Mapping[str, Any]) -> tuple[float, float] | None:
@@ -244,11 +245,7 @@ def value_of(text: str) -> object:
 
 def _resolved(document: dict[str, Any], key: str) -> list[str | int]:
     """Return the parts of a key, with the index of a table of which there are several."""
-    names = {
-        table: [row.get("name") if isinstance(row, dict) else None for row in rows]
-        for table in NAMED
-        if isinstance(rows := document.get(table), list)
-    }
+    names = names_of(document)
     path = parts_of(key, names)
     table = str(path[0])
     if table not in NAMED or len(path) < 2:

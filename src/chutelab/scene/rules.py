@@ -309,8 +309,8 @@ def _names(look: Look) -> Iterator[Fault]:
     for row in range(look.rows("particle")):
         name = look("particle", "material", row)
         if isinstance(name, str) and name not in (*own, *PRESETS):
-            known = [n for n in own if isinstance(n, str)] + list(PRESETS)
-            allowed = did_you_mean(name, known, "`chutelab materials` lists them")
+            there = [n for n in own if isinstance(n, str)] + list(PRESETS)
+            allowed = did_you_mean(name, there, "`chutelab materials` lists them")
             yield Fault(
                 look.path("particle", "material", row), name, f"no such material; {allowed}"
             )

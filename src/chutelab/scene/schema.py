@@ -28,11 +28,11 @@ from chutelab.scene.units import (
     Point,
     Polyline,
     Positive,
+    Radius,
     Rate,
     Repeats,
     Share,
     Size,
-    Span,
     Switch,
     Table,
     Text,
@@ -55,7 +55,7 @@ class Particle(Table):
         "What turns, with spin: a disk has I = m r²/2, a sphere 2/5 m r²; boxes and polygons are"
         " for the pymunk engine",
     )
-    radius: Amount | Span = described(
+    radius: Radius = described(
         0.004,
         "Radius r, 0 is a mass point; or [from, to], drawn evenly for each particle, of which the"
         " first has the mean",
@@ -91,7 +91,7 @@ class Particle(Table):
     @property
     def span(self) -> tuple[float, float] | None:
         """The range of its radii, m; None if all are alike."""
-        span: Any = self._typed.get("radius")
+        span: tuple[float, float] | None = self._typed.get("radius")  # type: ignore[assignment]
         return span
 
     @property
@@ -146,7 +146,7 @@ class Plate(Table):
 
     name: Name | None = described(None, "Name of a further plate, for events and the ledger")
     pivot: Point | None = described(None, "Of a further plate: its pivot [x, y]", "m")
-    distance: Positive | None = described(
+    distance: Positive = described(
         None,
         "Of the damping plate: d_okr, from the pulley's leading edge x = R to the pivot",
         "m",
@@ -370,7 +370,7 @@ class Run(Table):
 
 
 def _one_or_several(given: object) -> object:
-    return (given,) if isinstance(given, Mapping) else given
+    return (given,) if isinstance(given, Mapping | Table) else given
 
 
 def _as_either(rule: dict[str, Any]) -> None:
@@ -449,20 +449,12 @@ class Scene(Table):
     @property
     def plate(self) -> Plate | None:
         """The damping plate."""
-        for plate in self.plates:
-            if plate.distance is not None:
-                return plate
-        return None
+        return next((plate for plate in self.plates if plate.pivot is None), None)
 
     @property
     def stream(self) -> Stream:
         """The first stream."""
         return self.streams[0]
-
-    @property
-    def hanging(self) -> tuple[Plate, ...]:
-        """Plates that hang from pivots of their own."""
-        return tuple(plate for plate in self.plates if plate.pivot is not None)
 
     @property
     def kinds(self) -> tuple[int, ...]:
@@ -508,10 +500,10 @@ class Scene(Table):
             )
             column = ""
         else:
-            home = self.surface_table(other)
-            homes = (home,)
-            steel = isinstance(home, Plate) or (
-                isinstance(home, Surface) and home.material == "steel"
+            table = self.surface_table(other)
+            homes = (table,)
+            steel = isinstance(table, Plate) or (
+                isinstance(table, Surface) and table.material == "steel"
             )
             column = "_steel" if steel else "_rubber"
         for home in homes:
@@ -521,26 +513,29 @@ class Scene(Table):
             return getattr(homes[0], key)
         material = self._material(particle)
         value = None if material is None else getattr(material, key + column)
-        if value is None and material is not None:
-            value = getattr(material, key)
         if value is not None:
             return value
         return getattr(homes[0], key) if homes else Stream.model_fields[key].default
 
     def _material(self, particle: Particle) -> Any:
+        if particle.material is None:
+            return None
         own = {material.name: material for material in self.material}
-        return own.get(particle.material or "", PRESETS.get(particle.material or ""))
+        return own.get(particle.material) or PRESETS[particle.material].material
 
     def surface_table(self, name: str) -> Incoming | Plate | Outgoing | Conveyor | Surface:
-        """Return the table that a surface is from, by its name; a KeyError if there is none."""
+        """Return the table that a surface is from, by its name."""
         for key in ("incoming", "plate", "outgoing"):
-            table: Any = getattr(self, key) if name == key else None
-            if table is not None:
+            table: Incoming | Plate | Outgoing | None = getattr(self, key)
+            if name == key and table is not None:
                 return table
-        for free in (*self.hanging, *self.conveyor, *self.surface):
-            if free.name == name:
-                return free
-        raise KeyError(name)
+        return next(free for free in self.free if free.name == name)
+
+    @property
+    def free(self) -> tuple[Plate | Conveyor | Surface, ...]:
+        """Surfaces with names of their own, in the order of the ledger."""
+        hanging = tuple(plate for plate in self.plates if plate.pivot is not None)
+        return (*hanging, *self.conveyor, *self.surface)
 
     @property
     def source(self) -> str:
@@ -551,10 +546,7 @@ class Scene(Table):
     def surfaces(self) -> tuple[str, ...]:
         """Names of its surfaces, as the ledger has them."""
         tables = [name for name in ("incoming", "plate", "outgoing") if getattr(self, name)]
-        return (
-            *tables,
-            *(str(free.name) for free in (*self.hanging, *self.conveyor, *self.surface)),
-        )
+        return (*tables, *(str(free.name) for free in self.free))
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -590,6 +582,20 @@ class Scene(Table):
 
         overrides = [Override(key, plain_number(plain(value))) for key, value in values.items()]
         return from_dict(to_dict(self), self.source, overrides)
+
+    def alone(self) -> Scene:
+        """Return the scene with its first particle only; nothing is expected of that."""
+        tables = as_written(self)
+        streams = tables.get("stream", {})
+        first = streams[0] if isinstance(streams, tuple) else streams
+        changes: dict[str, object] = {
+            "stream": {**first, "count": 1, "interact": False},
+            "expect": None,
+        }
+        if self.string:
+            held = [row for row in tables["string"] if row.get("particle", 0) == 0]
+            changes["string"] = held or None
+        return self.with_values(changes)
 
     def __eq__(self, other: object) -> bool:
         # The same machine from another file is the same scene.
@@ -637,11 +643,12 @@ class Scene(Table):
         shaped = particle.shape in ("box", "polygon")
         if shaped:
             density = None
-        if density is None and not isinstance(particle.radius, tuple) and not shaped:
+        span: Any = particle.radius
+        if density is None and not isinstance(span, tuple) and not shaped:
             return particle
         filled = particle.model_copy()
-        if isinstance(filled.radius, tuple):
-            filled._resolve("radius", 0.5 * (filled.radius[0] + filled.radius[1]))
+        if isinstance(span, tuple):
+            filled._resolve("radius", 0.5 * (span[0] + span[1]))
         if shaped:
             filled._fill("radius", max(hypot(x, y) for x, y in filled.outline))
         if density is not None:
@@ -650,7 +657,7 @@ class Scene(Table):
 
     def _with_rate(self, stream: Stream, number: int, kind: int) -> Stream:
         """Return a stream with its name, and its rate in particles per second."""
-        typed = stream._typed.get("rate", stream.rate)
+        typed: Any = stream._typed.get("rate", stream.rate)
         if stream.name is not None and not isinstance(typed, str):
             return stream
         filled = stream.model_copy()
@@ -663,9 +670,14 @@ class Scene(Table):
         return filled
 
 
-def as_written(scene: Scene) -> dict[str, Any]:
-    """Return the keys that were set, nested as in the file; one table is no list of one."""
-    tables: dict[str, Any] = scene.model_dump(by_alias=True, exclude_unset=True, warnings=False)
+def as_written(scene: Scene, *, defaults: bool = False) -> dict[str, Any]:
+    """Return the keys that were set, nested as in the file; one table is no list of one.
+
+    With `defaults`, all keys.
+    """
+    tables: dict[str, Any] = scene.model_dump(
+        by_alias=True, exclude_unset=not defaults, warnings=False
+    )
     for key in EITHER:
         if len(rows := tables.get(key, ())) == 1:
             tables[key] = rows[0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from itertools import pairwise
 from math import isfinite, nan
-from typing import Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 from pydantic import (
     AfterValidator,
@@ -189,7 +189,7 @@ def _said(words: str) -> Any:
 Span = Annotated[
     tuple[Positive, Positive],
     AfterValidator(_ascending),
-    _said("a range [from, to] of two numbers > 0, from < to"),
+    _said("a range [from, to]"),
 ]
 """A range [from, to]."""
 
@@ -268,12 +268,17 @@ def _rate(rate: float | str) -> float | str:
     return rate
 
 
-Rate = Annotated[
-    Annotated[Number, Field(ge=1e-6, le=1e9)]
-    | Annotated[Text, Field(max_length=40), _said('a text such as "120 t/h"')],
-    AfterValidator(_rate),
-]
-"""Particles per second, or a mass per time, in t/h, as engineers ask."""
+# A scene resolves both to a number, which is all that others see.
+if TYPE_CHECKING:
+    Rate = float
+    Radius = float
+else:
+    Radius = Amount | Span
+    Rate = Annotated[
+        Annotated[Number, Field(ge=1e-6, le=1e9)]
+        | Annotated[Text, Field(max_length=40), _said('a text such as "120 t/h"')],
+        AfterValidator(_rate),
+    ]
 
 
 def described(default: Any, what: str, unit: str = "", **limits: Any) -> Any:
@@ -286,11 +291,11 @@ def described(default: Any, what: str, unit: str = "", **limits: Any) -> Any:
     )
 
 
-def pair_restitution(default: float, pair: str) -> Any:
+def pair_restitution(default: float | None, pair: str) -> Any:
     """Describe the restitution of a pair, such as particle-plate."""
     return described(default, f"Coefficient of restitution of the pair {pair}")
 
 
-def pair_friction(default: float, pair: str) -> Any:
+def pair_friction(default: float | None, pair: str) -> Any:
     """Describe the friction of a pair, such as particle-plate."""
     return described(default, f"Coulomb coefficient of friction µ of the pair {pair}")

@@ -19,7 +19,7 @@ from chutelab.scene.overrides import (
     apply,
     joined,
     limits_of,
-    names_in,
+    names_of,
     parts_of,
     rule_at,
 )
@@ -177,7 +177,7 @@ def quantity(scene: Scene, vary: Vary) -> Quantity:
     faults, _ = apply(document, [Override(vary.key, plain_number(vary.values[0]))])
     if faults:
         raise InputError(faults[0].allowed, vary.typed)
-    parts = parts_of(vary.key, names_in(scene))
+    parts = parts_of(vary.key, names_of(document))
     path, indexed = joined(parts), isinstance(parts[-1], int)
     while isinstance(parts[-1], int):
         parts.pop()
@@ -276,7 +276,7 @@ def family(scene: Scene, columns: Mapping[str, Floats]) -> Scene:
             case [str(table), *index, str(key)]:
                 rows = EITHER.get(table, table)
                 tables = list(changes.get(rows, getattr(scene, rows)))
-                number = index[0] if index else 0
+                number = int(index[0]) if index else 0
                 tables[number] = tables[number].model_copy(update={key: values})
                 changes[rows] = tuple(tables)
     out, plates = changes.get("outgoing", scene.outgoing), changes.get("plates", scene.plates)
@@ -284,7 +284,7 @@ def family(scene: Scene, columns: Mapping[str, Floats]) -> Scene:
         changes["outgoing"] = out.model_copy(update={"speed": None})
     changes["plates"] = tuple(
         plate
-        if "pivot_height" in plate.model_fields_set or plate.distance is None
+        if "pivot_height" in plate.model_fields_set or plate.pivot is not None
         else plate.model_copy(update={"pivot_height": None})
         for plate in plates
     )

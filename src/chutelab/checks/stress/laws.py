@@ -161,7 +161,9 @@ def _energy_bound(e: Evidence) -> float:
     touched = max(1, e.recording.contacts)
     if e.engine != "contact":
         steps += touched * HAIR
-    return rounding + steps + touched * m.particle.mass * m.gravity * e.late / e.energy
+    return (
+        rounding + steps + touched * float(np.max(m.particle.mass)) * m.gravity * e.late / e.energy
+    )
 
 
 def momentum(e: Evidence) -> Verdict | None:

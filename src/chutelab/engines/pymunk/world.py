@@ -175,7 +175,7 @@ class World:
         if face.tangent is None:
             return True
         point = face.shape.point_query(x).point
-        return min((point - end).length for end in face.ends) <= self.hair
+        return bool(min((point - end).length for end in face.ends) <= self.hair)
 
     def meets(
         self, path: Flight | Carriage, face: Face, span: float, leaving: bool = False

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from math import cos
-
 import numpy as np
 
 from chutelab.engines.contact import engine, module
@@ -45,27 +43,6 @@ class Core:
     @property
     def world(self):
         return self.module.world
-
-    def kinds(self, table):
-        """Set the table of pairs, (kinds, kinds + surfaces): (restitution, friction, rolling)."""
-        count = len(table)
-        self.module.place(("pairs", module.dtype("Pair"), count * len(table[0])))
-        self.world.kind_count = count
-        pairs = self._array("pairs", "Pair", count * len(table[0]))
-        for place, values in enumerate(value for row in table for value in row):
-            pairs[place] = values
-
-    def arc(self, k, center, radius, middle, half, speed=0.0):
-        """Turn surface k into an arc round a centre, `half` (rad) to both sides of a direction."""
-        surface = self.surfaces[k]
-        surface["shape"] = module.constants("Shape")["ARC"]
-        surface["x"], surface["y"] = center
-        surface["tx"], surface["ty"] = np.cos(middle), np.sin(middle)
-        surface["radius"], surface["cos_half"], surface["speed"] = radius, cos(half), speed
-        for n, angle in enumerate((middle - half, middle + half)):
-            end = np.array(center) + radius * np.array([np.cos(angle), np.sin(angle)])
-            surface["end"][2 * n : 2 * n + 2] = end
-        surface["box"] = *(np.array(center) - radius), *(np.array(center) + radius)
 
     def tilt(self, angle):
         """Turn gravity counter-clockwise by an angle (rad)."""

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import cos, sin
+from math import cos, inf, sin
 
 import numpy as np
 
 from chutelab.machine import build
+from chutelab.machine.parts import Arcs, Particle
 from chutelab.scene import from_dict
 
 PERPENDICULAR = """
@@ -67,6 +68,37 @@ def thrown(machine, position, velocity=(0.0, 0.0), t=0.0):
         kind=np.zeros(count, dtype=np.int64),
     )
     return replace(machine, releases=releases, interact=count > 1)
+
+
+def bent(machine, *arcs):
+    """Return the machine with arcs, each a surface of its own unless it has the name of another.
+
+    Each is a mapping of center, radius, begin and extent, and maybe name, speed, restitution,
+    friction, appears and vanishes.
+    """
+    usual = {"speed": 0.0, "restitution": 0.0, "friction": 0.0, "appears": -inf, "vanishes": inf}
+    rows = [{"name": f"arc {n}", **usual, **arc} for n, arc in enumerate(arcs)]
+    names = tuple(dict.fromkeys([*machine.surfaces, *(row.pop("name") for row in rows)]))
+    owner = [names.index(arc.get("name", f"arc {n}")) for n, arc in enumerate(arcs)]
+    columns = {name: np.array([row[name] for row in rows], dtype=float) for name in rows[0]}
+    return replace(machine, surfaces=names, arcs=Arcs(**columns, surface=np.array(owner)))
+
+
+def gated(machine, piece, appears=-inf, vanishes=inf):
+    """Return the machine with a segment that is there from one time to another only."""
+    came, went = machine.segments.appears.copy(), machine.segments.vanishes.copy()
+    came[piece], went[piece] = appears, vanishes
+    return replace(machine, segments=replace(machine.segments, appears=came, vanishes=went))
+
+
+def of_sizes(machine, radius, mass, share=0.0, kind=None, **tables):
+    """Return the machine with radii (N,) and masses (N,), I = share m r^2, and tables by kind."""
+    radius, mass, share = np.broadcast_arrays(radius, mass, share)
+    particle = Particle(radius.copy(), mass.copy(), share * mass * radius**2)
+    releases = machine.releases
+    if kind is not None:
+        releases = replace(releases, kind=np.array(kind))
+    return replace(machine, particle=particle, releases=releases, **tables)
 
 
 def box(count, seed, side, *, radius=0.02, friction=0.0, spin=False, end=1.0, dt=1e-3):

@@ -14,12 +14,13 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
+from chutelab.engines.contact import run
 from chutelab.engines.contact.module import Status, constants, dtype
 from chutelab.machine import build
 from chutelab.results import REASONS, Kind
 from chutelab.scene import load
 from cores import Core, modes
-from machines import face, scene_of, thrown
+from machines import bent, face, gated, of_sizes, scene_of, thrown
 
 G = 9.81
 FAR = face("far", (-50.0, -90.0), (50.0, -90.0))
@@ -35,23 +36,26 @@ def crowd_scene(**tables):
 # Masses and radii
 
 
+REST, RUB = np.array([[0.9, 0.7], [0.7, 1.0]]), np.array([[0.3, 0.6], [0.6, 0.0]])
+"""Restitution and friction of pairs of two kinds."""
+
+
 def mixed(seed, *, turning=True, count=40, end=1.5):
     """Disks of all sizes, masses and inertias that fly to the middle and through each other."""
     rng = np.random.default_rng(seed)
     machine = crowd_scene(gravity=0.0, surface=[FAR], run={"until": end})
     place = np.stack(np.divmod(np.arange(count), 7), axis=1) - 3.0
     place = 0.12 * place + rng.uniform(-0.03, 0.03, (count, 2))
-    core = Core(thrown(machine, place, -place + rng.normal(0.0, 0.2, (count, 2))))
-    disks = core.disks
-    disks["radius"] = rng.uniform(0.005, 0.02, count)
-    disks["mass"] = 10.0 ** rng.uniform(-2.0, 1.0, count)
+    machine = thrown(machine, place, -place + rng.normal(0.0, 0.2, (count, 2)))
+    radius, mass = rng.uniform(0.005, 0.02, count), 10.0 ** rng.uniform(-2.0, 1.0, count)
     share = rng.choice([0.4, 0.5] if turning else [0.0, 0.4, 0.5], count)
-    disks["inertia"] = share * disks["mass"] * disks["radius"] ** 2
-    disks["spin"] = np.where(share > 0.0, rng.normal(0.0, 5.0, count), 0.0)
-    disks["kind"] = rng.integers(0, 2, count)
-    table = [[(0.9, 0.3, 0.0), (0.7, 0.6, 0.0), (0.5, 0.5, 0.0)],
-             [(0.7, 0.6, 0.0), (1.0, 0.0, 0.0), (0.5, 0.5, 0.0)]]  # fmt: skip
-    core.kinds(table)
+    spin = np.where(share > 0.0, rng.normal(0.0, 5.0, count), 0.0)
+    machine = of_sizes(
+        machine, radius, mass, share, rng.integers(0, 2, count), pair_restitution=REST,
+        pair_friction=RUB, rolling=np.zeros(2),
+    )  # fmt: skip
+    core = Core(machine)
+    core.disks["spin"] = spin
     return core, core.disks.copy()
 
 
@@ -83,7 +87,7 @@ def test_all_sizes_and_masses_conserve_momentum_and_close_the_ledger(seed, turni
 
 def test_each_pair_of_kinds_has_its_own_restitution_and_friction():
     # Newton: u_n' = -e u_n; Coulomb: the slip ends, or J_t = µ J_n against it.
-    rest, rub = np.array([[0.9, 0.7], [0.7, 1.0]]), np.array([[0.3, 0.6], [0.6, 0.0]])
+    rest, rub = REST, RUB
     checked = np.zeros((2, 2), dtype=int)
     for seed in range(3):
         core, start = mixed(seed)
@@ -169,13 +173,9 @@ def test_a_tilted_world_is_a_turned_scene(crowded):
 def pendulum(angle, dt, *, end=1.2):
     """A disk that does not turn in a half pipe, let go at rest at an angle from the bottom."""
     radius, r = 0.51, 0.01
-    machine = scene_of(particle={"spin": False}, surface=[{**FLOOR, "friction": 0.0}],
-                       run={"until": end, "dt": dt})  # fmt: skip
-    place = (radius - r) * np.array([sin(angle), -cos(angle)])
-    core = Core(thrown(machine, place, [0.0, 0.0]))
-    core.arc(0, (0.0, 0.0), radius, -0.5 * pi, 0.5 * pi)
-    core.world.exit_box[:] = -9.0, -9.0, 9.0, 9.0
-    return core
+    machine = scene_of(particle={"spin": False}, surface=[FAR], run={"until": end, "dt": dt})
+    machine = bent(machine, {"center": (0.0, 0.0), "radius": radius, "begin": -pi, "extent": pi})
+    return thrown(machine, (radius - r) * np.array([sin(angle), -cos(angle)]), [0.0, 0.0])
 
 
 def swing(angle, times, length=0.5):
@@ -196,7 +196,7 @@ def test_a_ball_in_a_half_pipe_is_a_pendulum_of_large_amplitude():
     expected = length * np.stack([np.sin(theta), -np.cos(theta)], axis=1)
     steps, errors = [2e-3, 1e-3, 5e-4, 2.5e-4], []
     for dt in steps:
-        place, _ = pendulum(angle, dt).run().at(times)
+        place, _ = run(pendulum(angle, dt)).at(times)
         errors.append(np.abs(place[:-1, 0] - expected[:-1]).max())
     assert errors[1] < 1e-4, errors
     order = np.polyfit(np.log(steps), np.log(errors), 1)[0]
@@ -206,7 +206,7 @@ def test_a_ball_in_a_half_pipe_is_a_pendulum_of_large_amplitude():
 def test_energy_in_a_half_pipe_is_kept_to_second_order():
     worst = []
     for dt in (2e-3, 1e-3):
-        recording = pendulum(1.4, dt).run()
+        recording = run(pendulum(1.4, dt))
         track = recording.track(0)
         kinetic, potential = recording.energies(track)
         whole = kinetic + potential
@@ -219,12 +219,9 @@ def test_energy_in_a_half_pipe_is_kept_to_second_order():
 def test_a_ball_leaves_the_outside_of_an_arc_where_its_load_ends(dt):
     # u = v²/(g ρ): u = u0 + 2 (1 - cos φ), and it leaves at u = cos φ: cos φ = (u0 + 2)/3.
     radius, r, speed = 0.49, 0.01, 0.5
-    machine = scene_of(particle={"spin": False}, surface=[{**FLOOR, "friction": 0.0}],
-                       run={"until": 0.8, "dt": dt})  # fmt: skip
-    core = Core(thrown(machine, [0.0, radius + r], [speed, 0.0]))
-    core.arc(0, (0.0, 0.0), radius, 0.5 * pi, 0.5 * pi)
-    core.world.exit_box[:] = -9.0, -9.0, 9.0, 9.0
-    left = core.run().select(Kind.SEPARATION)[0]
+    machine = scene_of(particle={"spin": False}, surface=[FAR], run={"until": 0.8, "dt": dt})
+    machine = bent(machine, {"center": (0.0, 0.0), "radius": radius, "begin": 0.0, "extent": pi})
+    left = run(thrown(machine, [0.0, radius + r], [speed, 0.0])).select(Kind.SEPARATION)[0]
     rho = radius + r
     u0 = speed**2 / (G * rho)
     assert atan_of(left["position"]) == pytest.approx(acos((u0 + 2.0) / 3.0), abs=2e-3)
@@ -241,13 +238,14 @@ def atan_of(place):
 def test_a_ball_meets_an_arc_when_the_parabola_does(inside):
     # Thrown at an arc: |x0 + v t + g t²/2 - c| = R ∓ r, by the quartic.
     radius, r = 0.5, 0.01
-    floor = {**FLOOR, "restitution": 1.0, "friction": 0.0}
-    machine = scene_of(particle={"spin": False}, surface=[floor], run={"until": 0.6})
+    machine = scene_of(particle={"spin": False}, surface=[FAR], run={"until": 0.6})
+    machine = bent(
+        machine,
+        {"center": (0.0, 0.0), "radius": radius, "begin": (-0.5 if inside else 2.6) - 0.9,
+         "extent": 1.8, "restitution": 1.0},
+    )  # fmt: skip
     place, velocity = ((0.1, 0.0), (1.3, 0.4)) if inside else ((-0.9, 0.3), (1.5, 1.0))
-    core = Core(thrown(machine, place, velocity))
-    core.arc(0, (0.0, 0.0), radius, -0.5 if inside else 2.6, 0.9)
-    core.world.exit_box[:] = -9.0, -9.0, 9.0, 9.0
-    event = core.run().select(Kind.IMPACT)[0]
+    event = run(thrown(machine, place, velocity)).select(Kind.IMPACT)[0]
     x, v, g = np.array(place), np.array(velocity), np.array([0.0, -G])
     reach = radius - r if inside else radius + r
     roots = np.roots([0.25 * g @ g, v @ g, v @ v + x @ g, 2.0 * x @ v, x @ x - reach**2])
@@ -263,13 +261,12 @@ def test_a_ball_meets_an_arc_when_the_parabola_does(inside):
 
 
 @pytest.mark.parametrize("count", [1, 3])
-def test_what_lies_on_a_gate_falls_when_it_closes(count):
-    # Free fall from the closing time on: y = r - g (t - t0)²/2, v = -g (t - t0).
+def test_what_lies_on_a_gate_falls_when_it_opens(count):
+    # Free fall from the opening time on: y = r - g (t - t0)²/2, v = -g (t - t0).
     opened = 0.4321
     machine = crowd_scene(surface=[FLOOR, FAR], run={"until": 0.7})
-    core = Core(thrown(machine, [[0.1 * n, 0.01] for n in range(count)], [0.0, 0.0]))
-    core.surfaces["closes"][0] = opened
-    recording = core.run()
+    machine = thrown(machine, [[0.1 * n, 0.01] for n in range(count)], [0.0, 0.0])
+    recording = run(gated(machine, 0, vanishes=opened))
     times = np.linspace(opened, 0.699, 50)
     place, velocity = recording.at(times)
     for n in range(count):
@@ -280,14 +277,12 @@ def test_what_lies_on_a_gate_falls_when_it_closes(count):
     np.testing.assert_allclose(recording.at([0.1, 0.4])[0][..., 1], 0.01, rtol=0, atol=1e-9)
 
 
-def test_a_gate_that_opens_later_lets_pass_who_comes_before():
+def test_a_gate_that_shuts_later_lets_pass_who_comes_before():
     # Two fall from 0.3 m, one 0.2 s later: at √(2 h/g) = 0.243 s the first passes.
     machine = crowd_scene(surface=[FLOOR, FAR], run={"until": 0.8})
     machine = thrown(machine, [[0.0, 0.3], [0.5, 0.3]], [0.0, 0.0])
     releases = replace(machine.releases, t=np.array([0.0, 0.2]))
-    core = Core(replace(machine, releases=releases))
-    core.surfaces["opens"][0] = 0.3
-    recording = core.run()
+    recording = run(gated(replace(machine, releases=releases), 0, appears=0.3))
     met = recording.select(Kind.IMPACT)
     assert met["particle"][0] == 1
     assert set(met["particle"].tolist()) == {1}
@@ -307,9 +302,9 @@ def test_rolling_friction_slows_a_rolling_disk_as_its_arm_says():
     errors, steps = [], [4e-3, 2e-3, 1e-3]
     for dt in steps:
         machine = scene_of(surface=[FLOOR], run={"until": 2.5, "dt": dt})
-        core = Core(thrown(machine, [0.0, 0.01], [speed, 0.0]))
+        machine = replace(thrown(machine, [0.0, 0.01], [speed, 0.0]), rolling=np.array([rolling]))
+        core = Core(machine)
         core.disks["spin"] = -speed / 0.01
-        core.pairs["rolling"][1] = rolling
         recording = core.run()
         times = np.linspace(0.0, 2.49, 100)
         one = np.minimum(times, stop)
@@ -331,9 +326,8 @@ def test_rolling_friction_holds_a_disk_on_a_slope_up_to_its_arm():
         floor = face("ramp", (-2.0 * cos(slope), 2.0 * sin(slope)),
                      (2.0 * cos(slope), -2.0 * sin(slope)), friction=0.8)  # fmt: skip
         machine = scene_of(surface=[floor], run={"until": 1.0})
-        core = Core(thrown(machine, 0.01 * np.array([sin(slope), cos(slope)]), [0.0, 0.0]))
-        core.pairs["rolling"][1] = rolling
-        last = core.run().track(0)[-1]
+        machine = thrown(machine, 0.01 * np.array([sin(slope), cos(slope)]), [0.0, 0.0])
+        last = run(replace(machine, rolling=np.array([rolling]))).track(0)[-1]
         # a = g (sin β - ρ cos β)/(1 + I/(m r²))
         expected = 0.5 * G * (sin(slope) - rolling * cos(slope)) / 1.5 if rolls else 0.0
         way = hypot(*(last["position"] - 0.01 * np.array([sin(slope), cos(slope)])))
@@ -386,6 +380,8 @@ def test_a_heap_falls_asleep_and_costs_nothing_until_it_is_hit():
         position=np.vstack([machine.releases.position, [0.0, 0.5]]),
         velocity=np.vstack([machine.releases.velocity, [0.0, 0.0]]),
         carried=np.zeros(13, dtype=bool),
+        stream=np.zeros(13, dtype=np.int64),
+        kind=np.zeros(13, dtype=np.int64),
     )
     core = Core(replace(machine, releases=late))
     asleep_at = None

@@ -47,6 +47,7 @@ def test_all_parts_are_told_with_their_places():
 
 def test_what_a_scene_does_not_need_is_skipped_with_the_reason():
     skipped = named(look("perpendicular").skipped)
+    assert skipped.pop("air").endswith("mm farther forward")
     assert skipped == {
         "surfaces": "the scene has no [[surface]]",
         "rotation": "particle.spin = false",
@@ -55,10 +56,10 @@ def test_what_a_scene_does_not_need_is_skipped_with_the_reason():
         "what follows": 'the first touch of the outgoing belt: run.until = "landed"',
     }
     free = named(look("free-fall", "particle.spin=true").skipped)
-    assert set(free) == {"incoming", "plate", "outgoing", "collisions", "steps"}
+    assert set(free) == {"incoming", "plate", "outgoing", "collisions", "steps", "air"}
     assert free["collisions"].endswith("stream.interact = false")
     crowd = named(look("stream").skipped)
-    assert set(crowd) == {"surfaces", "rotation", "flights"}
+    assert set(crowd) == {"surfaces", "rotation", "flights", "air"}
 
 
 @pytest.mark.parametrize(

@@ -51,6 +51,7 @@ EVERY = [
     "tables --json",
     "scenes --json",
     "schema",
+    "materials --json",
     "new untitled.toml",
     "run untitled.toml --out untitled --only npz,json,png -q",
     "lesson build ./own -q",

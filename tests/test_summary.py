@@ -18,8 +18,8 @@ from chutelab.results.summary import summary
 
 TOP = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
-    "impact", "landing", "ended", "stopped", "rolling", "waited", "squeezed", "ledger", "theory",
-    "theory_as_printed",
+    "impact", "landing", "ended", "stopped", "rolling", "waited", "squeezed", "drag",
+    "ledger", "theory", "theory_as_printed",
     "error",
     "accuracy",
 ]  # fmt: skip

@@ -62,8 +62,8 @@ def descent(gap: Numbers, rate: Numbers, acceleration: Numbers) -> Floats:
     return np.asarray(t)
 
 
-def first_descent(coefficients: Floats, until: Floats) -> Floats:
-    """Return the first t in (0, until] where a polynomial of degree up to 4 becomes negative.
+def descents(coefficients: Floats, until: Floats) -> Floats:
+    """Return each t in (0, until] where a polynomial of degree up to 4 becomes negative.
 
     The stationary points of each derivative split the time axis into pieces on which the next one
     down is monotonic, so no root is missed or mistaken for another. Touching zero
@@ -72,22 +72,22 @@ def first_descent(coefficients: Floats, until: Floats) -> Floats:
     Parameters
     ----------
     coefficients : ndarray, (5, k)
-        Constant term first. The polynomial must not be negative just after 0.
+        Constant term first.
     until : ndarray, (k,)
         Finite end of the search.
 
     Returns
     -------
-    ndarray, (k,)
-        inf where the polynomial stays non-negative.
+    ndarray, (4, k)
+        In the order of time; inf where there is none.
     """
-    first = np.full(coefficients.shape[1], np.inf)
+    found = np.full((4, coefficients.shape[1]), np.inf)
     until = np.asarray(until, dtype=np.float64)
     scaled = coefficients * until ** np.arange(5)[:, None]
     # A polynomial lies above the smallest of its Bernstein coefficients.
     open_ = np.flatnonzero((BERNSTEIN @ scaled < 0.0).any(axis=0))
     if not len(open_):
-        return first
+        return found
     coefficients, until = coefficients[:, open_], until[open_]
     derivatives = [coefficients]
     for _ in range(3):
@@ -97,11 +97,15 @@ def first_descent(coefficients: Floats, until: Floats) -> Floats:
     knots = [zero, until]
     for derivative in reversed(derivatives[1:]):
         knots = [zero, *(_crossing(derivative, a, b) for a, b in pairwise(knots)), until]
-    for a, b in reversed(list(pairwise(knots))):
-        falls = polynomial(coefficients, b) < 0.0
+    # At 0 it may be 0 and go either way.
+    before = polynomial(coefficients, zero) < 0.0
+    for n, (a, b) in enumerate(pairwise(knots)):
+        after = polynomial(coefficients, b) < 0.0
+        falls = after & ~before
         if falls.any():
-            first[open_] = np.where(falls, _crossing(coefficients, a, b), first[open_])
-    return first
+            found[n, open_] = np.where(falls, _crossing(coefficients, a, b), np.inf)
+        before = after
+    return found
 
 
 def polynomial(coefficients: Floats, t: ArrayLike) -> Floats:

@@ -2,9 +2,9 @@
 
 A blow follows Newton restitution with Coulomb friction (`impulses`).
 
-On a ride the centre of the particle moves on a circle of radius ρ; φ is measured from the top,
-clockwise. With w the speed along the circle, z = r ω, N the normal and F the tangential force per
-mass,
+On a ride the centre of the particle moves on a circle of radius ρ. The angle φ is that of the
+normal, which points at the particle, from the top, clockwise; inside a circle ρ is negative. With w
+the speed along (n_y, -n_x), z = r ω, N the normal and F the tangential force per mass,
 
     φ' = w/ρ,   w' = g sin φ + F,   z' = 2 F (free disk) or 0,   N = g cos φ - w²/ρ,
 
@@ -104,7 +104,7 @@ class Circle:
     phi: Floats  # angle from the top, clockwise, rad
     w: Floats  # speed along the circle, m/s
     z: Floats  # r ω, m/s
-    rho: Floats  # radius of the centre's path, m
+    rho: Floats  # radius of the centre's path, m; negative inside a circle, φ is of the normal
     gravity: Floats  # m/s²
     friction: Floats  # µ, may be inf
     belt: Floats  # speed of the circle's surface, m/s
@@ -177,11 +177,12 @@ def _step_length(c: Circle) -> Floats:
     angle = np.minimum(STEP_ANGLE, STEP_GROWTH / np.maximum(2.0 * finite, 1e-300))
     held = (c.slip == 0.0) & ~c.turns
     pull = np.where(held, 0.0, c.gravity * (np.abs(np.sin(c.phi)) + finite))
-    pace = np.abs(c.w) + np.sqrt(2.0 * angle * c.rho * pull)
+    rho = np.abs(c.rho)
+    pace = np.abs(c.w) + np.sqrt(2.0 * angle * rho * pull)
     with np.errstate(divide="ignore"):
-        time = np.where(pace > 0.0, angle * c.rho / np.where(pace > 0.0, pace, 1.0), np.inf)
+        time = np.where(pace > 0.0, angle * rho / np.where(pace > 0.0, pace, 1.0), np.inf)
         # Near the top the pull grows with the angle, as exp(t sqrt(g/ρ)).
-        falling = STEP_FALL * np.sqrt(c.rho / c.gravity)
+        falling = STEP_FALL * np.sqrt(rho / c.gravity)
     return np.where(pull > 0.0, np.minimum(time, falling), time)
 
 

@@ -21,6 +21,7 @@ from chutelab.results.ledger import ledger
 from chutelab.results.recording import ENTRIES, EVENT, REASONS, Kind, Recording
 from chutelab.scene import Scene
 from chutelab.scene.rules import NEEDED, SYMBOLS
+from chutelab.theory import Drag, drag
 from chutelab.util.arrays import Floats
 from chutelab.util.tables import number
 
@@ -288,6 +289,25 @@ def waits(recording: Recording) -> Waits | None:
         return None
     longest, mean = (float(late.max()), float(late.mean())) if len(late) else (0.0, 0.0)
     return Waits(len(late), longest, mean, missing)
+
+
+def air_drag(recording: Recording) -> Drag | None:
+    """Return what air drag would do, by the fastest moment of a recording; None for mass points."""
+    speeds = np.hypot(*recording.knots["velocity"].T)
+    if not len(speeds):
+        return drag(recording.scene, recording.prediction, 0.0)
+    fastest = int(np.argmax(speeds))
+    speed = float(speeds[fastest])
+    # Not every knot has the speed just before an impact; events do.
+    met = np.hypot(*recording.events["velocity_before"].T)
+    who = int(np.searchsorted(recording.offsets, fastest, side="right")) - 1
+    if len(met) and met.max() > speed:
+        speed, who = float(met.max()), int(recording.events["particle"][np.argmax(met)])
+    radius, mass = (
+        float(np.broadcast_to(part, recording.count)[who])
+        for part in (recording.particle.radius, recording.particle.mass)
+    )
+    return drag(recording.scene, recording.prediction, speed, radius, mass)
 
 
 def squeezed(recording: Recording) -> Squeeze | None:

@@ -8,7 +8,16 @@ from typing import Any
 
 from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
-from chutelab.results.quantities import column, end_times, first, rolling, squeezed, stopped, waits
+from chutelab.results.quantities import (
+    air_drag,
+    column,
+    end_times,
+    first,
+    rolling,
+    squeezed,
+    stopped,
+    waits,
+)
 from chutelab.results.recording import REASONS, Recording
 from chutelab.scene.rules import SYMBOLS
 from chutelab.theory import Transfer, predict
@@ -31,7 +40,7 @@ def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> 
     `results.quantities.Stopped`), ``rolling`` unless disks settled on the outgoing belt without
     being carried by it (see `rolling`), ``waited`` unless particles found their place taken (see
     `results.quantities.Waits`), and ``squeezed`` unless riders by adhesion got into each other (see
-    `machine.releases.Squeeze`).
+    `machine.releases.Squeeze`). ``drag`` is what air drag, left out, would do (see `theory.Drag`).
     """
     error, scene = compare(recording), recording.scene
     as_printed = None
@@ -59,6 +68,7 @@ def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> 
         "rolling": rolling(recording),
         "waited": waits(recording),
         "squeezed": squeezed(recording),
+        "drag": air_drag(recording),
         "ledger": ledger(recording),
         "theory": _theory(recording.prediction),
         "theory_as_printed": as_printed,

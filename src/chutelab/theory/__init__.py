@@ -4,30 +4,40 @@ V. Molnár et al., "Energy calculation model of an outgoing conveyor with applic
 chute with the damping plate", Mech. Sci. 7, 167-177, 2016, doi:10.5194/ms-7-167-2016.
 
 - `results`: `Transfer` and `Reason`: the answer, or why there is none.
-- `separation`: how the pulley is left: adhesion, slip at finite friction, a rolling disk.
+- `separation`: how the pulley is left, on the level or an incline: adhesion, slip at finite
+  friction, bodies that roll.
 - `transfer`: Eqs. (2)-(16) and their generalisations, vectorised; plain numbers in.
+- `slide`: sliding and rolling along a round chute.
 - `obstacles`: first contacts of a disk with finite surfaces.
 - `prediction`: `predict`, particle 0 of a scene, or the reason why the closed form does not hold
   for it; `unbounded`, the same without looking at the finite machine.
+- `drag`: what air drag, left out everywhere else, would do.
 - `paper`: the paper's tables beside what the equations give.
 - `figures`: its figures.
 
 Only NumPy, `chutelab.scene` and `chutelab.util` are imported.
 """
 
+from chutelab.theory.drag import Drag, drag
 from chutelab.theory.paper import TABLES, Table, table
 from chutelab.theory.prediction import predict, unbounded
 from chutelab.theory.results import STAGES, Reason, Transfer
-from chutelab.theory.transfer import Rebound, transfer
+from chutelab.theory.slide import Slide, slide
+from chutelab.theory.transfer import Rebound, belt_power, transfer
 
 __all__ = [
     "STAGES",
     "TABLES",
+    "Drag",
     "Reason",
     "Rebound",
+    "Slide",
     "Table",
     "Transfer",
+    "belt_power",
+    "drag",
     "predict",
+    "slide",
     "table",
     "transfer",
     "unbounded",

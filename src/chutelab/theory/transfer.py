@@ -1,7 +1,7 @@
 """The paper's equations (2) to (16) in closed form, vectorised, with their generalisations.
 
 Any plate angle, finite particles, friction and spin; the printed Eq. (9) beside the right one.
-`transfer` is what others call, `stages` has the equations.
+`transfer` is what others call, `stages` has the equations; `belt_power` speaks of a steady stream.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chutelab.theory.results import STAGES, Reason, Transfer
-from chutelab.theory.separation import separation
+from chutelab.theory.separation import FAULTS, separation
 from chutelab.util.arrays import Bools, Floats
 
 Rebound = Literal["corrected", "as-printed"]
@@ -55,6 +55,9 @@ def transfer(
     gravity: ArrayLike = 9.81,
     friction: ArrayLike = np.inf,
     spin: ArrayLike = False,
+    inertia: ArrayLike = 0.5,
+    incline: ArrayLike = 0.0,
+    ride_length: ArrayLike = 0.0,
     plate_friction: ArrayLike = 0.0,
     interval: ArrayLike | None = None,
     rebound: Rebound = "corrected",
@@ -88,7 +91,14 @@ def transfer(
     friction : array_like
         µ of particle and incoming belt or pulley; infinite is adhesion, Eq. (1).
     spin : array_like of bool
-        True: a free disk, I = m r²/2; needs r > 0.
+        True: a body that turns freely, such as a disk; needs r > 0.
+    inertia : array_like
+        I/(m r²) of one that does, 0 < I/(m r²) <= 1: 1/2 of a disk, 2/5 of a sphere.
+    incline : array_like
+        Angle β at which the incoming belt rises towards the pulley, rad, within ±π/2.
+    ride_length : array_like
+        Way on the belt before it meets the pulley, m, >= 0. It matters on an incline only, with
+        finite friction, where particles slide or roll.
     interval : array_like, optional
         Time per particle, s, the t that Eq. (15) leaves open; without it P is NaN.
     rebound : {"corrected", "as-printed"}
@@ -134,6 +144,9 @@ def transfer(
         "mass": mass,
         "gravity": gravity,
         "friction": friction,
+        "inertia": inertia,
+        "incline": incline,
+        "ride_length": ride_length,
         "plate_friction": plate_friction,
         "interval": np.nan if interval is None else interval,
     }
@@ -152,6 +165,63 @@ def transfer(
     return Transfer(reason=found.reason.astype(np.str_).reshape(turning.shape), **answers)
 
 
+def rebound(
+    *,
+    normal: Floats,
+    tangential: Floats,
+    rim: Floats,
+    restitution: Floats,
+    friction: Floats,
+    spin: Bools,
+    inertia: Floats,
+) -> tuple[Floats, Floats, Floats]:
+    """Return velocities off the plate and down along it, and the rim's, after an impact, m/s.
+
+    Before it they are `normal`, into the plate, `tangential` and `rim`.
+    """
+    # Coulomb: the impulse that stops the slip, or as much of it as friction can give.
+    slip = tangential - rim
+    limit = friction * (1.0 + restitution) * normal
+    share = np.where(spin, inertia / (1.0 + inertia), 1.0)  # m*/m
+    impulse = np.clip(slip * share, -limit, limit)
+    return restitution * normal, tangential - impulse, rim + np.where(spin, impulse / inertia, 0.0)
+
+
+def belt_power(
+    *,
+    rate_t_h: ArrayLike,
+    belt_speed: ArrayLike,
+    feed_speed: ArrayLike = 0.0,
+    lift: ArrayLike = 0.0,
+    gravity: ArrayLike = 9.81,
+) -> Floats:
+    """Return the power, W, that a belt needs to carry a steady stream, beside that to run empty.
+
+    P = ṁ v_b (v_b - v_x) + ṁ g H: the load is brought to the belt's speed, slip heat included,
+    and lifted.
+
+    Parameters
+    ----------
+    rate_t_h : array_like
+        ṁ in tonnes an hour, 3.6 t/h = 1 kg/s.
+    belt_speed, feed_speed : array_like
+        v_b of the belt, and v_x of the load along the belt as it comes on it, m/s. It must not roll
+        on the belt.
+    lift : array_like
+        H, by which the belt rises, m; negative where it falls.
+    gravity : array_like
+        g, m/s².
+
+    Examples
+    --------
+    >>> float(belt_power(rate_t_h=360.0, belt_speed=2.0, feed_speed=-1.0, lift=5.0))
+    5505.0
+    """
+    flow, v_b, v_x = (np.asarray(part) for part in (rate_t_h, belt_speed, feed_speed))
+    height = np.multiply(gravity, lift)
+    return np.asarray(flow / 3.6 * (v_b * (v_b - v_x) + height), dtype=np.float64)
+
+
 def stages(
     *,
     speed: Floats,
@@ -166,6 +236,9 @@ def stages(
     mass: Floats,
     gravity: Floats,
     friction: Floats,
+    inertia: Floats,
+    incline: Floats,
+    ride_length: Floats,
     plate_friction: Floats,
     interval: Floats,
     spin: Bools,
@@ -189,10 +262,16 @@ def stages(
     found.require("particle_radius > 0 with spin", ~spin | (particle_radius > 0.0))
     found.require("0 <= gravity < inf", (gravity >= 0.0) & (gravity < np.inf))
     found.require("friction >= 0", friction >= 0.0)
+    found.require("0 < inertia <= 1", (inertia > 0.0) & (inertia <= 1.0))
+    found.require("|incline| < π/2", np.abs(incline) < 0.5 * np.pi)
+    found.require("0 <= ride_length < inf", (ride_length >= 0.0) & (ride_length < np.inf))
     ride_radius = pulley_radius + particle_radius
     left = separation(
-        speed=speed, ride_radius=ride_radius, gravity=gravity, friction=friction, spin=spin
-    )
+        speed=speed, ride_radius=ride_radius, gravity=gravity, friction=friction, spin=spin,
+        inertia=inertia, incline=incline, ride_length=ride_length,
+    )  # fmt: skip
+    for fault in range(1, len(FAULTS)):
+        found.fail(left.fault == fault, Reason.OUTSIDE.because(FAULTS[fault]))
     found.keep(phi1=left.phi1, v1=left.v1, omega1=turning(left.rim))
 
     # Fly to the plate: the gap between disk and plate's line is a quadratic in time.
@@ -201,7 +280,7 @@ def stages(
     cos, sin = np.cos(angle), np.sin(angle)
     to_pivot = (pulley_radius + distance) * cos + pivot_height * sin - particle_radius
     # The gap on the pulley is least where the centre's radius is square to the plate.
-    closest = np.clip(0.5 * np.pi - angle, 0.0, left.phi1)
+    closest = np.clip(0.5 * np.pi - angle, -incline, left.phi1)
     behind = to_pivot < ride_radius * np.sin(closest + angle)
     behind &= found.fine
     if unbounded_plate:
@@ -213,13 +292,17 @@ def stages(
     gap = to_pivot - ride_radius * (left.sin * cos + left.cos * sin)
     closing = left.v1 * (left.cos * cos - left.sin * sin)
     discriminant = closing**2 - 2.0 * gravity * sin * gap
-    found.fail(closing <= 0.0, Reason.NO_IMPACT.because("the velocity points off the plate"))
+    normal = np.sqrt(discriminant)
+    t2 = 2.0 * gap / (closing + normal)  # Eq. (5)
+    # Thrown up steeply, it meets a plate that leans away when it comes down again.
+    parts = (closing <= 0.0) & (sin >= 0.0)
+    comes_down = np.isfinite(left.again) & ~(~parts & (t2 <= left.again))
+    found.fail(comes_down, Reason.EARLY.because("pulley: the flight comes down on it again"))
+    found.fail(parts, Reason.NO_IMPACT.because("the velocity points off the plate"))
     found.fail(
         discriminant <= 0.0,
         Reason.NO_IMPACT.because("the flight turns away before it reaches the plate's line"),
     )
-    normal = np.sqrt(discriminant)
-    t2 = 2.0 * gap / (closing + normal)  # Eq. (5)
     x2 = left.v1 * t2 * left.cos  # Eq. (3)
     y2 = 0.5 * gravity * t2**2 + left.v1 * t2 * left.sin  # Eq. (4)
     v2x = left.v1 * left.cos
@@ -241,13 +324,10 @@ def stages(
         away, down = v2r * np.sin(phi2r), v2r * np.cos(phi2r)
         rim = left.rim
     else:
-        # Coulomb: the impulse that stops the slip, or as much of it as friction can give.
-        slip = tangential - left.rim
-        limit = plate_friction * (1.0 + restitution) * normal
-        impulse = np.clip(slip * np.where(spin, 1.0 / 3.0, 1.0), -limit, limit)
-        down = tangential - impulse
-        rim = left.rim + np.where(spin, 2.0 * impulse, 0.0)
-        away = restitution * normal
+        away, down, rim = rebound(
+            normal=normal, tangential=tangential, rim=left.rim, restitution=restitution,
+            friction=plate_friction, spin=spin, inertia=inertia,
+        )  # fmt: skip
         v2r = np.hypot(away, down)  # Eq. (9) corrected
         phi2r = np.arctan2(away, down)  # Eq. (8)
     found.keep(phi2r=phi2r, v2r=v2r, omega2=turning(rim))
@@ -273,7 +353,9 @@ def stages(
         )
     dEk = 0.5 * mass * (v3x**2 + belt_speed**2)  # noqa: N806 - Eq. (14)
     slip = belt_speed + v3x - rim
-    carried = np.where(spin, mass / 3.0, mass)  # effective mass at the contact point
+    carried = np.where(
+        spin, mass / ((1.0 + inertia) / inertia), mass
+    )  # effective mass at the contact point
     lost_height = left.sin**2 / (1.0 + left.cos)  # 1 - cos φ1
     found.keep(
         t3=t3,

@@ -290,7 +290,7 @@ def preflight(scene: Scene) -> Preflight:
     return Preflight(
         title=scene.title,
         built=tuple(built(machine)),
-        skipped=tuple(skipped(scene, machine, engine)),
+        skipped=tuple(skipped(scene, machine, engine, tried.recording)),
         engine=engine,
         why=why,
         ends=ends,

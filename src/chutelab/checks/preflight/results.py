@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from chutelab.machine import Machine
-from chutelab.results.quantities import QUANTITIES
+from chutelab.results.quantities import QUANTITIES, air_drag
+from chutelab.results.recording import Recording
 from chutelab.scene import Scene
 from chutelab.scene.units import write_size
-from chutelab.theory import Reason, predict
+from chutelab.theory import Reason, drag, predict
 from chutelab.util.tables import Sheet, Shown
 
 
@@ -177,8 +178,10 @@ def built(machine: Machine) -> Iterator[Part]:
     yield Part("release", f"the first from ({x:.6g}, {y:.6g}) m at ({vx:.6g}, {vy:.6g}) m/s{last}")
 
 
-def skipped(scene: Scene, machine: Machine, engine: str) -> Iterator[Part]:
-    """Yield what the scene does without, and why."""
+def skipped(
+    scene: Scene, machine: Machine, engine: str, recording: Recording | None
+) -> Iterator[Part]:
+    """Yield what the scene does without, and why; `recording` is a trial run of it."""
     for table in ("incoming", "plate", "outgoing", "surface"):
         if not getattr(scene, table):
             written = f"[[{table}]]" if table == "surface" else f"[{table}]"
@@ -195,3 +198,6 @@ def skipped(scene: Scene, machine: Machine, engine: str) -> Iterator[Part]:
         yield Part("flights", "only contacts that last are stepped, blows have their own instants")
     if machine.until == "landed":
         yield Part("what follows", 'the first touch of the outgoing belt: run.until = "landed"')
+    air = drag(scene, predict(scene), 0.0) if recording is None else air_drag(recording)
+    if air is not None:
+        yield Part("air", str(air).replace("air drag, left out, would be", "its drag would be"))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from math import inf
+from dataclasses import replace
+from math import inf, pi
 from time import perf_counter
 from typing import Any
 
@@ -18,6 +19,10 @@ from chutelab.util.arrays import Progress
 
 GREATEST = 1e300
 """Friction without a bound, as a number that can be multiplied by zero."""
+
+JOINED, SMOOTH = 1e-3, 1e-2
+"""Radii, rad: pieces whose ends are no further apart and whose directions there differ by no more
+are one smooth surface, as one whose points are written with some digits is meant to be."""
 
 INTEGER, REAL = np.dtype("<i4"), np.dtype("<f8")
 
@@ -69,7 +74,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Recording:
     StalledError
         If a particle does not get on; it has the recording so far.
     """
-    if machine.particle.radius <= 0.0:
+    if np.min(machine.particle.radius) <= 0.0:
         raise ValueError("particle.radius = 0: the contact engine needs a radius above 0 m")
     begin = perf_counter()
     place = origin(machine)
@@ -87,6 +92,88 @@ def run(machine: Machine, progress: Progress | None = None) -> Recording:
     return recording
 
 
+def pieces(machine: Machine) -> NDArray[Any]:
+    """Return the pieces of all surfaces, segments, pulley and arcs, as rows of the core."""
+    seg, arcs, wheel = machine.segments, machine.arcs, machine.pulley
+    s, w = len(seg.length), int(wheel is not None)
+    # A piece is met in one place at a time: an arc of which a disk can touch both ends is two.
+    half, r = 0.5 * arcs.extent, np.max(machine.particle.radius)
+    narrow = (arcs.radius <= r) | ((half > 0.5 * pi) & (arcs.radius * np.sin(half) <= r))
+    parts = np.where(narrow & ~arcs.whole, 2, 1)
+    which = np.repeat(np.arange(len(parts)), parts)
+    arcs = replace(arcs, **{name: values[which] for name, values in vars(arcs).items()
+                            if name not in ("restitution", "friction")})  # fmt: skip
+    a, half = len(which), half[which] / parts[which]
+    second = np.append(False, which[1:] == which[:-1])[:a]
+    arcs = replace(arcs, begin=arcs.begin + np.where(second, 2.0 * half, 0.0), extent=2.0 * half)
+    rows = np.zeros(s + w + a, dtype("Surface"))
+    rows["material"] = np.append(np.arange(s + w), s + w + which)
+    rows["opens"], rows["closes"], rows["mates"] = -inf, inf, -1
+    shapes = constants("Shape")
+    flat, bent = rows[:s], rows[s + w :]
+    flat["x"], flat["y"] = seg.start.T
+    flat["tx"], flat["ty"] = seg.tangent.T
+    flat["length"], flat["speed"], flat["owner"] = seg.length, seg.speed, seg.surface
+    flat["opens"], flat["closes"] = seg.appears, seg.vanishes
+    flat["end"][:, :2], flat["end"][:, 2:] = seg.start, seg.end
+    low, high = np.minimum(seg.start, seg.end), np.maximum(seg.start, seg.end)
+    flat["box"][:, :2], flat["box"][:, 2:] = low, high
+    if wheel is not None:
+        rows["shape"][s] = shapes["CIRCLE"]
+        rows["radius"][s], rows["speed"][s] = wheel.radius, wheel.speed
+        rows["owner"][s] = wheel.surface
+        rows["box"][s] = -wheel.radius, -wheel.radius, wheel.radius, wheel.radius
+    if a:
+        bent["shape"] = np.where(arcs.whole, shapes["CIRCLE"], shapes["ARC"])
+        bent["x"], bent["y"] = arcs.center.T
+        bent["tx"], bent["ty"] = np.cos(arcs.begin + half), np.sin(arcs.begin + half)
+        bent["cos_half"] = np.cos(np.minimum(half, pi))
+        bent["radius"], bent["speed"], bent["owner"] = arcs.radius, arcs.speed, arcs.surface
+        bent["opens"], bent["closes"] = arcs.appears, arcs.vanishes
+        bent["end"][:, :2], bent["end"][:, 2:] = arcs.ends
+        corners = arcs.corners.reshape(-1, a, 2)
+        bent["box"][:, :2], bent["box"][:, 2:] = corners.min(axis=0), corners.max(axis=0)
+        _join(rows, s, s + w, float(np.min(machine.particle.radius)))
+    comes = np.isfinite(rows["opens"]) | np.isfinite(rows["closes"])
+    rows["gate"] = np.where(comes, np.cumsum(comes) - 1, -1)
+    return rows
+
+
+def _join(rows: NDArray[Any], straight: int, bent: int, radius: float) -> None:
+    """Note which pieces go on smoothly beyond an end: an arc, or beyond a segment an arc or circle.
+
+    The first `straight` rows are segments, those from `bent` on arcs and circles.
+    """
+    circle = rows["shape"] == constants("Shape")["CIRCLE"]
+    circle[:bent] = False
+    ended = np.flatnonzero(
+        (np.arange(len(rows)) < straight) | ((np.arange(len(rows)) >= bent) & ~circle)
+    )
+    # Ends by piece: where, and which way the piece would go on.
+    place = rows["end"][ended].reshape(-1, 2, 2)
+    onward = np.stack([rows["tx"], rows["ty"]], axis=1)[ended]
+    onward = np.stack([-onward, onward], axis=1)
+    of_arc = ended >= bent
+    center = np.stack([rows["x"], rows["y"]], axis=1)
+    out = (place - center[ended][:, None])[of_arc] / rows["radius"][ended][of_arc][:, None, None]
+    onward[of_arc] = np.stack([out[..., 1], -out[..., 0]], axis=-1) * [[1.0], [-1.0]]
+    for n, piece in enumerate(ended):
+        for end in range(2):
+            near = np.hypot(*np.moveaxis(place - place[n, end], -1, 0)) <= JOINED * radius
+            near &= np.hypot(*np.moveaxis(onward + onward[n, end], -1, 0)) <= SMOOTH
+            near[n] = False
+            near &= of_arc[:, None] | of_arc[n]
+            if near.any():
+                rows["mates"][piece, end] = ended[np.flatnonzero(near.any(axis=1))[0]]
+                continue
+            away = place[n, end] - center
+            distance = np.hypot(*away.T)
+            on = circle & (np.abs(distance - rows["radius"]) <= JOINED * radius)
+            on &= np.abs(away @ onward[n, end]) <= SMOOTH * distance
+            if on.any():
+                rows["mates"][piece, end] = np.flatnonzero(on)[0]
+
+
 class Job:
     """One run: fills the module's memory, drains what it writes, makes room where it is full."""
 
@@ -97,22 +184,28 @@ class Job:
         # Whoever is under way or to come when the run is ended, from the first disk of this part.
         self.stopped_from = machine.count
         n = machine.count
-        count = self.surface_count = len(machine.segments.length) + (machine.pulley is not None)
+        self.pieces = pieces(machine)
+        count = self.surface_count = len(self.pieces)
+        self.kinds = len(machine.rolling)
+        self.materials = int(self.pieces["material"].max(initial=-1)) + 1
+        gates = int(self.pieces["gate"].max(initial=-1)) + 1
         self.owners = len(machine.surfaces)
         buckets = 1 << (4 * n + 16).bit_length() if machine.interact else 1
         cells = 12 * n + 64 if machine.interact else 1
         module.place(
             ("disks", dtype("Disk"), n), ("tracks", dtype("Track"), n),
-            ("surfaces", dtype("Surface"), count), ("pairs", dtype("Pair"), 1 + count),
+            ("surfaces", dtype("Surface"), count),
+            ("pairs", dtype("Pair"), self.kinds * (self.kinds + self.materials)),
             ("books", REAL, 3 * (self.owners + 1)), ("cells", dtype("Cell"), cells),
             ("heads", INTEGER, buckets), ("heap", INTEGER, n), ("queue", INTEGER, n + 1),
             ("moved", INTEGER, n), ("found", INTEGER, 2 * n),
+            ("spared", INTEGER, n * gates),
         )  # fmt: skip
         self.make_room("knot", (100 if machine.releases.carried.any() else 30) * n + 200)
         self.make_room("event", 40 * n + 1200)
         self.make_room("contact", 8 * n + 16)
         self.make_room("near", 16 * n + 16 if machine.interact else 1)
-        self.settings(buckets, cells)
+        self.settings(buckets, cells, gates)
         self.fill()
 
     def make_room(self, what: str, room: int) -> None:
@@ -120,23 +213,24 @@ class Job:
         self.module.place(*((name, kind, rows * room) for name, kind, rows in GROWING[what]))
         setattr(self.module.world, f"{what}_room", room)
 
-    def settings(self, buckets: int, cells: int) -> None:
+    def settings(self, buckets: int, cells: int, gates: int) -> None:
         """Fill in the numbers of the world."""
         machine, world = self.machine, self.module.world
         alone = not machine.interact
-        r = machine.particle.radius
         left, right, bottom, top = machine.exit_box
         for name, value in (
             ("disk_count", machine.count), ("surface_count", self.surface_count),
-            ("kind_count", 1), ("material_count", self.surface_count),
+            ("kind_count", self.kinds), ("material_count", self.materials),
+            ("gate_count", gates),
             ("owner_count", self.owners), ("bucket_count", buckets), ("cell_room", cells),
             ("interact", machine.interact),
             ("until", constants("Until")[f"UNTIL_{machine.until.upper()}"]),
             ("landing", machine.landing), ("ride_owner", 0),
+            ("ride_incline", 0.0 if machine.pulley is None else machine.pulley.incline),
             ("sweeps", SWEEPS_ALONE if alone else SWEEPS), ("sleeps", not alone),
             ("gy", -machine.gravity), ("g", machine.gravity), ("dt", machine.dt),
             ("end_time", machine.end_time),
-            ("smooth_x", (1e-5 if alone else 1e-4) * r), ("smooth_v", 1e-4),
+            ("smooth_x", 1e-5 if alone else 1e-4), ("smooth_v", 1e-4),
             ("accurate", 1e-15 if alone else 3e-4),
         ):  # fmt: skip
             setattr(world, name, value)
@@ -152,34 +246,28 @@ class Job:
         disks["release"] = releases.t
         disks["radius"], disks["mass"] = particle.radius, particle.mass
         disks["inertia"] = particle.inertia
+        disks["kind"] = releases.kind
         carried = releases.carried
-        disks["ride_x"][carried] = releases.position[carried, 0]
-        disks["ride_rho"][carried] = releases.position[carried, 1]
-        disks["ride_speed"][carried] = releases.velocity[carried, 0]
-        surfaces = module.array("surfaces", dtype("Surface"), self.surface_count)
-        surfaces["material"] = np.arange(self.surface_count)
-        surfaces["opens"], surfaces["closes"] = -inf, inf
-        seg, wheel = machine.segments, machine.pulley
-        s = len(seg.length)
-        flat = surfaces[:s]
-        flat["x"], flat["y"] = seg.start.T
-        flat["tx"], flat["ty"] = seg.tangent.T
-        flat["length"], flat["speed"], flat["owner"] = seg.length, seg.speed, seg.surface
-        flat["end"][:, :2], flat["end"][:, 2:] = seg.start, seg.end
-        low, high = np.minimum(seg.start, seg.end), np.maximum(seg.start, seg.end)
-        flat["box"][:, :2], flat["box"][:, 2:] = low, high
-        restitution, friction = seg.restitution, seg.friction
-        if wheel is not None:
-            surfaces[s]["shape"] = constants("Shape")["CIRCLE"]
-            surfaces[s]["radius"], surfaces[s]["speed"] = wheel.radius, wheel.speed
-            surfaces[s]["owner"] = wheel.surface
-            surfaces[s]["box"] = -wheel.radius, -wheel.radius, wheel.radius, wheel.radius
-            restitution = np.append(restitution, wheel.restitution)
-            friction = np.append(friction, wheel.friction)
-        pairs = module.array("pairs", dtype("Pair"), 1 + self.surface_count)
-        pairs["restitution"][0] = machine.pair_restitution[0, 0]
-        pairs["friction"][0] = machine.pair_friction[0, 0]
-        pairs["restitution"][1:], pairs["friction"][1:] = restitution, friction
+        if machine.pulley is not None and carried.any():
+            sine, cosine = np.sin(machine.pulley.incline), np.cos(machine.pulley.incline)
+            (x, y), (vx, vy) = releases.position[carried].T, releases.velocity[carried].T
+            disks["ride_x"][carried] = x * cosine + y * sine
+            disks["ride_rho"][carried] = y * cosine - x * sine
+            disks["ride_speed"][carried] = vx * cosine + vy * sine
+        module.array("surfaces", dtype("Surface"), self.surface_count)[:] = self.pieces
+        pairs = module.array("pairs", dtype("Pair"), self.kinds * (self.kinds + self.materials))
+        pairs = pairs.reshape(self.kinds, -1)
+        own, wheel = pairs[:, : self.kinds], machine.pulley
+        own["restitution"], own["friction"] = machine.pair_restitution, machine.pair_friction
+        own["rolling"] = np.maximum.outer(machine.rolling, machine.rolling)
+        others = pairs[:, self.kinds :]
+        for name in ("restitution", "friction"):
+            values = [getattr(machine.segments, name), getattr(machine.arcs, name)]
+            if wheel is not None:
+                values.insert(1, np.asarray(getattr(wheel, name))[..., None])
+            values = [np.broadcast_to(each, (self.kinds, each.shape[-1])) for each in values]
+            others[name] = np.concatenate(values, axis=1)
+        others["rolling"] = machine.rolling[:, None]
         np.minimum(pairs["friction"], GREATEST, out=pairs["friction"])
 
     def run(self, progress: Progress | None) -> tuple[int, float, tuple[float, float]] | None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from chutelab.engines.exact.detect import bounds
-from chutelab.engines.exact.obstacles import NONE, dot, length_of, pick
+from chutelab.engines.exact.joints import NONE
+from chutelab.engines.exact.obstacles import dot, length_of, pick
 from chutelab.engines.exact.particle_state import COLLAPSE, Contact, Mode, State
 from chutelab.mechanics.contact import grip_limit, impulses, limited
 from chutelab.results import Kind
@@ -364,5 +365,5 @@ def _ride(s: State, index: Ints) -> None:
     side = np.where(side == 0.0, o.rim_side(index, on, normal), side)
     s.side[index] = side
     phi = np.arctan2(normal[0], normal[1])
-    rho = pick(o.rho, index, on - o.segments)
+    rho, s.angle[index] = pick(o.rho, index, on - o.segments), phi
     s.bounds[:, index] = bounds(o, index, on - o.segments, side, rho, phi, s.radius[index])

@@ -1,7 +1,7 @@
 """What a particle meets next, and when: solved, not stepped.
 
-In flight, or sliding straight, it may meet a face or a circle (a segment's end, the pulley). A ride
-round a circle is stopped by something else at an angle in closed form.
+In flight, or sliding straight, it may meet a face or a circle (an end, an arc from outside or
+inside, the pulley). A ride round a circle is stopped by something else at an angle in closed form.
 """
 
 from __future__ import annotations
@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.engines.exact.obstacles import NONE, Obstacles, dot, length_of, pick, rows_of
-from chutelab.mechanics.ballistics import descent, first_descent
+from chutelab.engines.exact.joints import FACES, NONE
+from chutelab.engines.exact.obstacles import Obstacles, dot, length_of, pick, rows_of
+from chutelab.mechanics.ballistics import descent, descents
 from chutelab.util.arrays import Bools, Floats, Ints
 
 PARALLEL = 1e-14
@@ -47,7 +48,8 @@ class Motion:
     left_side: Floats
     order: Ints
     past: Past | None = None  # of points
-    on: Ints | None = None  # segment they slide on, which they cannot meet
+    on: Ints | None = None  # segment they slide on, which they cannot meet, and its face
+    on_side: Floats | None = None
     never: Bools | None = None  # (S + C,), obstacles that none of them can meet
 
     def after(self, t: Floats) -> Floats:
@@ -91,33 +93,54 @@ def first_circle(
     d = motion.position[:, index] - pick(obstacles.center, rows, circle)
     rho = pick(obstacles.rho, rows, circle)
     distance = np.hypot(d[0], d[1])
-    # |d + v t + a t²/2|² - ρ², as a polynomial of t.
+    # |d + v t + a t²/2|² - ρ², as a polynomial of t; ρ² less that from inside.
+    sense, rho, touch = np.sign(rho), np.abs(rho), rows_of(obstacles.touch, rows)
     gap = np.empty((5, len(index)))
     gap[0] = (distance - rho) * (distance + rho)
     gap[1] = 2.0 * dot(d, v)
     gap[2] = dot(v, v) + dot(d, a)
     gap[3] = dot(v, a)
     gap[4] = 0.25 * dot(a, a)
+    gap *= sense
+    if obstacles.span.size:
+        # Who comes in through the opening of an arc, along its very end, is inside for a moment.
+        gap[0] += np.where((sense < 0.0) & (gap[0] < 0.0), 2.0 * rho * touch, 0.0)
     leaving = motion.left[index] == circle + obstacles.segments
-    touch = rows_of(obstacles.touch, rows)
+    if motion.past is not None:
+        leaving |= motion.left[index] == obstacles.back(circle)
     touching = np.abs(distance - rho) <= touch
     # The direction from the centre is as uncertain as the places are, over ρ.
     uncertain = 2.0 * (PARALLEL * rho + touch) * length_of(v)
     grazing = touching & (np.abs(gap[1]) <= uncertain)
     gap[1] = np.where(grazing & ~leaving, 0.0, gap[1])
-    order = np.where(leaving, motion.order[index], np.where(touching & (gap[1] >= 0.0), 1, 0))
-    now = touching & ~leaving & (gap[1] < 0.0)
+    closing = touching & (gap[1] < 0.0)
+    if motion.past is not None:
+        # A point behind a circle does not meet it, however near it is.
+        then = motion.past.place[:, rows] - pick(obstacles.center, rows, circle)
+        closing &= sense * (np.hypot(then[0], then[1]) - rho) >= -touch
+    order = np.where(leaving, motion.order[index], np.where(touching & ~closing, 1, 0))
+    now = closing & ~leaving
+    if obstacles.span.size:
+        now &= obstacles.spanned(rows, circle, d)
     for n in range(1, 4):
         shift = order >= n
         gap[:-1, shift] = gap[1:, shift]
         gap[-1, shift] = 0.0
-    # Inside already (overlapping), or nothing ever pulls it in: no contact to find.
-    open_ = (~now & (gap[0] >= 0.0) & (gap < 0.0).any(axis=0)).nonzero()[0]
+    # Behind already, and for good, or nothing ever pulls it in: no contact to find.
+    open_ = (
+        ~now & ((gap[0] >= 0.0) | (gap > 0.0).any(axis=0)) & (gap < 0.0).any(axis=0)
+    ).nonzero()[0]
     t = np.where(now, 0.0, np.inf)
     if len(open_):
-        found = first_descent(gap[:, open_], until[index[open_]])
+        d, v, a = d[:, open_], v[:, open_], a[:, open_]
+        found = descents(gap[:, open_], until[index[open_]])
+        if obstacles.span.size:
+            for times in found:
+                there = d + times * (v + 0.5 * times * a)
+                beside = obstacles.spanned(rows[open_], circle[open_], there)
+                times[~beside] = np.inf
         t[open_] = _polished(
-            found, d[:, open_], v[:, open_], a[:, open_], rho[open_], order[open_] == 0
+            found.min(axis=0), d, v, a, sense[open_] * rho[open_], order[open_] == 0
         )
     # The soonest is written last; of those met at once, the one with the lowest number.
     best = np.argsort(t, kind="stable")[::-1]
@@ -134,10 +157,10 @@ def _polished(t: Floats, d: Floats, v: Floats, a: Floats, rho: Floats, apart: Bo
     time = np.where(np.isfinite(t), t, 0.0)
     there, pace = d + time * (v + 0.5 * time * a), v + time * a
     distance = np.hypot(there[0], there[1])
-    rate = dot(there, pace) / distance
+    rate = np.sign(rho) * dot(there, pace) / distance
     steep = np.isfinite(t) & (rate < -GLANCING * length_of(pace))
-    better = steep & (apart | (-rate * time > rho))
-    correction = (distance - rho) / np.where(better, rate, 1.0)
+    better = steep & (apart | (-rate * time > np.abs(rho)))
+    correction = np.sign(rho) * (distance - np.abs(rho)) / np.where(better, rate, 1.0)
     return np.where(better, np.maximum(t - correction, 0.0), t)
 
 
@@ -149,15 +172,19 @@ def hidden(motion: Motion, obstacles: Obstacles, circles: Ints) -> Bools:
     if np.count_nonzero(curved):
         # Left tangentially with the speed not falling, all terms of the gap to a circle grow.
         curved &= dot(motion.velocity, motion.acceleration) >= 0.0
+        if obstacles.arcs:
+            curved &= pick(obstacles.rho, motion.rows, np.maximum(left - segments, 0)) > 0.0
         out |= curved & (left == (circles + segments)[:, None])
     # A face that is left with the pull away from it hides its own two ends, as does one slid on.
     flat = (left >= 0) & (left < segments)
     if np.count_nonzero(flat):
         normal = motion.left_side * pick(obstacles.normal, motion.rows, left)
         flat &= dot(motion.acceleration, normal) >= 0.0
-        out |= obstacles.owns[circles][:, np.where(flat, left, 0)] & flat
+        out |= obstacles.joints.owns[circles][:, np.where(flat, left, 0)] & flat
     if motion.on is not None:
-        out |= obstacles.owns[circles][:, motion.on]
+        assert motion.on_side is not None
+        face = np.where(motion.on_side < 0.0, 1, 0)
+        out |= obstacles.joints.beside[circles][:, motion.on, face]
     return out
 
 
@@ -365,34 +392,39 @@ def bounds(
         np.copyto(found["side"], side, where=nearer)
         np.copyto(found["handover"], handover, where=nearer)
 
-    center = pick(obstacles.center, rows, circle)
-    on_pulley = circle + obstacles.segments == obstacles.pulley
+    center, facing, joints = pick(obstacles.center, rows, circle), np.sign(rho), obstacles.joints
     for segment in range(obstacles.segments):
         start = rows_of(obstacles.start[:, segment], rows)
         tangent = rows_of(obstacles.tangent[:, segment], rows)
         normal = rows_of(obstacles.normal[:, segment], rows)
         length = rows_of(obstacles.length[segment], rows)
-        owned = obstacles.owns[circle, segment] | (on_pulley & (segment == 0))
-        for face in (1, -1):
+        for n, face in enumerate(FACES):
             # The gap to a face is ρ (cos(φ - tilt) - level).
             tilt = np.arctan2(face * normal[0], face * normal[1])
             level = (face * dot(start - center, normal) + radius) / rho
             half = np.arccos(np.clip(level, -1.0, 1.0))
-            met = (np.abs(level) <= 1.0) & ~(owned & (~on_pulley | (face == 1)))
+            met = (np.abs(level) <= 1.0) & ~joints.beside[circle, segment, n]
             for angle in (tilt - half, tilt + half):
                 foot = dot(center + rho * _up(angle) - start, tangent)
                 there = met & (foot >= 0.0) & (foot <= length)
-                narrow(angle, np.sin(angle - tilt), there, segment, face)
-        # The circle belongs to a segment on the outer side of that segment's end.
-        middle = start + 0.5 * length * tangent
-        outward = np.where(dot(center - middle, tangent) > 0.0, 1.0, -1.0) * tangent
-        tilt = np.arctan2(outward[0], outward[1])
-        for angle in (tilt - 0.5 * np.pi, tilt + 0.5 * np.pi):
-            side_there = np.where(dot(_up(angle), normal) > 0.0, 1, -1)
-            narrow(angle, np.sin(angle - tilt), owned, segment, side_there, True)
-    crown, here = pick(obstacles.crown, rows, circle), circle + obstacles.segments
+                narrow(angle, facing * np.sin(angle - tilt), there, segment, face)
+    here = circle + obstacles.segments
+    for this in np.unique(here).tolist():
+        for piece, end, face, onto in joints.handovers.get(this, ()):
+            outward = rows_of(joints.tips[1][:, piece, end], rows)
+            tilt = np.arctan2(outward[0], outward[1])
+            angle = tilt - 0.5 * np.pi if (face > 0) == (end > 0) else tilt + 0.5 * np.pi
+            closing = facing * np.sin(angle - tilt)
+            n = FACES.index(face)
+            if onto:
+                obstacle, face_there = joints.obstacle(piece, face), face
+            else:
+                closing = -closing
+                obstacle, face_there = (int(array[piece, end, n]) for array in joints.onward)
+            narrow(angle, closing, here == this, obstacle, face_there, True)
+    crown = pick(joints.crown, rows, circle)
     tilt = np.arctan2(crown[0], crown[1])
-    moves = ~on_pulley & (pick(obstacles.material, rows, here)[0] != 0.0)
+    moves = (crown != 0.0).any(axis=0) & (pick(obstacles.material, rows, here)[0] != 0.0)
     for angle in (tilt - 0.5 * np.pi, tilt + 0.5 * np.pi):
         narrow(angle, side * np.sin(angle - tilt), moves, here, -side, True)
     for other in range(obstacles.center.shape[1]):
@@ -400,14 +432,19 @@ def bounds(
         apart = rows_of(obstacles.center[:, other], rows) - center
         distance = np.hypot(apart[0], apart[1])
         distinct = (circle != other) & (distance > rows_of(obstacles.touch, rows))
+        distinct &= ~joints.beside[circle, other + obstacles.segments, 0]
         reach = rows_of(obstacles.rho[other], rows)
         level = (rho**2 + distance**2 - reach**2) / np.where(distinct, 2.0 * rho * distance, 1.0)
         met = distinct & (np.abs(level) < 1.0)
         half = np.arccos(np.clip(level, -1.0, 1.0))
         tilt = np.arctan2(apart[0], apart[1])
         for angle in (tilt - half, tilt + half):
-            closing = -np.sin(angle - tilt)
-            narrow(angle, closing, met, other + obstacles.segments, 0)
+            closing = -np.sign(reach) * facing * np.sin(angle - tilt)
+            there = met
+            if obstacles.span.size:
+                which = np.full(len(rows), other)
+                there = met & obstacles.spanned(rows, which, rho * _up(angle) - apart)
+            narrow(angle, closing, there, other + obstacles.segments, 0)
     return found
 
 

@@ -10,12 +10,16 @@ from time import perf_counter
 
 import numpy as np
 
+from chutelab.engines.exact.joints import COLLINEAR, FOLDED
 from chutelab.engines.exact.motion import carry, fly, ride, slide
 from chutelab.engines.exact.obstacles import (
-    FOLDED,
     JOINT,
+    Bends,
+    ahead_of,
     corners_of,
+    dot,
     obstacles,
+    resting,
     size_of,
     touch_of,
 )
@@ -42,12 +46,17 @@ def kinds(machine: Machine) -> list[Ints]:
     list of ndarray
         Numbers of members that are alike; each member is in one of them.
     """
-    ends, segments = corners_of(machine), len(machine.segments.surface)
-    size, radius = size_of(ends, machine.releases.position), machine.particle.radius
+    bends = Bends.of(machine)
+    ends, ahead = corners_of(machine, bends), ahead_of(machine, bends)
+    size, radius = size_of(ends, bends, machine.releases.position), machine.particle.radius
     reach = JOINT * size
     traits = [np.greater(radius, 0.0), radius <= touch_of(size), np.greater(machine.gravity, 0.0)]
     if machine.pulley is not None:
         traits.append(np.equal(machine.pulley.speed, 0.0))
+    traits += [*np.atleast_2d(machine.arcs.whole).T]
+    for arc, on in enumerate(resting(ends, bends, reach)):
+        slant = dot(ends - bends.center[:, arc, None], ahead) / bends.shape[0, arc]
+        traits += [*on, *(on & (np.abs(slant) <= COLLINEAR))]
     # Most ends are never near each other.
     beyond = ends.min(axis=-1)[:, :, None] > ends.max(axis=-1)[:, None] + reach.max()
     beyond |= beyond.transpose(0, 2, 1)
@@ -55,11 +64,13 @@ def kinds(machine: Machine) -> list[Ints]:
     for a, b in np.argwhere(np.triu(~beyond.any(axis=0), 1)).tolist():
         near: Bools = np.all(np.abs(ends[:, a] - ends[:, b]) <= reach, axis=0)
         joins[frozenset((a, b))] = near
-        outward, onward = (
-            machine.segments.tangent[..., end % segments, :] * (1.0 if end < segments else -1.0)
-            for end in (a, b)
-        )
-        traits += [near, near & (np.abs(outward - onward).max(axis=-1) <= FOLDED)]
+        outward, onward = ahead[:, a], ahead[:, b]
+        cross = np.abs(outward[0] * onward[1] - outward[1] * onward[0])
+        traits += [
+            near,
+            near & (np.abs(outward - onward).max(axis=0) <= FOLDED),
+            near & (cross <= COLLINEAR),
+        ]
     # Where a joins b and b joins c, but a does not join c, the order of the ends matters too.
     nobody = np.zeros(machine.count, dtype=bool)
     chained = nobody.copy()

@@ -8,9 +8,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from chutelab.engines.exact.contacts import end_slip, face_force, rest_on, settle_law, strike
+from chutelab.engines.exact.contacts import (
+    end_slip,
+    face_force,
+    load_on,
+    rest_on,
+    strike,
+)
 from chutelab.engines.exact.detect import FEW, Motion, bounds, first_contact
-from chutelab.engines.exact.obstacles import NONE, dot, pick, rows_of
+from chutelab.engines.exact.joints import NONE
+from chutelab.engines.exact.obstacles import dot, pick, rows_of
 from chutelab.engines.exact.particle_state import Mode, State
 from chutelab.mechanics.ballistics import descent
 from chutelab.mechanics.contact import STEP_ANGLE, Circle, Outcome, advance, normal_force
@@ -18,26 +25,21 @@ from chutelab.results import Kind
 from chutelab.util.arrays import Bools, Floats, Ints
 
 
-def ride_on(s: State, index: Ints, circle: Ints) -> None:
-    """Go on from the end of a face round a circle, or fly if it curves away too fast."""
+def go_on(s: State, index: Ints, obstacle: Ints, side: Floats) -> None:
+    """Go on from the end of a face or an arc on what follows, or fly if nothing holds there."""
     if not len(index):
         return
-    left, side, surface = s.on[index].copy(), s.side[index].copy(), s.obstacles.surface[s.on[index]]
-    c = s.contact(index, circle, np.zeros_like(side))
-    rho = pick(s.obstacles.rho, index, circle - s.obstacles.segments)
-    w = dot(s.v.take(index, axis=1), c.tangent)
-    stays = s.weight_on(index, c.normal) - w**2 / rho > 0.0
-    rest_on(s, index[stays], circle[stays], np.zeros_like(side[stays]), np.zeros(int(stays.sum())))
+    o, left, face = s.obstacles, s.on[index], s.side[index]
+    ends = obstacle == NONE
+    obstacle, side = np.where(ends, left, obstacle), np.where(ends, face, side)
+    stays = ~ends & (load_on(s, index, obstacle, s.contact(index, obstacle, side)) > 0.0)
     off = ~stays
-    s.part(index[off], surface[off])
-    # From the pulley it flies tangentially, above it for good; from an end it leaves the face.
-    from_pulley = circle[off] == s.obstacles.pulley
-    s.fly(
-        index[off],
-        np.where(from_pulley, circle[off], left[off]),
-        np.where(from_pulley, 0, side[off]),
-        2,
-    )
+    s.part(index[off], o.surface[left[off]])
+    # From a tangential joint it flies off what follows; from an end it leaves what ends.
+    flush = ends | (obstacle < o.segments) | (obstacle >= o.first_arc)
+    last, last_side = np.where(flush, obstacle, left), np.where(flush, side, face)
+    s.fly(index[off], last[off], last_side[off], 2)
+    rest_on(s, index[stays], obstacle[stays], side[stays], np.zeros(np.count_nonzero(stays)))
 
 
 def carry_round(s: State, index: Ints) -> None:
@@ -91,8 +93,11 @@ def ride(s: State, index: Ints) -> None:
     circle = s.on[index]
     c = s.contact(index, circle, s.side[index])
     rho = pick(s.obstacles.rho, index, circle - s.obstacles.segments)
+    phi = np.arctan2(c.normal[0], c.normal[1])
+    # The angle goes on where a turn is complete.
+    phi += 2.0 * np.pi * np.rint((s.angle[index] - phi) / (2.0 * np.pi))
     state = Circle(
-        phi=np.arctan2(c.normal[0], c.normal[1]),
+        phi=phi,
         w=dot(s.v.take(index, axis=1), c.tangent),
         z=s.z[index],
         rho=rho,
@@ -112,6 +117,7 @@ def ride(s: State, index: Ints) -> None:
     s.age[index[go]] += step.dt[go]
     center = s.p.take(index, axis=1) - rho * c.normal
     _place(s, index[go], rho[go], step.phi[go], step.w[go], center[:, go])
+    s.angle[index[go]] = step.phi[go]
     s.z[index[go]] = step.z[go]
     mass = s.mass[index]
     s.book(
@@ -138,7 +144,7 @@ def ride(s: State, index: Ints) -> None:
         there = s.bounds[way, index]
         obstacle, side = there["obstacle"], there["side"]
         joins = at & there["handover"]
-        rest_on(s, index[joins], obstacle[joins], side[joins], np.zeros(np.count_nonzero(joins)))
+        go_on(s, index[joins], obstacle[joins], side[joins])
         hit = at & ~joins
         if hit.any():
             strike(s, index[hit], obstacle[hit], side[hit])
@@ -152,9 +158,6 @@ def _place(
     s.p[:, index] = center + rho * np.stack([sine, cosine])
     s.v[:, index] = w * np.stack([cosine, -sine])
 
-
-COLLINEAR = 1e-12
-"""Sine of the angle at a joint below which one segment simply goes on as the next."""
 
 CLEAR = 16.0
 """Way, in `Obstacles.touch`, after which a point has been away from what it touches."""
@@ -210,7 +213,7 @@ def slide(s: State, index: Ints) -> None:
     c = s.contact(index, on, face)
     pull, force = face_force(s, index, c)
     motion = _motion(s, index, pull)
-    motion.on = on
+    motion.on, motion.on_side = on, face
     # The slip is linear in time, while there is one.
     slip = dot(motion.velocity, c.tangent) + s.z[index] - c.belt
     rate = dot(pull, c.tangent) + (2.0 * force if s.spins else 0.0)
@@ -324,17 +327,6 @@ def _leave_face(s: State, index: Ints) -> None:
         s.p.take(index, axis=1) - pick(o.start, index, segment), pick(o.tangent, index, segment)
     )
     end = (foot > 0.5 * pick(o.length, index, segment)).astype(np.int64)
-    following, circle = o.follow[segment, end], o.end_circle[segment, end]
-    normal = side * pick(o.normal, index, segment)
-    next_normal = pick(o.normal, index, np.maximum(following, 0))
-    sine = normal[0] * next_normal[1] - normal[1] * next_normal[0]
-    smooth = (following != NONE) & (np.abs(sine) <= COLLINEAR)
-    onto = index[smooth]
-    s.on[onto] = following[smooth]
-    s.side[onto] = np.where(dot(normal[:, smooth], next_normal[:, smooth]) > 0.0, 1.0, -1.0)
-    settle_law(s, onto)
-    round_ = ~smooth & (circle != NONE)
-    ride_on(s, index[round_], circle[round_])
-    off = ~smooth & (circle == NONE)
-    s.part(index[off], o.surface[segment[off]])
-    s.fly(index[off], segment[off], side[off], 2)
+    onward, onward_side = o.joints.onward
+    face = (side < 0.0).astype(np.int64)
+    go_on(s, index, onward[segment, end, face], onward_side[segment, end, face])

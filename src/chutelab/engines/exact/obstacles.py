@@ -1,8 +1,13 @@
-"""The machine as the exact engine sees it: faces to meet, circles to meet, and how they join.
+"""The machine as the exact engine sees it: faces to meet, and circles to meet.
 
 A disk of radius r touches a segment's face when its centre is r away, and its end when the centre
-is on a circle of radius r about it. The pulley is one more circle, of radius R + r. Obstacles are
-numbered: segments first, then circles.
+is on a circle of radius r about it. An arc of radius R is met from outside on a circle of radius
+R + r, and from inside on one of radius R - r, which counts as negative: then one formula serves
+both, with normals that point at the particle. The pulley is one more circle, of radius R + r.
+
+Obstacles are numbered: segments, then circles: ends, arcs from outside, arcs from inside, and the
+pulley. *Pieces* are the segments and then the arcs, those with ends first. A piece has a left and a
+right face, seen along it; along an arc is clockwise, so that its left face is its outside.
 
 Arrays have the particles last, and the two components of vectors first, so that what one operation
 reads lies together.
@@ -10,44 +15,47 @@ reads lies together.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from sys import float_info
 
 import numpy as np
 
+from chutelab.engines.exact.joints import NONE, Joints
 from chutelab.machine import Machine
-from chutelab.util.arrays import Bools, Floats, Ints
-
-NONE = -1
-
-FOLDED = 1e-9
-"""Difference of two directions below which one segment lies on the other."""
+from chutelab.util.arrays import Bools, Floats, Ints, Numbers
 
 PER_PARTICLE = (
-    "faces", "length", "center", "rho", "material", "low", "high", "touch",
+    "faces", "length", "center", "rho", "span", "bend", "material", "low", "high", "touch",
 )  # fmt: skip
 """Arrays of `Obstacles` whose last axis may be the particles."""
 
 
 @dataclass(frozen=True, eq=False)
 class Obstacles:
-    """S segments and C circles; n is 1 or the number of particles."""
+    """S segments, A arcs and C circles; n is 1 or the number of particles."""
 
     # Of the segments, (2, 4, S, 1, n), components first: unit normal, unit tangent to the right of
     # it, first end (m), and from where to where along a segment a place counts as beside it (m).
     faces: Floats
     length: Floats  # (S, n), m
-    center: Floats  # (2, C, n), of the circles: segment ends, then the pulley, m
-    rho: Floats  # (C, n), distance of a particle's centre from the circle's at contact, m
+    center: Floats  # (2, C, n), of the circles, m
+    # (C, n), distance of a particle's centre from the circle's at contact, m; negative from inside,
+    # NaN where the particle is too large for that.
+    rho: Floats
+    span: Floats  # (2, C, n), first angle of contacts and how far they reach, rad; or no circle
+    bend: Floats  # (3, A, n), of the arcs: radius (m), first angle, extent (rad)
     # (3, S + C, n): speed of the surface (m/s), of segments and their ends along the segment, of
-    # the pulley clockwise; restitution and friction of the pair.
+    # arcs and the pulley clockwise; restitution and friction of the pair.
     material: Floats
     low: Floats  # (2, S + C, n), box that a particle's centre is in when it touches, m
     high: Floats
     surface: Ints  # (S + C,), index into `Machine.surfaces`
-    spots: tuple[tuple[int, int], ...]  # (S,), places where segments begin and end, by number
-    end_circle: Ints  # (S, 2), obstacle number of the circle at each end, or -1 for a point
+    spots: tuple[tuple[int, int], ...]  # (P, 2), numbers of places where pieces begin and end
+    rests: Ints  # (P, 2), arc on which an end lies, or number of arcs for the pulley, or -1
+    end_circle: Ints  # (S + A, 2), obstacle number of the circle at each end, or -1
+    first_arc: int  # obstacle number of the first arc's outside
     pulley: int  # obstacle number of the pulley, or -1
     touch: Floats  # (n,), m; gaps smaller than this are rounding
 
@@ -55,6 +63,11 @@ class Obstacles:
     def segments(self) -> int:
         """Number of segments S."""
         return int(self.length.shape[0])
+
+    @property
+    def arcs(self) -> int:
+        """Number of arcs A."""
+        return int(self.bend.shape[1])
 
     @property
     def normal(self) -> Floats:
@@ -72,14 +85,6 @@ class Obstacles:
         return self.faces[:, 2, :, 0]
 
     @cached_property
-    def owns(self) -> Bools:
-        """Tell of which segments a circle is an end, (C, S)."""
-        circle = np.arange(self.segments, len(self.surface))[:, None]
-        owns = (self.end_circle[:, 0] == circle) | (self.end_circle[:, 1] == circle)
-        # The pulley only stands for one.
-        return np.asarray(owns & (circle != self.pulley))
-
-    @cached_property
     def bound(self) -> tuple[Floats, Floats]:
         """Lower and upper sides of boxes that hold those of all particles, (2, S + C) each, m."""
         return self.low.min(axis=-1), self.high.max(axis=-1)
@@ -89,57 +94,32 @@ class Obstacles:
         """Return what particles held on the incoming belt cannot meet at any height, (S + C,)."""
         held = np.zeros(len(self.surface), dtype=bool)
         held[0] = held[self.pulley] = True
-        held[self.end_circle[0]] = True
+        held[self.end_circle[0][self.end_circle[0] != NONE]] = True
         return held
 
     @cached_property
-    def follow(self) -> Ints:
-        """Return which segment goes on where another ends, (S, 2), -1 if none; the first one wins.
+    def joints(self) -> Joints:
+        """How the pieces join."""
+        return Joints(self)
 
-        Segments that fold back onto each other do not go on from each other.
-        """
-        follow = np.full((self.segments, 2), NONE, dtype=np.int64)
-        meeting: dict[int, list[tuple[int, int]]] = {}
-        for segment, pair in enumerate(self.spots):
-            for end, spot in enumerate(pair):
-                meeting.setdefault(spot, []).append((segment, end))
-        along = self.tangent[:, :, 0]
-        for ends in meeting.values():
-            for n, (s, e) in enumerate(ends):
-                for other, f in ends[n + 1 :]:
-                    if other == s or follow[s, e] != NONE or follow[other, f] != NONE:
-                        continue
-                    outward = along[:, s] if e else -along[:, s]
-                    there = along[:, other] if f else -along[:, other]
-                    if np.abs(outward - there).max() > FOLDED:
-                        follow[s, e], follow[other, f] = other, s
-        return follow
+    def back(self, circle: Ints) -> Ints:
+        """Return the obstacle number of the other face of arcs, of circles (k,); else -2."""
+        arc = circle + self.segments - self.first_arc
+        bent = (arc >= 0) & (arc < 2 * self.arcs)
+        other = np.where(arc < self.arcs, arc + self.arcs, arc - self.arcs)
+        return np.where(bent, other + self.first_arc, -2)
 
-    @cached_property
-    def crown(self) -> Floats:
-        """Vectors, (2, C, n), to the middle of the half that joins the left face of a segment.
-
-        At an end that is the segment's left normal, at a joint the sum of both. The pulley, which
-        turns clockwise all round, has 0.
-        """
-        crown = np.zeros((2, len(self.rho), self.length.shape[-1]))
-        for segment, end in reversed(list(np.ndindex(self.end_circle.shape))):
-            circle, joined = self.end_circle[segment, end], self.follow[segment, end]
-            if circle in (NONE, self.pulley):
-                continue
-            crown[:, circle - self.segments] = self.normal[:, segment]
-            if joined != NONE:
-                goes_on = self.end_circle[joined, 1 - end] == circle
-                crown[:, circle - self.segments] += (1 if goes_on else -1) * self.normal[:, joined]
-        return crown
+    def spanned(self, rows: Ints, circle: Ints, away: Floats) -> Bools:
+        """Tell whether directions from the centres of circles (k,) are those of the arc, (2, k)."""
+        begin, extent = pick(self.span, rows, circle)
+        turn = np.mod(np.arctan2(away[1], away[0]) - begin + FOOT, 2.0 * np.pi)
+        return np.asarray(turn <= extent + 2.0 * FOOT)
 
     def of(self, first: int, last: int) -> Obstacles:
         """Return the obstacles of the particles from `first` up to `last`."""
-        if self.length.shape[-1] == 1:
-            return self
-        return replace(
-            self, **{name: getattr(self, name)[..., first:last] for name in PER_PARTICLE}
-        )
+        own = {name: getattr(self, name) for name in PER_PARTICLE}
+        own = {name: array[..., first:last] for name, array in own.items() if array.shape[-1] > 1}
+        return replace(self, **own) if own else self
 
     def normal_at(self, rows: Ints, obstacle: Ints, side: Floats, position: Floats) -> Floats:
         """Contact normals, (2, k), of particles touching an obstacle, pointing at the particle.
@@ -151,17 +131,21 @@ class Obstacles:
         if len(round_):
             circle = obstacle[round_] - self.segments
             away = position[:, rows[round_]] - pick(self.center, rows[round_], circle)
-            normal[:, round_] = away / np.hypot(away[0], away[1])
+            distance = np.hypot(away[0], away[1])
+            if self.arcs:
+                distance = np.copysign(distance, pick(self.rho, rows[round_], circle))
+            normal[:, round_] = away / distance
         return np.asarray(normal)
 
     def rim_side(self, rows: Ints, obstacle: Ints, normal: Floats) -> Floats:
         """Return which half of circles (k,) normals (2, k) are on: 1, or -1 away from the crown.
 
         Round the end of a segment of speed v the surface moves with ±v along (n_y, -n_x), which is
-        v along the segment on both its faces.
+        v along the segment on both its faces. The inside of an arc is -1.
         """
-        crown = pick(self.crown, rows, obstacle - self.segments)
-        return np.where(dot(normal, crown) >= 0.0, 1.0, -1.0)
+        crown = pick(self.joints.crown, rows, obstacle - self.segments)
+        half = np.where(dot(normal, crown) >= 0.0, 1.0, -1.0)
+        return np.asarray(half * np.sign(pick(self.rho, rows, obstacle - self.segments)))
 
 
 def dot(a: Floats, b: Floats) -> Floats:
@@ -193,6 +177,8 @@ def rows_of(array: Floats, rows: Ints) -> Floats:
 
 def pick(array: Floats, rows: Ints, which: Ints) -> Floats:
     """Obstacle `which` for each particle, shape (..., k); numbers too large mean the last one."""
+    if not array.shape[-2]:
+        return np.zeros((*array.shape[:-2], len(which)))
     if array.shape[-1] == 1:
         return array[..., 0].take(which, axis=-1, mode="clip")
     return np.asarray(array[..., np.minimum(which, array.shape[-2] - 1), rows])
@@ -215,103 +201,204 @@ BOX_TOUCHES = 64.0
 """Width, in `Obstacles.touch`, by which the boxes of faces are larger than they need be."""
 
 
+@dataclass(frozen=True, eq=False)
+class Bends:
+    """The A arcs of a machine, the O with ends first; n is 1 or the number of particles."""
+
+    center: Floats  # (2, A, n), m
+    shape: Floats  # (3, A, n): radius (m), first angle and extent counterclockwise (rad)
+    order: Ints  # (A,), their numbers in the machine
+    open: int  # O
+
+    @classmethod
+    def of(cls, machine: Machine) -> Bends:
+        """Sort the arcs of a machine."""
+        arcs = machine.arcs
+        if not len(arcs.surface):
+            return STRAIGHT
+        whole = np.atleast_2d(arcs.whole)[0]
+        order = np.argsort(whole, kind="stable")
+        shape = np.stack([_scalars(array) for array in (arcs.radius, arcs.begin, arcs.extent)])
+        shape[2] = np.minimum(shape[2], 2.0 * np.pi)
+        open_ = len(whole) - int(np.count_nonzero(whole))
+        return cls(_vectors(arcs.center)[:, order], shape[:, order], order, open_)
+
+    @property
+    def ends(self) -> tuple[Floats, Floats]:
+        """First and second ends, seen clockwise, of those that have any, (2, O, n) each, m."""
+        radius, begin, extent = self.shape[:, : self.open]
+        center = self.center[:, : self.open]
+        first, second = (center + radius * _out(angle) for angle in (begin + extent, begin))
+        return first, second
+
+
+STRAIGHT = Bends(np.empty((2, 0, 1)), np.empty((3, 0, 1)), np.empty(0, dtype=np.int64), 0)
+"""No arcs."""
+
+
+def _out(angle: Floats) -> Floats:
+    """Return directions at angles (...) from the x axis, (2, ...)."""
+    return np.stack([np.cos(angle), np.sin(angle)])
+
+
 def obstacles(machine: Machine, far: float = 0.0) -> Obstacles:
     """Resolve the surfaces of a machine, moved here from that far away (m), into obstacles.
 
-    How segments join, and whether particles are points, is read off the first row where each
+    How pieces join, and whether particles are points, is read off the first row where each
     particle has its own: see `chutelab.engines.exact.kinds`. Of segments that
     lie on each other the first one counts, as it does when two are met at once.
     """
-    seg, r, wheel = machine.segments, machine.particle.radius, machine.pulley
+    seg, wheel = machine.segments, machine.pulley
+    radius = np.atleast_1d(machine.particle.radius)
     tangent, length = _vectors(seg.tangent), _scalars(seg.length)
-    corners = corners_of(machine)
-    size = size_of(corners, machine.releases.position)
+    bends = Bends.of(machine)
+    corners = corners_of(machine, bends)
+    size = size_of(corners, bends, machine.releases.position)
     touch = touch_of(size, far)
-    spots = spots_of(corners[..., 0], JOINT * size[0].item())
+    near = JOINT * size
+    spots = spots_of(corners[..., 0], near[0].item())
     seen: dict[frozenset[int], int] = {}
-    for s, pair in enumerate(spots):
+    for s, pair in enumerate(spots[: len(length)]):
         seen.setdefault(frozenset(pair), s)
     kept = list(seen.values())
-    if len(kept) < len(spots):
-        corners = corners[:, [*kept, *(s + len(spots) for s in kept)]]
-        spots, tangent, length = [spots[s] for s in kept], tangent[:, kept], length[kept]
+    if len(kept) < len(length):
+        pieces = [*kept, *range(len(length), len(spots))]
+        corners = corners[:, [*pieces, *(s + len(spots) for s in pieces)]]
+        spots, tangent, length = [spots[s] for s in pieces], tangent[:, kept], length[kept]
+    flat, arcs = len(length), len(bends.order)
 
-    # Segments, then their ends, then the pulley.
-    flat = len(length)
-    # Each place where segments of disks end is a circle; a point meets it with probability zero.
+    # Each place where pieces of disks end is a circle; a point meets it with probability zero. An
+    # end that lies on an arc, or that of the belt on the pulley, cannot be met.
+    rests = np.full((len(spots), 2), NONE)
+    if arcs:
+        for arc, on in enumerate(resting(corners, bends, near)[..., 0]):
+            rests[on.reshape(2, -1).T] = arc
+    if wheel is not None:
+        rests[0, 1] = arcs
     known: dict[int, int] = {}
     ends: list[tuple[int, int]] = []
-    end_circle = np.full((flat, 2), NONE)
-    for s, pair in enumerate(spots if np.ravel(r)[0] > 0.0 else ()):
+    end_circle = np.full((flat + arcs, 2), NONE)
+    for s, pair in enumerate(spots if radius[0] > 0.0 else ()):
         for e, spot in enumerate(pair):
-            if wheel is not None and (s, e) == (0, 1):
+            if rests[s, e] != NONE:
                 continue
             if spot not in known:
                 known[spot] = flat + len(ends)
                 ends.append((s, e))
             end_circle[s, e] = known[spot]
-    where = [s + e * flat for s, e in ends]
-    owner = kept + [kept[s] for s, _ in ends]
+    where = [s + e * len(spots) for s, e in ends]
+    owner = [*kept, *(len(seg.surface) + bends.order).tolist()]
+    own = [*owner[:flat], *(owner[s] for s, _ in ends), *owner[flat:], *owner[flat:]]
+    center = [corners.take(np.array(where, dtype=np.int64), axis=1)]
+    rho = [radius[None].repeat(len(ends), axis=0)]
+    if arcs:
+        room = bends.shape[0] - radius
+        center += [bends.center, bends.center]
+        rho += [bends.shape[0] + radius, np.where(room > touch, -room, np.nan)]
     if wheel is not None:
-        end_circle[0, 1] = flat + len(ends)
-        # It stands in for an end of the first segment until its own values are put in.
-        where.append(0)
-        owner.append(0)
-    center = corners.take(np.array(where, dtype=np.int64), axis=1)
-    rho = np.empty(center.shape[1:])
-    rho[:] = r
-    which = np.array(owner, dtype=np.int64)
-    values = (_scalars(column) for column in (seg.speed, seg.restitution, seg.friction))
-    material, surface = np.stack([*values]).take(which, axis=1), seg.surface.take(which)
-    pulley = NONE
+        center.append(np.zeros((2, 1, 1)))
+        rho.append(np.asarray(wheel.radius + radius).reshape(1, -1))
+        # It takes the first segment's values until its own are put in.
+        own.append(0)
+    centers, rhos, which = joined(center, 1), joined(rho, 0), np.array(own, dtype=np.int64)
+    names = ("speed", "restitution", "friction")
+    material = joined([_values(machine, name)[None] for name in names], 0).take(which, axis=1)
+    surface = np.concatenate([seg.surface, machine.arcs.surface]).take(which)
+    first, pulley = flat + len(ends), NONE
     if wheel is not None:
-        pulley = flat + len(ends)
-        center[:, -1], rho[-1], surface[-1] = 0.0, wheel.radius + r, wheel.surface
+        pulley, surface[-1] = first + 2 * arcs, wheel.surface
         for row, value in enumerate((wheel.speed, wheel.restitution, wheel.friction)):
-            material[row, -1] = value
-    first, second = corners[:, :flat], corners[:, flat:]
+            material[row, -1] = _of_kind(machine, value) if np.ndim(value) else value
+    start, stop = corners[:, :flat], corners[:, len(spots) : len(spots) + flat]
     faces = np.empty((2, 4, flat, 1, length.shape[1]))
     faces[0, 0], faces[1, 0] = -tangent[1][:, None], tangent[0][:, None]
-    faces[:, 1, :, 0], faces[:, 2, :, 0] = tangent, first
+    faces[:, 1, :, 0], faces[:, 2, :, 0] = tangent, start
     over = FOOT * length[:, None]
     faces[0, 3], faces[1, 3] = -over, over + length[:, None]
-    # A circle's box is smaller: what only touches it does not meet it.
-    reach, inner = r + BOX_TOUCHES * touch, rho - touch
+    # A circle's box is smaller, met from outside: what only touches it does not meet it.
+    beside, inner = radius + BOX_TOUCHES * touch, np.abs(rhos - touch)
+    low = [np.minimum(start, stop) - beside, centers - inner]
+    high = [np.maximum(start, stop) + beside, centers + inner]
+    if arcs:
+        # Nobody meets the inside of an arc that is too narrow.
+        low[1] = np.where(np.isnan(low[1]), np.inf, low[1])
+        high[1] = np.where(np.isnan(high[1]), -np.inf, high[1])
+    span = np.empty((2, 0, 1))
+    if bends.open:
+        span = np.zeros((2, *centers.shape[1:]))
+        span[1] = 2.0 * np.pi
+        span[:, first - flat : first - flat + 2 * arcs] = np.tile(bends.shape[1:], (1, 2, 1))
     return Obstacles(
         faces=faces,
         length=length,
-        center=center,
-        rho=rho,
+        center=centers,
+        rho=rhos,
+        span=span,
+        bend=bends.shape,
         material=material,
-        low=np.concatenate([np.minimum(first, second) - reach, center - inner], axis=1),
-        high=np.concatenate([np.maximum(first, second) + reach, center + inner], axis=1),
+        low=joined(low, 1),
+        high=joined(high, 1),
         surface=surface,
         spots=tuple(spots),
+        rests=rests,
         end_circle=end_circle,
+        first_arc=first,
         pulley=pulley,
         touch=touch,
     )
 
 
-def corners_of(machine: Machine) -> Floats:
-    """Return all first ends of the segments, then all second ones, (2, 2 S, n), m."""
+def joined(parts: Sequence[Floats], axis: int) -> Floats:
+    """Join arrays along an axis; along the last one, one column stands for all."""
+    counts = {part.shape[-1] for part in parts}
+    if len(counts) > 1:
+        most = max(counts)
+        parts = [part if part.shape[-1] == most else part.repeat(most, axis=-1) for part in parts]
+    return np.concatenate(parts, axis)
+
+
+def _of_kind(machine: Machine, values: Numbers) -> Floats:
+    """Return values of each particle, (N, ...), from those of each kind, (K, ...)."""
+    values = np.asarray(values)
+    return values if machine.segments.start.ndim == 3 else values[machine.releases.kind]
+
+
+def _values(machine: Machine, name: str) -> Floats:
+    """Return a number of all segments and then all arcs, (S + A, n)."""
+    parts = []
+    for part in (
+        (machine.segments, machine.arcs) if len(machine.arcs.surface) else (machine.segments,)
+    ):
+        array = getattr(part, name)
+        parts.append(_scalars(array if array.ndim == 1 else _of_kind(machine, array)))
+    return parts[0] if len(parts) == 1 else joined(parts, 0)
+
+
+def corners_of(machine: Machine, bends: Bends) -> Floats:
+    """Return all first ends of the P pieces that have any, then all second ones, (2, 2 P, n), m."""
     segments = machine.segments
-    return np.concatenate([_vectors(segments.start), _vectors(segments.end)], axis=1)
+    ends = [_vectors(segments.start), _vectors(segments.end)]
+    if bends.open:
+        first, second = bends.ends
+        ends = [ends[0], first, ends[1], second]
+    return np.concatenate(ends, axis=1)
+
+
+def size_of(corners: Floats, bends: Bends, places: Floats) -> Floats:
+    """Return the largest coordinate, m, (n,): of each particle, where each has its own corners."""
+    count = corners.shape[-1]
+    # Not their methods, which take twice as long.
+    size = np.maximum.reduce(np.abs(corners), axis=(0, 1), initial=0.0)
+    if len(bends.order):
+        size = np.maximum(size, (np.abs(bends.center) + bends.shape[0]).max(axis=(0, 1)))
+    farthest: Floats = np.maximum.reduce(np.abs(places.reshape(count, -1)), axis=1)
+    return np.asarray(np.maximum(size, farthest))
 
 
 def touch_of(size: Floats, far: float = 0.0) -> Floats:
     """Return `Obstacles.touch` of a scene of a size, counted from a point that far away, m."""
     # Far away the scene's own numbers are rounded, each by half a last place.
     return float_info.epsilon * (TOUCH_ULPS * size + GIVEN_ULPS * far)
-
-
-def size_of(corners: Floats, places: Floats) -> Floats:
-    """Return the largest coordinate, m, (n,): of each particle, where each has its own corners."""
-    count = corners.shape[-1]
-    # Not their methods, which take twice as long.
-    size = np.maximum.reduce(np.abs(corners), axis=(0, 1), initial=0.0)
-    farthest: Floats = np.maximum.reduce(np.abs(places.reshape(count, -1)), axis=1)
-    return np.asarray(np.maximum(size, farthest))
 
 
 def _vectors(array: Floats) -> Floats:
@@ -322,6 +409,26 @@ def _vectors(array: Floats) -> Floats:
 def _scalars(array: Floats) -> Floats:
     """(S,) or (N, S) to (S, n)."""
     return np.array(array, ndmin=2).T.copy()
+
+
+def ahead_of(machine: Machine, bends: Bends) -> Floats:
+    """Return the directions out of the pieces at those ends, (2, 2 P, n)."""
+    along = _vectors(machine.segments.tangent)
+    if bends.open:
+        _, begin, extent = bends.shape[:, : bends.open]
+        (x, y), (u, v) = _out(begin + extent), _out(begin)
+        return np.concatenate([-along, np.stack([-y, x]), along, np.stack([v, -u])], axis=1)
+    return np.concatenate([-along, along], axis=1)
+
+
+def resting(corners: Floats, bends: Bends, near: Floats) -> Bools:
+    """Tell which ends (2 P, n) lie on an arc, but not where it ends, (A, 2 P, n)."""
+    away = corners[:, None] - bends.center[:, :, None]
+    radius, begin, extent = bends.shape[:, :, None]
+    turn = np.mod(np.arctan2(away[1], away[0]) - begin, 2.0 * np.pi)
+    edge = np.where(extent < 2.0 * np.pi, near / radius, 0.0)
+    on = np.abs(np.hypot(away[0], away[1]) - radius) <= near
+    return np.asarray(on & (turn >= edge) & (turn <= extent - edge))
 
 
 def spots_of(ends: Floats, tolerance: float) -> list[tuple[int, int]]:

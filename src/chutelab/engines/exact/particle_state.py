@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chutelab.engines.exact.detect import BOUND, Past
-from chutelab.engines.exact.obstacles import NONE, Obstacles, along, dot, pick
+from chutelab.engines.exact.joints import NONE
+from chutelab.engines.exact.obstacles import Obstacles, along, dot, pick
 from chutelab.machine import Machine
 from chutelab.mechanics.contact import DISK_SHARE
 from chutelab.results import EVENT, KNOT, REASONS, Kind
@@ -143,7 +144,8 @@ class State:
         # whether anybody has any.
         self.idle, self.crawls = np.zeros((2, count), dtype=np.int64)
         self.idling = self.crawling = False
-        # Where rides round circles end.
+        # Angle of a ride round a circle, and where it ends.
+        self.angle = np.zeros(count)
         self.bounds = np.zeros((2, count), dtype=BOUND)
         self.past: Past | None = None
         if self.radius[0] <= self.obstacles.touch[0]:
@@ -231,7 +233,7 @@ class State:
             center = pick(o.center, rows, circle)
             away = place[:, round_] - center
             distance = np.hypot(away[0], away[1])
-            snapped[:, round_] = center + (pick(o.rho, rows, circle) / distance) * away
+            snapped[:, round_] = center + (np.abs(pick(o.rho, rows, circle)) / distance) * away
         self.p[:, self.at(index)] = snapped
 
     def at(self, index: Ints) -> Ints | slice:

@@ -12,6 +12,8 @@ from __future__ import annotations
 
 from time import perf_counter
 
+import numpy as np
+
 from chutelab.engines.pymunk.lone import Lone
 from chutelab.engines.pymunk.shared import Shared
 from chutelab.engines.pymunk.world import World
@@ -49,7 +51,7 @@ def run(machine: Machine, progress: Progress | None = None) -> Recording:
     StalledError
         If a lone particle goes on without getting on; it has the recording so far.
     """
-    if machine.particle.radius <= 0.0:
+    if np.min(machine.particle.radius) <= 0.0:
         raise ValueError("particle.radius = 0: pymunk needs disks with a radius above 0 m")
     begin, steps = perf_counter(), 0
     recorder, place = Recorder(machine), origin(machine)
@@ -78,7 +80,10 @@ def run(machine: Machine, progress: Progress | None = None) -> Recording:
             finally:
                 steps = shared.steps
         else:
+            alike = len(machine.pair_restitution) == 1 and not np.ndim(machine.particle.radius)
             for i in range(machine.count):
+                if not alike:
+                    world = World(machine, i)
                 lone = Lone(machine, world, recorder, i, report)
                 try:
                     lone.run()

@@ -11,7 +11,7 @@ particle lies by 2 √(2 h/g)/(1 - ε) too early, some 1e-6 s.
 from __future__ import annotations
 
 from functools import cache
-from math import ceil, inf
+from math import ceil, copysign, inf
 from operator import itemgetter
 from typing import Any, NamedTuple
 
@@ -61,6 +61,9 @@ SLACK = 1e-9
 TILT = 2e-13
 """Share of the momentum that is no load, where nothing weighs: rounding tilts normals so much."""
 
+ROLLS = 20
+"""Steps in search of the couple that stops the turning: three, unless friction starts to slip."""
+
 SHORT = 1e-5
 """Share of a step; a contact that lasts less has ended."""
 
@@ -78,15 +81,18 @@ TURNS = 200
 
 
 class Contact(NamedTuple):
-    """What Chipmunk did at one contact in one step.
+    """What was done at one contact in one step.
 
-    Impulses (N s) act on the particle, `push` along the normal n, `rub` along (n_y, -n_x).
+    Impulses (N s) act on the particle, `push` along the normal n, `rub` along (n_y, -n_x); `belt`
+    (m/s) is the surface's speed there, and `couple` (N m s) that of rolling friction.
     """
 
     face: Face
     normal: Vec2d
     push: float
     rub: float
+    belt: float
+    couple: float = 0.0
 
 
 class Step(NamedTuple):
@@ -103,7 +109,8 @@ class Step(NamedTuple):
         """Which way friction acts where it is used up, 0 if it is nowhere."""
         for c in self.contacts:
             if abs(c.rub) >= c.face.friction * c.push * (1.0 - SLACK):
-                return 1 if c.rub >= 0.0 else -1
+                # Without friction its sign is rounding.
+                return 1 if c.rub >= 0.0 or not c.face.friction else -1
         return 0
 
 
@@ -114,17 +121,21 @@ class Lone:
         self, machine: Machine, world: World, recorder: Recorder, particle: int, report: Progress
     ) -> None:
         self.machine, self.world = machine, world
-        self.tracks = Tracks(recorder, machine.particle.radius, range(particle, particle + 1))
+        self.tracks = Tracks(recorder, world.radius, range(particle, particle + 1))
         self.entries = recorder.entries[particle]
         self.recorder, self.particle, self.report = recorder, particle, report
-        p, start = machine.particle, machine.releases
-        self.r, self.g, self.dt = p.radius, machine.gravity, machine.dt
-        self.pull, self.weight = Vec2d(0.0, -self.g), p.mass * self.g
+        start = machine.releases
+        self.r, self.g, self.dt = world.radius, machine.gravity, machine.dt
+        self.pull = Vec2d(0.0, -self.g)
         self.t = float(start.t[particle])
         self.x = Vec2d(*start.position[particle].tolist())
         self.v = Vec2d(*start.velocity[particle].tolist())
         self.omega = 0.0
         self.body, self.circle = world.disk()
+        self.weight = self.body.mass * self.g
+        # Rolling friction's arm, m; nothing of what does not turn.
+        turns = self.body.moment < inf
+        self.arm = float(machine.rolling[start.kind[particle]]) * self.r if turns else 0.0
         world.space.add(self.body, self.circle)
         world.space.on_collision(PARTICLE, SURFACE, pre_solve=self._before, post_solve=self._after)
         # The restitution of each surface that may be met in a step; what it did.
@@ -134,6 +145,10 @@ class Lone:
         self.on = -1
         self.slipping: int | None = None
         self.ended = self.landed = False
+        # The surfaces that are there, until when that is so, and gates that shut on the particle.
+        self.faces, self.changes, self.shut = world.faces, inf, set[Face]()
+        if world.gates:
+            self.faces = [face for face in world.faces if face.appears <= self.t < face.vanishes]
         self.steps, self.last = 0, 0.0
         self.blows, self.struck = 0, -inf
 
@@ -149,8 +164,10 @@ class Lone:
             self._carry()
         while not self.ended:
             self._look()
+            if self.world.gates and not released:
+                self._gates()
             touching, room = {}, inf
-            for face in self.world.faces:
+            for face in self.faces:
                 gap, normal = face.gap(self.x)
                 if gap <= 0.5 * self.world.hair:
                     touching[face] = normal
@@ -165,6 +182,15 @@ class Lone:
         self.world.space.remove(self.body, self.circle)
         self._look()
 
+    def _gates(self) -> None:
+        """See which surfaces are there; who shut on the particle waits until it is clear."""
+        there = [face for face in self.world.faces if face.appears <= self.t < face.vanishes]
+        inside = {face for face in there if face.gap(self.x)[0] < -self.world.hair}
+        self.shut = inside.difference(self.faces)
+        self.faces = [face for face in there if face not in self.shut]
+        ahead = (t for face in self.world.faces for t in (face.appears, face.vanishes))
+        self.changes = min(t for t in (*ahead, inf) if t > self.t)
+
     def _look(self) -> None:
         """Report the progress; end the track here if that was enough."""
         span = self.machine.end_time - float(self.machine.releases.t[self.particle])
@@ -178,20 +204,47 @@ class Lone:
 
     # Chipmunk
 
-    def _step(self, x: Vec2d, v: Vec2d, h: float, g: Vec2d) -> list[Contact]:
+    def _step(self, x: Vec2d, v: Vec2d, omega: float, h: float, g: Vec2d) -> list[Contact]:
         """Have Chipmunk move the particle by v h, then change its velocity; return what pushed."""
         body, space = self.body, self.world.space
+        for face in self.restitution:
+            face.put(x + h * v)
         if h != self.last:
             # Chipmunk keeps impulses for the next step, but right ones only if it is as long.
             space.remove(self.circle)
             space.add(self.circle)
             self.last = h
-        body.position, body.velocity, body.angular_velocity = x, v, self.omega
+        body.position, body.velocity, body.angular_velocity = x, v, omega
         space.gravity, self.contacts = g, []
         space.iterations = WEDGED if len(self.restitution) > 1 else 1
         space.step(h)
         self.steps += 1
         return self.contacts
+
+    def _rolled(self, x: Vec2d, v: Vec2d, h: float) -> list[Contact]:
+        """Step in lasting contact, with the couple by which rolling friction opposes the spin.
+
+        Given before the step, friction bears it: as much as the pushes allow, or what stops the
+        turning, which is found between none and that much.
+        """
+        contacts = self._step(x, v, self.omega, h, self.pull)
+        if not self.arm or not contacts:
+            return contacts
+        couple, spin, moment = 0.0, contacts[0].face.spin, self.body.moment
+        ends = [(couple, self.body.angular_velocity - spin)]
+        while abs(after := ends[-1][1]) * moment > SLACK * abs(couple) and len(ends) < ROLLS:
+            opposite = [end for end in ends if end[1] * after < 0.0]
+            if opposite:
+                low, one = opposite[-1]
+                couple = (low * after - couple * one) / (after - one)
+            elif len(ends) == 1:
+                couple = -copysign(self.arm * sum(c.push for c in contacts), after)
+            else:
+                break
+            contacts = self._step(x, v, self.omega + couple / moment, h, self.pull)
+            ends.append((couple, self.body.angular_velocity - spin))
+        pushes = sum(contact.push for contact in contacts)
+        return [c._replace(couple=couple * c.push / pushes) for c in contacts]
 
     def _before(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
         face, normal = self.world.by_shape[arbiter.shapes[1]], -arbiter.normal
@@ -199,7 +252,7 @@ class Lone:
         arbiter.process_collision = restitution is not None
         if restitution is not None:
             arbiter.restitution, arbiter.friction = restitution, face.friction
-            if face.tangent is not None and face.speed != 0.0:
+            if not face.turns and face.speed != 0.0:
                 arbiter.surface_velocity = face.belt(normal) * Vec2d(normal.y, -normal.x)
 
     def _after(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
@@ -208,7 +261,8 @@ class Lone:
         if self.weight == 0.0:
             least = TILT * self.body.mass * self.v.length
         if (push := float(j.dot(normal))) > least:
-            self.contacts.append(Contact(face, normal, push, float(j.cross(normal))))
+            rub = float(j.cross(normal))
+            self.contacts.append(Contact(face, normal, push, rub, face.belt(normal)))
 
     # Flight and blows
 
@@ -222,14 +276,19 @@ class Lone:
         span, reason = self.machine.end_time - self.t, "time"
         if self.machine.until != "time" and (out := path.leaves(self.machine.exit_box)) < span:
             span, reason = out, "exit"
-        for face in self.world.faces:
+        if self.changes - self.t < span:
+            span, reason = self.changes - self.t, ""
+        for face in self.shut:
+            if (clear := self.world.clear(path, face, span)) < span:
+                span, reason = clear, ""
+        for face in self.faces:
             met = self.world.meets(path, face, span, face in touching)
             if met < span:
                 span, reason = met, ""
         count = ceil(span / self.dt)
         if count:
             h, self.restitution, begin, v = span / count, {}, self.t, self.v
-            self._step(self.x, self.v + 0.5 * h * self.pull, h, self.pull)
+            self._step(self.x, self.v + 0.5 * h * self.pull, self.omega, h, self.pull)
             for taken in range(1, count):
                 if taken % OFTEN == 0:
                     self.t, self.x = begin + taken * h, self.body.position
@@ -257,8 +316,10 @@ class Lone:
         self.restitution = {struck: self._rebound(struck, normal)}
         if self.blows > TURNS:
             self.restitution = {face: self._rebound(face, n) for face, n in touching.items()}
-        pushed = self._step(self.x, self.v, INSTANT, Vec2d(0, 0))
+        pushed = self._step(self.x, self.v, self.omega, INSTANT, Vec2d(0, 0))
         self.v, self.omega = self.body.velocity, self.body.angular_velocity
+        if self.arm:
+            pushed = [self._braked(contact, before[1]) for contact in pushed]
         for contact in pushed:
             self._book(contact, before)
             lands = contact.face.surface == self.machine.landing and not self.landed
@@ -277,9 +338,18 @@ class Lone:
                 " the surfaces there apart, or lower their restitution",
             )  # fmt: skip
 
+    def _braked(self, contact: Contact, omega: float) -> Contact:
+        """Give a blow's rolling friction, which stops the turning there was, at most."""
+        turning = self.body.moment * (omega - contact.face.spin)
+        couple = -copysign(min(self.arm * contact.push, abs(turning)), turning)
+        self.omega += couple / self.body.moment
+        return contact._replace(couple=couple)
+
     def _rebound(self, face: Face, normal: Vec2d) -> float:
         """Return ε, or 0 where a rebound would be too slow or too low."""
         approach, weight = -self.v.dot(normal), -self.pull.dot(normal)
+        # What slides in a hollow is pressed on by that.
+        weight += face.hollow(self.x) * self.v.cross(normal) ** 2
         rebound = face.restitution * approach
         touch = approach <= self.world.tiny * (1.0 + self.v.length)
         low = rebound * rebound < 2.0 * LOW * self.world.hair * weight
@@ -298,8 +368,9 @@ class Lone:
             room = 0.0
         for face in touching:
             room = min([room, *((self.x - end).length - self.r for end in face.ends)])
-        room = max(room, STRIDE * self.r)
-        h = min(self.dt, self.machine.end_time - self.t)
+        sharpest = max(face.hollow(self.x) for face in touching)
+        room = max(room, STRIDE * (1.0 / sharpest if sharpest * self.r > 1.0 else self.r))
+        h = min(self.dt, self.machine.end_time - self.t, self.changes - self.t)
         if (speed := self.v.length + self.g * self.dt) > 0.0:
             h = min(h, room / speed)
 
@@ -315,7 +386,7 @@ class Lone:
             if not pushing or any(self.world.curved(f, ahead.middle) for f in pushing - rims):
                 return "leaves"
             end = trial(h)
-            beside = set(self.world.faces).difference(c.face for c in end.contacts)
+            beside = set(self.faces).difference(c.face for c in end.contacts)
             if any(face.gap(end.x)[0] < -0.25 * self.world.hair for face in beside):
                 return "meets"
             # It grips, or turns back.
@@ -343,25 +414,31 @@ class Lone:
     def _trial(self, h: float, touching: dict[Face, Vec2d]) -> Step:
         """Return where a step in contact leads.
 
-        On a curved surface the particle moves away from the plane half-way, by v_n. It goes out as
-        -v_n (v1/v0)², which keeps it on the circle, and gives the normal impulse of the speed
-        half-way: Chipmunk's restitution, known after a first try. On a face v_n is 0.
+        On a curved surface the particle moves away from the plane half-way, or into it in a hollow,
+        by v_n. It goes out as -v_n (v1/v0)², which keeps it on the circle, and gives the normal
+        impulse of the speed half-way: Chipmunk's restitution, known after a first try. On a face
+        v_n is 0.
         """
         middle = self.x + 0.5 * h * self.v
         gaps = {face: face.gap(middle) for face in touching}
         gap, normal = min(gaps.values(), key=itemgetter(0))
-        middle -= gap * normal
-        self.restitution = {face: float(self.v.dot(n) > 0.0) for face, (_, n) in gaps.items()}
-        contacts = self._step(middle - h * self.v, self.v, h, self.pull)
-        if self.v.dot(normal) > SEAM * (1.0 + self.v.length):
+        if gap < inf:
+            middle -= gap * normal
+        self.restitution = {
+            face: float(self.v.dot(n) > 0.0 or face.hollow(middle) > 0.0)
+            for face, (_, n) in gaps.items()
+        }
+        contacts = self._rolled(middle - h * self.v, self.v, h)
+        if abs(self.v.dot(normal)) > SEAM * (1.0 + self.v.length):
             turn = (self.body.velocity.length / self.v.length) ** 2
             self.restitution = {face: turn * one for face, one in self.restitution.items()}
-            contacts = self._step(middle - h * self.v, self.v, h, self.pull)
+            contacts = self._rolled(middle - h * self.v, self.v, h)
         v, omega = self.body.velocity, self.body.angular_velocity
         x = middle + 0.5 * h * v
         for contact in contacts:
             gap, normal = contact.face.gap(x)
-            x -= gap * normal
+            if gap < inf:
+                x -= gap * normal
             if len(contacts) == 1 and self.world.curved(contact.face, middle):
                 v -= v.dot(normal) * normal
         return Step(x, v, omega, contacts, middle)
@@ -397,7 +474,7 @@ class Lone:
             and (end.v - self.v).length <= still
             and self.r * abs(end.omega - self.omega) <= still
             and all(
-                abs(end.v.cross(c.normal) + self.r * end.omega - c.face.belt(c.normal)) <= still
+                abs(end.v.cross(c.normal) + self.r * end.omega - c.belt) <= still
                 and (c.face.speed == 0.0 or c.face.surface == self.machine.landing)
                 for c in end.contacts
             )
@@ -446,9 +523,10 @@ class Lone:
     def _book(self, contact: Contact, before: tuple[Vec2d, float]) -> None:
         """Book an impulse J: J·(u before + u now)/2, u the relative velocity at the contact."""
         v, omega = 0.5 * (before[0] + self.v), 0.5 * (before[1] + self.omega)
-        belt = contact.face.belt(contact.normal)
-        slip = v.cross(contact.normal) + self.r * omega - belt
-        self.recorder.book(
-            self.particle, contact.face.surface, contact.rub * belt,
-            -contact.push * v.dot(contact.normal), -contact.rub * slip,
-        )  # fmt: skip
+        slip = v.cross(contact.normal) + self.r * omega - contact.belt
+        work, heat = contact.rub * contact.belt, -contact.rub * slip
+        if contact.couple:
+            spin = contact.face.spin
+            work, heat = work + contact.couple * spin, heat - contact.couple * (omega - spin)
+        loss = -contact.push * v.dot(contact.normal)
+        self.recorder.book(self.particle, contact.face.surface, work, loss, heat)

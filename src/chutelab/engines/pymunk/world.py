@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from math import acos, ceil, cos, inf, sin, sqrt
-from typing import NamedTuple
+from math import acos, atan2, ceil, cos, inf, pi, sin, sqrt
+from typing import Any, NamedTuple
 
 import numpy as np
 import pymunk
 from numpy.typing import ArrayLike
 from pymunk import Vec2d
 
-from chutelab.machine import Machine
+from chutelab.machine import Arcs, Machine, Segments
 from chutelab.results import KNOT
 from chutelab.results.recorder import Recorder
 from chutelab.util.arrays import Bools, Floats
@@ -43,13 +43,23 @@ FIRST = 1e-3
 ROUGH = 1e-4
 """Share of the radius by which a track may be off between two knots."""
 
+CREEP = 1e-7
+"""Share of the radius; how finely the ends of an arc are told from what is between them."""
+
+JOINT = 4.0
+"""An arc goes on past its ends by the angle at which a tangent is this many times a hair away: what
+slides on to it from a face that it is joined to meets it before that face ends."""
+
 ARC = 0.025
 """rad between knots round the pulley: ρ Δφ⁴/384, the curve's error, is 1e-9 of the radius."""
 
 
 @dataclass(frozen=True, eq=False)
 class Face:
-    """A straight surface, as a segment without thickness, or the pulley, as a circle."""
+    """A straight surface, as a segment without thickness, the pulley, as a circle, or a point.
+
+    A point is the end of an arc; its tangent is the arc's there.
+    """
 
     shape: pymunk.Shape  # on a body of its own
     surface: int  # index into `Machine.surfaces`
@@ -57,12 +67,28 @@ class Face:
     speed: float  # m/s
     restitution: float  # of the pair with a particle, and so is friction
     friction: float  # finite
-    radius: float  # of the particles, m
+    radius: float  # of the particle, m
+    appears: float  # from when to when it is there, s
+    vanishes: float
+    spin: float  # of a wheel, rad/s: what rolls on it rolls as fast as it turns against this
 
     @cached_property
     def ends(self) -> tuple[Vec2d, ...]:
         """Both ends of a segment (m)."""
         return (self.shape.a, self.shape.b) if isinstance(self.shape, pymunk.Segment) else ()
+
+    @property
+    def touched(self) -> pymunk.Shape:
+        """The shape in the Space that a particle by itself is in contact with."""
+        return self.shape
+
+    @property
+    def turns(self) -> bool:
+        """Whether that shape turns with the surface's speed."""
+        return self.tangent is None
+
+    def put(self, x: Vec2d) -> None:
+        """Make ready to be touched from a place (m)."""
 
     def gap(self, x: Vec2d) -> tuple[float, Vec2d]:
         """Return the gap (m) between the surface and a disk round a point, and the normal there.
@@ -82,6 +108,98 @@ class Face:
             return self.speed
         return -self.speed
 
+    def hollow(self, x: Vec2d) -> float:
+        """Return 1 over the radius (1/m) on which a disk's centre follows a hollow side, or 0."""
+        return 0.0
+
+    def free(self, path: Flight | Carriage, x: Vec2d, v: Vec2d, gap: float, normal: Vec2d) -> float:
+        """Return a time (s) in which a disk at a place on a path surely meets no surface.
+
+        A convex one lies behind the plane through its nearest point: the gap stays above
+        gap + rate τ + a τ²/2, a the least acceleration along the normal there.
+        """
+        return falls(gap, v.dot(normal), path.pull(normal))
+
+
+@dataclass(frozen=True, eq=False)
+class Bend(Face):
+    """An arc, met from inside and outside, or a whole circle; the ends of an arc are other faces.
+
+    Chipmunk has no hollow shape. Its distance query on the circle tells the gap, on either side; to
+    be pushed, a disk is given a point to lie on, put where the circle is nearest.
+    """
+
+    foot: pymunk.Circle  # without radius, on a body of its own
+    begin: float  # rad, as those of `Arcs`
+    extent: float
+
+    @property
+    def touched(self) -> pymunk.Shape:
+        """The point that a disk lies on."""
+        return self.foot
+
+    @property
+    def turns(self) -> bool:
+        """A point has no rim to turn with."""
+        return False
+
+    @property
+    def center(self) -> Vec2d:
+        """Centre of the circle (m)."""
+        assert self.shape.body is not None
+        return self.shape.body.position
+
+    def put(self, x: Vec2d) -> None:
+        """Put the foot where the arc is nearest to a place (m), or out of reach beside an arc."""
+        assert self.foot.body is not None
+        beside = self.gap(x)[0] == inf
+        away = x + Vec2d(4.0 * self.radius, 0.0)
+        self.foot.body.position = away if beside else self.shape.point_query(x).point
+
+    def gap(self, x: Vec2d) -> tuple[float, Vec2d]:
+        """Return the gap (m) and the normal; inf where an end is nearer than all between them."""
+        found = self.shape.point_query(x)
+        side = 1.0 if found.distance >= 0.0 else -1.0
+        if self.extent < 2.0 * pi:
+            away = x - self.center
+            if (atan2(away.y, away.x) - self.begin) % (2.0 * pi) > self.extent:
+                return inf, side * found.gradient
+        return side * found.distance - self.radius, side * found.gradient
+
+    def belt(self, normal: Vec2d) -> float:
+        """Return the speed (m/s) along (n_y, -n_x): the surface runs clockwise."""
+        assert self.foot.body is not None
+        outside = (self.foot.body.position - self.center).dot(normal) >= 0.0
+        return self.speed if outside else -self.speed
+
+    def hollow(self, x: Vec2d) -> float:
+        """Return 1/(R - r) inside, 0 outside."""
+        assert isinstance(self.shape, pymunk.Circle)
+        room = self.shape.radius - self.radius
+        return 1.0 / room if room > 0.0 and (x - self.center).length < self.shape.radius else 0.0
+
+    def free(self, path: Flight | Carriage, x: Vec2d, v: Vec2d, gap: float, normal: Vec2d) -> float:
+        """Return a time (s) in which it is not met; see `Face.free` for the outside.
+
+        Beside an arc that is the time to a line through the centre and an end. Inside, with c from
+        the centre to the place, ρ² - c² starts at the gap times ρ + c, changes at -2 c·v, and that
+        by -2 (v² + c·a), which is bounded for the time that it takes to go some ρ.
+        """
+        away = x - self.center
+        if gap == inf:
+            lines = (Vec2d.from_polar(1.0, self.begin + turn) for turn in (0.0, self.extent))
+            sides = [line.perpendicular() for line in lines]
+            sides = [side if away.dot(side) >= 0.0 else -side for side in sides]
+            ahead = min(falls(away.dot(n), v.dot(n), path.pull(n)) for n in sides)
+            # Past the line, or it would stay there.
+            return max(ahead, CREEP * self.radius / max(v.length, sqrt(path.most * self.radius)))
+        if not (hollow := self.hollow(x)):
+            return falls(gap, v.dot(normal), path.pull(normal))
+        rho, c = 1.0 / hollow, away.length
+        horizon = rho / (v.length + sqrt(path.most * rho))
+        bend = 2.0 * ((v.length + path.most * horizon) ** 2 + rho * path.most)
+        return min(falls(gap * (rho + c), -2.0 * away.dot(v), -bend), horizon)
+
 
 class Flight(NamedTuple):
     """Free flight from a place (m) at a velocity (m/s); `g` is gravity (m/s²)."""
@@ -97,6 +215,11 @@ class Flight(NamedTuple):
     def pull(self, normal: Vec2d) -> float:
         """Return the acceleration (m/s²) along a normal."""
         return self.g.dot(normal)
+
+    @property
+    def most(self) -> float:
+        """The largest acceleration (m/s²) in any direction."""
+        return self.g.length
 
     def leaves(self, box: tuple[float, float, float, float]) -> float:
         """Return the time (s) after which it leaves the exit box, inf if never."""
@@ -120,16 +243,18 @@ def falls(gap: float, rate: float, pull: float) -> float:
 class World:
     """A Space with all surfaces of a machine, counted from near its place (`machine.origin`).
 
-    `faces` are its segments, in their order, and the pulley. Gaps up to `hair` (m) are contact, and
-    gaps of `rounding` (m) are none. `tiny` is the share of speeds below which one into a surface is
-    rounding, which tilts normals.
+    `faces` are its segments, in their order, the pulley, the arcs and their ends, as one particle
+    meets them; `gates` tells whether some are not there all the time. Gaps up to `hair` (m) are
+    contact, and gaps of `rounding` (m) are none. `tiny` is the share of speeds below which one into
+    a surface is rounding, which tilts normals.
     """
 
-    def __init__(self, machine: Machine) -> None:
-        self.machine = machine
+    def __init__(self, machine: Machine, particle: int = 0) -> None:
+        self.machine, self.particle = machine, particle
         self.space = pymunk.Space()
-        parts, r, wheel = machine.segments, machine.particle.radius, machine.pulley
-        size = float(np.abs([*parts.start.ravel(), *parts.end.ravel(), r]).max())
+        parts, arcs, wheel = machine.segments, machine.arcs, machine.pulley
+        r = self.radius = self.of(machine.particle.radius)
+        size = float(np.abs([*machine.corners.ravel(), r]).max())
         self.rounding = DIGITS * size
         self.hair = max(HAIR * r, 4.0 * self.rounding)
         self.tiny = max(TINY, self.rounding / r)
@@ -138,58 +263,111 @@ class World:
             zip(parts.start.tolist(), parts.end.tolist(), strict=True)
         ):
             still = pymunk.Body(body_type=pymunk.Body.STATIC)
-            self._add(
-                pymunk.Segment(still, start, end, 0.0), int(parts.surface[n]),
-                Vec2d(*parts.tangent[n].tolist()), float(parts.speed[n]),
-                float(parts.restitution[n]), float(parts.friction[n]),
-            )  # fmt: skip
+            about = self._about(parts, n)
+            tangent = Vec2d(*parts.tangent[n].tolist())
+            self._add(Face(pymunk.Segment(still, start, end, 0.0), tangent=tangent, **about))
         if wheel is not None:
             turning = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
             turning.angular_velocity = -wheel.speed / wheel.radius
-            self._add(
+            restitution, friction = map(self.paired, (wheel.restitution, wheel.friction))
+            self._add(Face(
                 pymunk.Circle(turning, wheel.radius), wheel.surface, None, wheel.speed,
-                wheel.restitution, wheel.friction,
-            )  # fmt: skip
+                float(restitution), min(float(friction), GRIP), r, -inf, inf,
+                turning.angular_velocity,
+            ))  # fmt: skip
+        for n, center in enumerate(arcs.center.tolist()):
+            self._bend(n, Vec2d(*center), self._about(arcs, n))
         self.faces = list(self.by_shape.values())
+        self.gates = any(face.appears > -inf or face.vanishes < inf for face in self.faces)
 
-    def _add(
-        self, shape: pymunk.Shape, surface: int, tangent: Vec2d | None, speed: float,
-        restitution: float, friction: float,
-    ) -> None:  # fmt: skip
+    def paired(self, values: ArrayLike) -> Any:
+        """Return pair values, (S,) or (K, S), or of the pulley one or (K,), with the particle."""
+        values, kinds = np.asarray(values), len(self.machine.pair_restitution)
+        return values[self.machine.releases.kind[self.particle]] if kinds > 1 else values
+
+    def of(self, values: ArrayLike) -> float:
+        """Return the particle's own of a property that all share or each has."""
+        values = np.asarray(values)
+        return float(values[self.particle] if values.ndim else values)
+
+    def _about(self, parts: Segments | Arcs, n: int) -> dict[str, Any]:
+        """Return what a face knows of a segment or arc."""
+        restitution, friction = (
+            self.paired(values)[n] for values in (parts.restitution, parts.friction)
+        )
+        return {
+            "surface": int(parts.surface[n]), "speed": float(parts.speed[n]),
+            "restitution": float(restitution), "friction": min(float(friction), GRIP),
+            "radius": self.radius,
+            "appears": float(parts.appears[n]), "vanishes": float(parts.vanishes[n]), "spin": 0.0,
+        }  # fmt: skip
+
+    def _bend(self, n: int, center: Vec2d, about: dict[str, Any]) -> None:
+        """Add an arc, and its ends."""
+        arcs = self.machine.arcs
+        radius, begin, extent = (
+            float(values[n]) for values in (arcs.radius, arcs.begin, arcs.extent)
+        )
+        body = pymunk.Body(body_type=pymunk.Body.STATIC)
+        body.position = center
+        # A shape that is not in the Space does not keep its body.
+        self.space.add(body)
+        circle = pymunk.Circle(body, radius)
+        circle.cache_bb()
+        foot = pymunk.Circle(pymunk.Body(body_type=pymunk.Body.KINEMATIC), 0.0)
+        if extent >= 2.0 * pi:
+            about["spin"] = -about["speed"] / radius
+            self._add(Bend(circle, tangent=None, foot=foot, begin=0.0, extent=inf, **about))
+            return
+        more = sqrt(2.0 * JOINT * self.hair / radius)
+        self._add(Bend(
+            circle, tangent=None, foot=foot, begin=begin - more, extent=extent + 2.0 * more, **about
+        ))  # fmt: skip
+        for end, angle in zip(
+            (part[n].tolist() for part in arcs.ends), (begin, begin + extent), strict=True
+        ):
+            still = pymunk.Body(body_type=pymunk.Body.STATIC)
+            self._add(
+                Face(
+                    pymunk.Circle(still, 0.0, end), tangent=Vec2d(sin(angle), -cos(angle)), **about
+                )
+            )
+
+    def _add(self, face: Face) -> None:
+        shape = face.touched
         assert shape.body is not None
         shape.collision_type = SURFACE
         self.space.add(shape.body, shape)
-        r, friction = self.machine.particle.radius, min(friction, GRIP)
-        self.by_shape[shape] = Face(shape, surface, tangent, speed, restitution, friction, r)
+        self.by_shape[shape] = face
 
     def disk(self) -> tuple[pymunk.Body, pymunk.Circle]:
         """Return a new body with its shape, not yet in the Space."""
         p = self.machine.particle
-        body = pymunk.Body(p.mass, p.inertia if p.inertia > 0.0 else inf)
-        circle = pymunk.Circle(body, p.radius + self.hair)
+        mass, inertia = self.of(p.mass), self.of(p.inertia)
+        body = pymunk.Body(mass, inertia if inertia > 0.0 else inf)
+        circle = pymunk.Circle(body, self.radius + self.hair)
         circle.collision_type = PARTICLE
         return body, circle
 
     def curved(self, face: Face, x: Vec2d) -> bool:
-        """Tell whether what is nearest of a surface is the pulley or the end of a segment."""
-        if face.tangent is None:
+        """Tell whether what is nearest of a surface is an arc, the pulley or the end of a face."""
+        if not face.ends:
             return True
         point = face.shape.point_query(x).point
         return bool(min((point - end).length for end in face.ends) <= self.hair)
 
     def meets(
-        self, path: Flight | Carriage, face: Face, span: float, leaving: bool = False
-    ) -> float:
+        self, path: Flight | Carriage, face: Face, span: float, leaving: bool = False,
+        begin: float = 0.0,
+    ) -> float:  # fmt: skip
         """Return after what time (s) a disk on a path meets a surface, inf if not within `span`.
 
-        All surfaces are convex, and so lie behind the plane through their nearest point: the gap
-        stays above gap + rate τ + a τ²/2, a the least acceleration along the normal there. Stepping
-        from root to root of that bound never passes a contact, and converges like Newton's method.
-        A surface that is being left along its tangent gives no bound; it is looked at after times
-        that grow by half.
+        It goes on by the times in which surely nothing is met, see `Face.free`: that never passes a
+        contact, and converges like Newton's method. A surface that is being left along its tangent
+        gives no bound; it is looked at after times that grow by half.
         """
         r, g, hair = face.radius, self.machine.gravity, self.hair
-        t = last = 0.0
+        t = last = begin
         while True:
             x, v = path.at(t)
             gap, normal = face.gap(x)
@@ -205,7 +383,7 @@ class World:
                 if rate < -slow and (rate < -graze or not self.curved(face, x)):
                     return t
                 leaving = True
-            tau = falls(gap, rate, path.pull(normal))
+            tau = face.free(path, x, v, gap, normal)
             if leaving and (speed := v.length + g * self.machine.dt) > 0.0:
                 tau = max(tau, min(0.5 * t + FIRST * self.machine.dt, r / speed))
             if t + tau == t:
@@ -214,40 +392,71 @@ class World:
                 return inf
             last, t = t, min(t + tau, span)
 
+    def clear(self, path: Flight | Carriage, face: Face, span: float, begin: float = 0.0) -> float:
+        """Return when (s) a disk on a path is off a gate that shut on it, at most `span`.
+
+        It is looked for after each tenth of a radius' way.
+        """
+        t = begin
+        while t < span:
+            x, v = path.at(t)
+            if face.gap(x)[0] >= -self.hair:
+                return t
+            t += 0.1 * self.radius / max(v.length, sqrt(path.most * self.radius), self.tiny)
+        return span
+
+    def meets_gate(self, path: Flight | Carriage, face: Face, span: float, t: float) -> float:
+        """Return what `meets` does of a path that begins at a time (s), while the face is there."""
+        begin, span = max(face.appears - t, 0.0), min(span, face.vanishes - t)
+        if begin > 0.0:
+            begin = self.clear(path, face, span, begin)
+        return self.meets(path, face, span, begin=begin) if begin < span else inf
+
 
 class Carriage:
     """Ride of one particle at the belt's speed, not turning, at the height it is released at.
 
-    It begins at `t` (s), is above the pulley's axis at `top`, and lasts `until` separation at
-    cos φ1 = v²/(g ρ), at the top if that is 1 or more; or until another surface is met; or to the
-    end of the run.
+    It begins at `t` (s), comes to the pulley at `top`, at the angle -β from its axis, and lasts
+    `until` separation: there if v² ≥ g ρ cos β, else at cos φ1 = v²/(g ρ); or until another surface
+    is met; or to the end of the run.
     """
 
     def __init__(self, machine: Machine, world: World, particle: int, t: float) -> None:
         assert machine.pulley is not None
-        start = machine.releases
+        start, self.incline = machine.releases, machine.pulley.incline
         self.particle, self.surface, self.t = particle, machine.pulley.surface, t
-        self.weight = machine.particle.mass * machine.gravity
-        self.x, self.rho = map(float, start.position[particle])
-        self.speed = float(start.velocity[particle, 0])
-        self.until, self.height, self.written = machine.end_time, self.rho, -inf
+        self.weight = world.of(machine.particle.mass) * machine.gravity
+        # Along the belt and square to it.
+        self.along = Vec2d(cos(self.incline), sin(self.incline))
+        self.up = self.along.perpendicular()
+        place = Vec2d(*start.position[particle].tolist())
+        self.x, self.rho = place.dot(self.along), place.dot(self.up)
+        self.speed = Vec2d(*start.velocity[particle].tolist()).dot(self.along)
+        self.until, self.height, self.written = machine.end_time, place.y, -inf
         self.top = inf
         if self.speed > 0.0:
             cosine = self.speed**2 / (machine.gravity * self.rho) if machine.gravity > 0.0 else inf
-            path = max(0.0, -self.x) + self.rho * acos(min(cosine, 1.0))
+            angle = acos(cosine) if cosine < self.along.x else -self.incline
+            path = max(0.0, -self.x) + self.rho * (angle + self.incline)
             span = min(path / self.speed, self.until - t)
             others = (face for face in world.faces if face.surface != self.surface)
-            span = min((world.meets(self, face, span) for face in others), default=span)
+            span = min((world.meets_gate(self, face, span, t) for face in others), default=span)
             self.until = min(t + path / self.speed, self.until, t + span)
             self.top = t + max(0.0, -self.x / self.speed)
 
     def at(self, after: float) -> tuple[Vec2d, Vec2d]:
         """Return place (m) and velocity (m/s) a time (s) after the start."""
-        along = self.x + self.speed * after
-        if along <= 0.0:
-            return Vec2d(along, self.rho), Vec2d(self.speed, 0.0)
-        c, s = cos(along / self.rho), sin(along / self.rho)
+        way = self.x + self.speed * after
+        if way <= 0.0:
+            return self.along * way + self.up * self.rho, self.along * self.speed
+        angle = way / self.rho - self.incline
+        c, s = cos(angle), sin(angle)
         return Vec2d(self.rho * s, self.rho * c), Vec2d(self.speed * c, -self.speed * s)
+
+    @property
+    def most(self) -> float:
+        """The largest acceleration (m/s²) in any direction."""
+        return self.speed**2 / self.rho
 
     def pull(self, _normal: Vec2d) -> float:
         """Return the least acceleration (m/s²) along any normal."""

@@ -20,7 +20,7 @@ void describe(Contact *c, int i, int j) {
         c->owner = s->owner;
         c->other[0] = 0;
         c->other[1] = surface_speed(s, c->nx, c->ny, a->x, a->y);
-        c->other[2] = s->shape == CIRCLE ? -s->speed / s->radius : 0;
+        c->other[2] = s->shape != SEGMENT ? -s->speed / s->radius : 0;
     } else {
         const Disk *b = W.disks + j;
         double x = a->x - b->x, y = a->y - b->y, d = sqrt(x * x + y * y);
@@ -95,6 +95,26 @@ void share_out(const Contact *c, const double *u, const double *v, double f, dou
     entries[2] = -J[1] * (first * u[1] + then * v[1]) - J[2] * (first * u[2] + then * v[2]);
     given[0] = c->j >= 0 && !c->two ? all * (J[0] * c->other[0] + J[1] * c->other[1]) : 0;
     given[1] = given[2] = 0;
+}
+
+/* By how much more than gravity the way inside an arc presses a disk that lies there on a surface,
+   that arc or what goes on from it, m/s2. */
+double pressed_inside(const Disk *d, int surface) {
+    double most = 0;
+    for (int n = 0; n < d->held_count; n++) {
+        const Surface *s = W.surfaces + d->held[n];
+        if (s->shape == SEGMENT || s->radius <= d->radius) continue;
+        if (square(d->x - s->x) + square(d->y - s->y) >= s->radius * s->radius) continue;
+        if (!goes_on(-1 - d->held[n], -1 - surface)) continue;
+        most = MAX(most, (d->vx * d->vx + d->vy * d->vy) / (s->radius - d->radius));
+    }
+    return most;
+}
+
+/* Time in which a disk that slides inside an arc is turned by TURN, INFINITY on what is not hollow. */
+double turning_time(const Disk *d, const Surface *s) {
+    double bends = -bending(s, d->x, d->y, d->radius) * sqrt(d->vx * d->vx + d->vy * d->vy);
+    return bends > 0 ? TURN / bends : INFINITY;
 }
 
 /* How hard gravity and the curved way press a disk on a surface, m/s2. */

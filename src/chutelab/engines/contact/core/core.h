@@ -44,6 +44,8 @@ extern World W;
 #define GRAZE 1e-6
 /* Impacts of a disk in a step that no collapse needs: something is wrong, the run stops. */
 #define STALL 20000
+/* rad; within it the inside of an arc counts as flat: steps of a disk by itself turn it by no more. */
+#define TURN 0.2
 /* Blows that one impact may pass on at its instant, per lasting contact; the rest are foreseen. */
 #define SHOCKS 4
 
@@ -55,10 +57,25 @@ static inline const Pair *pair_of(int kind, int other) {
 static inline const Pair *surface_pair(const Disk *d, int k) {
     return pair_of(d->kind, W.kind_count + W.surfaces[k].material);
 }
+/* Whether a gate shut on a disk that is not clear of it yet. */
+static inline int *spared_by(const Surface *s, const Disk *d) {
+    return W.spared + (d - W.disks) * W.gate_count + s->gate;
+}
+static inline int is_spared(const Surface *s, const Disk *d) {
+    return s->gate >= 0 && *spared_by(s, d);
+}
 /* Whether a surface is there and near the box that a disk can reach in this step. */
 static inline int is_near(const Surface *s, const Disk *d) {
     return s->there && s->box[0] < d->right && s->box[2] > d->left && s->box[1] < d->top
-        && s->box[3] > d->bottom;
+        && s->box[3] > d->bottom && !is_spared(s, d);
+}
+/* Whether two partners of a disk, in the numbers of `Contact.j`, are one or go on smoothly. */
+static inline int is_mate(int j, int other) {
+    const int *mates = W.surfaces[-1 - j].mates;
+    return mates[0] == -1 - other || mates[1] == -1 - other;
+}
+static inline int goes_on(int j, int other) {
+    return j == other || (j < 0 && other < 0 && (is_mate(j, other) || is_mate(other, j)));
 }
 static inline int is_live(const Disk *d) { return d->mode >= RIDING && d->mode <= ASLEEP; }
 
@@ -74,6 +91,7 @@ static inline void advance(Disk *d, double t) {
 
 /* geometry.c */
 double gap_to(const Surface *s, double x, double y, double r, double *nx, double *ny);
+const Surface *face_at(const Surface *s, double x, double y);
 double surface_speed(const Surface *s, double nx, double ny, double x, double y);
 double bending(const Surface *s, double x, double y, double r);
 double meet_surface(const Surface *s, const Disk *d, double span, double *approach);
@@ -106,6 +124,8 @@ void relative(const Contact *c, int earlier, double *out);
 void push(const Contact *c, const double *impulse);
 void share_out(const Contact *c, const double *u, const double *v, double f, double *entries,
                double *given);
+double pressed_inside(const Disk *d, int surface);
+double turning_time(const Disk *d, const Surface *s);
 double press_on(const Disk *d, const Surface *s, double nx, double ny);
 
 /* impacts.c */

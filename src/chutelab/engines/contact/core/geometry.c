@@ -2,10 +2,29 @@
 
 #include "core.h"
 
-/* Whether a point, seen from the centre, is in the angle of an arc; all of a circle. */
+/* Whether a point, seen from the centre, is in the angle of an arc, which may be wider than a half
+   circle; all of a circle. */
 static int in_angle(const Surface *s, double dx, double dy) {
     if (s->shape == CIRCLE) return 1;
     return dx * s->tx + dy * s->ty >= s->cos_half * sqrt(dx * dx + dy * dy);
+}
+
+/* How far along a piece the foot of a point is: -1 before the first end, 1 beyond the second, else 0. */
+static int beyond(const Surface *s, double dx, double dy) {
+    if (s->shape == SEGMENT) {
+        double along = dx * s->tx + dy * s->ty;
+        return along < 0 ? -1 : along > s->length;
+    }
+    return in_angle(s, dx, dy) ? 0 : s->tx * dy - s->ty * dx < 0 ? -1 : 1;
+}
+
+/* The piece whose face a disk at (x, y) is on: beyond a smooth end of `s` the one that goes on there.
+   So the end between two such pieces is not felt, even by a disk that has sunk in a little. */
+const Surface *face_at(const Surface *s, double x, double y) {
+    if (s->mates[0] < 0 && s->mates[1] < 0) return s;
+    int end = beyond(s, x - s->x, y - s->y), mate = end ? s->mates[end > 0] : -1;
+    const Surface *next = W.surfaces + MAX(mate, 0);
+    return mate >= 0 && next->there && !beyond(next, x - next->x, y - next->y) ? next : s;
 }
 
 /* Distance of a point from the nearer end, and the unit vector from there. */
@@ -140,10 +159,26 @@ static double meet_ends(const Surface *s, const Disk *d, double span, double *ap
             double along = x * s->tx + y * s->ty;
             if (e == 0 ? along > 0 : along < 0) continue;
         } else if (in_angle(s, x + s->end[e] - s->x, y + s->end[e + 1] - s->y)) continue;
+        if (face_at(s, x + s->end[e], y + s->end[e + 1]) != s) continue;
         first = h;
         *approach = speed;
     }
     return first;
+}
+
+/* When a disk meets a circle from inside. Where it goes inwards at first, from outside through the
+   opening of an arc or from a place that touches, that is after it was nearest to the centre. */
+static double meet_inside(const Surface *s, const Disk *d, double span, double *approach) {
+    double x = d->x - s->x, y = d->y - s->y, vx = d->vx, vy = d->vy, t = 0;
+    double in = x * vx + y * vy;
+    if (in < 0) {
+        t = MIN(-in / (vx * vx + vy * vy), span);
+        x += (vx + 0.5 * W.gx * t) * t;
+        y += (vy + 0.5 * W.gy * t) * t;
+        vx += W.gx * t;
+        vy += W.gy * t;
+    }
+    return t + meet_round(x, y, vx, vy, s->radius - d->radius, -1, span - t, approach);
 }
 
 /* Time from d->t until a disk meets a surface, INFINITY if not within the span. */
@@ -169,15 +204,17 @@ double meet_surface(const Surface *s, const Disk *d, double span, double *approa
     }
     double away = sqrt(dx * dx + dy * dy), side = away >= s->radius ? 1 : -1;
     if (side * (away - s->radius) > sweep + r) return INFINITY;
-    if (side > 0 || s->radius > r) {
-        double reach = s->radius + side * r;
-        double h = meet_round(dx, dy, d->vx, d->vy, reach, side, span, approach);
+    for (; side >= -1; side -= 2) {
+        double h = INFINITY;
+        if (side > 0) h = meet_round(dx, dy, d->vx, d->vy, s->radius + r, 1, span, approach);
+        else if (s->radius > r) h = meet_inside(s, d, span, approach);
         if (h < INFINITY) {
             double px = dx + (d->vx + 0.5 * W.gx * h) * h, py = dy + (d->vy + 0.5 * W.gy * h) * h;
             if (in_angle(s, px, py)) return h;
         }
+        if (s->shape == CIRCLE) return INFINITY;
     }
-    return s->shape == CIRCLE ? INFINITY : meet_ends(s, d, span, approach);
+    return meet_ends(s, d, span, approach);
 }
 
 /* Time until two disks at a relative place (x, y) and velocity (u, v) are `reach` apart: as both
@@ -210,6 +247,7 @@ double free_span(const Disk *d, double least) {
         int count = 0;
         if (s->opens > d->t) span = MIN(span, s->opens - d->t);
         if (s->closes > d->t) span = MIN(span, s->closes - d->t);
+        if (is_spared(s, d)) span = 0;
         if (s->shape == SEGMENT) {
             double off = dy * s->tx - dx * s->ty, side = off >= 0 ? 1 : -1, speed;
             double rate = side * (d->vy * s->tx - d->vx * s->ty);

@@ -130,9 +130,13 @@ int enter_again(int i, double end) {
 /* Put the disks that disk i may meet in what is left of the step into `W.found`. */
 int reachable(int i) { return W.interact ? query(i, &W.disks[i].left) : 0; }
 
-/* Whether a disk released at (x, y) would overlap no other. */
+/* Whether a disk released at (x, y) would overlap no other, and no gate that is shut. */
 int place_is_free(int i, double x, double y, double t) {
-    double r = W.disks[i].radius, box[4] = {x - r, y - r, x + r, y + r};
+    double r = W.disks[i].radius, box[4] = {x - r, y - r, x + r, y + r}, nx, ny;
+    for (int k = 0; k < W.surface_count && W.gate_count; k++) {
+        const Surface *s = W.surfaces + k;
+        if (s->gate >= 0 && s->there == THERE && gap_to(s, x, y, r, &nx, &ny) < -1e-9 * r) return 0;
+    }
     if (!W.interact) return 1;
     int n = query(i, box);
     for (int k = 0; k < n; k++) {

@@ -60,13 +60,16 @@ double soft_approach(const Disk *d, double radius) {
 }
 
 /* Approach up to which a contact is left to the next step, m/s. What lies on a surface comes back to
-   it at the end of each step, as fast as gravity makes it in one; not what has sunk into it. */
+   it at the end of each step, as fast as gravity makes it in one, and on the inside of an arc as the
+   curved way does; not what has sunk into it. */
 double left_over(const Disk *d, int impacts, int surface, double radius) {
     double skip = W.skip * radius, least = soft_approach(d, radius), nx, ny;
-    for (int n = 0; n < d->held_count; n++)
-        if (d->held[n] == surface
-                && gap_to(W.surfaces + surface, d->x, d->y, d->radius, &nx, &ny) > -SUNK * radius)
-            least = MAX(least, 1.000001 * W.g * W.step);
+    for (int n = 0; n < d->held_count; n++) {
+        if (!goes_on(-1 - d->held[n], -1 - surface)) continue;
+        const Surface *s = W.surfaces + surface;
+        if (gap_to(s, d->x, d->y, d->radius, &nx, &ny) <= -SUNK * radius) continue;
+        least = MAX(least, 1.000001 * (W.g + pressed_inside(d, surface)) * W.step);
+    }
     /* Surfaces do not give way: with them it grows only if jams do not help. */
     int many = surface >= 0 ? 2 * JAM : MANY;
     if (impacts <= many) return least;
@@ -165,17 +168,32 @@ void was_moved(int i) {
 }
 
 
-/* Give a contact a normal impulse, with the friction that it allows, and book what it does. */
+/* Give a contact a normal impulse, with the friction that it allows, and book what it does. Rolling
+   friction stops the turning as far as its arm allows, and friction the slip that then is left: each
+   changes what the other has to stop, by a share of 5/7 at most in turn. */
 static void give(Contact *c, double normal) {
     Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
     double *J = c->impulse, u[3], v[3], entries[3], given[3], most = c->friction * normal;
+    double arm = c->arm * normal, more[3] = {normal, 0, 0};
     relative(c, 0, u);
     J[0] = normal;
-    J[1] = MIN(MAX(-c->mass[1] * (u[1] + c->drift), -most), most);
-    most = c->arm * normal;
-    J[2] = MIN(MAX(-c->mass[2] * u[2], -most), most);
-    push(c, J);
+    J[1] = more[1] = MIN(MAX(-c->mass[1] * (u[1] + c->drift), -most), most);
+    J[2] = 0;
+    push(c, more);
     relative(c, 0, v);
+    for (int n = 0; n < 100 && arm > 0; n++) {
+        more[0] = more[1] = 0;
+        more[2] = MIN(MAX(J[2] - c->mass[2] * v[2], -arm), arm) - J[2];
+        push(c, more);
+        relative(c, 0, v);
+        more[1] = MIN(MAX(J[1] - c->mass[1] * (v[1] + c->drift), -most), most) - J[1];
+        J[1] += more[1];
+        J[2] += more[2];
+        if (more[1] == 0) break;
+        more[2] = 0;
+        push(c, more);
+        relative(c, 0, v);
+    }
     share_out(c, u, v, 0, entries, given);
     book(a->entries, c->two ? b->entries : 0, c->owner, entries);
     if (given[0] != 0) book(a->entries, 0, W.ride_owner, given);
@@ -246,7 +264,8 @@ static void jam(Contact *struck, double t) {
             last = k;
         }
         for (int k = 0; k < W.surface_count; k++)
-            if (W.surfaces[k].there == THERE && is_near(W.surfaces + k, a))
+            if (W.surfaces[k].there == THERE && is_near(W.surfaces + k, a)
+                    && face_at(W.surfaces + k, a->x, a->y) == W.surfaces + k)
                 add_touching(m, -1 - k, a->radius, &count);
     }
     for (int n = 0; n < count; n++) {
@@ -350,7 +369,7 @@ static void strike(int i, int j, double t) {
     int jammed = impacts >= (j >= 0 ? CROWDED : c.rest < 1 ? JAM : CROWDED);
     if (jammed || (c.rest < 1 && impacts >= FEW && -u[0] < SLOW * W.g * W.dt)) back = 0;
     double press = j < 0 ? press_on(a, W.surfaces + (-1 - j), c.nx, c.ny) : 0, later = 0;
-    int rests = j < 0 && back <= press * W.step;
+    int rests = j < 0 && back <= press * MIN(W.step, turning_time(a, W.surfaces + (-1 - j)));
     if (rests) {
         /* The bounces that are left out, infinitely many, would have taken so long. */
         if (back > 0 && c.rest < 1) later = 2 * back / (press * (1 - c.rest));
@@ -375,17 +394,21 @@ static void strike(int i, int j, double t) {
     if (rests) support(i, -1 - j, t);
 }
 
-/* Whether a lasting contact of the step is struck now as well. */
-static int struck_too(const Contact *c, double t) {
+/* Whether a lasting contact of the step is struck now as well; on smooth surfaces its partner `j` may
+   be the next piece. */
+static int struck_too(const Contact *c, double t, int *j) {
     Disk *a = W.disks + c->i, *b = W.disks + MAX(c->j, 0);
     double nx, ny;
+    *j = c->j;
     if (a->mode != FREE) return 0;
     advance(a, t);
     if (c->j < 0) {
-        const Surface *s = W.surfaces + (-1 - c->j);
+        const Surface *s = face_at(W.surfaces + (-1 - c->j), a->x, a->y);
+        int k = (int)(s - W.surfaces);
         double gap = gap_to(s, a->x, a->y, a->radius, &nx, &ny);
+        *j = -1 - k;
         return gap < TOUCH * a->radius
-            && -(a->vx * nx + a->vy * ny) > left_over(a, a->impacts, -1 - c->j, a->radius);
+            && -(a->vx * nx + a->vy * ny) > left_over(a, a->impacts, k, a->radius);
     }
     if (b->mode != FREE) return 0;
     advance(b, t);
@@ -420,11 +443,12 @@ void shock(int i, int j, double t) {
         if (W.disks[m].landed && W.until == UNTIL_LANDED) continue;
         for (int link = W.disks[m].links; link >= 0; link = W.links[link]) {
             const Contact *c = W.contacts + link / 2;
-            if (budget <= 0 || !struck_too(c, t)) continue;
+            int partner;
+            if (budget <= 0 || !struck_too(c, t, &partner)) continue;
             budget--;
-            strike(c->i, c->j, t);
+            strike(c->i, partner, t);
             queue_up(c->i, &tail);
-            if (c->j >= 0) queue_up(c->j, &tail);
+            if (partner >= 0) queue_up(partner, &tail);
         }
     }
     for (int k = 0; k < W.moved_count; k++) {
@@ -450,7 +474,8 @@ void lie_down(int i) {
     for (int k = 0; k < W.surface_count; k++) {
         const Surface *s = W.surfaces + k;
         double nx, ny;
-        if (s->there != THERE || gap_to(s, d->x, d->y, d->radius, &nx, &ny) > 1e-9 * d->radius) continue;
+        if (s->there != THERE || is_spared(s, d) || face_at(s, d->x, d->y) != s) continue;
+        if (gap_to(s, d->x, d->y, d->radius, &nx, &ny) > 1e-9 * d->radius) continue;
         double press = press_on(d, s, nx, ny);
         if (press <= 0 || fabs(d->vx * nx + d->vy * ny) > press * W.dt) continue;
         d->on = s->owner;

@@ -38,8 +38,9 @@ typedef struct {
     double inertia;             /* [in] kg m2; 0: it does not turn */
     double inv_mass, inv_inertia; /* 1/kg, 1/(kg m2); 0 for one that does not turn */
     double release;             /* [in] s; it waits from then on until its place is free */
-    double ride_x;              /* [in] m along the belt where a ride by adhesion begins, <= 0 ... */
-    double ride_rho;            /* [in] ... and its distance from the axis of the pulley; 0: no ride */
+    double ride_x;              /* [in] m along the belt from where that meets the pulley, where a ride
+                                   by adhesion begins, <= 0 ... */
+    double ride_rho;            /* [in] ... and its distance from the axis on the pulley; 0: no ride */
     double ride_speed;          /* [in] m/s */
     double ride_from, ride_to;  /* s; when the ride began and ends */
     double left, bottom, right, top; /* box that it can reach in this step */
@@ -109,6 +110,8 @@ typedef struct {
     int shape;
     int material;           /* [in] column of the table of pairs, behind the kinds of disks */
     int owner;              /* [in] number of the surface it is part of */
+    int mates[2];           /* [in] pieces that go on smoothly beyond its ends, or -1 */
+    int gate;               /* [in] column of `spared` if it comes and goes, else -1 */
     int there;              /* whether it is there in this step; LEAVING: until just now */
     double box[4];          /* m; left, bottom, right, top */
 } Surface;
@@ -168,22 +171,25 @@ typedef struct {
     int *queue;          /* (disks + 1) */
     int *moved;          /* (disks) */
     int *found;          /* (2 disks) */
+    int *spared;         /* (disks, gates) 1: what shut on this disk, and does not touch it yet */
     /* sizes */
     int disk_count, surface_count, kind_count, material_count, owner_count;
     int knot_room, event_room, contact_room, near_room, cell_room;
     int bucket_count;    /* a power of two */
+    int gate_count;
     /* the run */
     int interact;        /* disks meet each other */
     int until;
     int landing;         /* owner that a disk lands on, or -1 */
     int ride_owner;      /* owner that rides are on */
+    double ride_incline; /* rad; at which the belt rises to the pulley */
     int sweeps;          /* of the contact solver, at most */
     int sleeps;          /* whether islands may fall asleep */
     double gx, gy;       /* m/s2 */
     double dt;           /* s; longest step */
     double end_time;     /* s */
     double exit_box[4];  /* m; left, bottom, right, top; tracks end outside */
-    double smooth_x, smooth_v; /* m, m/s; by how much a track may leave out what lasts */
+    double smooth_x, smooth_v; /* radii, m/s; by how much a track may leave out what lasts */
     double accurate;     /* m/s; changes at which sweeps end */
     /* [out] */
     int knot_count, event_count, contact_count, near_count, earlier_count;

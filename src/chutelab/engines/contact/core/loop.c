@@ -20,19 +20,44 @@ World W;
 /* Place and velocity of a rider: along the belt, then round the pulley, at constant speed. */
 static void ride_at(const Disk *d, double t, double *place) {
     double along = d->ride_x + d->ride_speed * (t - d->ride_from), rho = d->ride_rho;
-    double phi = MAX(along, 0) / rho, c = phi > 0 ? cos(phi) : 1, s = phi > 0 ? sin(phi) : 0;
-    place[0] = along <= 0 ? along : rho * s;
-    place[1] = rho * c;
+    /* From the top of the pulley on, clockwise; the belt meets it before. */
+    double phi = MAX(along, 0) / rho - W.ride_incline;
+    double c = phi != 0 ? cos(phi) : 1, s = phi != 0 ? sin(phi) : 0;
+    place[0] = rho * s + MIN(along, 0) * c;
+    place[1] = rho * c - MIN(along, 0) * s;
     place[2] = d->ride_speed * c;
-    place[3] = phi > 0 ? -d->ride_speed * s : 0;
+    place[3] = 0 - d->ride_speed * s;
 }
 
-/* Gap of a rider at t to the nearest surface that is not its own, and that surface. */
+/* Note which gates shut on a disk at t. What lasts in a crowd may have sunk into others so far. */
+static void spare(Disk *d, double t) {
+    double place[4] = {d->x, d->y, 0, 0}, nx, ny, deep = (W.interact ? SUNK : 1e-9) * d->radius;
+    if (d->mode == RIDING) ride_at(d, t, place);
+    for (int k = 0; k < W.surface_count; k++) {
+        const Surface *s = W.surfaces + k;
+        if (s->opens == t) *spared_by(s, d) = gap_to(s, place[0], place[1], d->radius, &nx, &ny) < -deep;
+        else if (is_spared(s, d) && s->opens < t)
+            *spared_by(s, d) = gap_to(s, place[0], place[1], d->radius, &nx, &ny) < 0;
+    }
+}
+
+/* When the next surface comes or goes, s. */
+static double next_gate(double t) {
+    double next = INFINITY;
+    for (int k = 0; k < W.surface_count; k++) {
+        if (W.surfaces[k].opens > t) next = MIN(next, W.surfaces[k].opens);
+        if (W.surfaces[k].closes > t) next = MIN(next, W.surfaces[k].closes);
+    }
+    return next;
+}
+
+/* Gap of a rider at t to the nearest surface that is there and not its own, and that surface. */
 static double ride_gap(const Disk *d, double t, int *which) {
     double place[4], nx, ny, least = INFINITY;
     ride_at(d, t, place);
     for (int k = 0; k < W.surface_count; k++) {
-        if (W.surfaces[k].owner == W.ride_owner) continue;
+        const Surface *s = W.surfaces + k;
+        if (s->owner == W.ride_owner || t < s->opens || t >= s->closes || is_spared(s, d)) continue;
         double gap = gap_to(W.surfaces + k, place[0], place[1], d->radius, &nx, &ny);
         if (gap < least) {
             least = gap;
@@ -42,17 +67,20 @@ static double ride_gap(const Disk *d, double t, int *which) {
     return least;
 }
 
-/* Set when a ride ends: where cos phi = v^2 / (g rho), or where another surface is met. The gap
-   there shrinks by no more than the way, so the way may be looked at in strides of the gap. */
+/* Set when a ride ends: where cos phi = v^2 / (g rho), at once where the belt meets the pulley if that
+   is more than cos phi there, or where another surface is met. The gap there shrinks by no more than
+   the way, so the way may be looked at in strides of the gap, up to where a gate comes or goes. */
 static void plan_ride(Disk *d, double from) {
     double v = d->ride_speed, rho = d->ride_rho, c = W.g > 0 ? v * v / (W.g * rho) : 1, t = from;
+    double turn = c < cos(W.ride_incline) ? acos(c) + W.ride_incline : 0;
     int which = -1;
     d->ride_from = from;
     d->ride_met = -1;
     d->ride_to = INFINITY;
     if (v <= 0) return;
-    d->ride_to = from + (MAX(-d->ride_x, 0) + rho * acos(MIN(c, 1))) / v;
+    d->ride_to = from + (MAX(-d->ride_x, 0) + rho * turn) / v;
     for (double safe = from; t < d->ride_to;) {
+        if (W.gate_count) spare(d, t);
         double gap = ride_gap(d, t, &which);
         if (gap <= 0) {
             /* Bisect to the last place that is free. */
@@ -65,7 +93,7 @@ static void plan_ride(Disk *d, double from) {
             return;
         }
         safe = t;
-        t += MAX(gap, 1e-3 * d->radius) / v;
+        t = MIN(t + MAX(gap, 1e-3 * d->radius) / v, next_gate(t));
     }
 }
 
@@ -113,7 +141,8 @@ static void write_ride(int i, double until) {
 
 /* Knots that a ride may take, at the most. */
 static int ride_knots(const Disk *d) {
-    return d->mode <= RIDING && d->ride_rho > 0 ? 4 + (int)(1.6 / ARC_ANGLE) : 0;
+    double most = 1.6 + MAX(W.ride_incline, 0);
+    return d->mode <= RIDING && d->ride_rho > 0 ? 4 + (int)(most / ARC_ANGLE) : 0;
 }
 
 static void take_off(int i) {
@@ -224,7 +253,6 @@ static int has_settled(void) {
 
 /* Tell which surfaces are there; what sleeps wakes when one comes or goes. Next change, s. */
 static double set_gates(double t) {
-    double next = INFINITY;
     for (int k = 0; k < W.surface_count; k++) {
         Surface *s = W.surfaces + k;
         int there = t < s->opens || t > s->closes ? ABSENT : t < s->closes ? THERE : LEAVING;
@@ -232,10 +260,11 @@ static double set_gates(double t) {
             for (int i = W.low; i < W.high; i++)
                 if (W.disks[i].mode == ASLEEP) wake(i, W.t);
         s->there = there;
-        if (s->opens > t) next = MIN(next, s->opens);
-        if (s->closes > t) next = MIN(next, s->closes);
     }
-    return next;
+    if (!W.gate_count) return INFINITY;
+    for (int i = W.low; i < W.high; i++)
+        if (is_live(W.disks + i)) spare(W.disks + i, t);
+    return next_gate(t);
 }
 
 /* A sleeper that rides a belt wakes where that ends. */
@@ -262,6 +291,9 @@ static int begin_step(void) {
     double next = set_gates(W.t), h = W.dt, stride = 0;
     if (W.g > 0)
         for (int i = W.low; i < W.high; i++) h = MIN(h, sqrt(8 * HOP * W.disks[i].radius / W.g));
+    if (!W.interact)
+        for (int n = 0; n < W.disks[W.low].held_count; n++)
+            h = MIN(h, turning_time(W.disks + W.low, W.surfaces + W.disks[W.low].held[n]));
     W.step = h;
     W.soft = 2 * W.g * h;
     W.skip = SKIP / h;
@@ -391,10 +423,7 @@ static int is_over(void) {
         if (d->mode == WAITING) next = MIN(next, MAX(d->release, W.t));
     }
     if (awake) return 0;
-    for (int k = 0; k < W.surface_count; k++) {
-        if (W.surfaces[k].opens > W.t) next = MIN(next, W.surfaces[k].opens);
-        if (W.surfaces[k].closes > W.t) next = MIN(next, W.surfaces[k].closes);
-    }
+    next = MIN(next, next_gate(W.t));
     int asleep = 0;
     for (int i = W.low; i < W.high; i++) asleep |= W.disks[i].mode == ASLEEP;
     if (next >= W.end_time || next == INFINITY) next = W.end_time;

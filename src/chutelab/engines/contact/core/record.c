@@ -50,7 +50,7 @@ void knot_before_blow(int i) {
     Track *track = W.tracks + i;
     double state[6] = {d->t, d->x, d->y, d->vx, d->vy, d->spin};
     track->again = track->held_back && d->t - track->knot[0] < W.step
-        && fabs(d->x - track->knot[1]) + fabs(d->y - track->knot[2]) < W.smooth_x;
+        && fabs(d->x - track->knot[1]) + fabs(d->y - track->knot[2]) < W.smooth_x * d->radius;
     if (track->again) {
         memcpy(track->blow, state, sizeof state);
         memcpy(track->blow_before, d->entries, sizeof track->blow_before);
@@ -93,13 +93,13 @@ void flush_track(int i) {
 }
 
 static int foretold(const Track *track, const double *state, double radius) {
-    double h = state[0] - track->knot[0];
+    double h = state[0] - track->knot[0], close = W.smooth_x * radius;
     for (int n = 0; n < 3; n++) {
         double v = track->knot[3 + n], a = track->bend[n], off = fabs(v + a * h - state[3 + n]);
         if (off * (n < 2 ? 1 : radius) > W.smooth_v) return 0;
         /* A cubic whose end velocity is off by so much bulges by a seventh of off h. */
-        if (n < 2 && 0.15 * off * h > W.smooth_x) return 0;
-        if (n < 2 && fabs(track->knot[1 + n] + (v + 0.5 * a * h) * h - state[1 + n]) > W.smooth_x)
+        if (n < 2 && 0.15 * off * h > close) return 0;
+        if (n < 2 && fabs(track->knot[1 + n] + (v + 0.5 * a * h) * h - state[1 + n]) > close)
             return 0;
     }
     return 1;

@@ -33,27 +33,41 @@
 #define DIVERGES 1e3
 /* m/s; below it the contacts of a crowd count as calm: `settled` in the contract. */
 #define CALM 1e-3
+/* m/s; of a disk by itself: what is left of a speed that has come to nothing. */
+#define STOPPED 1e-9
 /* Of sqrt(g r): below it an island may fall asleep; 0.5 mm/s for r = 4 mm. */
 #define REST 2.5e-3
 
 static double gap_later(const Contact *c, double h) {
     const Disk *a = W.disks + c->i;
     double x = a->x + (a->vx + 0.5 * W.gx * h) * h, y = a->y + (a->vy + 0.5 * W.gy * h) * h, nx, ny;
-    if (c->j < 0) return gap_to(W.surfaces + (-1 - c->j), x, y, a->radius, &nx, &ny);
+    if (c->j < 0) return gap_to(face_at(W.surfaces + (-1 - c->j), x, y), x, y, a->radius, &nx, &ny);
     const Disk *b = W.disks + c->j;
     x -= b->x + (b->vx + 0.5 * W.gx * h) * h;
     y -= b->y + (b->vy + 0.5 * W.gy * h) * h;
     return sqrt(x * x + y * y) - a->radius - b->radius;
 }
 
-/* Time until the foot of a disk on a face passes its end, INFINITY where there is none. */
+/* Time until the foot of a disk on a face passes its end, INFINITY where there is none or the face
+   goes on smoothly. */
 static double time_on_face(const Contact *c) {
     const Disk *d = W.disks + c->i;
     const Surface *s = W.surfaces + (-1 - c->j);
-    if (s->shape != SEGMENT) return INFINITY;
-    double along = (d->x - s->x) * s->tx + (d->y - s->y) * s->ty, run = d->vx * s->tx + d->vy * s->ty;
-    if (along < 0 || along > s->length || run == 0) return INFINITY;
-    return (run > 0 ? s->length - along : along) / fabs(run);
+    double x = d->x - s->x, y = d->y - s->y, along, run, length = s->length;
+    if (s->shape == CIRCLE) return INFINITY;
+    if (s->shape == SEGMENT) {
+        along = x * s->tx + y * s->ty;
+        run = d->vx * s->tx + d->vy * s->ty;
+    } else {
+        /* Angles; the foot of a disk in contact turns with its centre. */
+        double half = acos(s->cos_half), square_away = x * x + y * y;
+        if (square_away == 0) return INFINITY;
+        along = atan2(s->tx * y - s->ty * x, s->tx * x + s->ty * y) + half;
+        run = (x * d->vy - y * d->vx) / square_away;
+        length = 2 * half;
+    }
+    if (along < 0 || along > length || run == 0 || s->mates[run > 0] >= 0) return INFINITY;
+    return (run > 0 ? length - along : along) / fabs(run);
 }
 
 /* When a load (N s of impulse per time, newest first) falls to nothing, by the line through two. */
@@ -67,6 +81,7 @@ static int add(int i, int j, double least, double bound, double h) {
     Contact *c = W.contacts + W.contact_count;
     const Disk *d = W.disks + i;
     double u[3], later;
+    if (j < 0 && face_at(W.surfaces + (-1 - j), d->x, d->y) != W.surfaces + (-1 - j)) return 1;
     describe(c, i, j);
     /* The next face or pulley that a disk by itself slides on to may be further off. */
     int far = c->gap > TOUCH * least;
@@ -85,10 +100,10 @@ static int add(int i, int j, double least, double bound, double h) {
     c->drift = 0.5 * h * c->pull;
     c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
     for (int k = d->before; k >= 0; k = W.earlier[k].next)
-        if (W.earlier[k].j == j)
+        if (goes_on(W.earlier[k].j, j))
             for (int n = 0; n < 3; n++) c->impulse[n] = W.again * W.earlier[k].impulse[n];
     int pressed = c->impulse[0] > 0;
-    for (int n = 0; n < d->held_count; n++) pressed |= d->held[n] == -1 - j;
+    for (int n = 0; n < d->held_count; n++) pressed |= goes_on(-1 - d->held[n], j);
     /* What was pressed came down from its last hop: it may leave along the surface, not into it, and
        above the face while that lasts. Beyond, the end presses it only if it is slow enough. */
     double floor = -u[0], until = j < 0 ? time_on_face(c) : INFINITY, least_need = floor;
@@ -172,8 +187,11 @@ int find_contacts(double h, int *woke) {
         int first = W.contact_count;
         double bound = d->impacts > CROWDED ? INFINITY : left_over(d, d->impacts, -1, d->radius);
         if (d->supports) bound = MAX(bound, W.interact ? MAX(W.soft, W.skip * d->radius) : W.soft);
-        for (int k = 0; k < W.surface_count; k++)
-            if (is_near(W.surfaces + k, d) && !add(i, -1 - k, d->radius, bound, h)) return 0;
+        for (int k = 0; k < W.surface_count; k++) {
+            if (!is_near(W.surfaces + k, d)) continue;
+            double inside = pressed_inside(d, k), most = MAX(bound, inside ? W.soft + 2 * h * inside : 0);
+            if (!add(i, -1 - k, d->radius, most, h)) return 0;
+        }
         if (W.contact_count > first) carry_to_end(i, first, h);
     }
     return 1;
@@ -425,13 +443,17 @@ static void note_grip(Disk *d, const Contact *c, const double *u, const double *
     d->slips = !grips;
 }
 
-/* Whether a disk by itself that grips stays as it is: on a face, and nothing pulls it along. */
-static int lies(const Disk *d, const Contact *c) {
+/* Whether a disk by itself that grips stays as it is: nothing pulls it along, and on what is round, or
+   slows its rolling, it has stopped. */
+static int lies(const Disk *d, const Contact *c, double h) {
     const Surface *s = W.surfaces + (-1 - c->j);
+    double speed = fabs(d->vx + 0.5 * h * W.gx) + fabs(d->vy + 0.5 * h * W.gy);
     if (s->speed != 0 && c->owner != W.landing) return 0;
-    if (bending(s, d->x, d->y, d->radius) != 0 && (d->vx != 0 || c->other[1] != 0)) return 0;
-    if (c->arm > 0 && d->spin != c->other[2]) return 0;
-    return d->inertia == 0 || c->pull == 0;
+    if (bending(s, d->x, d->y, d->radius) != 0 && (speed > STOPPED || c->other[1] != 0)) return 0;
+    if (c->arm > 0 && fabs(d->spin - c->other[2]) * d->radius > STOPPED) return 0;
+    /* Its arm may have stopped it for a moment, or holds it. */
+    int held = speed <= STOPPED && fabs(c->pull) * d->radius <= c->arm * press_on(d, s, c->nx, c->ny);
+    return d->inertia == 0 || c->pull == 0 || held;
 }
 
 /* End the track of a disk that came to rest on one surface, when its slip was used up: `d->since`.
@@ -577,8 +599,12 @@ void close_step(double h) {
             relative(only, 1, u);
             relative(only, 0, v);
             note_grip(d, only, u, v, h);
-            if (!W.interact && W.until == UNTIL_SETTLED && !d->slips && d->since <= d->t + h && lies(d, only))
+            if (!W.interact && W.until == UNTIL_SETTLED && !d->slips && d->since <= d->t + h
+                    && lies(d, only, h)) {
+                /* What rolled stops now, not when it began to. */
+                if (only->arm > 0 && d->inertia > 0) d->since = MAX(d->since, d->t);
                 settle(i, only, h);
+            }
         } else {
             /* On several; of a surface it lies on, if any, it may still part. */
             int ground = -1;
@@ -603,7 +629,7 @@ void close_step(double h) {
             for (int link = d->links; link >= 0; link = W.links[link])
                 if (W.contacts[link / 2].impulse[0] > 0)
                     most = MAX(most, fabs(W.contacts[link / 2].other[1]));
-            if (most + fabs(s[2]) * d->radius < 1e-9) reason = BY_SETTLING;
+            if (most + fabs(s[2]) * d->radius < STOPPED) reason = BY_SETTLING;
         }
         if (W.until == UNTIL_LANDED && d->landed) reason = BY_LANDING;
         d->ends = reason;

@@ -1,0 +1,192 @@
+"""What air drag would do, against solutions in closed form, small-drag theory and SciPy."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from scipy.integrate import quad, solve_ivp
+
+from chutelab.cli.program import main
+from chutelab.engines.simulation import simulate
+from chutelab.results.summary import summary
+from chutelab.scene import from_dict
+from chutelab.theory import drag, predict
+from chutelab.theory.drag import drag_coefficient, fly
+
+G = 9.81
+AIR, VISCOSITY = 1.2, 1.8e-5
+
+
+def scene(**tables: Any) -> Any:
+    base: dict[str, Any] = {
+        "incoming": {"speed": 2.0, "pulley_radius": 0.1},
+        "plate": {"distance": 0.5},
+        "outgoing": {"drop": 0.5},
+    }
+    for name, table in tables.items():
+        base[name] = {**base.get(name, {}), **table}
+    return from_dict(base, "test")
+
+
+def by_scipy(found: Any, *, r: float, m: float, eps: float, alpha: float) -> tuple[float, float]:
+    """Height of the impact on the plate and x of the landing, with drag by Schiller and Naumann."""
+
+    def rate(_: float, y: Any) -> list[float]:
+        v = math.hypot(y[2], y[3])
+        re = AIR * v * 2 * r / VISCOSITY
+        cd = 0.44 if re >= 1000 else 24 / re * (1 + 0.15 * re**0.687)
+        slow = 0.5 * AIR * cd * math.pi * r * r * v / m
+        return [y[2], y[3], -slow * y[2], -slow * y[3] - G]
+
+    n = np.array([-math.cos(alpha), -math.sin(alpha)])
+
+    def plate(_: float, y: Any) -> float:
+        return float((np.asarray(y[:2]) - [0.6, 0.1]) @ n - r)
+
+    rho = 0.1 + r
+    start = rho * np.array([math.sin(found.phi1), math.cos(found.phi1)])
+    velocity = found.v1 * np.array([math.cos(found.phi1), -math.sin(found.phi1)])
+    hit = start + np.array([found.x2, -found.y2])
+    level = hit[1] - 0.5
+
+    def leg(place: Any, v: Any, event: Any) -> Any:
+        event.terminal, event.direction = True, -1.0
+        run = solve_ivp(
+            rate, (0.0, 9.0), [*place, *v], events=event, method="DOP853", rtol=1e-12, atol=1e-14
+        )
+        return run.y_events[0][0]
+
+    y = leg(start, velocity, plate)
+    v = y[2:] - (1.0 + eps) * (y[2:] @ n) * n
+    return float(y[1] - hit[1]), float(
+        leg(y[:2], v, lambda t, y: y[1] - level)[0] - (hit[0] - found.x3)
+    )
+
+
+@pytest.mark.parametrize("degrees", [-15.0, 0.0, 12.0])
+@pytest.mark.parametrize("r", [0.02, 0.004, 0.0006])
+def test_the_shifts_against_scipy(r: float, degrees: float) -> None:
+    m = 2650.0 * 4.0 / 3.0 * math.pi * r**3
+    plate = {"angle_deg": degrees, "below": 2.0}
+    one = scene(particle={"radius": r, "mass": m}, plate=plate)
+    found = predict(one)
+    assert found.reason == ""
+    told = drag(one, found, 0.0)
+    assert told is not None
+    impact, landing = by_scipy(found, r=r, m=m, eps=0.5, alpha=math.radians(degrees))
+    # Where the coefficient jumps, from 0.438 to 0.44, a step of either is of lower order.
+    assert told.impact_shift == pytest.approx(impact, rel=1e-5)
+    assert told.landing_shift == pytest.approx(landing, rel=1e-5)
+    assert told.arrives
+
+
+def test_the_shift_of_a_heavy_particle_is_that_of_small_drag_theory() -> None:
+    # To first order drag works along the path without it: m δ'' = -c |v| v, straight down a fall.
+    r, m = 0.02, 400.0
+    one = scene(particle={"radius": r, "mass": m}, plate={"restitution": 0.0})
+    found = predict(one)
+    told = drag(one, found, 0.0)
+    assert told is not None
+    c = 0.5 * AIR * 0.44 * math.pi * r * r / m
+    t2 = float(found.t2)
+
+    def accelerations(t: float) -> tuple[float, float]:
+        v = math.hypot(2.0, G * t)
+        return -c * v * 2.0, c * v * G * t
+
+    late = quad(lambda t: (t2 - t) * accelerations(t)[0], 0.0, t2, epsabs=0.0, epsrel=1e-12)[0]
+    up = quad(lambda t: (t2 - t) * accelerations(t)[1], 0.0, t2, epsabs=0.0, epsrel=1e-12)[0]
+    # It comes to the plate later by -late/2 s, and falls on meanwhile.
+    assert told.impact_shift == pytest.approx(up + late / 2.0 * G * t2, rel=1e-5)
+    assert told.landing_shift == pytest.approx(0.0, abs=1e-12)
+
+
+@given(st.floats(0.2, 30.0), st.floats(0.05, 2.0))
+def test_a_fall_with_a_constant_coefficient(terminal: float, height: float) -> None:
+    # v = vt tanh(g t/vt), y = vt²/g ln cosh(g t/vt), so v² = vt² (1 - exp(-2 g y/vt²)).
+    def rate(vx: float, vy: float) -> tuple[float, float]:
+        v = math.hypot(vx, vy)
+        return -G * v * vx / terminal**2, -G * v * vy / terminal**2 - G
+
+    speed = terminal * math.sqrt(-math.expm1(-2.0 * G * height / terminal**2))
+    time = terminal / G * math.atanh(speed / terminal) if speed < terminal else math.inf
+    free = math.sqrt(2.0 * height / G)
+    assume(time < 2.9 * free)
+    down = fly((0.0, 0.0, 0.0, 0.0), rate, lambda state: state[1] + height, free)
+    assert down is not None
+    assert down[1] == pytest.approx(-height, rel=1e-12)
+    assert down[3] == pytest.approx(-speed, rel=1e-5)
+
+
+def test_the_coefficient_of_a_sphere() -> None:
+    assert drag_coefficient(1e-6) * 1e-6 == pytest.approx(24.0, rel=1e-4)  # Stokes
+    assert drag_coefficient(1.0) == pytest.approx(24.0 * 1.15)
+    assert drag_coefficient(100.0) == pytest.approx(0.24 * (1.0 + 0.15 * 100.0**0.687))
+    assert drag_coefficient(999.0) == pytest.approx(0.44, abs=3e-3)
+    assert drag_coefficient(1e5) == 0.44
+    assert math.isinf(drag_coefficient(0.0))
+
+
+def test_the_share_of_the_weight() -> None:
+    r, m, v = 0.01, 0.011, 5.0
+    one = scene(particle={"radius": r, "mass": m})
+    told = drag(one, predict(one), v)
+    assert told is not None
+    assert (told.speed, told.coefficient) == (v, 0.44)
+    assert told.reynolds == pytest.approx(2 * r * v * AIR / VISCOSITY)
+    force = 0.5 * AIR * 0.44 * math.pi * r**2 * v**2
+    assert told.share_of_weight == pytest.approx(force / (m * G), rel=1e-14)
+    point = scene(particle={"radius": 0.0})
+    assert drag(point, predict(point), v) is None
+    weightless = scene(particle={"radius": r}, plate={"angle_deg": 20.0})
+    floating = weightless.with_values({"gravity": 0.0})
+    told = drag(floating, predict(floating), v)
+    assert told is not None
+    assert math.isinf(told.share_of_weight)
+
+
+def test_air_keeps_dust_from_the_plate() -> None:
+    for r in (5e-5, 1e-6):
+        one = scene(particle={"radius": r, "mass": 2650.0 * 4 / 3 * math.pi * r**3})
+        told = drag(one, predict(one), 0.0)
+        assert told is not None
+        assert not told.arrives
+        assert math.isnan(told.landing_shift)
+        assert "times the weight" in str(told)
+        assert "keep particle 0 from getting there" in str(told)
+
+
+def test_summary_report_and_check_tell_it() -> None:
+    one = scene()
+    told = summary(simulate(one))["drag"]
+    assert told["speed"] == pytest.approx(float(predict(one).v3), rel=1e-12)
+    assert told["landing_shift"] == pytest.approx(2.5e-4, abs=2e-5)
+    assert set(told) == {
+        "speed", "reynolds", "coefficient", "share_of_weight", "impact_shift", "landing_shift",
+        "arrives",
+    }  # fmt: skip
+    run = CliRunner().invoke(main, ["run", "perpendicular"])
+    words = " ".join(run.output.split())
+    assert "Air drag, left out, would be 0.33 % of the weight at 4.4 m/s, and particle 0" in words
+    checked = CliRunner().invoke(main, ["check", "perpendicular", "--json"])
+    parts = {
+        part["name"]: part["what"] for part in json.loads(checked.output)["scenes"][0]["skipped"]
+    }
+    assert parts["air"].startswith("its drag would be 0.33 % of the weight at 4.4 m/s")
+
+
+def test_without_a_closed_form_only_the_share_is_told() -> None:
+    free = from_dict(
+        {"stream": {"at": [0.0, 1.0], "velocity": [3.0, 0.0]}, "run": {"until": 0.5}}, "test"
+    )
+    told = summary(simulate(free))["drag"]
+    assert told["speed"] == pytest.approx(math.hypot(3.0, G * 0.5), rel=1e-9)
+    assert told["landing_shift"] is told["impact_shift"] is None
+    assert told["arrives"]

@@ -1,0 +1,305 @@
+"""The event-driven engine on arcs, against differential equations integrated here."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import atan2, cos, hypot, inf, pi, radians, sin, sqrt
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.special import ellipk
+
+from chutelab.engines import exact
+from chutelab.machine.parts import Arcs
+from chutelab.results import REASONS, Kind
+from chutelab.results.ledger import ledger
+from machines import face, scene_of
+
+G = 9.81
+FAR = face("far", [5.0, -5.0], [6.0, -5.0])
+
+
+def with_arcs(built, *arcs):
+    """Return the machine with arcs, each a surface of its own."""
+    given = {
+        "begin": 0.0, "extent": 2.0 * pi, "speed": 0.0, "restitution": 0.0, "friction": 0.0,
+        "appears": -inf, "vanishes": inf,
+    }  # fmt: skip
+    rows = [{**given, **arc, "surface": len(built.surfaces) + n} for n, arc in enumerate(arcs)]
+    columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
+    names = tuple(f"arc {n}" for n in range(len(arcs)))
+    return replace(built, surfaces=built.surfaces + names, arcs=Arcs(**columns))
+
+
+def at(position, velocity=(0.0, 0.0), *surfaces, radius=0.02, spin=False, until=2.0, gravity=G):
+    return scene_of(
+        gravity=gravity,
+        particle={"radius": radius, "spin": spin},
+        surface=list(surfaces) or [FAR],
+        stream={"at": list(position), "velocity": list(velocity)},
+        run={"until": until},
+    )
+
+
+def bowl(radius=1.0, **values):
+    return {"center": (0.0, 0.0), "radius": radius, "begin": pi, "extent": pi, **values}
+
+
+def on_the_bowl(angle, radius, length):
+    """A place inside, that far from the lowest point, and the direction counterclockwise there."""
+    reach = length - radius
+    return np.array([reach * sin(angle), -reach * cos(angle)]), np.array([cos(angle), sin(angle)])
+
+
+def inside(length, speed, angle, until, *, friction, belt=0.0, turning=0.0):
+    """Integrate what slides or rolls inside a circle, from a slip to its end; (θ, w, z) at times.
+
+    θ counterclockwise from the lowest point, w along it, z the spin's share of the slip w + z - b,
+    and L θ'' = -g sin θ - σ µ N, z' = (m r²/I) F, N = g cos θ + w²/L.
+    """
+
+    def rates(_t, y):
+        theta, w, z = y
+        slip = w + z - belt
+        force = -np.sign(slip) * friction * (G * cos(theta) + w * w / length)
+        return [w / length, -G * sin(theta) + force, turning * force]
+
+    def no_slip(_t, y):
+        return y[1] + y[2] - belt
+
+    no_slip.terminal = True
+    return solve_ivp(
+        rates, (0.0, until), [angle, speed, 0.0], method="DOP853", rtol=1e-13, atol=1e-14,
+        dense_output=True, events=no_slip,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("radius", [0.02, 0.3, 0.0])
+def test_without_friction_it_swings_like_a_pendulum(radius):
+    """T = 4 sqrt(L/g) K(sin²(θ/2)), L = R - r; at rest it is where it started."""
+    theta, length = 1.2, 1.0 - radius
+    place, _ = on_the_bowl(theta, radius, 1.0)
+    period = 4.0 * sqrt(length / G) * ellipk(sin(theta / 2) ** 2)
+    run = exact.run(with_arcs(at(place, until=3.0 * period, radius=radius), bowl()))
+    end = run.track(0)[-1]
+    np.testing.assert_allclose(end["position"], place, rtol=0, atol=1e-11)
+    track = run.track(0)
+    np.testing.assert_allclose(np.hypot(*track["position"].T), length, rtol=1e-13)
+    fallen = place[1] - track["position"][:, 1]
+    np.testing.assert_allclose((track["velocity"] ** 2).sum(axis=1), 2.0 * G * fallen, atol=1e-12)
+    assert abs(ledger(run).residual) < 1e-13
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_sliding_in_a_bowl_obeys_its_equation_of_motion(seed):
+    """Random angle, speed, friction, belt and spin, up to where the slip ends."""
+    draw = np.random.default_rng(seed)
+    angle, speed = draw.uniform(-1.2, 1.2), draw.uniform(-3.0, 3.0)
+    friction, belt = draw.uniform(0.05, 0.8), draw.choice([0.0, 1.0, -2.0])
+    spin = bool(seed % 2)
+    place, along = on_the_bowl(angle, 0.05, 0.7)
+    built = at(place, speed * along, radius=0.05, spin=spin, until=1.0)
+    # Inside, a surface that moves clockwise runs against the angle θ.
+    run = exact.run(with_arcs(built, bowl(0.7, friction=friction, speed=-belt)))
+    true = inside(
+        0.65, speed, angle, 1.0, friction=friction, belt=belt, turning=2.0 if spin else 0.0
+    )
+    ends = true.t_events[0][0] if true.t_events[0].size else 1.0
+    if ends < 1.0:
+        theta, w, _ = true.y[:, -1]
+        holds = abs(sin(theta)) * (1.0 / 3.0 if spin else 1.0)
+        if G * holds < friction * (G * cos(theta) + w * w / 0.65):
+            assert run.select(Kind.STICK)["t"][0] == pytest.approx(ends, abs=1e-10)
+    track = run.track(0)
+    track = track[track["t"] < ends - 1e-9]
+    assert len(track) > 5
+    theta, w, z = true.sol(track["t"])
+    np.testing.assert_allclose(
+        np.arctan2(track["position"][:, 0], -track["position"][:, 1]), theta, atol=1e-10
+    )
+    wanted = w[:, None] * np.stack([np.cos(theta), np.sin(theta)], axis=1)
+    np.testing.assert_allclose(track["velocity"], wanted, atol=1e-10)
+    # θ grows as the disk turns clockwise.
+    np.testing.assert_allclose(track["omega"] * 0.05, z, atol=1e-10)
+    assert ledger(run).relative_residual < 1e-13
+
+
+def test_a_disk_that_rolls_in_a_bowl_is_a_slower_pendulum():
+    """θ'' = -2/3 g sin θ / L; the period at the angle 1 is 4 sqrt(3 L/2 g) K(sin² ½)."""
+    place, _ = on_the_bowl(1.0, 0.1, 1.0)
+    period = 4.0 * sqrt(1.5 * 0.9 / G) * ellipk(sin(0.5) ** 2)
+    run = exact.run(
+        with_arcs(at(place, radius=0.1, spin=True, until=2.0 * period), bowl(friction=5.0))
+    )
+    end = run.track(0)[-1]
+    np.testing.assert_allclose(end["position"], place, rtol=0, atol=1e-11)
+    assert ledger(run).friction_loss == pytest.approx(0.0, abs=1e-15)
+
+
+@pytest.mark.parametrize("speed", [0.3, 1.0, 1.9])
+def test_it_leaves_the_outside_where_its_weight_no_longer_holds_it(speed):
+    """From a level ramp onto the top of a roller: cos φ = 2/3 + v²/(3 g ρ), without friction."""
+    ramp = face("ramp", [-1.0, 0.0], [0.0, 0.0], friction=0.0)
+    roller = {"center": (0.0, -0.4), "radius": 0.4}
+    run = exact.run(with_arcs(at([-0.5, 0.02], [speed, 0.0], ramp, until=4.0), roller))
+    (left,) = run.select(Kind.SEPARATION)
+    phi = atan2(left["position"][0], left["position"][1] + 0.4)
+    assert cos(phi) == pytest.approx((2.0 + speed**2 / (G * 0.42)) / 3.0, rel=1e-13, abs=0.0)
+    assert run.surfaces[left["surface"]] == "arc 0"
+
+
+def test_faster_than_the_weight_can_bend_its_path_it_flies_off_at_the_tangent():
+    ramp = face("ramp", [-1.0, 0.0], [0.0, 0.0], friction=0.0)
+    run = exact.run(
+        with_arcs(at([-0.5, 0.02], [2.5, 0.0], ramp), {"center": (0.0, -0.4), "radius": 0.4})
+    )
+    (left,) = run.select(Kind.SEPARATION)
+    np.testing.assert_allclose(left["position"], [0.0, 0.02], atol=1e-14)
+
+
+@pytest.mark.parametrize("radius", [0.02, 0.0])
+@pytest.mark.parametrize("seed", range(4))
+def test_down_a_chute_of_ramps_and_bends_nothing_is_lost_but_by_friction(seed, radius):
+    """A ramp, a bend to the left, one to the right, a ramp: v dv/ds = g sin - µ N, N with v²/ρ."""
+    draw = np.random.default_rng(seed)
+    slope, turn, back = draw.uniform(0.5, 1.0), draw.uniform(0.3, 0.9), draw.uniform(0.2, 0.5)
+    mu, big, small = draw.uniform(0.0, 0.15), draw.uniform(0.3, 0.6), draw.uniform(2.0, 3.0)
+    down = np.array([cos(slope), -sin(slope)])
+    up = np.array([sin(slope), cos(slope)])
+    # The ramp ends at the origin; the first bend is round a point on its left.
+    one = big * up
+    flat = slope - turn
+    joint = one - big * np.array([sin(flat), cos(flat)])
+    two = joint - small * np.array([sin(flat), cos(flat)])
+    steep = flat + back
+    last = two + small * np.array([sin(steep), cos(steep)])
+    further = np.array([cos(steep), -sin(steep)])
+    ramps = [
+        face("down", (-2.0 * down).tolist(), [0.0, 0.0], friction=mu),
+        face("on", last.tolist(), (last + 3.0 * further).tolist(), friction=mu),
+    ]
+    first = {
+        "center": one,
+        "radius": big,
+        "begin": 1.5 * pi - slope,
+        "extent": turn,
+        "friction": mu,
+    }
+    second = {
+        "center": two,
+        "radius": small,
+        "begin": 0.5 * pi - steep,
+        "extent": back,
+        "friction": mu,
+    }
+    way = 0.3
+    # A point must not start below the ramp, not even by rounding.
+    place = -way * down + max(radius, 1e-13) * up
+    built = at(place, (0.0, 0.0), *ramps, radius=radius, until=5.0)
+    run = exact.run(with_arcs(built, first, second))
+
+    # v² along the pieces, by its differential equation over the angle or the way.
+    def bend(v2, rho, start, end):
+        """φ from the top of the normal; ρ < 0 inside; φ' = w/ρ."""
+
+        def rate(phi, y):
+            return [2.0 * rho * (G * sin(phi) - mu * (G * cos(phi) - y[0] / rho))]
+
+        return solve_ivp(rate, (start, end), [v2], method="DOP853", rtol=1e-13, atol=1e-14).y[0, -1]
+
+    v2 = 2.0 * (G * sin(slope) - mu * G * cos(slope)) * way
+    v2 = bend(v2, -(big - radius), slope, flat)
+    v2 = bend(v2, small + radius, flat, steep)
+    assert v2 < G * cos(steep) * small
+    touched = [run.surfaces[n] for n in run.select(Kind.SEPARATION)["surface"]]
+    assert touched == ["on"]
+    end = run.select(Kind.SEPARATION)[0]
+    v2 += 2.0 * (G * sin(steep) - mu * G * cos(steep)) * 3.0
+    assert hypot(*end["velocity_before"]) ** 2 == pytest.approx(v2, rel=1e-10)
+    assert ledger(run).relative_residual < 1e-13
+
+
+def test_round_a_loop_it_comes_off_where_the_normal_force_is_gone():
+    """In at the bottom at v² < 5 g L: off where v² = -g L cos φ, v² = v0² - 2 g L (1 - cos φ)."""
+    floor = face("floor", [-2.0, 0.0], [0.0, 0.0], friction=0.0)
+    length, v2 = 0.48, 4.6 * G * 0.48
+    loop = {"center": (0.0, 0.5), "radius": 0.5, "begin": -0.5 * pi, "extent": 1.75 * pi}
+    run = exact.run(with_arcs(at([-1.0, 0.02], [sqrt(v2), 0.0], floor), loop))
+    left = run.select(Kind.SEPARATION)[0]
+    phi = atan2(left["position"][0], 0.5 - left["position"][1])
+    assert cos(phi) == pytest.approx((2.0 - v2 / (G * length)) / 3.0, rel=1e-12, abs=0.0)
+    again = run.select(Kind.IMPACT)[0]
+    # The parabola meets the loop again, inside: |d| = L at that time and at none before.
+    flight = np.linspace(1e-3, again["t"] - left["t"] - 1e-9, 200)[:, None]
+    d = left["position"] - [0.0, 0.5] + left["velocity_after"] * flight
+    d[:, 1] -= 0.5 * G * flight[:, 0] ** 2
+    assert (np.hypot(*d.T) < length).all()
+    assert hypot(*(again["position"] - [0.0, 0.5])) == pytest.approx(length, rel=1e-13, abs=0.0)
+
+
+def test_round_the_whole_loop_the_angle_goes_on():
+    floor = face("floor", [-2.0, 0.0], [0.0, 0.0], friction=0.0)
+    loop = {"center": (0.0, 0.5), "radius": 0.5, "begin": -0.5 * pi, "extent": 1.75 * pi}
+    run = exact.run(with_arcs(at([-1.0, 0.02], [6.0, 0.0], floor), loop))
+    left = run.select(Kind.SEPARATION)[0]
+    # It leaves at the far end, tangentially, as fast as its height there allows.
+    angle = radians(-90.0 + 0.875 * 360.0)
+    wanted = [0.48 * cos(angle), 0.5 + 0.48 * sin(angle)]
+    np.testing.assert_allclose(left["position"], wanted, atol=1e-12)
+    height = wanted[1] - 0.02
+    assert hypot(*left["velocity_after"]) ** 2 == pytest.approx(36.0 - 2.0 * G * height, rel=1e-12)
+
+
+@pytest.mark.parametrize("aim", [-1.0, -0.4, 0.2, 0.9])
+def test_a_blow_on_either_side_is_newtons_and_coulombs(aim):
+    """Shot from the centre and from far outside without gravity, on a rim that runs clockwise."""
+    direction = np.array([cos(aim), sin(aim)])
+    clockwise = np.array([direction[1], -direction[0]])
+    for start, sense in (((0.0, 0.0), 1.0), (tuple(3.0 * direction), -1.0)):
+        velocity = sense * 2.0 * direction + 0.0 * clockwise
+        built = at(start, velocity, gravity=0.0)
+        arc = {"center": (0.0, 0.0), "radius": 1.0, "begin": -1.5, "extent": 3.0,
+               "speed": 3.0, "restitution": 0.5, "friction": 0.2}  # fmt: skip
+        hit = exact.run(with_arcs(built, arc)).select(Kind.IMPACT)[0]
+        np.testing.assert_allclose(hit["position"], (1.0 - sense * 0.02) * direction, atol=1e-13)
+        wanted = -sense * 1.0 * direction + 0.2 * 1.5 * 2.0 * clockwise
+        np.testing.assert_allclose(hit["velocity_after"], wanted, atol=1e-13)
+
+
+def test_through_the_opening_and_out_again_it_meets_the_outside():
+    """Up through the gap of a bowl, over, and down on the back of its rim."""
+    arc = {"center": (0.0, 0.0), "radius": 1.0, "begin": -0.2, "extent": 1.2}
+    run = exact.run(with_arcs(at([0.0, 0.0], [0.8, 5.0], radius=0.0), arc))
+    hit = run.select(Kind.IMPACT)
+    # By hand: where the parabola's distance from the centre is 1, on the arc's angles, and how.
+    t = np.linspace(0.0, 2.0, 2_000_001)
+    x, y = 0.8 * t, 5.0 * t - 0.5 * G * t * t
+    away = np.hypot(x, y) - 1.0
+    cross = np.flatnonzero(np.diff(np.sign(away)))
+    angle = np.arctan2(y[cross], x[cross])
+    met = cross[(angle > -0.2) & (angle < 1.0)]
+    assert cross[0] < met[0]
+    assert away[met[0]] > 0.0
+    assert hit["t"][0] == pytest.approx(t[met[0]], abs=2e-6)
+
+
+def test_what_is_larger_than_the_inside_of_an_arc_meets_its_ends():
+    """A disk of 0.3 over a cup of 0.2: it comes to rest on both of its rims."""
+    cup = {"center": (0.0, 0.0), "radius": 0.2, "begin": pi, "extent": pi, "friction": 1.0}
+    run = exact.run(with_arcs(at([0.0, 1.0], radius=0.3, until="settled"), cup))
+    end = run.track(0)[-1]
+    assert REASONS[run.ended[0]] == "settled"
+    np.testing.assert_allclose(end["position"], [0.0, sqrt(0.3**2 - 0.2**2)], atol=1e-9)
+
+
+def test_along_the_very_end_of_a_bowl_it_falls_in():
+    """Its path only touches the circle of contact, and the rim, where the bowl begins."""
+    run = exact.run(with_arcs(at([-0.98, 0.5], until=0.6), bowl()))
+    track = run.track(0)
+    below = track[track["position"][:, 1] < -1e-3]
+    np.testing.assert_allclose(np.hypot(*below["position"].T), 0.98, rtol=1e-12)
+    # Without friction energy tells its speed.
+    np.testing.assert_allclose(
+        (below["velocity"] ** 2).sum(axis=1), 2.0 * G * (0.5 - below["position"][:, 1]), rtol=1e-10
+    )

@@ -114,6 +114,12 @@ class Particle:
             return NotImplemented
         return all(np.array_equal(vars(self)[name], vars(other)[name]) for name in vars(self))
 
+    def of(self, index: Any) -> Particle:
+        """Return some of the particles, by their numbers."""
+        if np.ndim(self.radius) == 0:
+            return self
+        return Particle(self.radius[index], self.mass[index], self.inertia[index])
+
     def kinetic(self, vx: ArrayLike, vy: ArrayLike, omega: ArrayLike) -> Floats:
         """Return ½ m v² + ½ I ω² (J) for arrays of any one shape (m/s, rad/s)."""
         vx, vy, omega = np.asarray(vx), np.asarray(vy), np.asarray(omega)

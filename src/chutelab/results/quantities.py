@@ -347,13 +347,14 @@ class Rolling:
 def rolling(recording: Recording) -> Rolling | None:
     """Return what settled on the outgoing belt without being carried; None if nothing did."""
     belt = recording.scene.outgoing
-    if belt is None or belt.speed is None or recording.particle.inertia == 0.0:
+    if belt is None or belt.speed is None or np.all(recording.particle.inertia == 0.0):
         return None
     settled = recording.select(Kind.SETTLE, surface="outgoing")
     missing = belt.speed - settled["velocity_after"][:, 0]
-    missing = missing[np.abs(missing) > CARRIED]
-    if not len(missing):
+    astray = np.abs(missing) > CARRIED
+    if not astray.any():
         return None
     paid = ledger(recording).by_surface["outgoing"]["belt_work"]
-    due = recording.particle.mass * belt.speed * float(missing.sum())
-    return Rolling(len(missing), paid, paid + due)
+    masses = np.broadcast_to(recording.particle.mass, recording.count)[settled["particle"]]
+    due = belt.speed * float((masses * missing)[astray].sum())
+    return Rolling(int(astray.sum()), paid, paid + due)

@@ -24,6 +24,7 @@ from chutelab.results.recording import ENTRIES, EVENT, KNOT, REASONS, Kind, Reco
 from chutelab.scene import from_dict
 from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, whole, write_lines
+from chutelab.util.tables import plain
 
 FORMAT = 1
 """Version of the file; a reader refuses what it does not know."""
@@ -153,7 +154,7 @@ def _about(recording: Recording) -> dict[str, Any]:
         "scene": recording.scene.model_dump_json(by_alias=True),
         "title": recording.title,
         "engine": recording.engine,
-        "particle": asdict(recording.particle),
+        "particle": plain(asdict(recording.particle)),
         "gravity": recording.gravity,
         "surfaces": list(recording.surfaces),
         "steps": recording.steps,

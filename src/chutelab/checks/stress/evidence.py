@@ -129,7 +129,7 @@ class Evidence:
         """
         if self.crowd or not len(self.recording.knots):
             return ledger(self.recording).turned_over
-        kinetic, potential = self.recording.energies(self.recording.knots)
+        kinetic, potential = self.recording.energies(self.recording.knots, self.recording.owner)
         height = kinetic + np.abs(potential) + np.abs(self.recording.knots["entries"]).sum(axis=1)
         offsets = self.recording.offsets
         starts = offsets[:-1][offsets[1:] > offsets[:-1]]

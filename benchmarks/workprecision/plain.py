@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import pymunk
 
-from chutelab.machine.releases import draw
+from chutelab.machine import build
 from chutelab.scene import Scene
 from chutelab.util.arrays import Floats
 from workprecision.cases import FRAME, Answer
@@ -130,7 +130,7 @@ def belt(scene: Scene, dt: float) -> Answer:
 def _alone(scene: Scene, dt: float, *, grip: bool) -> Answer:
     world, out = _World(scene), scene.outgoing
     assert out is not None
-    starts = draw(scene)
+    starts = build(scene).releases
     body = world.add(starts.position[0], starts.velocity[0])
     level = world.lowest + scene.particle.radius
     track = [(0.0, *body.position)]

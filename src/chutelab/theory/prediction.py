@@ -12,7 +12,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from chutelab.theory.obstacles import Flight, Segments, corner_times, first_in_flight, first_on_arc
+from chutelab.theory.obstacles import (
+    Flight,
+    Obstacles,
+    corner_times,
+    first_in_flight,
+    first_on_pulley,
+)
 from chutelab.theory.results import Reason, Transfer, cut, unanswered
 from chutelab.theory.transfer import Rebound, transfer
 
@@ -199,7 +205,7 @@ Trouble = tuple[str, str] | None
 
 
 def _on_the_ride(course: Course) -> Trouble:
-    obstacles = Segments.of(course.lines)
+    obstacles = Obstacles.of(course.lines)
     at, radius = course.scene.stream.at, course.radius
     start = np.array([-course.belt.length if at is None else at[0], course.ride_radius])
     index = obstacles.overlapped(start, radius)
@@ -208,7 +214,7 @@ def _on_the_ride(course: Course) -> Trouble:
         index = first_in_flight(straight, obstacles, radius, float(-start[0]))[1]
     if index < 0:
         last = float(course.found.phi1)
-        index = first_on_arc(course.ride_radius, last, obstacles, radius)[1]
+        index = first_on_pulley(course.ride_radius, 0.0, last, obstacles, radius)[1]
     if index < 0:
         return None
     what = f"{obstacles.names[index]}: it is in the way of the ride"
@@ -220,8 +226,8 @@ def _before_the_plate(course: Course) -> Trouble:
     low, high = course.plate_reach
     foot = float((course.impact - course.pivot) @ course.up)
     hit = low <= foot <= high  # false for NaN: the line is not met
-    plate = Segments.of(course.lines[:1])
-    obstacles = Segments.of(course.lines[1:] if hit else course.lines)
+    plate = Obstacles.of(course.lines[:1])
+    obstacles = Obstacles.of(course.lines[1:] if hit else course.lines)
     horizon = float(found.t2) if hit else flight.horizon(plate, radius)
     index = first_in_flight(flight, obstacles, radius, horizon)[1]
     # What is in the way of a flight that misses the plate anyway does not matter.
@@ -248,9 +254,9 @@ def _after_the_rebound(course: Course) -> Trouble:
         return "landing", Reason.MISSES.because("the plate is met below the belt")
     lands = bool(np.isfinite(found.t3))
     flight, top = course.rebounded, course.belt.pulley_radius
-    around = Segments.of([("pulley", (-top, -top), (top, top)), *course.lines])
+    around = Obstacles.of([("pulley", (-top, -top), (top, top)), *course.lines])
     horizon = float(found.t3) if lands else flight.horizon(around, radius)
-    solid = Segments.of([("incoming", (-course.belt.length, top), (0.0, top)), *course.lines[2:]])
+    solid = Obstacles.of([("incoming", (-course.belt.length, top), (0.0, top)), *course.lines[2:]])
     time, index = first_in_flight(flight, solid, radius, horizon)
     time, name = min(
         (time, solid.names[index]),
@@ -281,5 +287,7 @@ def _plate_again(course: Course, horizon: float) -> float:
         again = 2.0 * away / pressing
         foot = float((flight.at(np.array(again)) - course.pivot) @ course.up)
         face = float(again) if low <= foot <= high else np.inf
-    clipped = corner_times(flight, Segments.of(course.lines[:1]).points, course.radius, horizon)
+    clipped = corner_times(
+        flight, Obstacles.of(course.lines[:1]).segments.points, course.radius, horizon
+    )
     return float(min(face, clipped.min()))

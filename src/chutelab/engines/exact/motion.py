@@ -12,12 +12,13 @@ from chutelab.engines.exact.contacts import (
     end_slip,
     face_force,
     load_on,
+    look_round,
     rest_on,
     strike,
 )
 from chutelab.engines.exact.detect import FEW, Motion, bounds, first_contact
 from chutelab.engines.exact.joints import NONE
-from chutelab.engines.exact.obstacles import dot, pick, rows_of
+from chutelab.engines.exact.obstacles import dot, length_of, pick, rows_of
 from chutelab.engines.exact.particle_state import Mode, State
 from chutelab.mechanics.ballistics import descent
 from chutelab.mechanics.contact import STEP_ANGLE, Circle, Outcome, advance, normal_force
@@ -42,45 +43,57 @@ def go_on(s: State, index: Ints, obstacle: Ints, side: Floats) -> None:
     rest_on(s, index[stays], obstacle[stays], side[stays], np.zeros(np.count_nonzero(stays)))
 
 
-def carry_round(s: State, index: Ints) -> None:
-    """Carry particles by adhesion from the top of the pulley until cos φ1 = v²/(g ρ)."""
+def carry_round(s: State, index: Ints, start: Floats, v: Floats) -> None:
+    """Carry particles by adhesion round the pulley, from an angle until cos φ1 = v²/(g ρ)."""
     if not len(index):
         return
     o = s.obstacles
-    s.p[0, index] = 0.0
-    rho, v = s.p[1, index], s.v[0, index]
-    left = s.stop[index] - s.age[index]
+    up = np.empty((2, len(index)))
+    up[0], up[1] = np.sin(start), np.cos(start)
+    rho = dot(s.p[:, index], up)
+    s.p[:, index] = rho * up
+    stop = s.next_change(index)
+    left = stop - s.age[index]
     cosine = np.minimum(v**2 / (s.gravity[index] * rho), 1.0)
-    end, struck, found = np.zeros(len(index)), np.zeros(len(index), dtype=bool), None
-    if np.count_nonzero(cosine < 1.0):
-        end = np.arctan2(np.sqrt((1.0 - cosine) * (1.0 + cosine)), cosine)
+    end, found = start.copy(), None
+    struck = cut = np.zeros(len(index), dtype=bool)
+    stays = cosine < up[1]
+    if np.count_nonzero(stays):
+        last = np.arctan2(np.sqrt((1.0 - cosine) * (1.0 + cosine)), cosine)
+        end = np.where(stays, last, start)
         pulley = np.full(len(index), o.pulley - o.segments)
-        top, clockwise = np.zeros(len(index)), np.ones(len(index))
-        found = bounds(o, index, pulley, clockwise, rho, top, s.radius[index])[1]
+        clockwise = np.ones(len(index))
+        found = bounds(o, index, pulley, clockwise, rho, start, s.radius[index], s.epoch(index))[1]
         struck = ~found["handover"] & (found["angle"] < end)
         end = np.where(struck, found["angle"], end)
-        end = np.where(end * rho / v > left, left * v / rho, end)
-        _ease_round(s, index, rho, v, end)
+        cut = (end - start) * rho / v > left
+        end = np.where(cut, start + left * v / rho, end)
+        _ease_round(s, index, rho, v, start, end)
+        if len(s.changes):
+            s.age[index[cut]] = stop[cut]
     over = s.age[index] >= s.stop[index]
-    hit, free = struck & ~over, ~struck & ~over
+    # Where a gate opens or shuts the ride goes on, with another look at what is in the way.
+    waits = cut & ~over if len(s.changes) else np.zeros(len(index), dtype=bool)
+    hit, free = struck & ~over & ~waits, ~struck & ~over & ~waits
     s.finish(index[over], "time")
     s.part(index[free], 0)
-    s.fly(index[free], o.pulley, 0, 2 + (end[free] > 0.0))
+    s.fly(index[free], o.pulley, 0, 2 + (end[free] > start[free]))
     if found is not None and np.count_nonzero(hit):
         strike(s, index[hit], found["obstacle"][hit], found["side"][hit])
 
 
-def _ease_round(s: State, index: Ints, rho: Floats, v: Floats, end: Floats) -> None:
-    """Carry particles from the top of the pulley to an angle, knot by knot."""
+def _ease_round(s: State, index: Ints, rho: Floats, v: Floats, first: Floats, end: Floats) -> None:
+    """Carry particles from an angle of the pulley to another, knot by knot."""
     surface = s.obstacles.surface[s.obstacles.pulley]
-    start, above = s.age[index], rho.copy()
-    pieces = np.ceil(end / STEP_ANGLE)
+    start, above, way = s.age[index], rho * np.cos(first), end - first
+    pieces = np.ceil(way / STEP_ANGLE)
     for n in range(1, int(pieces.max()) + 1):
         on = (pieces >= n).nonzero()[0]
-        riders, part = index[on], end[on] * (n / pieces[on])
+        riders, turn = index[on], way[on] * (n / pieces[on])
+        part = first[on] + turn
         _place(s, riders, rho[on], part, v[on])
-        s.age[riders] = start[on] + rho[on] * part / v[on]
-        # The belt lets the particle down: F v = -m g v sin φ, summed from the last knot.
+        s.age[riders] = start[on] + rho[on] * turn / v[on]
+        # The belt lifts the particle, or lets it down: F v = -m g v sin φ, from the last knot on.
         height = rho[on] * np.cos(part)
         work = -s.mass[riders] * s.gravity[riders] * (above[on] - height)
         s.book(riders, np.full(len(riders), surface), work)
@@ -90,7 +103,7 @@ def _ease_round(s: State, index: Ints, rho: Floats, v: Floats, end: Floats) -> N
 
 def ride(s: State, index: Ints) -> None:
     """Move riders on by one knot, or to the next event, and resolve it."""
-    circle = s.on[index]
+    o, circle = s.obstacles, s.on[index]
     c = s.contact(index, circle, s.side[index])
     rho = pick(s.obstacles.rho, index, circle - s.obstacles.segments)
     phi = np.arctan2(c.normal[0], c.normal[1])
@@ -105,12 +118,13 @@ def ride(s: State, index: Ints) -> None:
         friction=c.friction,
         belt=c.belt,
         slip=s.slip[index],
-        turns=np.full(len(index), s.spins),
+        share=s.share[index],
         low=s.bounds["angle"][0, index],
         high=s.bounds["angle"][1, index],
     )
     lifted = normal_force(state) <= 0.0
-    step = advance(state, s.stop[index] - s.age[index])
+    stop = s.next_change(index)
+    step = advance(state, stop - s.age[index])
     outcome = np.where(lifted, Outcome.LIFT, step.outcome)
     go = np.flatnonzero(~lifted)
     s.count_idle(index, np.where(lifted, 0.0, step.dt))
@@ -131,6 +145,12 @@ def ride(s: State, index: Ints) -> None:
 
     over = (outcome == Outcome.NOTHING) & (s.age[index] >= s.stop[index])
     s.finish(index[over], "time")
+    if len(s.changes):
+        changed = (outcome == Outcome.NOTHING) & (s.age[index] >= stop) & ~over
+        s.age[index[changed]] = stop[changed]
+        stays = o.present[s.epoch(index), circle]
+        look_round(s, index[changed & stays])
+        s.drop(index[changed & ~stays])
     lift = outcome == Outcome.LIFT
     s.part(index[lift], c.surface[lift])
     s.fly(index[lift], circle[lift], 0, np.where(lifted[lift], 2, 3))
@@ -193,17 +213,33 @@ def fly(s: State, index: Ints) -> None:
 
 def carry(s: State, index: Ints) -> None:
     """Move particles that the belt carries on to the pulley, or to what is in the way."""
+    if len(s.changes):
+        # Who was on the pulley when a gate opened or shut.
+        place = s.p[:, index]
+        round_ = dot(place, s.up_belt[:, index]) > rows_of(s.obstacles.touch, index)
+        turn, pace = np.arctan2(place[0], place[1]), length_of(s.v[:, index])
+        carry_round(s, index[round_], turn[round_], pace[round_])
+        index = index[~round_]
+        if not len(index):
+            return
     motion = _motion(s, index, AT_REST)
     motion.never = s.obstacles.under_belt
-    v = motion.velocity[0]
-    ends, stops = -motion.position[0] / v, s.stop[index] - s.age[index]
+    before, up_belt = motion.position, rows_of(s.up_belt, index)
+    v, stops = dot(motion.velocity, up_belt), s.stop[index] - s.age[index]
+    ends = -dot(before, up_belt) / v
     ends[~(v > 0.0)] = np.inf
     dt, hits, obstacle, side = _next(s, motion, np.minimum(ends, stops))
     _move(s, motion, dt)
+    tilted = np.count_nonzero(up_belt[1]) > 0
+    if tilted:
+        lifted = s.mass[index] * s.gravity[index] * (s.p[1, index] - before[1])
+        s.book(index, s.obstacles.surface[np.zeros(len(index), dtype=np.int64)], lifted)
     s.knots(index)
     free = ~hits
     _stop(s, index[free & (stops < ends)])
-    carry_round(s, index[free & (ends <= stops)])
+    onto = free & (ends <= stops)
+    start = np.arctan2(-up_belt[1], up_belt[0]) if tilted else np.zeros(len(index))
+    carry_round(s, index[onto], start[onto], v[onto])
     _strike(s, index, hits, obstacle, side)
 
 
@@ -216,11 +252,13 @@ def slide(s: State, index: Ints) -> None:
     motion.on, motion.on_side = on, face
     # The slip is linear in time, while there is one.
     slip = dot(motion.velocity, c.tangent) + s.z[index] - c.belt
-    rate = dot(pull, c.tangent) + (2.0 * force if s.spins else 0.0)
+    rate = dot(pull, c.tangent) + (s.lever[index] * force if s.spins else 0.0)
     fading = s.slip[index] * rate < 0.0
     grips = np.where(fading, np.maximum(-slip / np.where(fading, rate, 1.0), 0.0), np.inf)
     ends = _end(s, motion)
-    stops = s.stop[index] - s.age[index]
+    # Whatever it lies on may vanish; that counts as a stop.
+    stop = np.minimum(s.stop[index], s.vanish(index)) if len(s.changes) else s.stop[index]
+    stops = np.maximum(stop - s.age[index], 0.0)
     dt, hits, obstacle, side = _next(s, motion, np.minimum(np.minimum(grips, ends), stops))
     mean = np.where(s.slip[index] == 0.0, 0.0, slip + 0.5 * rate * dt)
     mass = s.mass[index]
@@ -228,12 +266,18 @@ def slide(s: State, index: Ints) -> None:
     _move(s, motion, dt)
     s.snap(index, on, face)
     if s.spins:
-        s.z[index] += 2.0 * force * dt
+        s.z[index] += s.lever[index] * force * dt
     # What was left at the beginning is some way off now.
     s.left[index[dt > 0.0]] = NONE
     s.knots(index)
     free = ~hits
-    _stop(s, index[free & (stops < grips) & (stops < ends)])
+    over = free & (stops < grips) & (stops < ends)
+    if len(s.changes):
+        opens = over & (stop < s.stop[index])
+        s.age[index[opens]] = np.maximum(s.age[index], stop)[opens]
+        s.drop(index[opens])
+        over &= ~opens
+    _stop(s, index[over])
     _leave_face(s, index[free & (ends < grips) & (ends <= stops)])
     end_slip(s, index[free & (grips <= ends) & (grips <= stops)])
     _strike(s, index, hits, obstacle, side)
@@ -249,6 +293,7 @@ def _motion(s: State, index: Ints, acceleration: Floats) -> Motion:
         s.left_side[index],
         s.order[index],
         s.past,
+        gates=s.changes[:, index] - s.age[index] if len(s.changes) else None,
     )
 
 
@@ -327,6 +372,7 @@ def _leave_face(s: State, index: Ints) -> None:
         s.p.take(index, axis=1) - pick(o.start, index, segment), pick(o.tangent, index, segment)
     )
     end = (foot > 0.5 * pick(o.length, index, segment)).astype(np.int64)
-    onward, onward_side = o.joints.onward
     face = (side < 0.0).astype(np.int64)
-    go_on(s, index, onward[segment, end, face], onward_side[segment, end, face])
+    at = (s.epoch(index), segment, end, face)
+    obstacle, obstacle_side = (array[at] for array in o.joints.onward)
+    go_on(s, index, obstacle, obstacle_side)

@@ -101,6 +101,14 @@ class Obstacles:
         return held
 
     @cached_property
+    def turning(self) -> Floats:
+        """Angular velocities of arcs, of the pulley, and 0, (S + C, n), rad/s."""
+        turning = np.zeros((len(self.surface), max(self.rho.shape[-1], self.material.shape[-1])))
+        arcs = slice(self.first_arc, self.first_arc + 2 * self.arcs)
+        turning[arcs] = -self.material[0, arcs] / np.concatenate([self.bend[0], self.bend[0]])
+        return turning
+
+    @cached_property
     def joints(self) -> Joints:
         """How the pieces join."""
         return Joints(self)

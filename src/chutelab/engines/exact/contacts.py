@@ -8,7 +8,7 @@ from chutelab.engines.exact.detect import bounds
 from chutelab.engines.exact.joints import NONE
 from chutelab.engines.exact.obstacles import dot, length_of, pick
 from chutelab.engines.exact.particle_state import COLLAPSE, NO_SLIP, Contact, Mode, State
-from chutelab.mechanics.contact import grip_limit, limited, shared
+from chutelab.mechanics.contact import grip_limit, impulses, limited, shared
 from chutelab.results import Kind
 from chutelab.util.arrays import Bools, Floats, Ints
 
@@ -333,12 +333,19 @@ def _blow(
     omega_before = s.omega(index)
     along = dot(before, c.tangent)
     slip = s.slip_of(index, c, along)
-    normal = np.asarray((1.0 + c.restitution) * approach)
-    tangential, work, heat = _rub(s, index, c, slip, normal)
+    share = s.share[index]
+    normal, tangential = impulses(approach, slip, c.restitution, c.friction, share)
+    tangential, change, work, heat = _rub(s, index, c, slip, normal, tangential)
     # The normal speed is set, not added to: ε |v_n| to the last bit.
     s.v[:, s.at(index)] = rebound * c.normal + (along + tangential) * c.tangent
-    mass = s.mass[index]
-    s.book(index, c.surface, work, 0.5 * mass * (approach - rebound) * (approach + rebound), heat)
+    after, mass = slip + change, s.mass[index]
+    s.book(
+        index,
+        c.surface,
+        mass * tangential * c.belt + work,
+        0.5 * mass * (approach - rebound) * (approach + rebound),
+        -0.5 * mass * tangential * (slip + after) + heat,
+    )
     s.knots(index)
     told = (approach > NEGLIGIBLE) | (tangential != 0.0)
     if landing is not None:
@@ -401,37 +408,40 @@ def _last_bounces(s: State, index: Ints, obstacle: Ints, side: Floats, rebound: 
     w = w + pull * time
     slip = s.slip_of(index, c, w)
     normal = np.maximum(weight * time - u, 0.0)
-    tangential, work, heat = _rub(s, index, c, slip, normal)
+    tangential = limited(slip, normal, c.friction, s.share[index])
+    tangential, change, work, heat = _rub(s, index, c, slip, normal, tangential)
     s.v[:, index] = (w + tangential) * c.tangent
-    s.book(index, c.surface, work, 0.5 * s.mass[index] * u * u, heat)
+    mass = s.mass[index]
+    s.book(
+        index,
+        c.surface,
+        mass * tangential * c.belt + work,
+        0.5 * mass * u * u,
+        -0.5 * mass * tangential * (2.0 * slip + change) + heat,
+    )
     s.knots(index)
 
 
 def _rub(
-    s: State, index: Ints, c: Contact, slip: Floats, normal: Floats
-) -> tuple[Floats, Floats, Floats]:
-    """Let friction answer to a normal impulse per mass, and change the spin by that.
+    s: State, index: Ints, c: Contact, slip: Floats, normal: Floats, tangential: Floats
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Change the spin by the tangential impulse that goes with a normal one, per mass.
 
-    Returns the tangential impulse per mass (m/s), the belt's work and the heat (J), (k,).
+    Rolling friction has its share in that. Returns tangential impulse per mass and change of the
+    slip (m/s), and the work and heat of rolling friction (J), (k,).
     """
-    share, mass = s.share[index], s.mass[index]
+    share, lever, mass, none = s.share[index], s.lever[index], s.mass[index], np.zeros(len(index))
     if not s.rolls:
-        tangential = limited(slip, normal, c.friction, share)
         if s.spins:
-            s.z[index] += s.lever[index] * tangential
-        after = slip + tangential / share
-        work = mass * tangential * c.belt
-        return tangential, work, -0.5 * mass * tangential * (slip + after)
-    turn, lever = s.surface_spin(index, c.obstacle), s.lever[index]
+            s.z[index] += lever * tangential
+        return tangential, tangential / share, none, none
+    turn = s.surface_spin(index, c.obstacle)
     spin = s.z[index] - turn
     tangential, couple = shared(slip, spin, normal, c.friction, s.rolling[index], share)
-    s.z[index] += lever * (tangential + couple)
-    change = tangential / share + lever * couple
-    work = mass * (tangential * c.belt + couple * turn)
-    rubbed = tangential * (2.0 * slip + change) + couple * (
-        2.0 * spin + lever * (tangential + couple)
-    )
-    return tangential, work, -0.5 * mass * rubbed
+    gain = lever * (tangential + couple)
+    s.z[index] += gain
+    heat = -0.5 * mass * couple * (2.0 * spin + gain)
+    return tangential, tangential + gain, mass * couple * turn, heat
 
 
 def look_round(s: State, index: Ints) -> None:

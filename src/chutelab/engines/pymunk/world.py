@@ -316,7 +316,8 @@ class World:
         self.space.add(body)
         circle = pymunk.Circle(body, radius)
         circle.cache_bb()
-        foot = pymunk.Circle(pymunk.Body(body_type=pymunk.Body.KINEMATIC), 0.0)
+        base = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+        foot = pymunk.Circle(base, 0.0)
         if whole:
             about["spin"] = -about["speed"] / radius
             self._add(Bend(circle, tangent=None, foot=foot, begin=0.0, extent=inf, **about))

@@ -13,7 +13,7 @@ from chutelab.results import ENTRIES
 from chutelab.results.ledger import Ledger, ledger
 
 EXACT = [name for name in scene.shipped() if name != "stream"]
-G, R, M = 9.81, 0.004, 0.008
+G, R, M = 9.81, 0.0063, 0.008
 
 
 def shipped(name, *overrides):
@@ -66,7 +66,7 @@ def test_the_entries_are_what_the_impacts_and_the_ride_say():
     recording = shipped("low-speed")
     books = ledger(recording).by_surface
     left, plate, landing = (recording.select(kind)[0] for kind in (1, 3, 4))
-    drop = 0.504 - left["position"][1]
+    drop = 0.5 + R - left["position"][1]
     assert books["incoming"]["belt_work"] == pytest.approx(-M * G * drop, rel=1e-13, abs=0.0)
     normal = plate["velocity_before"][0]
     lost = 0.5 * M * normal**2 * (1.0 - 0.5**2)

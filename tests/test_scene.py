@@ -46,7 +46,7 @@ speed = 1
 CONTRACT = {
     "title": "machine",
     "gravity": 9.81,
-    "particle": {"radius": 0.004, "mass": 0.008, "spin": False},
+    "particle": {"radius": 0.0063, "mass": 0.008, "spin": False},
     "incoming": {
         "speed": 3.0,
         "pulley_radius": 0.2,

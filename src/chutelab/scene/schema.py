@@ -36,7 +36,7 @@ from chutelab.scene.units import (
 class Particle(Table):
     """The particles, all alike: disks, or mass points with radius 0."""
 
-    radius: Amount = described(0.004, "Radius r; 0 is a mass point", "m")
+    radius: Amount = described(0.0063, "Radius r; 0 is a mass point", "m")
     mass: Positive = described(0.008, "Mass m", "kg")
     spin: Switch = described(False, "true: a free disk, I = m r²/2; false: never turns")
 

@@ -424,10 +424,12 @@ class Lone:
         gap, normal = min(gaps.values(), key=itemgetter(0))
         if gap < inf:
             middle -= gap * normal
-        self.restitution = {
-            face: float(self.v.dot(n) > 0.0 or face.hollow(middle) > 0.0)
-            for face, (_, n) in gaps.items()
-        }
+        self.restitution = {}
+        for face, (_, n) in gaps.items():
+            into, before = self.v.dot(n), min(self.v.dot(touching[face]), 0.0)
+            # In a hollow, what it moved into the surface by from the start is no bend of the way.
+            bends = into > 0.0 or (into < before and face.hollow(middle) > 0.0)
+            self.restitution[face] = 1.0 - max(before / into, 0.0) if bends else 0.0
         contacts = self._rolled(middle - h * self.v, self.v, h)
         if abs(self.v.dot(normal)) > SEAM * (1.0 + self.v.length):
             turn = (self.body.velocity.length / self.v.length) ** 2
@@ -457,8 +459,9 @@ class Lone:
             self._tell(Kind.SLIP if slips else Kind.STICK, surface)
         for contact in end.contacts:
             self._book(contact, motion)
-        state = np.array([before, (*self.x, *self.v, self.omega)])[:, :, None]
-        self.tracks.step(np.array([True]), (self.t - h, self.t), state, entries)
+        if self.t > self.tracks.t[0]:
+            state = np.array([before, (*self.x, *self.v, self.omega)])[:, :, None]
+            self.tracks.step(np.array([True]), (self.t - h, self.t), state, entries)
         if self.t >= self.machine.end_time:
             self._end("time")
 

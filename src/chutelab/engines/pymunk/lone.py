@@ -319,7 +319,7 @@ class Lone:
         pushed = self._step(self.x, self.v, self.omega, INSTANT, Vec2d(0, 0))
         self.v, self.omega = self.body.velocity, self.body.angular_velocity
         if self.arm:
-            pushed = [self._braked(contact, before[1]) for contact in pushed]
+            pushed = self._braked(pushed, before[1])
         for contact in pushed:
             self._book(contact, before)
             lands = contact.face.surface == self.machine.landing and not self.landed
@@ -338,12 +338,16 @@ class Lone:
                 " the surfaces there apart, or lower their restitution",
             )  # fmt: skip
 
-    def _braked(self, contact: Contact, omega: float) -> Contact:
-        """Give a blow's rolling friction, which stops the turning there was, at most."""
-        turning = self.body.moment * (omega - contact.face.spin)
-        couple = -copysign(min(self.arm * contact.push, abs(turning)), turning)
-        self.omega += couple / self.body.moment
-        return contact._replace(couple=couple)
+    def _braked(self, pushed: list[Contact], omega: float) -> list[Contact]:
+        """Give blows their rolling friction, which stops the turning there was, at most."""
+        braked = []
+        for contact in pushed:
+            turning = self.body.moment * (omega - contact.face.spin)
+            couple = -copysign(min(self.arm * contact.push, abs(turning)), turning)
+            omega += couple / self.body.moment
+            self.omega += couple / self.body.moment
+            braked.append(contact._replace(couple=couple))
+        return braked
 
     def _rebound(self, face: Face, normal: Vec2d) -> float:
         """Return ε, or 0 where a rebound would be too slow or too low."""

@@ -117,6 +117,10 @@ def test_the_arrow_of_a_belt_shows_where_it_moves_to(
     assert said(drawn(machine_of(Line("belt", (0.0, 0.0), end, speed)))) == [f"belt, 2 m/s {arrow}"]
 
 
+def test_a_hyphen_in_a_name_stays_one() -> None:
+    assert said(drawn(machine_of(Line("left-wall", (0.0, 0.0), (0.0, 1.0))))) == ["left-wall"]
+
+
 @pytest.mark.parametrize(("speed", "arrow"), [(0.5, "↻"), (-0.5, "↺")])
 def test_a_roller_shows_how_it_turns(speed: float, arrow: str) -> None:
     ax = drawn(machine_of(Round("roller", (0.0, 0.0), 0.1, speed=speed)))

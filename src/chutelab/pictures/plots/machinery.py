@@ -241,7 +241,7 @@ class _Names:
         """Write all names. One for which there is no room is left out."""
         for surface, parts in self.parts.items():
             label = self.ax.annotate(
-                style.plain(self._said(surface, parts[0][0]).replace("-", "−")), (0.0, 0.0),
+                style.plain(self._said(surface, parts[0][0])), (0.0, 0.0),
                 xytext=(0.0, 0.0), textcoords="offset points", fontsize=style.SMALL,
                 color=colour_of(self.machine, parts[0][0]), path_effects=HALO, zorder=4.0,
             )  # fmt: skip
@@ -299,7 +299,8 @@ class _Names:
             x, y = machine.segments.tangent[piece.index]
             angle = float(np.degrees(np.arctan2(-x, y))) + 0.0  # no -0
             values = np.unique(np.atleast_2d(machine.segments.restitution)[:, piece.index])
-            return f"plate, {angle:.3g}°\nε = {' / '.join(f'{one:.3g}' for one in values)}"
+            leans = f"{angle:.3g}°".replace("-", "−")
+            return f"plate, {leans}\nε = {' / '.join(f'{one:.3g}' for one in values)}"
         if np.isnan(piece.radius):
             moves = _motion(speed, piece.points[1] - piece.points[0])
         else:

@@ -86,7 +86,7 @@ class Arcs:
         whole = np.tile(self.extent >= 2.0 * np.pi, 2)
         radius = np.where(whole, np.nan, np.tile(self.radius, 2))
         direction = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-        return np.tile(self.center, (2, 1)) + radius[:, None] * direction
+        return np.asarray(np.tile(self.center, (2, 1)) + radius[:, None] * direction)
 
     @property
     def box(self) -> Floats:

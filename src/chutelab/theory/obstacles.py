@@ -11,13 +11,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from chutelab.util.arrays import Bools, Floats
 
-Line = tuple[str, Sequence[float], Sequence[float]]
+Line = tuple[str, ArrayLike, ArrayLike]
 """A straight surface: its name and both ends, m."""
 
-Bend = tuple[str, Sequence[float], float, float, float]
+Bend = tuple[str, ArrayLike, float, float, float]
 """A round one: its name, centre and radius, m, begin and extent, rad, as `Arcs` has them."""
 
 HALVINGS = 60

@@ -126,13 +126,13 @@ def free_surfaces(scene: Scene) -> tuple[list[Line], list[Bend]]:
             angle = np.radians(plate.angle_deg)
             up = np.array([-np.sin(angle), np.cos(angle)])
             below = REACH_HANGING if plate.below is None else plate.below
-            ends = (np.array(plate.pivot) + reach * up for reach in (-below, plate.above))
-            lines.append((str(plate.name), *ends))
+            pivot = np.array(plate.pivot)
+            lines.append((str(plate.name), pivot - below * up, pivot + plate.above * up))
     for belt in scene.conveyor:
         axes, r = np.array([belt.from_, belt.to]), belt.pulley_radius
         way = axes[1] - axes[0]
         off = r / np.hypot(*way) * np.array([-way[1], way[0]])
-        lines += [(belt.name, *(axes + side * off)) for side in (1.0, -1.0)]
+        lines += [(belt.name, axes[0] + side, axes[1] + side) for side in (off, -off)]
         bends += [(belt.name, axis, r, 0.0, 2.0 * np.pi) for axis in axes]
     for free in scene.surface:
         shifts = np.zeros((1, 2))

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from math import sqrt
+from collections.abc import Sequence
+from dataclasses import replace
+from math import inf, sqrt
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from chutelab import scene
-from chutelab.machine import build
-from chutelab.results import Kind, Recording
+from chutelab.machine import Machine, build
+from chutelab.machine.parts import Arcs, Particle, Segments
+from chutelab.machine.releases import Releases
+from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.recorder import Recorder
 
 G, V, R, PARTICLE, EPS, DISTANCE, DROP, MASS, MU = 9.81, 2.0, 0.1, 0.004, 0.5, 0.5, 0.5, 0.008, 0.5
@@ -95,6 +100,100 @@ def by_hand(residual: float = 0.0, shift: float = 0.0) -> Recording:
     )  # fmt: skip
     recorder.ended[:] = 1
     return recorder.finish(engine="exact", steps=3)
+
+
+class Line(NamedTuple):
+    """A straight piece of the surface of that name."""
+
+    name: str
+    start: tuple[float, float]
+    end: tuple[float, float]
+    speed: float = 0.0
+    appears: float = -inf
+    vanishes: float = inf
+
+
+class Round(NamedTuple):
+    """An arc, in degrees, or a whole circle."""
+
+    name: str
+    center: tuple[float, float]
+    radius: float
+    begin: float = 0.0
+    extent: float = 360.0
+    speed: float = 0.0
+    appears: float = -inf
+    vanishes: float = inf
+
+
+def conveyor(
+    name: str, start: tuple[float, float], end: tuple[float, float], radius: float, speed: float
+) -> list[Line | Round]:
+    """A belt round two pulleys, forward on top."""
+    a, b = np.array(start), np.array(end)
+    x, y = (b - a) / np.hypot(*(b - a))
+    up = radius * np.array([-y, x])
+    runs = [Line(name, tuple(p), tuple(q), speed) for p, q in ((a + up, b + up), (b - up, a - up))]
+    return [*runs, Round(name, start, radius, speed=speed), Round(name, end, radius, speed=speed)]
+
+
+def machine_of(
+    *pieces: Line | Round,
+    at: Sequence[tuple[float, float]] = ((0.0, 1.0),),
+    stream: Sequence[int] = (),
+    radius: float | np.ndarray = 0.004,
+    **more: Any,
+) -> Machine:
+    """A machine of these pieces without conveyors, particles released at these places at 0 s."""
+    base = build(
+        scene.parse('title = "By hand"\n[stream]\nat = [0.0, 1.0]\nvelocity = [0.0, 0.0]\n')
+    )
+    names = tuple(dict.fromkeys(piece.name for piece in pieces))
+    lines = [piece for piece in pieces if isinstance(piece, Line)]
+    rounds = [piece for piece in pieces if isinstance(piece, Round)]
+
+    def common(of: Sequence[Line | Round]) -> dict[str, Any]:
+        every = {key: np.array([float(getattr(one, key)) for one in of])
+                 for key in ("speed", "appears", "vanishes")}  # fmt: skip
+        every |= {key: np.full(len(of), 0.5) for key in ("restitution", "friction")}
+        return every | {"surface": np.array([names.index(one.name) for one in of], np.int64)}
+
+    start, end = (np.array([getattr(one, key) for one in lines], float).reshape(-1, 2)
+                  for key in ("start", "end"))  # fmt: skip
+    length = np.hypot(*(end - start).T)
+    count, which = len(at), np.array(stream or [0] * len(at))
+    return replace(
+        base,
+        surfaces=names,
+        segments=Segments(
+            start=start, tangent=(end - start) / length[:, None], length=length, **common(lines)
+        ),
+        arcs=Arcs(
+            center=np.array([one.center for one in rounds], float).reshape(-1, 2),
+            radius=np.array([one.radius for one in rounds]),
+            begin=np.radians([one.begin for one in rounds]),
+            extent=np.radians([one.extent for one in rounds]),
+            **common(rounds),
+        ),
+        releases=Releases(
+            np.zeros(count), np.array(at, float), np.zeros((count, 2)), np.zeros(count, bool),
+            which, which.copy(),
+        ),
+        particle=Particle(radius, 0.008, 0.0),
+        outlines=more.pop("outlines", (None,) * (1 + max(which))),
+        **more,
+    )  # fmt: skip
+
+
+def recording_of(machine: Machine, *tracks: Any, ended: str = "time") -> Recording:
+    """A recording of tracks, one a particle, of rows t, x, y, vx, vy, ω."""
+    recorder = Recorder(machine)
+    for i, track in enumerate(tracks):
+        rows = np.array(track, float)
+        recorder.knots(np.full(len(rows), i), rows[:, 0], rows[:, 1:3], rows[:, 3:5], rows[:, 5])
+        recorder.events(Kind.RELEASE, i, rows[0, 0], rows[0, 1:3], rows[0, 3:5])
+    recorder.ended[:] = REASONS.index(ended)
+    return recorder.finish(engine="exact", steps=0)
 
 
 def seen(figure: Figure) -> list[Text]:

@@ -3,6 +3,7 @@ from __future__ import annotations
 import subprocess
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from io import BytesIO
 from itertools import groupby
 from pathlib import Path
@@ -24,7 +25,8 @@ from PIL import Image, ImageDraw
 from chutelab import scene
 from chutelab.cli import main
 from chutelab.engines.simulation import simulate
-from chutelab.machine import build
+from chutelab.machine import Machine, build
+from chutelab.machine.parts import Thread
 from chutelab.pictures.animation import Moment, Stage, VideoError, animate, film, moments
 from chutelab.pictures.animation import files as video
 from chutelab.pictures.animation.actors import SIGNS, Writing, stacks
@@ -38,7 +40,7 @@ from chutelab.pictures.animation.moments import (
     span,
 )
 from chutelab.pictures.animation.stage import TRAIL, Layout, lay_out
-from chutelab.pictures.plots import style, window_of
+from chutelab.pictures.plots import Window, style, window_of
 from chutelab.pictures.plots.scenery import energies
 from chutelab.results import Kind, Recording
 from chutelab.results.recorder import Recorder
@@ -52,16 +54,22 @@ from handmade import (
     PARTICLE,
     TEXT,
     G,
+    Line,
     R,
+    Round,
     V,
     by_hand,
+    conveyor,
     expected,
+    machine_of,
+    recording_of,
     seen,
     t_impact,
     t_landing,
 )
 
 WIDTH, HEIGHT = 800, 450
+FLOOR = Line("floor", (-0.6, 0.0), (0.6, 0.0))
 
 
 def moments_at(times: Sequence[float]) -> tuple[Moment, ...]:
@@ -337,6 +345,53 @@ def test_contact_normal_points_away_from_a_clipped_end() -> None:
     assert contact_normal(recording.machine, hit) == pytest.approx(expected, abs=1e-14)
 
 
+@pytest.mark.parametrize(
+    ("degrees", "away", "speed", "normal"),
+    [
+        # At the lowest point of a bowl of 0.5 m round (0, 1), from inside and from below.
+        (270.0, -0.004, (0.0, -1.0), (0.0, 1.0)),
+        (270.0, 0.004, (0.0, 1.0), (0.0, -1.0)),
+        (225.0, -0.004, (-1.0, -1.0), (0.5**0.5, 0.5**0.5)),
+    ],
+)
+def test_contact_normal_of_an_arc_is_radial(
+    degrees: float, away: float, speed: Any, normal: Any
+) -> None:
+    machine = machine_of(FLOOR, Round("bowl", (0.0, 1.0), 0.5, 180.0, 180.0))
+    out = np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])
+    event = struck(machine, (0.0, 1.0) + (0.5 + away) * out, speed)
+    assert contact_normal(machine, event) == pytest.approx(normal, abs=1e-12)
+
+
+def test_contact_normal_points_away_from_the_end_of_an_arc() -> None:
+    machine = machine_of(Round("bowl", (0.0, 1.0), 0.5, 180.0, 180.0))
+    # Its ends are at (-0.5, 1) and (0.5, 1).
+    away = 0.004 * np.array([0.6, 0.8])
+    event = struck(machine, np.array([0.5, 1.0]) + away, (0.0, -1.0))
+    assert contact_normal(machine, event) == pytest.approx([0.6, 0.8], abs=1e-9)
+    event = struck(machine, np.array([-0.5, 1.0]) + away, (0.0, -1.0))
+    assert contact_normal(machine, event) == pytest.approx([0.6, 0.8], abs=1e-9)
+
+
+def struck(machine: Machine, position: Any, velocity: Any) -> Any:
+    """An impact of particle 0 on the last surface."""
+    recorder = Recorder(machine)
+    surface = len(machine.surfaces) - 1
+    recorder.knots([0], [0.0], position, velocity, 0.0)
+    recorder.events(
+        Kind.IMPACT, [0], [0.0], position, np.zeros(2), velocity_before=velocity, surface=surface
+    )
+    return recorder.finish(engine="exact", steps=0).events[0]
+
+
+def test_a_separation_before_the_top_is_told_as_such() -> None:
+    recording = by_hand()
+    (event,) = recording.select(Kind.SEPARATION).copy()
+    angle = np.radians(20.0)
+    event["position"] = 0.104 * np.array([-np.sin(angle), np.cos(angle)])
+    assert "leaves the drive pulley 20.0° before the top" in sentence(recording, event)
+
+
 def test_separation_is_told_by_its_angle(runs: dict[str, Recording]) -> None:
     recording = runs["low-speed"]
     (event,) = recording.select(Kind.SEPARATION)
@@ -583,6 +638,119 @@ def test_pulley_turns_and_belt_marks_run_with_the_belt() -> None:
     later = np.asarray(moved(stage, 1)["marks"].get_xydata())
     shift = np.abs(later[:, None, 0] - marks[None, :, 0] - V * 0.01).min(axis=1)
     assert np.mean(shift < 1e-12) > 0.9  # all but those that came in at an end
+
+
+def falling(
+    *pieces: Line | Round, at: Sequence[tuple[float, float]] = ((0.0, 0.5),), **more: Any
+) -> Recording:
+    """Particles that lie at their places for a second, each."""
+    rows = [[(0, x, y, 0, 0, 0), (1, x, y, 0, 0, 0)] for x, y in at]
+    return recording_of(machine_of(FLOOR, *pieces, at=at, **more), *rows, ended="settled")
+
+
+def test_pulleys_and_rollers_turn_clockwise_and_marks_run_round_arcs() -> None:
+    belt = conveyor("second", (-0.3, 0.1), (0.3, 0.2), 0.05, 0.4)
+    spoon = Round("spoon", (0.0, 0.5), 0.4, 180.0, 170.0, speed=0.8)
+    stage = stage_of(falling(*belt, spoon), moments_at([0.2, 0.25]))
+    seen_angles = []
+    for index, t in enumerate((0.2, 0.25)):
+        drawn = moved(stage, index)
+        holes = [one for one, _ in stage.moving if one.get_gid() == "holes second"]
+        places = [np.asarray(one.get_xydata()) for one in holes]  # type: ignore[attr-defined]
+        for center, three in zip([(-0.3, 0.1), (0.3, 0.2)], places, strict=True):
+            angle = 0.4 * t / 0.05
+            first = 0.6 * 0.05 * np.array([np.sin(angle), np.cos(angle)])
+            assert three[0] - center == pytest.approx(first, abs=1e-14)
+            assert np.hypot(*(three - center).T) == pytest.approx(0.03, rel=1e-12)
+        away = np.asarray(drawn["marks"].get_xydata()) - (0.0, 0.5)
+        on_spoon = away[np.abs(np.hypot(*away.T) - 0.4) < 1e-12]
+        # Clockwise from the lowest point.
+        seen_angles.append(np.arctan2(-on_spoon[:, 0], -on_spoon[:, 1]))
+    first, later = seen_angles
+    assert len(first) > 1
+    turned = np.abs(later[:, None] - first - 0.8 * 0.05 / 0.4).min(axis=1)
+    # All but one that came in at an end.
+    assert np.count_nonzero(turned < 1e-9) >= len(later) - 1
+
+
+def test_a_gate_is_seen_while_it_is_there() -> None:
+    gate = Line("gate", (-0.3, 0.25), (0.3, 0.25), vanishes=0.4)
+    flap = Line("flap", (-0.3, 0.35), (0.3, 0.35), appears=0.7)
+    times = [0.1, np.nextafter(0.4, 0.0), 0.4, 0.7, 0.9]
+    recording = falling(gate, flap)
+    layout = laid_out(recording)
+    wide = Window(-0.6, 0.6, -0.1, 0.6).fitted(layout.window.width / layout.window.height)
+    stage = stage_of(recording, moments_at(times), layout=replace(layout, window=wide))
+    seen_there = []
+    for index in range(len(times)):
+        shown = np.asarray(stage.frame(index)).astype(int)
+        rows = []
+        for y in (0.25, 0.35):
+            left, up = stage.view.transData.transform((-0.29, y))
+            right = stage.view.transData.transform((0.29, y))[0]
+            row = shown[HEIGHT - 1 - round(up), round(left) : round(right)]
+            rows.append(bool((row.max(axis=1) < 60).all()))
+        seen_there.append(rows)
+    assert seen_there == [
+        [True, False],
+        [True, False],
+        [False, False],
+        [False, True],
+        [False, True],
+    ]
+
+
+def test_streams_have_colours_and_names_of_their_own() -> None:
+    spots = [(0.1 * i - 0.4, 0.3) for i in range(6)]
+    names = ("coarse", "fine ones")
+    sizes = np.array([0.02, 0.02, 0.03, 0.01, 0.01, 0.01])
+    recording = falling(at=spots, stream=[0, 0, 0, 1, 1, 1], streams=names, radius=sizes)
+    stage = stage_of(recording, moments_at([0.5]))
+    drawn = moved(stage, 0)
+    assert len(drawn["crowd coarse"].get_offsets()) == 2
+    assert len(np.asarray(drawn["crowd fine ones"].get_xydata())) == 3
+    legend = stage.view.get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()][:3] == ["particle 0", *names]
+    diameter = stage.view.transData.transform([(0, 0), (0.02, 0)])[:, 0]
+    fine = drawn["crowd fine ones"].get_markersize() / 72.0 * stage.figure.dpi
+    assert fine == pytest.approx(np.ptp(diameter), rel=1e-9)
+    assert_readable(stage, 0)
+
+
+def test_a_film_of_many_is_of_all_of_them_to_the_end() -> None:
+    spots = [(0.015 * (i % 40) - 0.3, 0.01 + 0.015 * (i // 40)) for i in range(400)]
+    machine = machine_of(
+        FLOOR, Line("gate", (-0.1, 0.3), (0.1, 0.3), vanishes=0.4), at=spots, radius=0.007,
+        interact=True,
+    )  # fmt: skip
+    # Particle 0 leaves early; nothing repeats after it.
+    rows = [[(0, x, y, 0, 0, 0), (0.1 if not i else 2, x, y, 0, 0, 0)]
+            for i, (x, y) in enumerate(spots)]  # fmt: skip
+    recording = recording_of(machine, *rows, ended="exit")
+    shots, slow = filmed(recording)
+    assert shots[-1].t == 2.0
+    assert {shot.delay for shot in shots[:-1]} == {4}
+    words = {shot.words for shot in shots}
+    assert words == {"", "t = 0.400 s: “gate” opens"}
+    assert all(0.4 <= shot.t <= 0.4 + moments.TOLD / slow for shot in shots if shot.words)
+    stage = stage_of(recording, shots, slow)
+    drawn = moved(stage, 10)
+    assert len(np.asarray(drawn["crowd"].get_xydata())) == 399
+    # To scale: none covers its neighbours.
+    (x0, _), (x1, _) = stage.view.transData.transform([(0.0, 0.0), (0.014, 0.0)])
+    assert drawn["crowd"].get_markersize() / 72.0 * stage.figure.dpi == pytest.approx(x1 - x0)
+    assert not set(drawn) & {"strobe", "arrows", "trails"}
+    assert_readable(stage, 10)
+
+
+def test_strings_end_at_their_particles() -> None:
+    threads = (Thread((0.0, 0.9), 0, 0.4), Thread((0.3, 0.9), 1, 0.5))
+    recording = falling(at=[(0.0, 0.5), (0.3, 0.5)], threads=threads)
+    path = np.asarray(moved(stage_of(recording, moments_at([0.5])), 0)["strings"].get_xydata())
+    first, second, _ = np.split(path, np.flatnonzero(np.isnan(path[:, 0])) + 1)
+    assert first[[0, -2]] == pytest.approx(np.array([(0.0, 0.9), (0.0, 0.5)]))
+    assert second[[0, -2]] == pytest.approx(np.array([(0.3, 0.9), (0.3, 0.5)]))
 
 
 def test_what_is_not_asked_for_is_not_shown() -> None:

@@ -22,10 +22,12 @@ from chutelab.theory.drag import drag_coefficient, fly
 
 G = 9.81
 AIR, VISCOSITY = 1.2, 1.8e-5
+BALL = ["--set", "particle.radius=0.004", "--set", "particle.mass=0.008"]
 
 
 def scene(**tables: Any) -> Any:
     base: dict[str, Any] = {
+        "particle": {"radius": 0.004, "mass": 0.008},
         "incoming": {"speed": 2.0, "pulley_radius": 0.1},
         "plate": {"distance": 0.5},
         "outgoing": {"drop": 0.5},
@@ -172,10 +174,10 @@ def test_summary_report_and_check_tell_it() -> None:
         "speed", "reynolds", "coefficient", "share_of_weight", "impact_shift", "landing_shift",
         "arrives",
     }  # fmt: skip
-    run = CliRunner().invoke(main, ["run", "perpendicular"])
+    run = CliRunner().invoke(main, ["run", "perpendicular", *BALL])
     words = " ".join(run.output.split())
     assert "Air drag, left out, would be 0.33 % of the weight at 4.4 m/s, and particle 0" in words
-    checked = CliRunner().invoke(main, ["check", "perpendicular", "--json"])
+    checked = CliRunner().invoke(main, ["check", "perpendicular", *BALL, "--json"])
     parts = {
         part["name"]: part["what"] for part in json.loads(checked.output)["scenes"][0]["skipped"]
     }

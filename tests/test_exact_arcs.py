@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from math import atan2, cos, hypot, inf, pi, radians, sin, sqrt
+from math import atan2, cos, hypot, pi, radians, sin, sqrt
 
 import numpy as np
 import pytest
@@ -11,25 +10,12 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from chutelab.engines import exact
-from chutelab.machine.parts import Arcs
 from chutelab.results import REASONS, Kind
 from chutelab.results.ledger import ledger
-from machines import face, scene_of
+from machines import bent, face, scene_of
 
 G = 9.81
 FAR = face("far", [5.0, -5.0], [6.0, -5.0])
-
-
-def with_arcs(built, *arcs):
-    """Return the machine with arcs, each a surface of its own."""
-    given = {
-        "begin": 0.0, "extent": 2.0 * pi, "speed": 0.0, "restitution": 0.0, "friction": 0.0,
-        "appears": -inf, "vanishes": inf,
-    }  # fmt: skip
-    rows = [{**given, **arc, "surface": len(built.surfaces) + n} for n, arc in enumerate(arcs)]
-    columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-    names = tuple(f"arc {n}" for n in range(len(arcs)))
-    return replace(built, surfaces=built.surfaces + names, arcs=Arcs(**columns))
 
 
 def at(position, velocity=(0.0, 0.0), *surfaces, radius=0.02, spin=False, until=2.0, gravity=G):
@@ -81,7 +67,7 @@ def test_without_friction_it_swings_like_a_pendulum(radius):
     theta, length = 1.2, 1.0 - radius
     place, _ = on_the_bowl(theta, radius, 1.0)
     period = 4.0 * sqrt(length / G) * ellipk(sin(theta / 2) ** 2)
-    run = exact.run(with_arcs(at(place, until=3.0 * period, radius=radius), bowl()))
+    run = exact.run(bent(at(place, until=3.0 * period, radius=radius), bowl()))
     end = run.track(0)[-1]
     np.testing.assert_allclose(end["position"], place, rtol=0, atol=1e-11)
     track = run.track(0)
@@ -101,7 +87,7 @@ def test_sliding_in_a_bowl_obeys_its_equation_of_motion(seed):
     place, along = on_the_bowl(angle, 0.05, 0.7)
     built = at(place, speed * along, radius=0.05, spin=spin, until=1.0)
     # Inside, a surface that moves clockwise runs against the angle θ.
-    run = exact.run(with_arcs(built, bowl(0.7, friction=friction, speed=-belt)))
+    run = exact.run(bent(built, bowl(0.7, friction=friction, speed=-belt)))
     true = inside(
         0.65, speed, angle, 1.0, friction=friction, belt=belt, turning=2.0 if spin else 0.0
     )
@@ -129,9 +115,7 @@ def test_a_disk_that_rolls_in_a_bowl_is_a_slower_pendulum():
     """θ'' = -2/3 g sin θ / L; the period at the angle 1 is 4 sqrt(3 L/2 g) K(sin² ½)."""
     place, _ = on_the_bowl(1.0, 0.1, 1.0)
     period = 4.0 * sqrt(1.5 * 0.9 / G) * ellipk(sin(0.5) ** 2)
-    run = exact.run(
-        with_arcs(at(place, radius=0.1, spin=True, until=2.0 * period), bowl(friction=5.0))
-    )
+    run = exact.run(bent(at(place, radius=0.1, spin=True, until=2.0 * period), bowl(friction=5.0)))
     end = run.track(0)[-1]
     np.testing.assert_allclose(end["position"], place, rtol=0, atol=1e-11)
     assert ledger(run).friction_loss == pytest.approx(0.0, abs=1e-15)
@@ -141,8 +125,8 @@ def test_a_disk_that_rolls_in_a_bowl_is_a_slower_pendulum():
 def test_it_leaves_the_outside_where_its_weight_no_longer_holds_it(speed):
     """From a level ramp onto the top of a roller: cos φ = 2/3 + v²/(3 g ρ), without friction."""
     ramp = face("ramp", [-1.0, 0.0], [0.0, 0.0], friction=0.0)
-    roller = {"center": (0.0, -0.4), "radius": 0.4}
-    run = exact.run(with_arcs(at([-0.5, 0.02], [speed, 0.0], ramp, until=4.0), roller))
+    roller = {"center": (0.0, -0.4), "radius": 0.4, "begin": 0.0, "extent": 2.0 * pi}
+    run = exact.run(bent(at([-0.5, 0.02], [speed, 0.0], ramp, until=4.0), roller))
     (left,) = run.select(Kind.SEPARATION)
     phi = atan2(left["position"][0], left["position"][1] + 0.4)
     assert cos(phi) == pytest.approx((2.0 + speed**2 / (G * 0.42)) / 3.0, rel=1e-13, abs=0.0)
@@ -152,7 +136,10 @@ def test_it_leaves_the_outside_where_its_weight_no_longer_holds_it(speed):
 def test_faster_than_the_weight_can_bend_its_path_it_flies_off_at_the_tangent():
     ramp = face("ramp", [-1.0, 0.0], [0.0, 0.0], friction=0.0)
     run = exact.run(
-        with_arcs(at([-0.5, 0.02], [2.5, 0.0], ramp), {"center": (0.0, -0.4), "radius": 0.4})
+        bent(
+            at([-0.5, 0.02], [2.5, 0.0], ramp),
+            {"center": (0.0, -0.4), "radius": 0.4, "begin": 0.0, "extent": 2.0 * pi},
+        )
     )
     (left,) = run.select(Kind.SEPARATION)
     np.testing.assert_allclose(left["position"], [0.0, 0.02], atol=1e-14)
@@ -197,7 +184,7 @@ def test_down_a_chute_of_ramps_and_bends_nothing_is_lost_but_by_friction(seed, r
     # A point must not start below the ramp, not even by rounding.
     place = -way * down + max(radius, 1e-13) * up
     built = at(place, (0.0, 0.0), *ramps, radius=radius, until=5.0)
-    run = exact.run(with_arcs(built, first, second))
+    run = exact.run(bent(built, first, second))
 
     # v² along the pieces, by its differential equation over the angle or the way.
     def bend(v2, rho, start, end):
@@ -225,7 +212,7 @@ def test_round_a_loop_it_comes_off_where_the_normal_force_is_gone():
     floor = face("floor", [-2.0, 0.0], [0.0, 0.0], friction=0.0)
     length, v2 = 0.48, 4.6 * G * 0.48
     loop = {"center": (0.0, 0.5), "radius": 0.5, "begin": -0.5 * pi, "extent": 1.75 * pi}
-    run = exact.run(with_arcs(at([-1.0, 0.02], [sqrt(v2), 0.0], floor), loop))
+    run = exact.run(bent(at([-1.0, 0.02], [sqrt(v2), 0.0], floor), loop))
     left = run.select(Kind.SEPARATION)[0]
     phi = atan2(left["position"][0], 0.5 - left["position"][1])
     assert cos(phi) == pytest.approx((2.0 - v2 / (G * length)) / 3.0, rel=1e-12, abs=0.0)
@@ -241,7 +228,7 @@ def test_round_a_loop_it_comes_off_where_the_normal_force_is_gone():
 def test_round_the_whole_loop_the_angle_goes_on():
     floor = face("floor", [-2.0, 0.0], [0.0, 0.0], friction=0.0)
     loop = {"center": (0.0, 0.5), "radius": 0.5, "begin": -0.5 * pi, "extent": 1.75 * pi}
-    run = exact.run(with_arcs(at([-1.0, 0.02], [6.0, 0.0], floor), loop))
+    run = exact.run(bent(at([-1.0, 0.02], [6.0, 0.0], floor), loop))
     left = run.select(Kind.SEPARATION)[0]
     # It leaves at the far end, tangentially, as fast as its height there allows.
     angle = radians(-90.0 + 0.875 * 360.0)
@@ -261,7 +248,7 @@ def test_a_blow_on_either_side_is_newtons_and_coulombs(aim):
         built = at(start, velocity, gravity=0.0)
         arc = {"center": (0.0, 0.0), "radius": 1.0, "begin": -1.5, "extent": 3.0,
                "speed": 3.0, "restitution": 0.5, "friction": 0.2}  # fmt: skip
-        hit = exact.run(with_arcs(built, arc)).select(Kind.IMPACT)[0]
+        hit = exact.run(bent(built, arc)).select(Kind.IMPACT)[0]
         np.testing.assert_allclose(hit["position"], (1.0 - sense * 0.02) * direction, atol=1e-13)
         wanted = -sense * 1.0 * direction + 0.2 * 1.5 * 2.0 * clockwise
         np.testing.assert_allclose(hit["velocity_after"], wanted, atol=1e-13)
@@ -270,7 +257,7 @@ def test_a_blow_on_either_side_is_newtons_and_coulombs(aim):
 def test_through_the_opening_and_out_again_it_meets_the_outside():
     """Up through the gap of a bowl, over, and down on the back of its rim."""
     arc = {"center": (0.0, 0.0), "radius": 1.0, "begin": -0.2, "extent": 1.2}
-    run = exact.run(with_arcs(at([0.0, 0.0], [0.8, 5.0], radius=0.0), arc))
+    run = exact.run(bent(at([0.0, 0.0], [0.8, 5.0], radius=0.0), arc))
     hit = run.select(Kind.IMPACT)
     # By hand: where the parabola's distance from the centre is 1, on the arc's angles, and how.
     t = np.linspace(0.0, 2.0, 2_000_001)
@@ -287,7 +274,7 @@ def test_through_the_opening_and_out_again_it_meets_the_outside():
 def test_what_is_larger_than_the_inside_of_an_arc_meets_its_ends():
     """A disk of 0.3 over a cup of 0.2: it comes to rest on both of its rims."""
     cup = {"center": (0.0, 0.0), "radius": 0.2, "begin": pi, "extent": pi, "friction": 1.0}
-    run = exact.run(with_arcs(at([0.0, 1.0], radius=0.3, until="settled"), cup))
+    run = exact.run(bent(at([0.0, 1.0], radius=0.3, until="settled"), cup))
     end = run.track(0)[-1]
     assert REASONS[run.ended[0]] == "settled"
     np.testing.assert_allclose(end["position"], [0.0, sqrt(0.3**2 - 0.2**2)], atol=1e-9)
@@ -295,7 +282,7 @@ def test_what_is_larger_than_the_inside_of_an_arc_meets_its_ends():
 
 def test_along_the_very_end_of_a_bowl_it_falls_in():
     """Its path only touches the circle of contact, and the rim, where the bowl begins."""
-    run = exact.run(with_arcs(at([-0.98, 0.5], until=0.6), bowl()))
+    run = exact.run(bent(at([-0.98, 0.5], until=0.6), bowl()))
     track = run.track(0)
     below = track[track["position"][:, 1] < -1e-3]
     np.testing.assert_allclose(np.hypot(*below["position"].T), 0.98, rtol=1e-12)

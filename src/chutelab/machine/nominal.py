@@ -12,7 +12,14 @@ import numpy as np
 
 from chutelab.machine.releases import on_belt, release_point, release_velocity
 from chutelab.mechanics.ballistics import descent
-from chutelab.mechanics.contact import Circle, Outcome, advance, grip_slip, normal_force
+from chutelab.mechanics.contact import (
+    DISK_SHARE,
+    Circle,
+    Outcome,
+    advance,
+    grip_slip,
+    normal_force,
+)
 from chutelab.scene import Scene
 from chutelab.util.arrays import Bools, Floats, Ints, Numbers
 
@@ -54,12 +61,12 @@ def _slip_round(scene: Scene, rho: Numbers, speed: Numbers, distance: Numbers) -
     rho, speed, distance, gravity, friction, belt = (
         np.broadcast_to(values, shape).ravel() for values in given
     )
-    turns = np.full(len(rho), scene.particle.spin)
-    w, z = _along_belt(speed, distance, friction * gravity, belt, turns)
+    share = np.full(len(rho), DISK_SHARE if scene.particle.spin else 1.0)
+    w, z = _along_belt(speed, distance, friction * gravity, belt, share)
     nothing = np.zeros(len(rho))
     circle = Circle(
         phi=nothing, w=w, z=z, rho=rho, gravity=gravity, friction=friction, belt=belt,
-        slip=nothing, turns=turns, low=nothing - 1e-9, high=nothing + inf,
+        slip=nothing, share=share, low=nothing - 1e-9, high=nothing + inf,
     )  # fmt: skip
     slip = w + z - belt
     circle = replace(circle, slip=np.where(slip == 0.0, grip_slip(circle), np.sign(slip)))
@@ -69,19 +76,18 @@ def _slip_round(scene: Scene, rho: Numbers, speed: Numbers, distance: Numbers) -
 
 
 def _along_belt(
-    w: Floats, distance: Floats, drag: Floats, belt: Floats, turns: Bools
+    w: Floats, distance: Floats, drag: Floats, belt: Floats, share: Floats
 ) -> tuple[Floats, Floats]:
     """Return speed and r ω at the top of the pulley after slipping along the belt, NaN if never."""
     slip = w - belt
     slips = (slip != 0.0) & (drag > 0.0)
     pull = np.where(slip > 0.0, -drag, drag)
-    lever = np.where(turns, 3.0, 1.0)
-    until_grip = np.where(slips, np.abs(slip) / np.where(slips, drag * lever, 1.0), 0.0)
+    until_grip = np.where(slips, np.abs(slip) / np.where(slips, drag * (1.0 / share), 1.0), 0.0)
     reach = descent(distance, -w, -pull)
     reach = np.where(np.isfinite(reach), reach, inf)
     t = np.minimum(until_grip, reach)
     pace = np.where(slips, w + pull * t, w)
-    z = np.where(slips & turns, 2.0 * pull * t, 0.0)
+    z = np.where(slips, (1.0 / share - 1.0) * pull * t, 0.0)
     arrives = np.where(slips & (reach <= until_grip), True, pace > 0.0)
     return np.where(arrives, pace, nan), z
 

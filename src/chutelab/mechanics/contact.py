@@ -6,10 +6,10 @@ On a ride the centre of the particle moves on a circle of radius ρ. The angle �
 normal, which points at the particle, from the top, clockwise; inside a circle ρ is negative. With w
 the speed along (n_y, -n_x), z = r ω, N the normal and F the tangential force per mass,
 
-    φ' = w/ρ,   w' = g sin φ + F,   z' = 2 F (free disk) or 0,   N = g cos φ - w²/ρ,
+    φ' = w/ρ,   w' = g sin φ + F,   z' = (m r²/I) F,   N = g cos φ - w²/ρ,
 
-and F = stick · g sin φ + load · N: gripping without turning is stick = -1, rolling -1/3, with
-I = m r²/2; slipping is load = -σ µ, with σ the sign of the slip u = w + z - belt. Everything is
+and F = stick · g sin φ + load · N: gripping without turning is stick = -1, rolling -I/(I + m r²),
+-1/3 of a disk; slipping is load = -σ µ, with σ the sign of the slip u = w + z - belt. Everything is
 expanded in a Taylor series in time, which holds for any mixture of turning back, spinning and
 slipping; a step is as long as a knot may be, so the series costs no extra steps.
 """
@@ -30,8 +30,27 @@ DISK_SHARE = 1.0 / 3.0
 much as it would a particle that does not turn."""
 
 
+def rim_share(radius: ArrayLike, mass: ArrayLike, inertia: ArrayLike) -> Floats:
+    """Return m*/m = I/(I + m r²) at the rim of particles, (...); 1 of those that do not turn.
+
+    Examples
+    --------
+    >>> abs(float(rim_share(0.1, 2.0, 0.4 * 2.0 * 0.1**2)) - 2.0 / 7.0) < 1e-15
+    True
+    """
+    radius, mass, inertia = (np.asarray(given) for given in (radius, mass, inertia))
+    turns = inertia > 0.0
+    share = np.where(turns, inertia / np.where(turns, inertia + mass * radius**2, 1.0), 1.0)
+    # That of a disk is not to depend on the rounding of its I.
+    return np.asarray(np.where(np.abs(share - DISK_SHARE) < 1e-15, DISK_SHARE, share))
+
+
 def impulses(
-    approach: ArrayLike, slip: ArrayLike, restitution: ArrayLike, friction: ArrayLike, share: float
+    approach: ArrayLike,
+    slip: ArrayLike,
+    restitution: ArrayLike,
+    friction: ArrayLike,
+    share: ArrayLike,
 ) -> tuple[Floats, Floats]:
     """Return the normal and tangential impulse per mass (m/s) of an impact.
 
@@ -43,8 +62,8 @@ def impulses(
         Normal speed towards the surface (>= 0) and slip of the contact point before, m/s.
     restitution, friction : array_like
         ε and µ of the pair; µ may be inf.
-    share : float
-        m*/m: 1 for a particle that does not turn, `DISK_SHARE` for a free disk.
+    share : array_like
+        m*/m, see `rim_share`.
 
     Examples
     --------
@@ -56,10 +75,11 @@ def impulses(
     return normal, limited(slip, normal, np.asarray(friction, dtype=np.float64), share)
 
 
-def limited(slip: ArrayLike, normal: Floats, friction: Floats, share: float) -> Floats:
+def limited(slip: ArrayLike, normal: Floats, friction: Floats, share: ArrayLike) -> Floats:
     """Return the impulse per mass that stops the slip, or the most that friction allows."""
     most = grip_limit(friction, normal)
-    return np.minimum(np.maximum(-share * np.asarray(slip), -most), most)
+    wanted = -np.asarray(share) * np.asarray(slip)
+    return np.asarray(np.minimum(np.maximum(wanted, -most), most))
 
 
 def grip_limit(friction: Floats, normal: Floats) -> Floats:
@@ -109,7 +129,7 @@ class Circle:
     friction: Floats  # µ, may be inf
     belt: Floats  # speed of the circle's surface, m/s
     slip: Floats  # sign σ of the slip; 0 while gripping or rolling
-    turns: Bools  # whether the particle is a free disk
+    share: Floats  # m*/m, see `rim_share`
     low: Floats  # angles where the circle ends or something is met, rad
     high: Floats
 
@@ -138,7 +158,7 @@ def grip_slip(circle: Circle) -> Floats:
     Otherwise the particle starts to slip the way gravity pulls.
     """
     pull = circle.gravity * np.sin(circle.phi)
-    force = np.where(circle.turns, DISK_SHARE, 1.0) * np.abs(pull)
+    force = circle.share * np.abs(pull)
     return np.where(force <= grip_limit(circle.friction, normal_force(circle)), 0.0, np.sign(pull))
 
 
@@ -175,7 +195,7 @@ def _step_length(c: Circle) -> Floats:
     """Time for at most `STEP_ANGLE`, less where slip grows fast; inf at rest."""
     finite = np.where(np.isinf(c.friction) | (c.slip == 0.0), 0.0, c.friction)
     angle = np.minimum(STEP_ANGLE, STEP_GROWTH / np.maximum(2.0 * finite, 1e-300))
-    held = (c.slip == 0.0) & ~c.turns
+    held = (c.slip == 0.0) & (c.share == 1.0)
     pull = np.where(held, 0.0, c.gravity * (np.abs(np.sin(c.phi)) + finite))
     rho = np.abs(c.rho)
     pace = np.abs(c.w) + np.sqrt(2.0 * angle * rho * pull)
@@ -196,10 +216,10 @@ def _series(c: Circle) -> Floats:
     sine[0], cosine[0] = np.sin(c.phi), np.cos(c.phi)
     slip[0] = c.w + c.z - c.belt
     gripping = c.slip == 0.0
-    stick = np.where(gripping, np.where(c.turns, -DISK_SHARE, -1.0), 0.0)
+    stick = np.where(gripping, -c.share, 0.0)
     load = np.where(gripping, 0.0, -c.slip * np.where(gripping, 0.0, c.friction))
     slip[0] = np.where(gripping, 0.0, slip[0])
-    spin = np.where(c.turns, 2.0, 0.0)
+    spin = 1.0 / c.share - 1.0  # m r²/I, or 0
     for n in range(ORDER + 1):
         normal[n] = c.gravity * cosine[n] - np.einsum("ik,ik->k", w[: n + 1], w[n::-1]) / c.rho
         force[n] = stick * c.gravity * sine[n] + load * normal[n]

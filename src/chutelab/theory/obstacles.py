@@ -119,6 +119,9 @@ class Arcs:
                 yield index, size - radius, True
 
 
+NO_ARCS = Arcs.of([])
+
+
 @dataclass(frozen=True, eq=False)
 class Obstacles:
     """Straight and round surfaces together; indices count the segments first."""
@@ -129,7 +132,7 @@ class Obstacles:
     @classmethod
     def of(cls, lines: Sequence[Line], bends: Sequence[Bend] = ()) -> Obstacles:
         """Collect both, see `Segments.of` and `Arcs.of`."""
-        return cls(Segments.of(lines), Arcs.of(bends))
+        return cls(Segments.of(lines), Arcs.of(bends) if bends else NO_ARCS)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -92,20 +92,24 @@ def separation(
     never, sound = np.full(count, np.inf), np.zeros(count, dtype=np.int64)
     left = Separation(np.arctan2(sin, cos), cos, sin, speed.copy(), np.zeros(count), never, sound)
     slips = (start < 1.0) & np.isfinite(friction)
+    if not (slips.any() or np.any(incline)):
+        return left
+    k, beta, way = (
+        np.broadcast_to(np.asarray(part, dtype=np.float64), (count,))
+        for part in (inertia, incline, ride_length)
+    )
+    tilted = beta != 0.0
     ride = _Ride(np.zeros(count), start, belt, np.zeros(count, dtype=np.bool_), start, left.rim)
-    more = (np.asarray(part, dtype=np.float64) for part in (inertia, incline, ride_length))
-    inertia, incline, ride_length = (np.broadcast_to(part, (count,)) for part in more)
-    tilted = incline != 0.0
     if tilted.any():
-        given = (speed, gravity, ride_radius, friction, spin, inertia, incline, ride_length)
+        numbers = (part[tilted] for part in (speed, gravity, ride_radius, friction, k, beta, way))
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-            there, onward, slips[tilted] = _inclined(*(part[tilted] for part in given))
+            there, onward, slips[tilted] = _inclined(*numbers, spin=spin[tilted])
         ride = _Ride(*(part.copy() for part in vars(ride).values()))
         for whole, part in ((left, there), (ride, onward)):
             for name, values in vars(part).items():
                 getattr(whole, name)[tilted] = values
     if slips.any():
-        slip = _Slip(ride.of(slips), friction[slips], spin[slips], inertia[slips])
+        slip = _Slip(ride.of(slips), friction[slips], spin[slips], k[slips])
         root = slip.separation()
         phi1 = slip.onset + root
         left.phi1[slips] = phi1
@@ -156,10 +160,11 @@ def _inclined(
     gravity: Floats,
     radius: Floats,
     friction: Floats,
-    spin: Bools,
     inertia: Floats,
     incline: Floats,
     length: Floats,
+    *,
+    spin: Bools,
 ) -> tuple[Separation, _Ride, Bools]:
     """Follow rides on belts that rise or fall: where they end, how they go on, which go on to slip.
 

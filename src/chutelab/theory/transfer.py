@@ -28,12 +28,15 @@ class Answers:
 
     def fail(self, where: Bools, reason: str) -> None:
         """State a reason where there is none yet."""
+        if not where.any():
+            return
         self.reason[where & self.fine] = reason
         self.fine &= ~where
 
     def require(self, what: str, holds: Bools) -> None:
         """Object to parameters; NaN never holds."""
-        self.fail(~holds, Reason.OUTSIDE.because(f"{what} is required"))
+        if not holds.all():
+            self.fail(~holds, Reason.OUTSIDE.because(f"{what} is required"))
 
     def keep(self, **values: Floats) -> None:
         """Store results of a stage where nothing has gone wrong up to now."""
@@ -270,8 +273,9 @@ def stages(
         speed=speed, ride_radius=ride_radius, gravity=gravity, friction=friction, spin=spin,
         inertia=inertia, incline=incline, ride_length=ride_length,
     )  # fmt: skip
-    for fault in range(1, len(FAULTS)):
-        found.fail(left.fault == fault, Reason.OUTSIDE.because(FAULTS[fault]))
+    if left.fault.any():
+        for fault in range(1, len(FAULTS)):
+            found.fail(left.fault == fault, Reason.OUTSIDE.because(FAULTS[fault]))
     found.keep(phi1=left.phi1, v1=left.v1, omega1=turning(left.rim))
 
     # Fly to the plate: the gap between disk and plate's line is a quadratic in time.

@@ -33,13 +33,14 @@ def _hold(s: State, index: Ints, on: tuple[Ints, Floats], other: tuple[Ints, Flo
         return
     a, b = s.contact(index, *on), s.contact(index, *other)
     moving = (a.belt != 0.0) | (b.belt != 0.0)
-    if s.spins and moving.any():
+    if np.any(moving & s.turns[index]):
         raise CornerError(
             "a spinning disk is held between two surfaces of which one moves; the exact engine"
             ' cannot follow that: run it with engine = "contact"'
         )
     v, mass = s.v.take(index, axis=1), s.mass[index]
-    kinetic = 0.5 * mass * (dot(v, v) + 0.5 * s.z[index] ** 2)
+    turning = s.z[index] ** 2 / np.where(s.turns[index], s.lever[index], 1.0)
+    kinetic = 0.5 * mass * (dot(v, v) + turning)
     s.v[:, index], s.z[index] = 0.0, 0.0
     s.book(index, b.surface, 0.0, kinetic, 0.0)
     s.knots(index)
@@ -107,19 +108,18 @@ def settle_law(s: State, index: Ints) -> None:
     w = dot(s.v.take(index, axis=1), c.tangent)
     slip = s.slip_of(index, c, w)
     still = slip == 0.0
-    if s.spins:
-        s.z[index] = np.where(still, c.belt - w, s.z[index])
-    else:
-        w = np.where(still, c.belt, w)
+    halted = index[still]
+    if len(halted):
+        w[still] = s.stop_slip(halted, c.belt[still], w[still])
     s.v[:, index] = w * c.tangent
     pull, load = s.weight_along(index, c.normal), load_on(s, index, s.on[index], c)
-    grips = still & (s.share * np.abs(pull) <= grip_limit(c.friction, load))
+    grips = still & (s.share[index] * np.abs(pull) <= grip_limit(c.friction, load))
     begins = grips & (s.slip[index] != 0.0)
     s.slip[index] = np.where(grips, 0.0, np.where(still, np.sign(pull), np.sign(slip)))
     s.event(int(Kind.STICK), index[begins], c.surface[begins])
     if s.machine.until == "settled":
         # Rolling down a slope is not lying on it.
-        steady = grips & ((pull == 0.0) | (not s.spins)) & ~(arc & (w != 0.0))
+        steady = grips & ((pull == 0.0) | ~s.turns[index]) & ~(arc & (w != 0.0))
         lies = steady & ((c.belt == 0.0) | (c.surface == s.machine.landing))
         s.event(int(Kind.SETTLE), index[lies], c.surface[lies])
         s.finish(index[lies], "settled")
@@ -130,10 +130,9 @@ def end_slip(s: State, index: Ints) -> None:
     if not len(index):
         return
     c = s.contact(index)
-    if s.spins:
-        s.z[index] = c.belt - dot(s.v.take(index, axis=1), c.tangent)
-    else:
-        s.v[:, index] = c.belt * c.tangent
+    w = s.stop_slip(index, c.belt, dot(s.v.take(index, axis=1), c.tangent))
+    slides = ~s.turns[index]
+    s.v[:, index[slides]] = (w * c.tangent)[:, slides]
     settle_law(s, index)
 
 
@@ -143,7 +142,7 @@ def face_force(s: State, index: Ints, c: Contact) -> tuple[Floats, Floats]:
     slip = s.slip[index]
     gripping = slip == 0.0
     finite = np.where(np.isinf(c.friction) | gripping, 0.0, c.friction)
-    force = np.where(gripping, -s.share * pull, -slip * finite * load)
+    force = np.where(gripping, -s.share[index] * pull, -slip * finite * load)
     return (pull + force) * c.tangent, force
 
 
@@ -267,12 +266,13 @@ def _blow(
     omega_before = s.omega(index)
     along = dot(before, c.tangent)
     slip = s.slip_of(index, c, along)
-    normal, tangential = impulses(approach, slip, c.restitution, c.friction, s.share)
+    share = s.share[index]
+    normal, tangential = impulses(approach, slip, c.restitution, c.friction, share)
     # The normal speed is set, not added to: ε |v_n| to the last bit.
     s.v[:, s.at(index)] = rebound * c.normal + (along + tangential) * c.tangent
     if s.spins:
-        s.z[index] += 2.0 * tangential
-    after, mass = slip + tangential / s.share, s.mass[index]
+        s.z[index] += s.lever[index] * tangential
+    after, mass = slip + tangential / share, s.mass[index]
     s.book(
         index,
         c.surface,
@@ -341,17 +341,18 @@ def _last_bounces(s: State, index: Ints, obstacle: Ints, side: Floats, rebound: 
     s.p[:, index] += (time * (w + 0.5 * pull * time)) * c.tangent
     w = w + pull * time
     slip = s.slip_of(index, c, w)
-    tangential = limited(slip, np.maximum(weight * time - u, 0.0), c.friction, s.share)
+    share = s.share[index]
+    tangential = limited(slip, np.maximum(weight * time - u, 0.0), c.friction, share)
     s.v[:, index] = (w + tangential) * c.tangent
     if s.spins:
-        s.z[index] += 2.0 * tangential
+        s.z[index] += s.lever[index] * tangential
     mass = s.mass[index]
     s.book(
         index,
         c.surface,
         mass * tangential * c.belt,
         0.5 * mass * u * u,
-        -0.5 * mass * tangential * (2.0 * slip + tangential / s.share),
+        -0.5 * mass * tangential * (2.0 * slip + tangential / share),
     )
     s.knots(index)
 

@@ -130,7 +130,7 @@ def run(
     Raises
     ------
     ValueError
-        If the particles interact.
+        If the particles interact, or some but not all are points.
     CornerError
         If a spinning disk is held between surfaces of which one moves.
     StalledError
@@ -138,6 +138,9 @@ def run(
     """
     if machine.interact:
         raise ValueError("the exact engine has no contacts between particles")
+    points = np.equal(machine.particle.radius, 0.0)
+    if points.any() and not points.all() and machine.segments.start.ndim == 2:
+        raise ValueError("the exact engine has no points beside disks")
     begin = perf_counter()
     recorder = Recorder(machine, apart=apart)
     rounds, stalled, enough = 0, None, False

@@ -42,45 +42,50 @@ def go_on(s: State, index: Ints, obstacle: Ints, side: Floats) -> None:
     rest_on(s, index[stays], obstacle[stays], side[stays], np.zeros(np.count_nonzero(stays)))
 
 
-def carry_round(s: State, index: Ints) -> None:
-    """Carry particles by adhesion from the top of the pulley until cos φ1 = v²/(g ρ)."""
+def carry_round(s: State, index: Ints, start: Floats, v: Floats) -> None:
+    """Carry particles by adhesion round the pulley, from an angle until cos φ1 = v²/(g ρ)."""
     if not len(index):
         return
     o = s.obstacles
-    s.p[0, index] = 0.0
-    rho, v = s.p[1, index], s.v[0, index]
+    up = np.empty((2, len(index)))
+    up[0], up[1] = np.sin(start), np.cos(start)
+    rho = dot(s.p[:, index], up)
+    s.p[:, index] = rho * up
     left = s.stop[index] - s.age[index]
     cosine = np.minimum(v**2 / (s.gravity[index] * rho), 1.0)
-    end, struck, found = np.zeros(len(index)), np.zeros(len(index), dtype=bool), None
-    if np.count_nonzero(cosine < 1.0):
-        end = np.arctan2(np.sqrt((1.0 - cosine) * (1.0 + cosine)), cosine)
+    end, struck, found = start.copy(), np.zeros(len(index), dtype=bool), None
+    stays = cosine < up[1]
+    if np.count_nonzero(stays):
+        last = np.arctan2(np.sqrt((1.0 - cosine) * (1.0 + cosine)), cosine)
+        end = np.where(stays, last, start)
         pulley = np.full(len(index), o.pulley - o.segments)
-        top, clockwise = np.zeros(len(index)), np.ones(len(index))
-        found = bounds(o, index, pulley, clockwise, rho, top, s.radius[index])[1]
+        clockwise = np.ones(len(index))
+        found = bounds(o, index, pulley, clockwise, rho, start, s.radius[index])[1]
         struck = ~found["handover"] & (found["angle"] < end)
         end = np.where(struck, found["angle"], end)
-        end = np.where(end * rho / v > left, left * v / rho, end)
-        _ease_round(s, index, rho, v, end)
+        end = np.where((end - start) * rho / v > left, start + left * v / rho, end)
+        _ease_round(s, index, rho, v, start, end)
     over = s.age[index] >= s.stop[index]
     hit, free = struck & ~over, ~struck & ~over
     s.finish(index[over], "time")
     s.part(index[free], 0)
-    s.fly(index[free], o.pulley, 0, 2 + (end[free] > 0.0))
+    s.fly(index[free], o.pulley, 0, 2 + (end[free] > start[free]))
     if found is not None and np.count_nonzero(hit):
         strike(s, index[hit], found["obstacle"][hit], found["side"][hit])
 
 
-def _ease_round(s: State, index: Ints, rho: Floats, v: Floats, end: Floats) -> None:
-    """Carry particles from the top of the pulley to an angle, knot by knot."""
+def _ease_round(s: State, index: Ints, rho: Floats, v: Floats, first: Floats, end: Floats) -> None:
+    """Carry particles from an angle of the pulley to another, knot by knot."""
     surface = s.obstacles.surface[s.obstacles.pulley]
-    start, above = s.age[index], rho.copy()
-    pieces = np.ceil(end / STEP_ANGLE)
+    start, above, way = s.age[index], rho * np.cos(first), end - first
+    pieces = np.ceil(way / STEP_ANGLE)
     for n in range(1, int(pieces.max()) + 1):
         on = (pieces >= n).nonzero()[0]
-        riders, part = index[on], end[on] * (n / pieces[on])
+        riders, turn = index[on], way[on] * (n / pieces[on])
+        part = first[on] + turn
         _place(s, riders, rho[on], part, v[on])
-        s.age[riders] = start[on] + rho[on] * part / v[on]
-        # The belt lets the particle down: F v = -m g v sin φ, summed from the last knot.
+        s.age[riders] = start[on] + rho[on] * turn / v[on]
+        # The belt lifts the particle, or lets it down: F v = -m g v sin φ, from the last knot on.
         height = rho[on] * np.cos(part)
         work = -s.mass[riders] * s.gravity[riders] * (above[on] - height)
         s.book(riders, np.full(len(riders), surface), work)
@@ -105,7 +110,7 @@ def ride(s: State, index: Ints) -> None:
         friction=c.friction,
         belt=c.belt,
         slip=s.slip[index],
-        turns=np.full(len(index), s.spins),
+        share=s.share[index],
         low=s.bounds["angle"][0, index],
         high=s.bounds["angle"][1, index],
     )
@@ -195,15 +200,22 @@ def carry(s: State, index: Ints) -> None:
     """Move particles that the belt carries on to the pulley, or to what is in the way."""
     motion = _motion(s, index, AT_REST)
     motion.never = s.obstacles.under_belt
-    v = motion.velocity[0]
-    ends, stops = -motion.position[0] / v, s.stop[index] - s.age[index]
+    before, up_belt = motion.position, rows_of(s.up_belt, index)
+    v, stops = dot(motion.velocity, up_belt), s.stop[index] - s.age[index]
+    ends = -dot(before, up_belt) / v
     ends[~(v > 0.0)] = np.inf
     dt, hits, obstacle, side = _next(s, motion, np.minimum(ends, stops))
     _move(s, motion, dt)
+    tilted = np.count_nonzero(up_belt[1]) > 0
+    if tilted:
+        lifted = s.mass[index] * s.gravity[index] * (s.p[1, index] - before[1])
+        s.book(index, s.obstacles.surface[np.zeros(len(index), dtype=np.int64)], lifted)
     s.knots(index)
     free = ~hits
     _stop(s, index[free & (stops < ends)])
-    carry_round(s, index[free & (ends <= stops)])
+    onto = free & (ends <= stops)
+    start = np.arctan2(-up_belt[1], up_belt[0]) if tilted else np.zeros(len(index))
+    carry_round(s, index[onto], start[onto], v[onto])
     _strike(s, index, hits, obstacle, side)
 
 
@@ -216,7 +228,7 @@ def slide(s: State, index: Ints) -> None:
     motion.on, motion.on_side = on, face
     # The slip is linear in time, while there is one.
     slip = dot(motion.velocity, c.tangent) + s.z[index] - c.belt
-    rate = dot(pull, c.tangent) + (2.0 * force if s.spins else 0.0)
+    rate = dot(pull, c.tangent) + (s.lever[index] * force if s.spins else 0.0)
     fading = s.slip[index] * rate < 0.0
     grips = np.where(fading, np.maximum(-slip / np.where(fading, rate, 1.0), 0.0), np.inf)
     ends = _end(s, motion)
@@ -228,7 +240,7 @@ def slide(s: State, index: Ints) -> None:
     _move(s, motion, dt)
     s.snap(index, on, face)
     if s.spins:
-        s.z[index] += 2.0 * force * dt
+        s.z[index] += s.lever[index] * force * dt
     # What was left at the beginning is some way off now.
     s.left[index[dt > 0.0]] = NONE
     s.knots(index)

@@ -117,9 +117,11 @@ class Obstacles:
 
     def of(self, first: int, last: int) -> Obstacles:
         """Return the obstacles of the particles from `first` up to `last`."""
+        if self.length.shape[-1] == self.rho.shape[-1] == self.material.shape[-1] == 1:
+            return self
         own = {name: getattr(self, name) for name in PER_PARTICLE}
         own = {name: array[..., first:last] for name, array in own.items() if array.shape[-1] > 1}
-        return replace(self, **own) if own else self
+        return replace(self, **own)
 
     def normal_at(self, rows: Ints, obstacle: Ints, side: Floats, position: Floats) -> Floats:
         """Contact normals, (2, k), of particles touching an obstacle, pointing at the particle.
@@ -350,9 +352,8 @@ def obstacles(machine: Machine, far: float = 0.0) -> Obstacles:
 
 def joined(parts: Sequence[Floats], axis: int) -> Floats:
     """Join arrays along an axis; along the last one, one column stands for all."""
-    counts = {part.shape[-1] for part in parts}
-    if len(counts) > 1:
-        most = max(counts)
+    most = max([part.shape[-1] for part in parts])
+    if most > 1:
         parts = [part if part.shape[-1] == most else part.repeat(most, axis=-1) for part in parts]
     return np.concatenate(parts, axis)
 

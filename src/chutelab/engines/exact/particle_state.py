@@ -13,7 +13,7 @@ from chutelab.engines.exact.detect import BOUND, Past
 from chutelab.engines.exact.joints import NONE
 from chutelab.engines.exact.obstacles import Obstacles, along, dot, pick
 from chutelab.machine import Machine
-from chutelab.mechanics.contact import DISK_SHARE
+from chutelab.mechanics.contact import rim_share
 from chutelab.results import EVENT, KNOT, REASONS, Kind
 from chutelab.results.recorder import Recorder, StalledError
 from chutelab.util.arrays import Floats, Ints, Numbers
@@ -116,8 +116,14 @@ class State:
         self.radius, self.mass = self.each(particle.radius), self.each(particle.mass)
         self.gravity, inertia = self.each(machine.gravity), self.each(particle.inertia)
         self.fall = np.stack([np.zeros(count), -self.gravity])
-        self.falls, self.spins = bool(self.gravity[0] != 0.0), bool(inertia[0] > 0.0)
-        self.share = DISK_SHARE if self.spins else 1.0
+        self.falls = bool(self.gravity[0] != 0.0)
+        # Who turns, and whether anybody does; m*/m and m r²/I (or 0), see `rim_share`.
+        self.turns = inertia > 0.0
+        self.spins = np.count_nonzero(self.turns) > 0
+        self.share, self.lever = np.ones(count), np.zeros(count)
+        if self.spins:
+            self.share = rim_share(self.radius, self.mass, inertia)
+            self.lever = 1.0 / self.share - 1.0
         start = machine.releases
         self.released = start.t[mine]
         self.staggered = np.count_nonzero(self.released) > 0
@@ -165,6 +171,13 @@ class State:
         """Left, right, bottom and top beyond which each particle has left the scene, (4, k), m."""
         return np.stack([self.each(side) for side in self.machine.exit_box])
 
+    @cached_property
+    def up_belt(self) -> Floats:
+        """Direction in which the incoming belt runs, (2, k)."""
+        assert self.machine.pulley is not None
+        incline = self.each(self.machine.pulley.incline)
+        return np.stack([np.cos(incline), np.sin(incline)])
+
     def count_idle(self, index: Ints, dt: Floats) -> None:
         """Count events in a row that take no time, and raise rather than hang if they never end."""
         moved = dt > ROUNDING * self.age[index]
@@ -200,6 +213,14 @@ class State:
     def omega(self, index: Ints) -> Floats:
         """Angular velocities, rad/s."""
         return self.z[index] / self.radius[index] if self.spins else np.zeros(len(index))
+
+    def stop_slip(self, index: Ints, belt: Floats, w: Floats) -> Floats:
+        """Take a slip that is used up to exactly zero: off the spin, else off the pace returned."""
+        if not self.spins:
+            return belt
+        turns = self.turns[index]
+        self.z[index] = np.where(turns, belt - w, self.z[index])
+        return np.where(turns, w, belt)
 
     def contact(
         self, index: Ints, obstacle: Ints | None = None, side: Floats | None = None

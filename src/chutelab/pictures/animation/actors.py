@@ -14,14 +14,32 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.font_manager import FontProperties, findfont
+from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from PIL import ImageDraw, ImageFont
 
 from chutelab.machine import Machine
 from chutelab.pictures.plots import style
-from chutelab.pictures.plots.scenery import nominal, spread, strobe_times, subset, track_times
+from chutelab.pictures.plots.bodies import (
+    LEAST,
+    WHITE,
+    Bodies,
+    motion,
+    stream_colours,
+    stream_handles,
+    strings,
+)
+from chutelab.pictures.plots.machinery import Piece, draw_piece, pieces, points_of
+from chutelab.pictures.plots.scenery import (
+    nominal,
+    one_of_many,
+    places,
+    spread,
+    strobe_times,
+    track_times,
+)
 from chutelab.results import Recording
-from chutelab.util.arrays import Floats
+from chutelab.util.arrays import Floats, Ints
 
 Moving = tuple[Artist, Callable[[int], object]]
 """What moves, and the function that sets it to the moment of an index."""
@@ -32,11 +50,12 @@ SHAFT, HEAD = 1.3, 6.0
 SEEN = 0.75
 """Heads that a component must be long to be drawn, beside an arrow that it hardly differs from."""
 
-DRAWN = 300
-"""Particles that are drawn at most, particle 0 included."""
+DRAWN, DRAWN_MEETING = 300, 3000
+"""Particles that are drawn at most, particle 0 included; and of those that meet each other, where
+one left out would leave a hole."""
 
 SMALLEST = 6.0
-"""pt; the diameter a particle is drawn with if to scale it would be smaller."""
+"""pt; the diameter the largest particle is drawn with if to scale it would be smaller."""
 
 MARKS, HOLES = 3, 3
 """Marks on a belt across the window, and holes in the pulley; they move with it."""
@@ -48,18 +67,26 @@ def line(ax: Axes, gid: str, points: Callable[[int], Floats], **look: Any) -> Mo
     return drawn, lambda index: drawn.set_data(*points(index).T)
 
 
-def disks(
-    ax: Axes, gid: str, points: Callable[[int], Floats], radius: float, color: str, edge: float
-) -> Moving:
-    """Return disks to scale (m), or of `SMALLEST` size, with a white edge (pt)."""
-    size = max(_points(ax, 2.0 * radius), SMALLEST)
-    return line(ax, gid, points, ls="none", marker="o", color=color, ms=size, mew=edge, mec="white")
+def bodies(
+    ax: Axes,
+    recording: Recording,
+    particles: Ints,
+    times: Floats,
+    gid: str,
+    color: str,
+    edge: float,
+) -> list[Moving]:
+    """Return particles to scale, or larger so as to be seen, with a white edge (pt).
 
-
-def _points(ax: Axes, length: float) -> float:
-    """Return how many pt a length (m) is in the picture."""
-    pixels = length * ax.get_window_extent().width / float(np.ptp(ax.get_xlim()))
-    return pixels * 72.0 / ax.figure.dpi
+    Where there are so many that all are to be seen together, they are not made larger.
+    """
+    few = recording.count <= DRAWN or not recording.machine.interact
+    least = SMALLEST if few and not one_of_many(recording) else LEAST
+    drawn = Bodies(ax, recording, particles, gid, color, least=least, edge=edge, animated=True)
+    position, angle = motion(recording, particles, times)
+    first, *others = drawn.artists
+    moving: list[Moving] = [(first, lambda index: drawn.move(position[index], angle[index]))]
+    return moving + [(artist, lambda _: None) for artist in others]
 
 
 def trail(ax: Axes, recording: Recording, times: Floats, reach: float) -> Moving:
@@ -104,7 +131,7 @@ def arrows(ax: Axes, position: Floats, velocity: Floats, length: float) -> Movin
         animated=True,
     )
     # Components are drawn where there are two that can be told from the whole.
-    two = length * np.abs(velocity).min(axis=1) > SEEN * HEAD / _points(ax, 1.0)
+    two = length * np.abs(velocity).min(axis=1) > SEEN * HEAD / points_of(ax, 1.0)
 
     def show(index: int) -> None:
         vx, vy = velocity[index]
@@ -114,23 +141,47 @@ def arrows(ax: Axes, position: Floats, velocity: Floats, length: float) -> Movin
     return drawn, show
 
 
-def crowd(ax: Axes, recording: Recording, times: Floats, reach: float) -> tuple[list[Moving], str]:
-    """Return the other particles, evenly thinned out to `DRAWN`, and how many they are, in words.
+def crowd(
+    ax: Axes, recording: Recording, times: Floats, reach: float
+) -> tuple[list[Moving], list[Line2D]]:
+    """Return the other particles, in the colours of their streams, and what a legend says of them.
 
-    Trails reach back `reach` seconds of the recording, to the picture before at least; 0: there are
-    none.
+    They are evenly thinned out to `DRAWN`, those that meet to `DRAWN_MEETING`. Trails reach back
+    `reach` seconds of the recording, to the picture before at least; 0: there are none, nor are
+    there of more than `DRAWN`.
     """
     first, last = recording.ends()
     during = np.flatnonzero(recording.released)[(first["t"] <= times[-1]) & (last["t"] >= times[0])]
     others = during[during != 0]
-    particles = others[spread(len(others), DRAWN - 1)]
+    most = DRAWN_MEETING if recording.machine.interact else DRAWN
+    particles = others[spread(len(others), most - 1)]
     thinned = len(particles) < len(others)
     of_all = f"{recording.count:,}"
     said = f"{len(particles) + 1} of {of_all}" if thinned else f"{of_all} particles"
+    streams, stream = recording.machine.streams, recording.machine.releases.stream
+    if len(streams) == 1:
+        dot: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6.0, "color": style.STREAM}
+        handles = [Line2D([], [], **dot, label=said)] if recording.count > 1 else []
+    else:
+        handles = stream_handles(recording.machine)
     if not len(particles):
-        return [], said
-    positions = subset(recording, particles).at(times)[0]
+        return [], handles
     since = np.searchsorted(times, times - reach)
+    moving: list[Moving] = []
+    for i, color in enumerate(stream_colours(len(streams))):
+        own = particles[stream[particles] == i]
+        if not len(own):
+            continue
+        gid = "crowd" if len(streams) == 1 else f"crowd {streams[i]}"
+        # Their white edges tell disks apart where they overlap.
+        moving += bodies(ax, recording, own, times, gid, color, WHITE)
+        if reach and len(particles) < DRAWN:
+            moving.insert(0, _trails(ax, places(recording, own, times), since, color, gid))
+    return moving, handles
+
+
+def _trails(ax: Axes, positions: Floats, since: Ints, color: str, gid: str) -> Moving:
+    """Return the ways of particles from the pictures `since`, (T,), on; positions are (T, n, 2)."""
 
     def behind(index: int) -> Floats:
         paths = positions[max(0, min(since[index], index - 1)) : index + 1]
@@ -138,18 +189,36 @@ def crowd(ax: Axes, recording: Recording, times: Floats, reach: float) -> tuple[
         gaps = np.full((1, *paths.shape[1:]), np.nan)
         return np.concatenate([paths, gaps]).swapaxes(0, 1).reshape(-1, 2)
 
-    # Their white edges tell disks apart where they overlap.
-    radius = recording.particle.radius
-    moving = [disks(ax, "crowd", lambda index: positions[index], radius, style.STREAM, 0.8)]
-    if reach:
-        light = style.tint(style.STREAM, 0.5)
-        moving.insert(0, line(ax, "trails", behind, color=light, lw=1.0))
-    return moving, said
+    light = style.tint(color, 0.5)
+    return line(ax, gid.replace("crowd", "trails"), behind, color=light, lw=1.0)
+
+
+def strung(ax: Axes, recording: Recording, times: Floats) -> list[Moving]:
+    """Return the strings, if there are any."""
+    if not recording.machine.threads:
+        return []
+    paths, gap = strings(recording, times), np.full((1, 2), np.nan)
+
+    def joined(index: int) -> Floats:
+        return np.concatenate([part for path in paths(index) for part in (path, gap)])
+
+    return [line(ax, "strings", joined, color=style.MUTED, lw=1.0)]
+
+
+def gates(ax: Axes, machine: Machine, times: Floats) -> list[Moving]:
+    """Return the pieces that are not always there: each is seen while it is."""
+
+    def shown(piece: Piece) -> Moving:
+        drawn = draw_piece(ax, machine, piece, animated=True)
+        there = (times >= piece.appears) & (times < piece.vanishes)
+        return drawn, lambda index: drawn.set_visible(bool(there[index]))
+
+    return [shown(piece) for piece in pieces(machine) if piece.gate]
 
 
 def drives(ax: Axes, machine: Machine, times: Floats) -> list[Moving]:
-    """Return marks that run with the belts, and holes that turn with the pulley at v0/R."""
-    segments, pulley = machine.segments, machine.pulley
+    """Return marks that run with belts, and holes that turn with pulleys and rollers at v/R."""
+    segments, arcs, pulley = machine.segments, machine.arcs, machine.pulley
     spacing = float(np.ptp(ax.get_xlim())) / MARKS
 
     def marks(index: int) -> Floats:
@@ -158,19 +227,32 @@ def drives(ax: Axes, machine: Machine, times: Floats) -> list[Moving]:
             shift = (segments.speed[i] * times[index]) % spacing
             along = np.arange(shift, segments.length[i], spacing)
             found.append(segments.start[i] + along[:, None] * segments.tangent[i])
+        for i in np.flatnonzero((arcs.speed != 0.0) & ~arcs.whole):
+            # Clockwise from its last end.
+            shift = (arcs.speed[i] * times[index]) % spacing
+            along = np.arange(shift, arcs.radius[i] * arcs.extent[i], spacing)
+            angle = arcs.begin[i] + arcs.extent[i] - along / arcs.radius[i]
+            around = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+            found.append(arcs.center[i] + arcs.radius[i] * around)
         return np.concatenate(found)
 
     dots: dict[str, Any] = {"ls": "none", "marker": "o", "mew": 0.0}
     moving = [line(ax, "marks", marks, color="white", ms=3.2, **dots)]
-    if pulley is None:
-        return moving
-    turned = pulley.speed * times / pulley.radius
-    # Clockwise from the top.
-    angles = turned[:, None] + 2.0 * np.pi / HOLES * np.arange(HOLES)
-    holes = 0.6 * pulley.radius * np.stack([np.sin(angles), np.cos(angles)], axis=-1)
-    size = min(_points(ax, 0.3 * pulley.radius), SMALLEST)
-    turning = line(ax, "holes", lambda index: holes[index], color=style.STEEL, ms=size, **dots)
-    return [turning, *moving]
+
+    def turning(gid: str, center: Floats, radius: float, speed: float) -> Moving:
+        turned = speed * times / radius
+        # Clockwise from the top.
+        angles = turned[:, None] + 2.0 * np.pi / HOLES * np.arange(HOLES)
+        holes = center + 0.6 * radius * np.stack([np.sin(angles), np.cos(angles)], axis=-1)
+        size = min(points_of(ax, 0.3 * radius), SMALLEST)
+        return line(ax, gid, lambda index: holes[index], color=style.STEEL, ms=size, **dots)
+
+    if pulley is not None:
+        moving.insert(0, turning("holes", np.zeros(2), pulley.radius, pulley.speed))
+    for i in np.flatnonzero((arcs.speed != 0.0) & arcs.whole):
+        gid = f"holes {machine.surfaces[arcs.surface[i]]}"
+        moving.append(turning(gid, arcs.center[i], float(arcs.radius[i]), float(arcs.speed[i])))
+    return moving
 
 
 class Writing:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan2, degrees, floor, hypot, log10
+from math import atan2, degrees, floor, hypot, isfinite, log10
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from chutelab.machine import Machine
 from chutelab.pictures.plots import Window
-from chutelab.pictures.plots.scenery import STRUCK, action, nominal
+from chutelab.pictures.plots.scenery import STRUCK, action, nominal, one_of_many
 from chutelab.pictures.plots.style import quantity
 from chutelab.results import PARTICLES, Kind, Recording
 from chutelab.util.arrays import Bools, Floats, Ints
@@ -32,24 +32,38 @@ def contact_normal(machine: Machine, event: Any) -> Floats:
 
     It comes from where the particle is: a fixed step's velocities have gravity in them, too.
     """
-    position, segments = event["position"], machine.segments
+    position, segments, arcs = event["position"], machine.segments, machine.arcs
     mine = segments.surface == event["surface"]
     start, tangent = segments.start[mine], segments.tangent[mine]
     along = np.einsum("sd,sd->s", position - start, tangent)
     foot = start + np.clip(along, 0.0, segments.length[mine])[:, None] * tangent
+    across = np.stack([-tangent[:, 1], tangent[:, 0]], axis=-1)
+    beyond = (along < 0.0) | (along > segments.length[mine])
+    if len(arcs.surface):
+        bent = arcs.surface == event["surface"]
+        radial = position - arcs.center[bent]
+        radial /= np.hypot(*radial.T)[:, None]
+        past = np.mod(np.arctan2(radial[:, 1], radial[:, 0]) - arcs.begin[bent], 2.0 * np.pi)
+        off = past > arcs.extent[bent]
+        ends = np.stack([end[bent] for end in arcs.ends])
+        nearer = np.hypot(*np.moveaxis(ends - position, 2, 0)).argmin(axis=0)
+        rim = arcs.center[bent] + arcs.radius[bent][:, None] * radial
+        rim[off] = ends[nearer, np.arange(len(nearer))][off]
+        foot, across = np.concatenate([foot, rim]), np.concatenate([across, radial])
+        beyond = np.concatenate([beyond, off])
     away = position - foot
     gap = np.hypot(*away.T)
     pulley, name = machine.pulley, machine.surfaces[event["surface"]]
     if pulley is not None and name == "incoming":
-        rim = np.hypot(*position)
-        if abs(rim - pulley.radius) < gap.min():
-            return np.asarray(position / rim)
+        out = np.hypot(*position)
+        if abs(out - pulley.radius) < gap.min():
+            return np.asarray(position / out)
     nearest = int(np.argmin(gap))
-    beyond = not 0.0 <= along[nearest] <= segments.length[mine][nearest]
-    if beyond and gap[nearest] > 0.5 * machine.particle.radius > 0.0:
+    radius = np.broadcast_to(machine.particle.radius, machine.count)[event["particle"]]
+    if beyond[nearest] and gap[nearest] > 0.5 * radius > 0.0:
         return np.asarray(away[nearest] / gap[nearest])
-    normal = np.array([-tangent[nearest][1], tangent[nearest][0]])
-    return normal if normal @ event["velocity_before"] < 0.0 else -normal
+    normal = across[nearest]
+    return np.asarray(normal if normal @ event["velocity_before"] < 0.0 else -normal)
 
 
 def sentence(recording: Recording, event: Any) -> str:
@@ -61,7 +75,8 @@ def sentence(recording: Recording, event: Any) -> str:
         f"{hypot(*event[key]):.3g} m/s" for key in ("velocity_before", "velocity_after")
     )
     angle = degrees(atan2(*event["position"]))
-    past = "at the top" if angle < 5e-4 else f"{angle:.1f}° past the top"
+    past = f"{abs(angle):.1f}° {'past' if angle > 0.0 else 'before'} the top"
+    past = "at the top" if abs(angle) < 5e-4 else past
     pulley = f"leaves the drive pulley {past}, at {after}"
     # The event keeps the velocity of its `particle` only.
     hits = f"hits particle {int(event['other'])} at {before}"
@@ -181,6 +196,8 @@ def film(
     events = recording.events
     mine = events[(events["particle"] == 0) | (events["other"] == 0)]
     mine = mine[(mine["t"] >= begin) & (mine["t"] <= end)]
+    if one_of_many(recording):
+        mine = mine[:0]
     held = _held(mine)
     stops = mine["t"][held]
     times = np.linspace(begin, end, max(2, round((end - begin) / step) + 1))
@@ -191,7 +208,10 @@ def film(
     hold = min(HOLD_TOTAL // max(len(stops), 1), HOLD_LONGEST)
     delays = np.where(np.isin(times, stops), hold, delay)
     delays[-1] = max(delays[-1], TAIL)
-    words = _words(recording, mine, held, times, slow)
+    if one_of_many(recording):
+        words = _gates(recording.machine, times, slow)
+    else:
+        words = _words(recording, mine, held, times, slow)
     return tuple(Moment(float(t), int(d), w) for t, d, w in zip(times, delays, words, strict=True))
 
 
@@ -199,17 +219,22 @@ def span(recording: Recording, shown: Window) -> tuple[float, float]:
     """Return the times (s) between which to film.
 
     From when particle 0 comes into the window to the end of the recording, but of a stream for no
-    longer than `LIVES` times particle 0 takes.
+    longer than `LIVES` times particle 0 takes, or the first of each of several streams.
     """
     track = recording.track(0)
     first, last = float(track["t"][0]), float(track["t"][-1])
     times = np.linspace(first, max(action(recording)[0], first), 400)
-    inset = max(EDGE, recording.particle.radius / max(shown.width, shown.height))
+    radius = float(np.broadcast_to(recording.particle.radius, recording.count)[0])
+    inset = max(EDGE, radius / max(shown.width, shown.height))
     all_of_it = shown.padded(*[-inset] * 4)
     inside = all_of_it.holds(nominal(recording, times)[0])
     begin = float(times[np.argmax(inside)]) if inside.any() else first
     end = float(recording.knots["t"].max())
-    return begin, min(end, begin + LIVES * (last - begin)) if last > begin else end
+    if last <= begin or one_of_many(recording):
+        return begin, end
+    firsts = np.unique(recording.machine.releases.stream, return_index=True)[1]
+    lasts = [recording.track(i)["t"][-1] for i in firsts[recording.released[firsts]].tolist()]
+    return begin, min(end, max(begin + LIVES * (last - begin), *lasts))
 
 
 def slowness(length: float) -> float:
@@ -234,6 +259,23 @@ def _held(mine: NDArray[Any]) -> Ints:
     struck = struck[np.unique(mine["t"][struck], return_index=True)[1]]
     hardest = np.argsort(-impulse[struck], kind="stable")[:HOLDS]
     return np.asarray(struck[np.sort(hardest)])
+
+
+def _gates(machine: Machine, times: Floats, slow: float) -> list[str]:
+    """Return the caption at each time: for a while which gate opened or closed last."""
+    news = {
+        (t, f"t = {t:.3f} s: {surface_words(machine.surfaces[surface])} {what}")
+        for parts in (machine.segments, machine.arcs)
+        for clock, what in ((parts.appears, "closes"), (parts.vanishes, "opens"))
+        for t, surface in zip(clock.tolist(), parts.surface.tolist(), strict=True)
+        if isfinite(t)
+    }
+    told = sorted(news)
+    last = np.searchsorted([t for t, _ in told], times, side="right") - 1
+    return [
+        told[i][1] if i >= 0 and slow * (t - told[i][0]) <= TOLD else ""
+        for t, i in zip(times.tolist(), last.tolist(), strict=True)
+    ]
 
 
 def _words(

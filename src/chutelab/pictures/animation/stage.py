@@ -16,10 +16,12 @@ from chutelab.pictures.animation.actors import (
     Writing,
     arrows,
     bars,
+    bodies,
     crowd,
-    disks,
     drives,
+    gates,
     strobe,
+    strung,
     trail,
 )
 from chutelab.pictures.animation.moments import Moment, span
@@ -28,6 +30,7 @@ from chutelab.pictures.plots.scenery import (
     around,
     energies,
     nominal,
+    one_of_many,
     round_step,
     strobe_step,
     track_times,
@@ -125,6 +128,8 @@ def lay_out(
         raise ValueError(f"{width} x {height} pixels: allowed are at least {LEAST[0]} x {LEAST[1]}")
     if unknown := sorted(shows - set(SHOWS)):
         raise ValueError(f"show = {unknown[0]!r}: allowed are {', '.join(SHOWS)}")
+    if one_of_many(recording):
+        shows -= {"strobe", "velocity"}
     view = (0.015, 0.135, 0.675 if "energy" in shows else 0.97, 0.65 if question else 0.71)
     aspect = view[2] * width / (view[3] * height)
     pulley = recording.machine.pulley
@@ -192,13 +197,16 @@ class Stage:
         draw_analytic(view, parts)
         position, velocity = nominal(recording, times)
         reach = layout.reach(TRAIL, "trails")
-        others, how_many = crowd(view, recording, times, reach)
-        self.moving = [*drives(view, recording.machine, times), *others]
+        others, named = crowd(view, recording, times, reach)
+        self.moving = [
+            *gates(view, recording.machine, times),
+            *drives(view, recording.machine, times),
+            *strung(view, recording, times),
+            *others,
+        ]
         # What the legend names, in its order.
         dot: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6.0}
-        handles = [Line2D([], [], **dot, color=style.STRIKE, label="particle 0")]
-        if recording.count > 1:
-            handles.append(Line2D([], [], **dot, color=style.STREAM, label=how_many))
+        handles = [Line2D([], [], **dot, color=style.STRIKE, label="particle 0"), *named]
         if parts:
             # Two dashes; the line's own would not fit.
             dashes: Any = (0, (1.5, 0.85))
@@ -215,8 +223,7 @@ class Stage:
             self.moving.append(arrows(view, position, velocity, layout.arrow))
             handles.append(Line2D([], [], color=style.INK, lw=2.0, label="velocity"))
         _add_legend(view, handles, components=layout.arrow > 0.0)
-        radius, where = recording.particle.radius, position[:, None]
-        self.moving.append(disks(view, "disk", lambda i: where[i], radius, style.STRIKE, 0.4))
+        self.moving += bodies(view, recording, np.array([0]), times, "disk", style.STRIKE, 0.4)
         self.writings = self._add_text(layout, pace_words(slow), moments)
         if "energy" in shows:
             # Above the bars is room for their title, and the clock.
@@ -271,21 +278,32 @@ class Stage:
         ]
 
 
+ALWAYS = 5
+"""Entries of a legend that are there in any case."""
+
+
 def _add_legend(ax: Axes, handles: list[Line2D], *, components: bool) -> None:
-    """Name what is drawn above the scene, and last the components of the velocity."""
-    legend = ax.legend(
-        handles=handles,
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
-        ncols=6,
-        fontsize=style.SMALL,
-        frameon=False,
-        borderaxespad=0.1,
-        borderpad=0.3,
-        handlelength=1.5,
-        columnspacing=0.8,
-        handletextpad=0.3,
-    )
+    """Name what is drawn above the scene, and last the components of the velocity.
+
+    What does not fit beside the rest is left out, the last first.
+    """
+    while True:
+        legend = ax.legend(
+            handles=handles,
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.0),
+            ncols=len(handles),
+            fontsize=style.SMALL,
+            frameon=False,
+            borderaxespad=0.1,
+            borderpad=0.3,
+            handlelength=1.5,
+            columnspacing=0.8,
+            handletextpad=0.3,
+        )
+        if len(handles) <= ALWAYS or legend.get_window_extent().x1 <= ax.get_window_extent().x1:
+            break
+        handles, components = handles[:-1], False
     for place, (name, colour) in enumerate(style.VELOCITY.items() if components else ()):
         ax.annotate(
             f"$v_{name[1]}$",

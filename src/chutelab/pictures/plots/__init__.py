@@ -2,7 +2,9 @@
 
 ===============  ==================================================================================
 `style`          colours, text sizes, units; a figure that shows itself
-`scenery`        the machine to scale, and the part of the world in which something happens
+`scenery`        what of a recording is worth drawing: particles, times, part of the world
+`machinery`      the machine to scale, with names
+`bodies`         particles to scale, turned as they are, strings
 `panels`         tracks, parabola, residual, velocity, energy ledger
 `figure`         the overlay; the paper's figures
 `strobe`         a still for print: where the particle is at round times
@@ -15,6 +17,7 @@ Figures are drawn by Agg through `Figure` objects: no pyplot, no global state.
 """
 
 from chutelab.pictures.plots.figure import overlay
+from chutelab.pictures.plots.machinery import draw_scene
 from chutelab.pictures.plots.panels import (
     Arc,
     analytic_of,
@@ -26,7 +29,7 @@ from chutelab.pictures.plots.panels import (
     draw_velocity,
     flight,
 )
-from chutelab.pictures.plots.scenery import Window, draw_scene, window_of
+from chutelab.pictures.plots.scenery import Window, window_of
 from chutelab.pictures.plots.strobe import strobe
 
 __all__ = [

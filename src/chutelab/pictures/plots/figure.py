@@ -8,12 +8,15 @@ from __future__ import annotations
 from pathlib import Path
 from textwrap import fill
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.gridspec import SubplotSpec
 
 from chutelab.pictures.plots import style
+from chutelab.pictures.plots.bodies import draw_bodies, stream_handles
+from chutelab.pictures.plots.machinery import HALO, draw_scene
 from chutelab.pictures.plots.panels import (
-    STREAM_TRACKS,
     Arc,
     analytic_of,
     draw_analytic,
@@ -21,8 +24,9 @@ from chutelab.pictures.plots.panels import (
     draw_residual,
     draw_tracks,
     draw_velocity,
+    drawn_tracks,
 )
-from chutelab.pictures.plots.scenery import draw_scene, window_of
+from chutelab.pictures.plots.scenery import bodily, one_of_many, places, window_of
 from chutelab.pictures.plots.style import Picture
 from chutelab.results import Recording
 from chutelab.theory import Transfer
@@ -49,7 +53,9 @@ def overlay(
     Returns
     -------
     Figure
-        Scene with tracks, residual beneath it, velocity and energy ledger beside it.
+        Scene with tracks, residual beneath it, velocity and energy ledger beside it. Where nothing
+        is known analytically, of many particles, boxes or strings: in place of the residual all
+        particles at four moments.
 
     Raises
     ------
@@ -59,14 +65,19 @@ def overlay(
     if prediction is None:
         prediction = recording.prediction
     figure = Picture(SIZE)
-    grid = figure.add_gridspec(
-        2, 1, height_ratios=(4.2, 1.0), left=0.06, right=0.56, top=0.88, bottom=0.08, hspace=0.28
-    )
-    side = figure.add_gridspec(2, 1, left=0.63, right=0.985, top=0.88, bottom=0.155, hspace=0.34)
     parts, start = analytic_of(recording, prediction)
+    all_of_them = not parts and bodily(recording)
+    grid = figure.add_gridspec(
+        2, 1, height_ratios=(2.6 if all_of_them else 4.2, 1.0), left=0.06, right=0.56, top=0.88,
+        bottom=0.02 if all_of_them else 0.08, hspace=0.28,
+    )  # fmt: skip
+    side = figure.add_gridspec(2, 1, left=0.63, right=0.985, top=0.88, bottom=0.155, hspace=0.34)
     view = figure.add_subplot(grid[0])
-    draw_view(view, recording, parts)
-    draw_residual(figure.add_subplot(grid[1]), recording, parts, start, str(prediction.reason))
+    draw_view(view, recording, parts, bodies=all_of_them)
+    if all_of_them:
+        draw_moments(figure, grid[1], recording)
+    else:
+        draw_residual(figure.add_subplot(grid[1]), recording, parts, start, str(prediction.reason))
     draw_velocity(figure.add_subplot(side[0]), recording, parts, start)
     books = draw_ledger(figure.add_subplot(side[1]), recording)
     figure.legend(
@@ -81,20 +92,73 @@ def overlay(
     )
     figure.headline(0.06, 0.965, recording.title)
     said = "one particle" if recording.count == 1 else f"{recording.count:,} particles"
-    if recording.count > STREAM_TRACKS:
-        said += f", {STREAM_TRACKS} tracks drawn"
+    drawn = len(drawn_tracks(recording))
+    if drawn < recording.count:
+        said += f", {drawn} tracks drawn"
     figure.remark(0.985, 0.965, f"engine {recording.engine}, {said}", ha="right", va="center")
     figure.write(path)
     return figure
 
 
-def draw_view(ax: Axes, recording: Recording, parts: tuple[Arc, ...]) -> Axes:
-    """Draw the scene to scale with tracks, strobe dots and the analytic parabola, and a legend."""
+def draw_view(
+    ax: Axes, recording: Recording, parts: tuple[Arc, ...], *, bodies: bool = False
+) -> Axes:
+    """Draw the scene to scale with tracks, strobe dots and the analytic parabola, and a legend.
+
+    With `bodies` also the particles, at the last moment at which half of them or more are there.
+    """
     style.dress(ax, "x, m", "y, m")
     draw_scene(ax, recording.machine, window_of(recording))
-    draw_tracks(draw_analytic(ax, parts), recording)
-    style.legend_above(ax, 4)
+    draw_analytic(ax, parts)
+    draw_tracks(ax, recording, marks=not (bodies and one_of_many(recording)))
+    handles = ax.get_legend_handles_labels()[0]
+    if bodies:
+        t = fullest(recording)
+        draw_bodies(ax, recording, t)
+        ax.set_xlabel(f"x, m    (particles at t = {t:.3g} s)")
+    if len(recording.machine.streams) > 1:
+        handles += stream_handles(recording.machine)
+    style.legend_above(ax, 4, handles)
     return ax
+
+
+def fullest(recording: Recording) -> float:
+    """Return the last of some even times, s, at which half of the most particles are in sight."""
+    clock = recording.knots["t"]
+    times = np.linspace(clock.min(), clock.max(), 61)
+    released = np.flatnonzero(recording.released)
+    there = window_of(recording).holds(places(recording, released, times)).sum(axis=1)
+    return float(times[np.flatnonzero(2 * there >= there.max())[-1]])
+
+
+MOMENTS = 4
+"""Moments at which all particles are shown beneath the scene."""
+
+GRIDS = ((1, 4), (2, 2), (4, 1))
+"""Rows and columns in which they may stand."""
+
+
+def draw_moments(figure: Picture, place: SubplotSpec, recording: Recording) -> None:
+    """Draw the scene small, without names, with all particles, at even times from first to last."""
+    window, clock = window_of(recording), recording.knots["t"]
+    room = place.get_position(figure)
+    size = np.array([room.height * SIZE[1], room.width * SIZE[0]])
+    grid = max(GRIDS, key=lambda grid: float((size / grid / (window.height, window.width)).min()))
+    cells = place.subgridspec(*grid, wspace=0.08, hspace=0.2)
+    times = np.linspace(clock.min(), clock.max(), MOMENTS)
+    for row, column in np.ndindex(*grid):
+        t = times[row * grid[1] + column]
+        ax = figure.add_subplot(cells[row, column])
+        draw_scene(ax, recording.machine, window, small=True)
+        draw_bodies(ax, recording, t)
+        ax.set(xticks=[], yticks=[])
+        for spine in ax.spines.values():
+            spine.set_color(style.STEEL_LIGHT)
+        said = ax.annotate(
+            f"{t:.3g} s", (0.0, 1.0), xycoords="axes fraction", xytext=(3.0, -3.0),
+            textcoords="offset points", va="top", gid="moment",
+        )  # fmt: skip
+        said.set(fontsize=style.SMALL, path_effects=HALO, zorder=8.0)
 
 
 WIDE = 185

@@ -9,11 +9,11 @@ from matplotlib.axes import Axes
 
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.figure import SIZE
+from chutelab.pictures.plots.machinery import draw_scene
 from chutelab.pictures.plots.panels import analytic_of, draw_analytic
 from chutelab.pictures.plots.scenery import (
     FAR,
     around,
-    draw_scene,
     nominal,
     struck_by_nominal,
     track_times,

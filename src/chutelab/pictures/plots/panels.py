@@ -16,9 +16,11 @@ from numpy.typing import ArrayLike
 
 from chutelab.machine.releases import on_belt, release_velocity
 from chutelab.pictures.plots import style
+from chutelab.pictures.plots.bodies import stream_colours
 from chutelab.pictures.plots.scenery import (
     energies,
     nominal,
+    one_of_many,
     spread,
     strobe_step,
     strobe_times,
@@ -32,7 +34,7 @@ from chutelab.results.quantities import measure
 from chutelab.scene import Scene
 from chutelab.theory import Transfer
 from chutelab.theory.separation import separation
-from chutelab.util.arrays import Floats
+from chutelab.util.arrays import Floats, Ints
 
 
 @dataclass(frozen=True)
@@ -121,8 +123,9 @@ def flight(parts: tuple[Arc, ...], times: ArrayLike) -> tuple[Floats, Floats]:
     return position, velocity
 
 
-STREAM_TRACKS = 60
-"""Tracks of a stream that are drawn; more would be one blot."""
+STREAM_TRACKS, FEW_TRACKS = 60, 12
+"""Tracks that are drawn of a stream, and of many particles that nothing brings one after the other;
+more would be one blot."""
 
 ROUNDING = 2.0**-52
 """m; the spacing of floating-point numbers at 1 m."""
@@ -144,24 +147,36 @@ def analytic_of(
     return arcs(recording.prediction if prediction is None else prediction, recording.scene), left
 
 
-def draw_tracks(ax: Axes, recording: Recording) -> Axes:
-    """Draw particle 0's track, strobe dots at round times and impact markers, over the stream's.
+def drawn_tracks(recording: Recording) -> Ints:
+    """Return the particles whose tracks are drawn; particle 0 is the first."""
+    chosen = spread(recording.count, FEW_TRACKS if one_of_many(recording) else STREAM_TRACKS)
+    return chosen[recording.released[chosen]]
 
-    Of a stream, up to `STREAM_TRACKS` tracks are drawn, thin and translucent.
+
+def draw_tracks(ax: Axes, recording: Recording, *, marks: bool = True) -> Axes:
+    """Draw particle 0's track over the others', with strobe dots at round times and impact markers.
+
+    The others' are thin and translucent, each in the colour of its stream. Without `marks` there
+    are neither dots nor markers.
     """
     lines = []
-    chosen = spread(recording.count, STREAM_TRACKS)[1:]
-    for i in chosen[recording.released[chosen]]:
+    chosen = drawn_tracks(recording)[1:]
+    machine = recording.machine
+    colours = stream_colours(len(machine.streams))
+    for i in chosen:
         one = subset(recording, [i])
         knots = np.unique(one.knots["t"])
         times = np.union1d(np.linspace(knots[0], knots[-1], 200), knots[:: len(knots) // 200 + 1])
         lines.append(one.at(times)[0][:, 0])
     if lines:
-        tracks = LineCollection(lines, colors=style.STREAM, lw=0.8, alpha=0.35, zorder=3.0)
+        hues = [colours[stream] for stream in machine.releases.stream[chosen]]
+        tracks = LineCollection(lines, colors=hues, lw=0.8, alpha=0.35, zorder=3.0)
         tracks.set_gid("stream")
         ax.add_collection(tracks, autolim=False)
     position, _ = nominal(recording, track_times(recording))
     ax.plot(*position.T, color=style.TRACK, lw=1.6, zorder=5.0, gid="track", label="track")
+    if not marks:
+        return ax
     dots, _ = nominal(recording, strobe_times(recording))
     said = f"every {strobe_step(recording):g} s"
     ax.plot(*dots.T, **style.RINGS, ms=5.0, zorder=6.0, gid="strobe", label=said)

@@ -1,8 +1,4 @@
-"""The machine drawn to scale: pulley, belts, plate and free surfaces, with their names.
-
-Also here: which part of the world is shown (where something happens), and which times and parts of
-a recording are worth drawing.
-"""
+"""What of a recording is worth drawing: particles, times, energies, and the part of the world."""
 
 from __future__ import annotations
 
@@ -12,13 +8,8 @@ from math import floor, isnan, log10
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.patches import Circle
-from matplotlib.patheffects import withStroke
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.machine import Machine
-from chutelab.pictures.plots import style
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.quantities import measure
 from chutelab.util.arrays import Bools, Floats, Ints
@@ -136,13 +127,11 @@ def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
     """
     books = recording.energy_at(times)
     first, _ = recording.ends()
-    order, who = np.argsort(first["t"], kind="stable"), np.flatnonzero(recording.released)
-    at_release = np.concatenate(
-        [[0.0], np.cumsum(sum(recording.energies(first[order], who[order])))]
-    )
+    order = np.argsort(first["t"], kind="stable")
+    at_release = np.concatenate([[0.0], np.cumsum(sum(recording.energies(first[order])))])
     released = np.searchsorted(first["t"][order], times, side="right")
-    masses = np.broadcast_to(recording.particle.mass, recording.count)[who][order]
-    weight = np.concatenate([[0.0], np.cumsum(masses)])[released] * recording.gravity
+    mass = np.broadcast_to(recording.particle.mass, recording.count)[recording.released][order]
+    weight = np.concatenate([[0.0], np.cumsum(mass)])[released] * recording.gravity
     heights = recording.knots["position"][:, 1]
     stays = recording.ended != REASONS.index("exit")
     staying = heights[np.repeat(stays, np.diff(recording.offsets))]
@@ -158,6 +147,37 @@ def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
 
 MANY = 60
 """Particles from which on some may stray out of the window."""
+
+
+def one_of_many(recording: Recording) -> bool:
+    """Tell whether what all particles do matters, not the way of particle 0.
+
+    So it is where there are many, and no conveyor brings one after the other.
+    """
+    return recording.count > MANY and recording.machine.pulley is None
+
+
+def bodily(recording: Recording) -> bool:
+    """Tell whether all particles are to be seen: `one_of_many`, boxes, polygons, or on strings."""
+    machine = recording.machine
+    corners = any(outline is not None for outline in machine.outlines)
+    return one_of_many(recording) or corners or bool(machine.threads)
+
+
+def stays(recording: Recording) -> Bools:
+    """Tell which particles are still to be seen after their end, (N,): those of many that lie."""
+    return np.asarray((recording.ended == REASONS.index("settled")) & (recording.count > MANY))
+
+
+def places(recording: Recording, particles: Sequence[int] | Ints, times: Floats) -> Floats:
+    """Return where some particles are to be seen, (T, n, 2), m; NaN where they are not."""
+    some = subset(recording, particles)
+    position = some.at(times)[0]
+    for i in np.flatnonzero(stays(recording)[np.asarray(particles, dtype=np.int64)]).tolist():
+        last = some.track(i)[-1]
+        position[times > last["t"], i] = last["position"]
+    return position
+
 
 NEARBY, FAR = 0.35, 1.0
 """Shares of the action's size: around it within the first the ends of surfaces are shown, within
@@ -200,6 +220,15 @@ class Window:
         x, y = 0.5 * (self.left + self.right), 0.5 * (self.bottom + self.top)
         return Window(x - width / 2, x + width / 2, y - height / 2, y + height / 2)
 
+    def joined(self, other: Window) -> Window:
+        """Return the smallest window that holds both."""
+        return Window(
+            min(self.left, other.left),
+            max(self.right, other.right),
+            min(self.bottom, other.bottom),
+            max(self.top, other.top),
+        )
+
     def holds(self, points: Floats) -> Bools:
         """Tell which points, (..., 2), lie inside."""
         x, y = points[..., 0], points[..., 1]
@@ -226,27 +255,35 @@ def window_of(recording: Recording) -> Window:
 
     It holds particle 0 from separation (or release, without one) to its landing (or last impact),
     the pulley, and ends of surfaces that are near; of what comes later, and of nearly all impacts
-    of the other particles, as much as does not make all else small.
+    of the other particles, as much as does not make all else small. Where particle 0 is not the
+    one that matters, see `bodily`, or there are several streams, it holds all particles alike.
     """
     path, tail = _path(recording)
-    machine = recording.machine
-    points = [path]
+    machine, crowd = recording.machine, _crowd(recording)
+    together = bodily(recording) or len(machine.streams) > 1
+    points = [np.concatenate([path, crowd]) if together else path]
+    for thread in machine.threads:
+        points += [np.array([thread.anchor]), recording.track(thread.particle)["position"]]
     if machine.pulley is not None:
         corner = np.full(2, machine.pulley.radius)
         points.append(np.array([-corner, corner]))
     core = around(np.concatenate(points))
     far = core.padded(*[FAR] * 4)
-    later = np.concatenate([tail, _crowd(recording)])
+    later = np.concatenate([tail, crowd])
     points.append(np.clip(later, (far.left, far.bottom), (far.right, far.top)))
     near = around(np.concatenate(points)).padded(*[NEARBY] * 4)
     # The incoming belt, segment 0, may be cut off anywhere.
     free = slice(0 if machine.pulley is None else 1, None)
-    ends = np.concatenate([machine.segments.start[free], machine.segments.end[free]])
-    points.append(ends[near.holds(ends)])
+    ends = [machine.segments.start[free], machine.segments.end[free], machine.arcs.corners]
+    points.append(np.concatenate(ends)[near.holds(np.concatenate(ends))])
     # Names stand left of the pulley and behind the plate.
     left = 0.06 if machine.pulley is None else 0.24
     right = 0.22 if "plate" in machine.surfaces else 0.06
-    return around(np.concatenate(points)).padded(left, right, 0.10, 0.12)
+    held = np.concatenate(points)
+    # Large particles are seen whole.
+    reach = 1.1 * float(np.max(machine.particle.radius))
+    whole = around(np.concatenate([held - reach, held + reach]))
+    return around(held).padded(left, right, 0.10, 0.12).joined(whole)
 
 
 def _path(recording: Recording) -> tuple[Floats, Floats]:
@@ -289,107 +326,3 @@ def around(points: Floats) -> Window:
     (left, bottom), (right, top) = points.min(axis=0), points.max(axis=0)
     least = 0.01 * max(right - left, top - bottom) or 0.1
     return Window(left, max(right, left + least), bottom, max(top, bottom + least))
-
-
-HALO = [withStroke(linewidth=3.0, foreground="white")]
-"""Keeps text readable where a line runs behind it."""
-
-TWO_LINES = 32.0
-"""pt; height of two lines of small text."""
-
-
-def draw_scene(ax: Axes, machine: Machine, window: Window | None = None) -> Axes:
-    """Draw the machine's surfaces to scale, with their names.
-
-    The limits of the axes are set to hold the window at equal scales; by default all surfaces.
-    """
-    if window is None:
-        ends = np.concatenate([machine.segments.start, machine.segments.end])
-        if machine.pulley is not None:
-            ends = np.concatenate([ends, [[machine.pulley.radius, -machine.pulley.radius]]])
-        window = around(ends).padded(0.1, 0.22, 0.1, 0.12)
-    box = ax.get_window_extent()
-    shown = window.fitted(box.width / box.height)
-    ax.set(xlim=(shown.left, shown.right), ylim=(shown.bottom, shown.top))
-    ax.set_aspect("equal", adjustable="box")
-    if machine.pulley is not None:
-        face = {"facecolor": style.STEEL_LIGHT, "edgecolor": style.BELT, "linewidth": 2.0}
-        ax.add_patch(Circle((0.0, 0.0), machine.pulley.radius, **face))
-        ax.plot(0.0, 0.0, "+", color=style.STEEL, ms=7.0, zorder=1.5)
-    labelled: set[int] = set()
-    for i, surface in enumerate(machine.segments.surface):
-        start, end = machine.segments.start[i], machine.segments.end[i]
-        name = machine.surfaces[surface]
-        speed = float(machine.segments.speed[i])
-        belt = name in ("incoming", "outgoing") or speed != 0.0
-        color = style.BELT if belt else style.INK
-        (drawn,) = ax.plot(*np.array([start, end]).T, color=color, lw=2.6, zorder=2.0)
-        drawn.set(solid_capstyle="butt", gid=f"surface {name}")
-        part = shown.clip(start, end)
-        if part is not None and surface not in labelled:
-            labelled.add(int(surface))
-            _label(ax, machine, i, part, shown, color)
-    return ax
-
-
-def _label(
-    ax: Axes,
-    machine: Machine,
-    segment: int,
-    part: tuple[Floats, Floats],
-    shown: Window,
-    color: str,
-) -> None:
-    """Name a surface at its part that is shown, on the side where no particle is expected."""
-    name = machine.surfaces[machine.segments.surface[segment]]
-    speed = float(machine.segments.speed[segment])
-    tangent = machine.segments.tangent[segment]
-    low, high = sorted(part, key=lambda point: (point[1], point[0]))
-    gap = 7.0
-    if name == "plate":
-        angle = float(np.degrees(np.arctan2(-tangent[0], tangent[1]))) + 0.0  # no -0
-        text = f"plate, {angle:.3g}°\nε = {machine.segments.restitution[segment]:.3g}"
-        where, offset = high, (gap, 0.0)
-        # Two lines need room above where they begin.
-        room = TWO_LINES * ax.figure.dpi / 72.0 * shown.height / ax.get_window_extent().height
-        if angle > 0.0 and high[1] > shown.top - room:
-            where = low + (high - low) * max(0.0, shown.top - room - low[1]) / (high[1] - low[1])
-        across, along = "left", "top" if angle <= 0.0 else "bottom"
-    elif name == "incoming":
-        text = f"incoming belt\n{_motion(speed)}"
-        where, offset = np.array([shown.left, part[0][1]]), (4.0, -gap)
-        across, along = "left", "top"
-    elif name == "outgoing":
-        text = f"outgoing belt, {_motion(speed)}"
-        where, offset = np.array([max(part[0][0], part[1][0]), part[0][1]]), (-6.0, -gap)
-        across, along = "right", "top"
-    else:
-        text = name if speed == 0.0 else f"{name}, {_motion(speed)}"
-        down = np.array([tangent[1], -tangent[0]])
-        down *= -1.0 if down[1] > 0.0 or (down[1] == 0.0 and down[0] < 0.0) else 1.0
-        where, offset = 0.5 * (low + high), (gap * down[0], gap * down[1])
-        across = "center" if abs(down[0]) < 0.2 else "right" if down[0] < 0.0 else "left"
-        along = "top" if down[1] < -0.2 else "center"
-    label = ax.annotate(
-        style.plain(text.replace("-", "−")),
-        (float(where[0]), float(where[1])),
-        xytext=offset,
-        textcoords="offset points",
-        fontsize=style.SMALL,
-        color=color,
-        ha=across,
-        va=along,
-        path_effects=HALO,
-        zorder=4.0,
-    )
-    # Shifted back over the edges of the axes.
-    box, frame = label.get_window_extent(), ax.get_window_extent().padded(-3.0)
-    right = max(frame.x0 - box.x0, 0.0) + min(frame.x1 - box.x1, 0.0)
-    up = max(frame.y0 - box.y0, 0.0) + min(frame.y1 - box.y1, 0.0)
-    points = 72.0 / ax.figure.dpi
-    label.xyann = (offset[0] + right * points, offset[1] + up * points)
-
-
-def _motion(speed: float) -> str:
-    arrow = "→" if speed > 0.0 else "←"
-    return f"{abs(speed):.3g} m/s {arrow}" if speed != 0.0 else "at rest"

@@ -12,8 +12,9 @@ from matplotlib.transforms import Bbox
 
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.figure import draw_view
+from chutelab.pictures.plots.machinery import HALO
 from chutelab.pictures.plots.panels import analytic_of
-from chutelab.pictures.plots.scenery import HALO, nominal, strobe_step, strobe_times
+from chutelab.pictures.plots.scenery import nominal, strobe_step, strobe_times
 from chutelab.pictures.plots.style import Picture
 from chutelab.results import Recording
 from chutelab.theory import Transfer

@@ -151,9 +151,10 @@ def note(ax: Axes, text: str) -> None:
     ax.set_title(plain(text), fontsize=SMALL, loc="right", color=MUTED)
 
 
-def legend_above(ax: Axes, columns: int) -> None:
-    """Add a legend right above axes, in one line if it fits."""
+def legend_above(ax: Axes, columns: int, handles: list[Any] | None = None) -> None:
+    """Add a legend right above axes, in one line if it fits; by default of all that has a label."""
     ax.legend(
+        handles=handles,
         loc="lower left",
         bbox_to_anchor=(-0.01, 1.0),
         ncols=columns,

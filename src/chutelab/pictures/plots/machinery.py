@@ -1,0 +1,384 @@
+"""The machine drawn to scale: pulleys, belts, plates, chutes, pegs and gates, with their names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import ceil, degrees, inf, pi, radians
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle
+from matplotlib.path import Path
+from matplotlib.patheffects import withStroke
+from matplotlib.transforms import Bbox
+
+from chutelab.machine import Machine
+from chutelab.pictures.plots import style
+from chutelab.pictures.plots.scenery import Window, around
+from chutelab.util.arrays import Floats
+
+HALO = [withStroke(linewidth=3.0, foreground="white")]
+"""Keeps text readable where a line runs behind it."""
+
+TWO_LINES = 32.0
+"""pt; height of two lines of small text."""
+
+FINE = radians(3.0)
+"""Between two points of an arc as it is drawn: off by 3e-4 of its radius at most."""
+
+GATE: dict[str, Any] = {"ls": (0, (2.2, 1.1))}
+"""How a piece that is not always there is drawn, in half its colour."""
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A straight piece of a surface, an arc or a whole circle, as it is drawn.
+
+    Attributes
+    ----------
+    surface : int
+        Index into `Machine.surfaces`.
+    index : int
+        Its own, among the segments or among the arcs.
+    points : ndarray, (P, 2)
+        m; along an arc clockwise.
+    center, radius : ndarray (2,), float
+        m; of an arc. NaN of a straight piece.
+    whole : bool
+        A circle all round.
+    speed : float
+        m/s, along the points.
+    appears, vanishes : float
+        s; from when to when it is there.
+    """
+
+    surface: int
+    index: int
+    points: Floats
+    center: Floats
+    radius: float
+    whole: bool
+    speed: float
+    appears: float
+    vanishes: float
+
+    @property
+    def gate(self) -> bool:
+        """Whether it is not always there."""
+        return self.appears > -inf or self.vanishes < inf
+
+
+def pieces(machine: Machine) -> list[Piece]:
+    """Return all pieces of a machine's surfaces but the drive pulley: segments, then arcs."""
+    segments, arcs = machine.segments, machine.arcs
+    ends = np.stack([segments.start, segments.end], axis=1)
+    nowhere = np.full(2, np.nan)
+    found = [
+        Piece(int(s), i, ends[i], nowhere, np.nan, whole=False, speed=v, appears=a, vanishes=b)
+        for i, (s, v, a, b) in enumerate(
+            zip(
+                segments.surface,
+                segments.speed.tolist(),
+                segments.appears.tolist(),
+                segments.vanishes.tolist(),
+                strict=True,
+            )
+        )
+    ]
+    for i, s in enumerate(arcs.surface.tolist()):
+        center, radius, extent = arcs.center[i], float(arcs.radius[i]), float(arcs.extent[i])
+        shares = np.linspace(1.0, 0.0, 1 + ceil(extent / FINE))
+        angles = arcs.begin[i] + extent * shares
+        points = center + radius * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+        found.append(
+            Piece(
+                s, i, points, center, radius, bool(arcs.whole[i]), float(arcs.speed[i]),
+                float(arcs.appears[i]), float(arcs.vanishes[i]),
+            )
+        )  # fmt: skip
+    return found
+
+
+def colour_of(machine: Machine, piece: Piece) -> str:
+    """Return the colour of a piece: of a belt, or of what stands still."""
+    belt = machine.surfaces[piece.surface] in ("incoming", "outgoing") or piece.speed != 0.0
+    return style.BELT if belt else style.INK
+
+
+def draw_piece(ax: Axes, machine: Machine, piece: Piece, **look: Any) -> Circle | Line2D:
+    """Draw a piece to scale, filled if it is a circle that nothing is released in."""
+    color = look.pop("color", colour_of(machine, piece))
+    gid = f"surface {machine.surfaces[piece.surface]}"
+    if not piece.whole:
+        (line,) = ax.plot(*piece.points.T, color=color, lw=2.6, zorder=2.0)
+        line.set(solid_capstyle="butt", gid=gid, **look)
+        return line
+    out = np.hypot(*(machine.releases.position - piece.center).T) >= piece.radius
+    # The line of a small one must not make it larger than it is.
+    width = min(2.0, points_of(ax, 0.5 * piece.radius))
+    inner = piece.radius if width == 2.0 else 0.75 * piece.radius
+    circle = Circle((float(piece.center[0]), float(piece.center[1])), inner)
+    circle.set(facecolor=style.STEEL_LIGHT if out.all() else "none", edgecolor=color)
+    circle.set(linewidth=width, zorder=1.0, gid=gid, **look)
+    ax.add_patch(circle)
+    return circle
+
+
+def points_of(ax: Axes, length: float) -> float:
+    """Return how many pt a length (m) is in the picture."""
+    pixels = length * ax.get_window_extent().width / float(np.ptp(ax.get_xlim()))
+    return pixels * 72.0 / ax.figure.dpi
+
+
+AXIS = 7.0
+"""pt; size of the cross on the axis of a pulley."""
+
+
+def draw_scene(
+    ax: Axes, machine: Machine, window: Window | None = None, *, small: bool = False
+) -> Axes:
+    """Draw the machine's surfaces to scale, with their names, but small with thinner lines only.
+
+    What is not always there, a gate, is dashed. The limits of the axes are set to hold the window
+    at equal scales; by default all surfaces.
+    """
+    if window is None:
+        ends = machine.corners
+        if machine.pulley is not None:
+            ends = np.concatenate([ends, [[machine.pulley.radius, -machine.pulley.radius]]])
+        window = around(ends).padded(0.1, 0.22, 0.1, 0.12)
+    box = ax.get_window_extent()
+    shown = window.fitted(box.width / box.height)
+    ax.set(xlim=(shown.left, shown.right), ylim=(shown.bottom, shown.top))
+    ax.set_aspect("equal", adjustable="box")
+    if machine.pulley is not None:
+        face = {"facecolor": style.STEEL_LIGHT, "edgecolor": style.BELT, "linewidth": 2.0}
+        ax.add_patch(Circle((0.0, 0.0), machine.pulley.radius, **face))
+        ax.plot(0.0, 0.0, "+", color=style.STEEL, ms=AXIS, zorder=1.5)
+    found = pieces(machine)
+    for piece in found:
+        look: dict[str, Any] = {"linewidth": 1.3} if small and not piece.whole else {}
+        if piece.gate:
+            look |= {**GATE, "color": style.tint(colour_of(machine, piece), 0.5)}
+        draw_piece(ax, machine, piece, **look)
+        if piece.whole and piece.speed != 0.0 and points_of(ax, piece.radius) > AXIS:
+            ax.plot(*piece.center, "+", color=style.STEEL, ms=AXIS, zorder=1.5)
+    if machine.threads:
+        anchors = np.array([thread.anchor for thread in machine.threads])
+        ax.plot(*anchors.T, "o", color=style.INK, ms=3.0, zorder=2.0, gid="anchors")
+    if not small:
+        _Names(ax, machine, found, shown).write()
+    return ax
+
+
+Spot = tuple[Floats, tuple[float, float], str, str]
+"""Where a name stands: a point (m), the way from there (pt), and how it is aligned to both axes."""
+
+GAP = 7.0
+"""pt; between a surface and its name."""
+
+SHARES = (0.5, 0.25, 0.75, 0.0, 1.0)
+"""Where along a piece its name may stand, the best first."""
+
+LOOKED_AT = 8
+"""Pieces of one surface beside which its name may stand."""
+
+BEFORE = 0.3
+"""Share of the window's width by which the incoming belt's name may stand before the belt."""
+
+FARTHER = (1.0, 2.5, 4.0)
+"""Gaps between a surface and its name, the best first."""
+
+
+class _Names:
+    """Writes the name of each surface that is seen, once, where it hides least, and no other name.
+
+    Parameters
+    ----------
+    ax : Axes
+        With its limits set.
+    machine : Machine
+        What is drawn.
+    found : list of Piece
+        Its pieces.
+    shown : Window
+        What of the world is in the picture.
+    """
+
+    def __init__(self, ax: Axes, machine: Machine, found: list[Piece], shown: Window) -> None:
+        self.ax, self.machine, self.shown = ax, machine, shown
+        self.frame = ax.get_window_extent().padded(-3.0)
+        self.parts: dict[int, list[tuple[Piece, Floats]]] = {}
+        for piece in found:
+            part = self._part(piece)
+            if part is not None:
+                self.parts.setdefault(piece.surface, []).append((piece, part))
+        self.found = found
+        self.lines = [
+            (Path(ax.transData.transform(piece.points)), piece.whole)
+            for parts in self.parts.values()
+            for piece, _ in parts
+        ]
+        if machine.pulley is not None:
+            rim = Path.circle((0.0, 0.0), machine.pulley.radius)
+            self.lines.append((rim.transformed(ax.transData), True))
+        self.starts = ax.transData.transform(machine.releases.position)
+        self.taken: list[Bbox] = []
+
+    def write(self) -> None:
+        """Write all names. One for which there is no room is left out."""
+        for surface, parts in self.parts.items():
+            label = self.ax.annotate(
+                style.plain(self._said(surface, parts[0][0]).replace("-", "−")), (0.0, 0.0),
+                xytext=(0.0, 0.0), textcoords="offset points", fontsize=style.SMALL,
+                color=colour_of(self.machine, parts[0][0]), path_effects=HALO, zorder=4.0,
+            )  # fmt: skip
+            best: tuple[int, Spot, Bbox] | None = None
+            for spot in self._spots(parts):
+                placed, box = self._placed(label, spot)
+                hides = self._hides(box)
+                if box.count_overlaps(self.taken) or (best is not None and hides >= best[0]):
+                    continue
+                best = hides, placed, box
+                if not hides:
+                    break
+            if best is None:
+                label.remove()
+                continue
+            self._put(label, best[1])
+            self.taken.append(best[2].padded(1.0))
+
+    def _part(self, piece: Piece) -> Floats | None:
+        """Return the points of a piece that are shown."""
+        if np.isnan(piece.radius):
+            ends = self.shown.clip(*piece.points)
+            return None if ends is None else np.array(ends)
+        inside = self.shown.holds(piece.points)
+        return piece.points[inside] if inside.any() else None
+
+    def _hides(self, box: Bbox) -> int:
+        """Return how many lines, circles and releases a name would stand on."""
+        x, y = self.starts.T
+        on = (x > box.x0) & (x < box.x1) & (y > box.y0) & (y < box.y1)
+        crossed = sum(line.intersects_bbox(box, filled=whole) for line, whole in self.lines)
+        return int(crossed) + int(on.any())
+
+    @staticmethod
+    def _put(label: Any, spot: Spot) -> None:
+        where, offset, across, along = spot
+        label.xy, label.xyann = (float(where[0]), float(where[1])), offset
+        label.set(ha=across, va=along)
+
+    def _placed(self, label: Any, spot: Spot) -> tuple[Spot, Bbox]:
+        """Return a spot shifted back over the edges of the axes, and the box of the name there."""
+        self._put(label, spot)
+        box, frame, (where, offset, across, along) = label.get_window_extent(), self.frame, spot
+        right = max(frame.x0 - box.x0, 0.0) + min(frame.x1 - box.x1, 0.0)
+        up = max(frame.y0 - box.y0, 0.0) + min(frame.y1 - box.y1, 0.0)
+        points = 72.0 / self.ax.figure.dpi
+        offset = (offset[0] + right * points, offset[1] + up * points)
+        return (where, offset, across, along), box.translated(right, up)
+
+    def _said(self, surface: int, piece: Piece) -> str:
+        """Return what is written at a surface, of which a piece is shown."""
+        name, machine = self.machine.surfaces[surface], self.machine
+        speed = piece.speed
+        if name == "plate":
+            x, y = machine.segments.tangent[piece.index]
+            angle = float(np.degrees(np.arctan2(-x, y))) + 0.0  # no -0
+            values = np.unique(np.atleast_2d(machine.segments.restitution)[:, piece.index])
+            return f"plate, {angle:.3g}°\nε = {' / '.join(f'{one:.3g}' for one in values)}"
+        if np.isnan(piece.radius):
+            moves = _motion(speed, piece.points[1] - piece.points[0])
+        else:
+            moves = f"{abs(speed):.3g} m/s {'↻' if speed > 0.0 else '↺'}"
+        if name == "incoming":
+            return f"incoming belt\n{moves if speed else 'at rest'}"
+        if name == "outgoing":
+            return f"outgoing belt, {moves if speed else 'at rest'}"
+        times = {(t, "closes") for one in self.found if one.surface == surface
+                 if (t := one.appears) > -inf}  # fmt: skip
+        times |= {(t, "opens") for one in self.found if one.surface == surface
+                  if (t := one.vanishes) < inf}  # fmt: skip
+        when = [f"{what} at {t:.4g} s" for t, what in sorted(times)]
+        return ", ".join([name, *([moves] if speed else []), *when])
+
+    def _spots(self, parts: list[tuple[Piece, Floats]]) -> Iterator[Spot]:
+        """Yield where the name of a surface may stand, the best first."""
+        piece, part = parts[0]
+        name = self.machine.surfaces[piece.surface]
+        low, high = sorted((part[0], part[-1]), key=lambda point: (point[1], point[0]))
+        if name == "plate":
+            x, y = self.machine.segments.tangent[piece.index]
+            angle = degrees(np.arctan2(-x, y))
+            # Two lines need room above where they begin.
+            room = TWO_LINES * self.ax.figure.dpi / 72.0
+            room *= self.shown.height / self.ax.get_window_extent().height
+            where = high
+            if angle > 0.0 and high[1] > self.shown.top - room:
+                share = max(0.0, self.shown.top - room - low[1]) / (high[1] - low[1])
+                where = low + (high - low) * share
+            yield where, (GAP, 0.0), "left", "top" if angle <= 0.0 else "bottom"
+        elif name == "incoming":
+            left = max(self.shown.left, part[0][0] - BEFORE * self.shown.width)
+            yield np.array([left, part[0][1]]), (4.0, -GAP), "left", "top"
+        elif name == "outgoing":
+            right = np.array([max(part[0][0], part[1][0]), part[0][1]])
+            yield right, (-6.0, -GAP), "right", "top"
+        for farther in FARTHER:
+            for piece, part in parts[:LOOKED_AT]:
+                for share in SHARES:
+                    for where, normal in _beside(piece, part, share):
+                        yield _spot(where, farther * GAP, normal)
+            corners = np.concatenate([part for _, part in parts])
+            (left, bottom), (right_, top) = corners.min(axis=0), corners.max(axis=0)
+            x, y = 0.5 * (left + right_), 0.5 * (bottom + top)
+            for where, away in (
+                ((x, bottom), (0.0, -1.0)), ((x, top), (0.0, 1.0)),
+                ((right_, y), (1.0, 0.0)), ((left, y), (-1.0, 0.0)),
+            ):  # fmt: skip
+                yield _spot(np.array(where), farther * GAP, np.array(away))
+
+
+def _beside(piece: Piece, part: Floats, share: float) -> Iterator[tuple[Floats, Floats]]:
+    """Yield a point at a share of a piece's way, and the directions in which its name may stand.
+
+    First to the side where no particle is expected: below.
+    """
+    if np.isnan(piece.radius):
+        low, high = sorted(part, key=lambda point: (point[1], point[0]))
+        where, along = low + share * (high - low), (high - low) / np.hypot(*(high - low))
+        down = np.array([along[1], -along[0]])
+        down *= -1.0 if down[1] > 0.0 or (down[1] == 0.0 and down[0] < 0.0) else 1.0
+        if share == 0.5:
+            where = 0.5 * (low + high)
+    else:
+        where = part[round(share * (len(part) - 1))]
+        if piece.whole:
+            # The lowest point of a circle first.
+            turn = 2.0 * pi * (share - 0.5)
+            where = piece.center - piece.radius * np.array([np.sin(turn), np.cos(turn)])
+        down = (where - piece.center) / piece.radius
+    yield where, down
+    if not piece.whole:
+        yield where, -down
+
+
+def _spot(where: Floats, gap: float, normal: Floats) -> Spot:
+    """Return a spot that far (pt) from a point of a surface along its normal."""
+    x, y = normal
+    across = "center" if abs(x) < 0.2 else "right" if x < 0.0 else "left"
+    along = "top" if y < -0.2 else "bottom" if y > 0.2 else "center"
+    return where, (gap * x, gap * y), across, along
+
+
+ARROWS = "→↗↑↖←↙↓↘"
+
+
+def _motion(speed: float, along: Floats) -> str:
+    """Return a speed along a direction, and an arrow that shows where to."""
+    x, y = along * np.sign(speed)
+    return f"{abs(speed):.3g} m/s {ARROWS[round(4.0 / pi * np.arctan2(y, x)) % 8]}"

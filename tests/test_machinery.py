@@ -1,0 +1,210 @@
+"""Arcs, pegs, conveyors and gates drawn to scale; each surface named once, no name on another."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from chutelab.machine import Machine
+from chutelab.pictures.plots import Window, draw_scene, style, window_of
+from handmade import Line, Round, conveyor, machine_of, recording_of
+
+
+def drawn(machine: Machine, window: Window | None = None, **options: bool) -> Axes:
+    figure = Figure(figsize=(7.0, 5.0))
+    FigureCanvasAgg(figure)
+    return draw_scene(figure.add_axes((0.0, 0.0, 1.0, 1.0)), machine, window, **options)
+
+
+def lines(ax: Axes, name: str) -> list[np.ndarray]:
+    return [np.asarray(one.get_xydata()) for one in ax.lines if one.get_gid() == f"surface {name}"]
+
+
+def circles(ax: Axes) -> list[Circle]:
+    return [one for one in ax.patches if isinstance(one, Circle)]
+
+
+def said(ax: Axes) -> list[str]:
+    return [text.get_text() for text in ax.texts]
+
+
+def assert_apart_and_inside(ax: Axes) -> None:
+    frame = ax.get_window_extent()
+    boxes = [text.get_window_extent() for text in ax.texts]
+    for i, box in enumerate(boxes):
+        assert frame.x0 <= box.x0, ax.texts[i]
+        assert box.x1 <= frame.x1, ax.texts[i]
+        assert frame.y0 <= box.y0, ax.texts[i]
+        assert box.y1 <= frame.y1, ax.texts[i]
+        assert not box.count_overlaps(boxes[:i]), ax.texts[i]
+
+
+def test_an_arc_is_drawn_round_its_centre_from_end_to_end() -> None:
+    ax = drawn(machine_of(Round("spoon", (0.3, -0.1), 0.25, begin=170.0, extent=110.0)))
+    (points,) = lines(ax, "spoon")
+    away = points - (0.3, -0.1)
+    assert np.hypot(*away.T) == pytest.approx(0.25, rel=1e-12)
+    ends = 0.25 * np.array([[np.cos(a), np.sin(a)] for a in np.radians([170.0, 280.0])])
+    assert sorted(map(tuple, away[[0, -1]])) == [
+        pytest.approx(end) for end in sorted(map(tuple, ends))
+    ]
+    # The chords between its points leave it by R (1 - cos 1.5°) at most.
+    middles = 0.5 * (away[1:] + away[:-1])
+    assert np.hypot(*middles.T).min() > 0.25 * np.cos(np.radians(1.51))
+
+
+@pytest.mark.parametrize("radius", [0.004, 0.3])
+def test_a_circle_is_to_scale_with_its_line(radius: float) -> None:
+    ax = drawn(machine_of(Round("peg", (0.0, 0.0), radius)), Window(-1.0, 1.0, -0.7, 0.7))
+    (peg,) = circles(ax)
+    pixels = (
+        ax.transData.transform([(0.0, 0.0), (1.0, 0.0)])[1, 0] - ax.transData.transform((0, 0))[0]
+    )
+    # Half of the line is outside: 1 pt of a large one, a quarter of the radius of a small one.
+    outside = 0.5 * peg.get_linewidth() * ax.figure.dpi / 72.0 / pixels
+    assert peg.get_radius() + outside == pytest.approx(radius, rel=0.01 if radius < 0.1 else 0.02)
+    assert peg.center == (0.0, 0.0)
+
+
+def test_a_drum_that_holds_what_is_released_is_not_filled() -> None:
+    ax = drawn(machine_of(Round("drum", (0.0, 0.0), 0.5), at=[(0.1, 0.2)]))
+    assert circles(ax)[0].get_facecolor()[3] == 0.0
+    ax = drawn(machine_of(Round("peg", (0.0, 0.0), 0.5), at=[(0.1, 0.6)]))
+    assert circles(ax)[0].get_facecolor()[:3] == to_rgb(style.STEEL_LIGHT)
+
+
+def test_all_of_a_circle_and_of_an_arc_is_in_the_picture() -> None:
+    machine = machine_of(
+        Round("drum", (2.0, 1.0), 0.5), Round("spoon", (0.0, 0.0), 1.0, 170.0, 200.0)
+    )
+    ax = drawn(machine)
+    (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
+    assert left < -1.0
+    assert right > 2.5
+    assert bottom < -1.0
+    assert top > 1.5
+
+
+def test_a_conveyor_is_a_belt_round_two_pulleys_named_once() -> None:
+    ax = drawn(machine_of(*conveyor("second", (0.0, 0.0), (1.0, 0.3), 0.1, 1.5)))
+    top, bottom = lines(ax, "second")
+    along = np.array([1.0, 0.3]) / np.hypot(1.0, 0.3)
+    up = 0.1 * np.array([-along[1], along[0]])
+    assert top == pytest.approx(np.array([(0.0, 0.0), (1.0, 0.3)]) + up)
+    assert bottom == pytest.approx(np.array([(1.0, 0.3), (0.0, 0.0)]) - up)
+    assert [one.center for one in circles(ax)] == [(0.0, 0.0), (1.0, 0.3)]
+    assert {to_rgb(one.get_edgecolor()[:3]) for one in circles(ax)} == {to_rgb(style.BELT)}
+    assert said(ax) == ["second, 1.5 m/s →"]
+
+
+@pytest.mark.parametrize(
+    ("end", "speed", "arrow"),
+    [
+        ((1.0, 0.1), 2.0, "→"), ((1.0, 0.1), -2.0, "←"), ((-1.0, 0.1), 2.0, "←"),
+        ((0.0, 1.0), 2.0, "↑"), ((0.7, -0.7), 2.0, "↘"), ((0.7, 0.7), -2.0, "↙"),
+    ],
+)  # fmt: skip
+def test_the_arrow_of_a_belt_shows_where_it_moves_to(
+    end: tuple[float, float], speed: float, arrow: str
+) -> None:
+    assert said(drawn(machine_of(Line("belt", (0.0, 0.0), end, speed)))) == [f"belt, 2 m/s {arrow}"]
+
+
+@pytest.mark.parametrize(("speed", "arrow"), [(0.5, "↻"), (-0.5, "↺")])
+def test_a_roller_shows_how_it_turns(speed: float, arrow: str) -> None:
+    ax = drawn(machine_of(Round("roller", (0.0, 0.0), 0.1, speed=speed)))
+    assert said(ax) == [f"roller, 0.5 m/s {arrow}"]
+
+
+def test_a_surface_of_many_pieces_is_named_once_beside_them() -> None:
+    pegs = [
+        Round("pegs", (0.06 * i - 0.03 * j, -0.05 * j), 0.01) for j in range(8) for i in range(8)
+    ]
+    ax = drawn(machine_of(*pegs))
+    (label,) = ax.texts
+    box = label.get_window_extent()
+    for peg in circles(ax):
+        x, y = ax.transData.transform(peg.center)
+        assert not (box.x0 <= x <= box.x1 and box.y0 <= y <= box.y1)
+    assert_apart_and_inside(ax)
+
+
+def test_a_gate_is_dashed_and_faded_and_says_when_it_moves() -> None:
+    ax = drawn(
+        machine_of(
+            Line("wall", (-1.0, 0.5), (-0.1, 0.0)),
+            Line("gate", (-0.1, 0.0), (0.1, 0.0), vanishes=0.4),
+            Line("flap", (0.5, 0.0), (0.9, 0.0), appears=1.25),
+            Line("valve", (0.5, -0.5), (0.9, -0.5), vanishes=0.5),
+            Line("valve", (0.5, -0.5), (0.9, -0.5), appears=2.0),
+        )
+    )
+    look = {one.get_gid(): one for one in ax.lines}
+    assert look["surface wall"].get_linestyle() == "-"
+    assert to_rgb(look["surface wall"].get_color()) == (0.0, 0.0, 0.0)
+    for gate in ("gate", "flap", "valve"):
+        assert look[f"surface {gate}"].is_dashed()
+        assert to_rgb(look[f"surface {gate}"].get_color())[0] == pytest.approx(0.5, abs=0.01)
+    assert set(said(ax)) == {
+        "wall", "gate, opens at 0.4 s", "flap, closes at 1.25 s",
+        "valve, opens at 0.5 s, closes at 2 s",
+    }  # fmt: skip
+
+
+PLACES = st.tuples(st.floats(-1.0, 1.0), st.floats(-0.7, 0.7))
+
+
+@given(st.lists(st.tuples(PLACES, PLACES, st.booleans()), min_size=1, max_size=14))
+@settings(max_examples=25, deadline=None)
+def test_names_never_lie_on_each_other_or_leave_the_picture(
+    drawn_pieces: list[tuple[tuple[float, float], tuple[float, float], bool]],
+) -> None:
+    pieces: list[Line | Round] = []
+    for i, (a, b, bent) in enumerate(drawn_pieces):
+        if bent or np.hypot(b[0] - a[0], b[1] - a[1]) < 1e-3:
+            pieces.append(Round(f"surface {i}", a, 0.02 + abs(b[0]), 180.0 * b[1], 200.0))
+        else:
+            pieces.append(Line(f"surface {i}", a, b))
+    ax = drawn(machine_of(*pieces), Window(-1.0, 1.0, -0.7, 0.7))
+    assert_apart_and_inside(ax)
+    assert len(set(said(ax))) == len(ax.texts)
+
+
+def test_with_room_all_names_are_there_and_hide_no_line() -> None:
+    pieces: list[Line | Round] = [
+        Line(f"chute {i}", (0.4 * i, 0.0), (0.4 * i + 0.2, -0.3)) for i in range(5)
+    ]
+    pieces += [Round(f"peg {i}", (0.4 * i, -0.6), 0.03) for i in range(5)]
+    ax = drawn(machine_of(*pieces))
+    assert len(ax.texts) == 10
+    for text in ax.texts:
+        box = text.get_window_extent()
+        for line in ax.lines:
+            path = line.get_path().transformed(line.get_transform())
+            assert not path.intersects_bbox(box, filled=False), text
+    assert_apart_and_inside(ax)
+
+
+def test_small_pictures_have_no_names() -> None:
+    ax = drawn(machine_of(Line("floor", (-1.0, 0.0), (1.0, 0.0))), small=True)
+    assert not ax.texts
+    assert len(lines(ax, "floor")) == 1
+
+
+def test_the_window_holds_arcs_near_the_action() -> None:
+    machine = machine_of(
+        Round("spoon", (0.0, 0.5), 0.25, 180.0, 180.0), Round("far", (30.0, 0.0), 1.0)
+    )
+    window = window_of(
+        recording_of(machine, [(0.0, 0.0, 1.0, 0, 0, 0), (0.4, 0.0, 0.2, 0, -4.0, 0)])
+    )
+    assert window.left < -0.25
+    assert window.right > 0.25
+    assert window.right < 5.0

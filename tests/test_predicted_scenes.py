@@ -7,11 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from chutelab.cli.program import main
 from chutelab.engines.simulation import simulate
 from chutelab.results.comparison import compare
+from chutelab.results.quantities import each
+from chutelab.results.summary import summary
 from chutelab.scene import from_dict
 from chutelab.theory import STAGES, Reason, Transfer, drag, predict, transfer
 
@@ -222,3 +226,30 @@ def test_sampled_tracks_touch_no_arc_unless_told(
     else:
         assert str(found.reason).startswith("early contact: wall")
         assert np.isnan(found.phi1) == (stage < 2)
+
+
+def test_a_stream_in_tonnes_an_hour_says_what_the_outgoing_belt_needs() -> None:
+    one = scene(stream={"rate": "120 t/h", "count": 3}, outgoing={"speed": 1.5})
+    told = summary(simulate(one))
+    vx = np.mean(told["landing"]["vx"])
+    assert told["steady"]["rate"] == pytest.approx(120.0)
+    assert told["steady"]["power"] == pytest.approx(120.0e3 / 3600.0 * 1.5 * (1.5 - vx), rel=1e-12)
+    assert summary(simulate(scene(stream={"rate": 50.0})))["steady"] is None
+    command = ["run", "perpendicular", "--set", "stream.rate=36 t/h"]
+    words = " ".join(CliRunner().invoke(main, command).output.split())
+    # It lands at -1 m/s on a belt of 2 m/s: 10 kg/s · 2 · 3.
+    assert "Outgoing belt, steady: P = 60 W at 36 t/h." in words
+
+
+def test_quantities_of_mixed_particles_are_each_particles_own() -> None:
+    one = scene(
+        particle=[{"name": "a", "radius": 0.03, "mass": 0.3}, {"name": "b", "mass": 0.01}],
+        stream=[{"particle": "b"}, {"particle": "a"}],
+    )
+    run = simulate(one, engine="contact")
+    compared = compare(run)
+    assert compared.max is not None
+    assert compared.max < 1e-12
+    energy = [0.5 * m * (vx**2 + 4.0) for m, vx in zip((0.01, 0.3), each(run, "v3x"), strict=True)]
+    assert each(run, "dEk") == pytest.approx(energy, rel=1e-13)
+    assert each(run, "d3") == pytest.approx([0.9, 0.9], rel=1e-12)

@@ -254,7 +254,7 @@ def build(scene: Scene) -> Machine:
             friction=np.array(grip) if len(grip) > 1 else grip[0],
             restitution=np.array(bounce) if len(grip) > 1 else bounce[0],
             surface=0,
-            incline=np.radians(belt.incline_deg),
+            incline=belt.incline_deg * (pi / 180.0),
         )
     every = range(len(particles))
     pairs = np.array([[scene.met(a, b) for b in every] for a in every])

@@ -395,9 +395,14 @@ class Recording(Shown):
         residual = np.where(slips | driven, residual, gain - (belt - restitution - friction))
         return kinetic, potential, belt, restitution, friction, residual
 
-    def energies(self, knots: NDArray[Any], particle: Ints) -> tuple[Floats, Floats]:
-        """Return kinetic (rotation included) and potential energy (J) of knots of particles."""
-        body = self.particle.of(particle)
+    def energies(
+        self, knots: NDArray[Any], particle: Ints | int | None = None
+    ) -> tuple[Floats, Floats]:
+        """Return kinetic (rotation included) and potential energy (J) of knots of any shape.
+
+        `particle` says whose each is; it is not needed where all particles are alike.
+        """
+        body = self.particle if particle is None else self.particle.of(particle)
         vx, vy = knots["velocity"][..., 0], knots["velocity"][..., 1]
         potential = body.mass * self.gravity * knots["position"][..., 1]
         return body.kinetic(vx, vy, knots["omega"]), potential

@@ -78,7 +78,7 @@ def arcs(prediction: Transfer, scene: Scene) -> tuple[Arc, ...]:
     riding = belt.pulley_radius + scene.particle.radius
     if scene.plate is None:
         carried = on_belt(scene) and release_velocity(scene) == (belt.speed, 0.0) and belt.speed > 0
-        met = scene.surface or scene.crowded
+        met = scene.free or scene.crowded
         if out is None or met or not g or not carried:
             return ()
         left = separation(
@@ -87,6 +87,7 @@ def arcs(prediction: Transfer, scene: Scene) -> tuple[Arc, ...]:
             gravity=np.array([g]),
             friction=np.array([np.inf if belt.friction == "adhesion" else float(belt.friction)]),
             spin=np.array([scene.particle.spin]),
+            inertia=scene.particle.moment or 0.5,
         )
         sine, cosine, speed = (float(part[0]) for part in (left.sin, left.cos, left.v1))
         fall = riding * cosine - (riding - out.drop)

@@ -102,7 +102,7 @@ def drag(
     scene: Scene, found: Transfer, speed: float, radius: float | None = None,
     mass: float | None = None,
 ) -> Drag | None:  # fmt: skip
-    """Estimate air drag in a scene; None for mass points, which have none.
+    """Estimate air drag in a scene; None for mass points, which have none, and where nothing moves.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def drag(
     fastest = [speed, *(float(part) for part in (found.v2, found.v3) if np.isfinite(part))]
     if max(fastest) > speed or radius is None or mass is None:
         radius, mass, speed = own.radius, own.mass, max(fastest)
-    if radius == 0.0:
+    if radius == 0.0 or speed == 0.0:
         return None
     reynolds = 2.0 * radius * speed * AIR_DENSITY / AIR_VISCOSITY
     slowed = slowing(speed, radius, mass) * speed

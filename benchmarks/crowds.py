@@ -50,7 +50,7 @@ SLOP = 1e-3
 
 BOX = {
     "title": "2,000 poured into a box 0.5 m wide",
-    "particle": {"radius": 0.004},
+    "particle": {"radius": 0.004, "mass": 0.0021},
     "surface": [
         {"name": "box", "points": [[-0.25, 3.0], [-0.25, 0.0], [0.25, 0.0], [0.25, 3.0]],
          "restitution": 0.5, "friction": 0.3},
@@ -61,7 +61,7 @@ BOX = {
 }  # fmt: skip
 
 LONG = ["stream.count=3200", "run.max_time=30"]
-BED = ["stream.count=1000", "stream.bed_height=0.032", "particle.spin=true"]
+BED = ["stream.count=1000", "particle.spin=true"]
 
 CASES = {
     "stream": lambda: load("stream"),
@@ -94,7 +94,7 @@ def space_of(machine):
     space = pymunk.Space()
     space.gravity = (0.0, -machine.gravity)
     space.collision_slop = SLOP * machine.particle.radius
-    own, grip = machine.pair_restitution**0.5, machine.pair_friction**0.5
+    own, grip = machine.pair_restitution[0, 0] ** 0.5, machine.pair_friction[0, 0] ** 0.5
     s, wheel = machine.segments, machine.pulley
     for k, (a, b) in enumerate(zip(s.start.tolist(), s.end.tolist(), strict=True)):
         shape = pymunk.Segment(space.static_body, a, b, HALF)

@@ -29,7 +29,7 @@ from chutelab.results import Kind
 from chutelab.results.ledger import ledger
 from chutelab.scene import load
 
-G, SPEED, PULLEY, DISTANCE, DROP, RESTITUTION, RADIUS = 9.81, 2.0, 0.1, 0.5, 0.5, 0.5, 0.004
+G, SPEED, PULLEY, DISTANCE, DROP, RESTITUTION, RADIUS = 9.81, 2.0, 0.1, 0.5, 0.5, 0.5, 0.0063
 STATE = 20
 """Numbers of 8 bytes of each particle that a round reads and writes."""
 

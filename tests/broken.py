@@ -158,7 +158,7 @@ BROKEN = {
         "incoming.speed",
     ),
     "point on adhesive belt": (
-        IN + "[stream]\nat = [-0.5, 0.104]\nvelocity = [2, 0.1]",
+        IN + "[stream]\nat = [-0.5, 0.1063]\nvelocity = [2, 0.1]",
         ["stream.velocity", "incoming.friction"],
         "Coulomb",
     ),

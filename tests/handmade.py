@@ -18,7 +18,7 @@ from chutelab.machine.releases import Releases
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.recorder import Recorder
 
-G, V, R, PARTICLE, EPS, DISTANCE, DROP, MASS, MU = 9.81, 2.0, 0.1, 0.004, 0.5, 0.5, 0.5, 0.008, 0.5
+G, V, R, PARTICLE, EPS, DISTANCE, DROP, MASS, MU = 9.81, 2.0, 0.1, 0.0063, 0.5, 0.5, 0.5, 0.008, 0.5
 BELT_TIME = 0.5
 TEXT = f"""
 title = "By hand"

@@ -221,7 +221,7 @@ def test_a_length_speaks_of_places_only():
     _, found = reach(sc.load("perpendicular"), "1um")
     assert (found.asked, found.unit, found.met) == (1e-6, "m", True)
     assert QUANTITIES[found.worst] == "length"
-    _, found = reach(sc.load("belt-landing"), "1um")
+    _, found = reach(sc.load("belt-landing", ["particle.radius=0.004"]), "1um")
     assert found.met
     assert found.worst.startswith("place")
 

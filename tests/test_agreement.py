@@ -142,11 +142,11 @@ def test_where_contacts_last_a_stepped_engine_converges():
 def test_the_promise_grows_with_what_a_scene_makes_of_a_change():
     """At v0² = g Rc (1 - δ), cos φ1 = 1 - δ: dφ1/dv = -(2/v0) cos φ1 / sin φ1, sin φ1 = √(2 δ)."""
     delta = 1e-8
-    speed = (GRAVITY * 0.104 * (1.0 - delta)) ** 0.5
+    speed = (GRAVITY * 0.1063 * (1.0 - delta)) ** 0.5
     row = rows_of("perpendicular", f"incoming.speed={speed!r}")["exact, theory"]
     # Speeds and gravity fall by one share s: cos φ1 = v²/(g Rc) falls by s, φ1 grows by s / sin φ1,
     # and the place of the separation moves by Rc times that, measured by d1 = 0.6 m.
-    growth = 0.104 / 0.6 / (2.0 * delta) ** 0.5
+    growth = 0.1063 / 0.6 / (2.0 * delta) ** 0.5
     assert row.tolerance == pytest.approx(1e-12 * growth, rel=0.1)
     assert row.holds
 

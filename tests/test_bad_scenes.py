@@ -169,8 +169,8 @@ def test_a_coulomb_belt_takes_what_an_adhesive_one_refuses():
     release = "[stream]\nspeed_spread = 0.1\nvelocity = [1, 0]\n"
     scene.parse(IN + "friction = 0.5\n" + release)
     # and so does the air above an adhesive one
-    scene.parse(IN + release + "at = [-0.5, 0.1041]\n")
-    scene.parse(IN + "[stream]\nvelocity = [2, 0]\nat = [-0.5, 0.104]\n")
+    scene.parse(IN + release + "at = [-0.5, 0.1064]\n")
+    scene.parse(IN + "[stream]\nvelocity = [2, 0]\nat = [-0.5, 0.1063]\n")
 
 
 def test_interacting_alone_is_no_conflict():

@@ -184,10 +184,10 @@ def test_no_root_says_so_and_shows_the_nearest():
 
 def test_a_jump_over_the_target_is_no_root():
     given = chutelab.load("inclined-20")
-    found = design.solve(given, "plate.angle_deg=7.97:8.5", "landing.vx=-0.9", points=11)
+    found = design.solve(given, "plate.angle_deg=10.353:11", "landing.vx=-0.85", points=11)
     assert not found.solved
     (jump,) = found.jumps
-    assert jump.before < -0.9 < jump.after
+    assert jump.before < -0.85 < jump.after
     assert jump.high - jump.low < 1e-14
     assert jump.courses == ("plate, incoming, outgoing", "plate, outgoing")
     assert "jumps over" in repr(found)
@@ -273,8 +273,8 @@ def test_slopes_are_the_derivatives():
 def test_a_slope_next_to_a_jump_does_not_reach_over_it():
     given = chutelab.load("inclined-20")
     narrow, wide = (
-        design.solve(given, f"plate.angle_deg={span}", "landing.vx=-0.99", points=21)
-        for span in ("7.9:8.2", "2:20")
+        design.solve(given, f"plate.angle_deg={span}", "landing.vx=-0.9", points=21)
+        for span in ("10.3:10.6", "5:20")
     )
     one, other = (found.answer.sensitivities[0].derivative for found in (narrow, wide))
     assert one < 0.0
@@ -429,15 +429,15 @@ def test_files_of_a_solution(tmp_path):
     assert sorted(file.name for file in out.iterdir()) == [
         "overlay.png", "scan.png", "solution.toml", "solve.json",
     ]  # fmt: skip
-    assert "47.25481227" in result.output
+    assert "47.82895061" in result.output
     assert "Sensitivity" in result.output
     recording = chutelab.simulate(chutelab.load(out / "solution.toml"))
-    assert recording.title.endswith("; with plate.angle_deg=47.25")
+    assert recording.title.endswith("; with plate.angle_deg=47.83")
     landing = recording.events[recording.events["kind"] == 4][0]
     assert landing["velocity_before"][0] == pytest.approx(1.0, abs=1e-12)
     told = json.loads((out / "solve.json").read_text(encoding="utf-8"))
     assert told["solved"] is True
-    assert told["answers"][0]["values"]["plate.angle_deg"] == pytest.approx(47.25481227)
+    assert told["answers"][0]["values"]["plate.angle_deg"] == pytest.approx(47.82895061)
     for name in ("scan.png", "overlay.png"):
         assert len(np.unique(np.asarray(Image.open(out / name)))) > 20
 
@@ -459,7 +459,7 @@ def test_scan_shows_pieces_target_and_answer():
     gids = [line.get_gid() for line in figure.axes[0].lines]
     assert gids.count("quantity") == 3
     assert gids.count("target") == 1
-    assert gids.count("solution") == len(found.answers) == 2
+    assert gids.count("solution") == len(found.answers) == 3
     several = design.solve(inclined(), ["plate.restitution=0:1", "particle.mass=0.01:0.02"],
                            "landing.vx=0.2")  # fmt: skip
     with pytest.raises(ValueError, match="several keys"):
@@ -548,7 +548,7 @@ def test_draws_beyond_the_scenes_domain_are_cut_and_said():
 
 
 def test_samples_that_never_land_are_left_out_and_said():
-    given = chutelab.load("inclined-60")
+    given = chutelab.load("inclined-60", ["particle.radius=0.004"])  # misses from 68.9° on
     found = design.uncertainty(given, "plate.angle_deg=69±3", ["landing.vx"], samples=64)
     lost = int(np.isnan(found.outputs).sum())
     assert 0 < lost == sum(found.lost.values())
@@ -560,7 +560,7 @@ def test_a_sample_that_lacks_one_quantity_is_told_as_lacking_that_one():
     given = chutelab.load("perpendicular", ["outgoing.friction=0"])  # so that it never grips
     found = design.uncertainty(given, "plate.restitution=0.5±0.01", samples=64)
     assert found.lost == {"no belt_work (touches plate, outgoing)": 128}
-    x = 0.596 - 0.5 * 2.0 * (sqrt((G * 0.298) ** 2 + G) - G * 0.298) / G
+    x = 0.5937 - 0.5 * 2.0 * (sqrt((G * 0.29685) ** 2 + G) - G * 0.29685) / G
     assert found.mean[0] == pytest.approx(x, rel=1e-4)
     assert np.isnan(found.mean[1])
 
@@ -686,21 +686,21 @@ def test_the_worksheets_commands_run(monkeypatch, tmp_path):
         result = CliRunner().invoke(main, shlex.split(command))
         assert result.exit_code == 0, result.output
         said.append(result.output)
-    assert "28.66" in said[0]
-    assert "47.25" in said[1]
-    assert "0.0063185" in said[2]
+    assert "28.939" in said[0]
+    assert "47.8289" in said[1]
+    assert "0.0071011" in said[2]
     assert "0.016" in said[3]
     # m v_b (v_b - v_x), with a belt of 1 m/s under the plate of 60°; without slip where v_x = 1 m/s
-    assert "least                  60  -0.0048407" in said[4]
-    assert "least         47.25" in said[5]
-    assert "share of plate.restitution   68" in said[7]
+    assert "least                  60  -0.0044494" in said[4]
+    assert "least         47.8289" in said[5]
+    assert "share of plate.restitution   70" in said[7]
 
 
 def test_the_worksheets_numbers_hold():
     text = (LESSON / "README.md").read_text(encoding="utf-8")
     given = chutelab.load("inclined-20")
-    down = design.solve(given, "plate.angle_deg=8:60", "landing.vx=0", points=21).scene
-    # Straight down the belt pays m v_b², at 60° a fifth of it.
+    down = design.solve(given, "plate.angle_deg=11:60", "landing.vx=0", points=21).scene
+    # Straight down the belt pays m v_b², at 60° less than a quarter of it.
     assert design.value(down, "belt_work") == pytest.approx(M * V**2)
     assert "32.0 mJ" in text
     energies = [design.value(chutelab.load(f"inclined-{n}"), "dEk") for n in (20, 40, 60)]
@@ -715,9 +715,9 @@ def test_the_worksheets_numbers_hold():
     low, high = found.interval[0]
     assert 0.5 * (high - low) == pytest.approx(0.024, abs=5e-4)
     shares = (100.0 * found.indices[0].first).round().astype(int).tolist()
-    assert shares == [68, 19, 11, 1]
-    assert "68 % of its variance" in text
-    assert "19 % that of the angle, 11 % that of the distance and 1 % that of the speed" in text
+    assert shares == [70, 18, 11, 1]
+    assert "70 % of its variance" in text
+    assert "18 % that of the angle, 11 % that of the distance and 1 % that of the speed" in text
 
 
 def test_the_notebook_is_shipped_without_outputs():

@@ -22,12 +22,10 @@ from chutelab.theory.drag import drag_coefficient, fly
 
 G = 9.81
 AIR, VISCOSITY = 1.2, 1.8e-5
-BALL = ["--set", "particle.radius=0.004", "--set", "particle.mass=0.008"]
 
 
 def scene(**tables: Any) -> Any:
     base: dict[str, Any] = {
-        "particle": {"radius": 0.004, "mass": 0.008},
         "incoming": {"speed": 2.0, "pulley_radius": 0.1},
         "plate": {"distance": 0.5},
         "outgoing": {"drop": 0.5},
@@ -171,19 +169,22 @@ def test_summary_report_and_check_tell_it() -> None:
     one = scene()
     told = summary(simulate(one))["drag"]
     assert told["speed"] == pytest.approx(float(predict(one).v3), rel=1e-12)
-    assert told["landing_shift"] == pytest.approx(2.5e-4, abs=2e-5)
+    _, landing = by_scipy(predict(one), r=0.0063, m=0.008, eps=0.5, alpha=0.0)
+    assert told["landing_shift"] == pytest.approx(landing, rel=1e-5)
     assert set(told) == {
         "speed", "reynolds", "coefficient", "share_of_weight", "impact_shift", "landing_shift",
         "arrives",
     }  # fmt: skip
-    run = CliRunner().invoke(main, ["run", "perpendicular", *BALL])
+    run = CliRunner().invoke(main, ["run", "perpendicular"])
     words = " ".join(run.output.split())
-    assert "Air drag, left out, would be 0.33 % of the weight at 4.4 m/s, and particle 0" in words
-    checked = CliRunner().invoke(main, ["check", "perpendicular", *BALL, "--json"])
+    share = 50.0 * AIR * 0.44 * math.pi * 0.0063**2 * told["speed"] ** 2 / (0.008 * G)
+    would = f"would be {share:.2f} % of the weight at 4.39 m/s"
+    assert f"Air drag, left out, {would}, and particle 0" in words
+    checked = CliRunner().invoke(main, ["check", "perpendicular", "--json"])
     parts = {
         part["name"]: part["what"] for part in json.loads(checked.output)["scenes"][0]["skipped"]
     }
-    assert parts["air"].startswith("its drag would be 0.33 % of the weight at 4.4 m/s")
+    assert parts["air"].startswith(f"its drag {would}")
 
 
 def test_without_a_closed_form_only_the_share_is_told() -> None:

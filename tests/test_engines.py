@@ -26,7 +26,7 @@ from chutelab.results.ledger import ledger
 from chutelab.results.recorder import StalledError
 from chutelab.scene import load, parse
 
-G, R, M = 9.81, 0.004, 0.008
+G, R, M = 9.81, 0.0063, 0.008
 
 both = pytest.mark.parametrize("engine", ["contact", "pymunk"])
 

@@ -10,9 +10,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from chutelab.engines import exact
-from chutelab.results import Kind
+from chutelab.results import REASONS, Kind
 from chutelab.results.ledger import ledger
-from machines import bent, face, of_sizes, scene_of, thrown
+from machines import bent, face, gated, of_sizes, scene_of, thrown
 
 G, WHEEL, RADIUS = 9.81, 0.3, 0.02
 RHO = WHEEL + RADIUS
@@ -260,3 +260,188 @@ def test_a_blow_on_a_sphere():
     hit = exact.run(of_sizes(built, np.array([0.05]), 0.2, np.array([0.4]))).select(Kind.IMPACT)[0]
     assert hit["velocity_after"][0] == pytest.approx(1.4 * 5.0 / 7.0, rel=1e-13)
     assert hit["omega_after"] * 0.05 == pytest.approx(-1.4 * 5.0 / 7.0, rel=1e-13)
+
+
+# Gates
+
+
+def test_who_lies_on_a_gate_flies_when_it_opens():
+    """At rest until then, however long; with `settled` too, and beside those on firm ground."""
+    floor = face("floor", [-1.0, 0.0], [1.0, 0.0], friction=0.5, restitution=0.0)
+    other = face("firm", [2.0, 0.0], [3.0, 0.0], friction=0.5, restitution=0.0)
+    built = scene_of(
+        particle={"radius": 0.02}, surface=[floor, other], stream={"at": [0.0, 0.5]},
+        run={"until": "settled"},
+    )  # fmt: skip
+    built = replace(thrown(built, [[0.0, 0.5], [2.5, 0.5]]), interact=False)
+    run = exact.run(gated(built, 0, vanishes=1.25))
+    assert [REASONS[n] for n in run.ended] == ["exit", "settled"]
+    (left,) = run.select(Kind.SEPARATION)
+    assert left["t"] == 1.25
+    np.testing.assert_array_equal(left["position"], [0.0, 0.02])
+    out = run.select(Kind.EXIT)[0]
+    # It leaves 1 m below the lowest surface, from rest.
+    assert out["t"] == pytest.approx(1.25 + sqrt(2.0 * 1.02 / G), rel=1e-13)
+
+
+def test_who_slides_on_a_gate_flies_on_as_fast_as_it_was():
+    floor = face("floor", [-1.0, 0.0], [5.0, 0.0], friction=0.3, restitution=0.0)
+    built = scene_of(
+        particle={"spin": False},
+        surface=[floor],
+        stream={"at": [0.0, 0.01], "velocity": [2.0, 0.0]},
+    )
+    run = exact.run(gated(built, 0, vanishes=0.4))
+    left = run.select(Kind.SEPARATION)[0]
+    speed = 2.0 - 0.3 * G * 0.4
+    np.testing.assert_allclose(left["velocity_after"][0], speed, rtol=1e-13)
+    end = run.track(0)[-1]
+    np.testing.assert_allclose(end["position"][1], 0.01 - 0.5 * G * 0.6**2, rtol=1e-13)
+    assert ledger(run).relative_residual < 1e-13
+
+
+@pytest.mark.parametrize(("shuts", "met"), [(0.2, True), (0.3, False), (0.35, False)])
+def test_a_gate_is_met_from_when_it_shuts_on_and_shuts_on_nobody(shuts, met):
+    """The disk falls through the line of the gate from 0.299 s to 0.326 s."""
+    floor = face("gate", [-1.0, 0.0], [1.0, 0.0], restitution=1.0, friction=0.0)
+    bottom = face("bottom", [-1.0, -0.5], [1.0, -0.5], restitution=1.0, friction=0.0)
+    radius = 0.04
+    fall = sqrt(2.0 * (0.48 - radius) / G)
+    assert fall < 0.3 < sqrt(2.0 * (0.48 + radius) / G) < 0.35
+    built = scene_of(
+        particle={"radius": radius, "spin": False}, surface=[floor, bottom],
+        stream={"at": [0.0, 0.48]}, run={"until": 0.6},
+    )  # fmt: skip
+    run = exact.run(gated(built, 0, appears=shuts))
+    hits = run.select(Kind.IMPACT)
+    first = run.surfaces[hits["surface"][0]]
+    assert first == ("gate" if met else "bottom")
+    if met:
+        assert hits["t"][0] == pytest.approx(fall, rel=1e-13)
+    else:
+        # From below it is a surface like any other, once the disk is clear of it.
+        down = sqrt(2.0 * (0.48 + 0.5 - radius) / G)
+        assert hits["t"][0] == pytest.approx(down, rel=1e-13)
+        speed = G * down
+        up = (speed - sqrt(speed**2 - 2.0 * G * (0.5 - 2.0 * radius))) / G
+        assert run.surfaces[hits["surface"][1]] == "gate"
+        assert hits["t"][1] == pytest.approx(down + up, rel=1e-12)
+
+
+def test_over_a_shut_trapdoor_it_slides_and_into_an_open_one_it_falls():
+    """Floor, trapdoor, floor in one line: flush while it is shut."""
+    parts = [
+        face(name, [x, 0.0], [x + 1.0, 0.0], friction=0.0, restitution=0.0)
+        for name, x in (("before", -1.0), ("door", 0.0), ("behind", 1.0))
+    ]
+    built = scene_of(
+        particle={"radius": 0.02}, surface=parts,
+        stream={"at": [-0.5, 0.02], "velocity": [1.0, 0.0]}, run={"until": 2.4},
+    )  # fmt: skip
+    shut = exact.run(gated(built, 1, vanishes=1.6))
+    assert [*shut.select(Kind.SEPARATION)["t"]] == []
+    assert [*shut.select(Kind.IMPACT)["t"]] == []
+    np.testing.assert_allclose(shut.track(0)[-1]["position"], [1.9, 0.02], atol=1e-12)
+    dropped = exact.run(gated(built, 1, vanishes=1.0))
+    assert dropped.select(Kind.SEPARATION)["t"][0] == 1.0
+    gone = exact.run(gated(built, 1, vanishes=0.2))
+    edge = gone.select(Kind.SEPARATION)[0]
+    # Faster than sqrt(g r), it flies off at the edge.
+    np.testing.assert_allclose(edge["position"], [0.0, 0.02], atol=1e-12)
+    # A door that shuts later is there for who comes then.
+    late = exact.run(gated(built, 1, appears=0.45))
+    np.testing.assert_allclose(late.track(0)[-1]["position"], [1.9, 0.02], atol=1e-12)
+
+
+def test_a_gate_across_a_bowl_stops_the_swing_only_while_it_is_there():
+    """A wall from the centre down: passed at first, then the pendulum is thrown back."""
+    wall = face("wall", [0.0, -0.5], [0.0, -1.5], restitution=1.0, friction=0.0)
+    arc = {"center": (0.0, 0.0), "radius": 1.0, "begin": pi, "extent": pi}
+    theta, length = -0.8, 0.95
+    built = scene_of(particle={"radius": 0.05, "spin": False}, surface=[wall],
+                     stream={"at": [0.0, 5.0]}, run={"until": 3.0})  # fmt: skip
+    built = bent(thrown(built, [[length * sin(theta), -length * cos(theta)]]), arc)
+    run = exact.run(gated(built, 0, appears=1.0))
+    hits = run.select(Kind.IMPACT)
+    hits = hits[hits["surface"] == 0]
+    # By hand: where the pendulum is 0.05 from the wall, on its way back.
+    true = solve_ivp(lambda _t, y: [y[1], -G / length * sin(y[0])], (0.0, 3.0), [theta, 0.0],
+                     method="DOP853", rtol=1e-13, atol=1e-14, dense_output=True)  # fmt: skip
+    t = np.linspace(0.0, 3.0, 300_001)
+    x = length * np.sin(true.sol(t)[0])
+    came = t[1:][(x[:-1] > 0.05) & (x[1:] <= 0.05) & (t[1:] > 1.0)]
+    assert hits["t"][0] == pytest.approx(came[0], abs=1.1e-5)
+    assert hits["t"][0] < came[0] + 1e-9
+    assert hits["position"][0][0] == pytest.approx(0.05, abs=1e-12)
+    assert ledger(run).relative_residual < 1e-12
+
+
+def test_in_a_corner_of_a_gate_it_waits_until_that_opens():
+    """A block on a slope against a gate; when it opens it slides off as from rest."""
+    slope, mu = 0.5, 0.1
+    down = np.array([cos(slope), -sin(slope)])
+    up = np.array([sin(slope), cos(slope)])
+    ramp = face("ramp", [0.0, 0.0], (3.0 * down).tolist(), friction=mu, restitution=0.0)
+    gate = face("gate", (1.0 * down).tolist(), (1.0 * down + up).tolist(), friction=0.0,
+                restitution=0.0)  # fmt: skip
+    place = (0.5 * down + 0.02 * up).tolist()
+    built = scene_of(
+        particle={"radius": 0.02, "spin": False}, surface=[ramp, gate],
+        stream={"at": place}, run={"until": 2.0},
+    )  # fmt: skip
+    run = exact.run(gated(built, 1, vanishes=1.5))
+    end = run.track(0)[-1]
+    pull = G * (sin(slope) - mu * cos(slope))
+    np.testing.assert_allclose(end["velocity"], pull * 0.5 * down, rtol=1e-11)
+    wanted = (0.98 + 0.5 * pull * 0.25) * down + 0.02 * up
+    np.testing.assert_allclose(end["position"], wanted, rtol=1e-11)
+    assert ledger(run).relative_residual < 1e-12
+
+
+def test_an_arc_that_opens_lets_go_of_what_rides_in_it():
+    arc = {"center": (0.0, 0.0), "radius": 1.0, "begin": pi, "extent": pi, "vanishes": 0.4}
+    theta, length = -0.8, 0.98
+    built = scene_of(particle={"radius": 0.02, "spin": False}, surface=[FAR],
+                     stream={"at": [0.0, 5.0]}, run={"until": 0.7})  # fmt: skip
+    built = bent(thrown(built, [[length * sin(theta), -length * cos(theta)]]), arc)
+    run = exact.run(built)
+    (left,) = run.select(Kind.SEPARATION)
+    assert left["t"] == 0.4
+    true = solve_ivp(lambda _t, y: [y[1], -G / length * sin(y[0])], (0.0, 0.4), [theta, 0.0],
+                     method="DOP853", rtol=1e-13, atol=1e-14)  # fmt: skip
+    angle, rate = true.y[:, -1]
+    velocity = length * rate * np.array([cos(angle), sin(angle)])
+    np.testing.assert_allclose(left["velocity_after"], velocity, atol=1e-11)
+    end = run.track(0)[-1]["velocity"]
+    np.testing.assert_allclose(end, velocity - [0.0, G * 0.3], atol=1e-11)
+
+
+def test_a_gate_that_shuts_again_is_two_pieces_of_it():
+    floor = {"friction": 0.5, "restitution": 0.0}
+    gate = [
+        face("gate", [-1.0, 0.0], [1.0, 0.0], **floor),
+        face("again", [-1.0, 0.0], [1.0, 0.0], **floor),
+    ]
+    built = scene_of(particle={"radius": 0.02}, surface=gate, stream={"at": [0.0, 0.02]},
+                     run={"until": 1.5})  # fmt: skip
+    position = [[0.0, 0.02], [0.3, 0.8]]
+    built = replace(thrown(built, position), interact=False)
+    run = exact.run(gated(gated(built, 0, vanishes=0.2), 1, appears=0.3))
+    first, second = run.track(0)[-1], run.track(1)[-1]
+    assert first["position"][1] == pytest.approx(0.02 - 0.5 * G * 1.3**2, rel=1e-12)
+    np.testing.assert_allclose(second["position"], [0.3, 0.02], atol=1e-13)
+
+
+def test_gates_across_the_way_of_a_carried_particle():
+    """A bar beside the pulley, in the way at 30°: passed before it is there, else struck."""
+    built = inclined(10.0, 0.8, "adhesion", until=3.0)
+    bar = {"radius": 0.02, "begin": 0.0, "extent": 2.0 * pi}
+    bar["center"] = (0.5 * 0.35, 0.5 * sqrt(3.0) * 0.35)
+    # It touches where the centres are 0.04 apart.
+    beta, apart = radians(10.0), acos((RHO**2 + 0.35**2 - 0.04**2) / (2.0 * RHO * 0.35))
+    there = (1.0 + RHO * (beta + radians(30.0) - apart)) / 0.8
+    for appears, struck in ((there - 0.01, True), (there + 0.01, False), (0.5, True)):
+        run = exact.run(bent(built, {**bar, "appears": appears}))
+        hits = run.select(Kind.IMPACT)
+        hits = hits[np.abs(hits["t"] - there) < 1e-9]
+        assert bool(len(hits)) is struck

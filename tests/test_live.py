@@ -63,7 +63,7 @@ def test_the_table_follows_the_slider_and_is_the_engine_s():
 
 
 def test_the_outgoing_belt_stays_where_it_is_when_the_plate_turns():
-    scene = load("inclined-40")
+    scene = load("inclined-40", ["plate.distance=0.07"])
     landed = simulate(scene).events[-1]["position"]
     board = Board(scene)
     assert numbers(board)["lands at x"] == pytest.approx(landed[0], rel=5e-3)

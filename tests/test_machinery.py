@@ -117,6 +117,10 @@ def test_the_arrow_of_a_belt_shows_where_it_moves_to(
     assert said(drawn(machine_of(Line("belt", (0.0, 0.0), end, speed)))) == [f"belt, 2 m/s {arrow}"]
 
 
+def test_a_hyphen_in_a_name_stays_one() -> None:
+    assert said(drawn(machine_of(Line("left-wall", (0.0, 0.0), (0.0, 1.0))))) == ["left-wall"]
+
+
 @pytest.mark.parametrize(("speed", "arrow"), [(0.5, "↻"), (-0.5, "↺")])
 def test_a_roller_shows_how_it_turns(speed: float, arrow: str) -> None:
     ax = drawn(machine_of(Round("roller", (0.0, 0.0), 0.1, speed=speed)))
@@ -156,6 +160,17 @@ def test_a_gate_is_dashed_and_faded_and_says_when_it_moves() -> None:
         "wall", "gate, opens at 0.4 s", "flap, closes at 1.25 s",
         "valve, opens at 0.5 s, closes at 2 s",
     }  # fmt: skip
+
+
+def test_the_name_of_a_gate_is_not_where_it_lets_fall() -> None:
+    hopper = [Line("hopper", (s * 0.3, 0.4), (s * 0.05, 0.0)) for s in (-1.0, 1.0)]
+    gate = Line("gate", (-0.05, 0.0), (0.05, 0.0), vanishes=0.4)
+    bin_ = Line("bin", (-0.4, -0.5), (0.4, -0.5))
+    ax = drawn(machine_of(*hopper, gate, bin_))
+    (name,) = [text for text in ax.texts if text.get_text().startswith("gate")]
+    box = name.get_window_extent()
+    (left, low), (right, high) = ax.transData.transform([(-0.05, -0.25), (0.05, 0.0)])
+    assert box.x1 < left or box.x0 > right or box.y1 < low or box.y0 > high
 
 
 PLACES = st.tuples(st.floats(-1.0, 1.0), st.floats(-0.7, 0.7))

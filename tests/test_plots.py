@@ -520,9 +520,9 @@ drop_from = "top"
     thrown = scene.parse(text)
     (arc,) = plots.arcs(theory.predict(thrown), thrown)
     # cos φ1 = v²/(g (R + r)), at most 1; then a fall to the belt, with r between.
-    phi1 = np.arccos(min(1.0, speed**2 / (9.81 * 0.104)))
-    y, vy = 0.104 * np.cos(phi1), -speed * np.sin(phi1)
-    fall = y - (0.1 - 0.8 + 0.004)
+    phi1 = np.arccos(min(1.0, speed**2 / (9.81 * 0.1063)))
+    y, vy = 0.1063 * np.cos(phi1), -speed * np.sin(phi1)
+    fall = y - (0.1 - 0.8 + 0.0063)
     t = (vy + np.sqrt(vy**2 + 2.0 * 9.81 * fall)) / 9.81
     landing = simulate(thrown).select(Kind.LANDING)[0]
     assert arc.end == pytest.approx(t, rel=1e-12, abs=0.0)
@@ -535,9 +535,9 @@ def test_without_a_plate_a_slipping_belt_throws_too() -> None:
     text = "[incoming]\nspeed = 2.0\npulley_radius = 0.5\nfriction = 0.5\n"
     thrown = scene.parse(text + '[outgoing]\ndrop = 1.5\ndrop_from = "top"\n')
     (arc,) = plots.arcs(theory.predict(thrown), thrown)
-    # The slip law's angle and speed for R = 0.5 m, r = 4 mm, 2 m/s, µ = 0.5.
-    assert np.degrees(np.arctan2(*arc.position)) == pytest.approx(22.913, abs=5e-4)
-    assert np.hypot(*arc.velocity) == pytest.approx(2.1340, abs=5e-5)
+    # The slip law's angle and speed for R = 0.5 m, r = 6.3 mm, 2 m/s, µ = 0.5.
+    assert np.degrees(np.arctan2(*arc.position)) == pytest.approx(23.157, abs=5e-4)
+    assert np.hypot(*arc.velocity) == pytest.approx(2.13697, abs=5e-6)
     landing = simulate(thrown).select(Kind.LANDING)[0]
     assert arc.at([arc.end])[0][0] == pytest.approx(landing["position"], abs=1e-9)
 

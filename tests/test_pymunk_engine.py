@@ -84,8 +84,8 @@ def test_friction_on_the_belt_leaves_at_the_top_without_a_hit():
         got = run(machine("perpendicular", "incoming.friction=0.5", f"run.dt={dt}"))
         assert not len(got.select(Kind.IMPACT, surface="incoming"))
         hit = got.select(Kind.IMPACT, surface="plate")[0]
-        t = (0.6 - 0.004) / 2.0
-        assert hit["position"][1] == pytest.approx(0.104 - 0.5 * 9.81 * t * t, abs=1e-11)
+        t = (0.6 - 0.0063) / 2.0
+        assert hit["position"][1] == pytest.approx(0.1063 - 0.5 * 9.81 * t * t, abs=1e-11)
 
 
 def test_slides_until_it_settles():

@@ -13,7 +13,8 @@ from chutelab.machine import build
 from chutelab.machine.releases import DEEP, squeeze
 from chutelab.results import Kind
 
-G, RC, V = 9.81, 0.1 + 0.004, 2.0
+G, V, r = 9.81, 2.0, 0.0063
+RC = 0.1 + r
 
 
 def drawn(*, incoming=None, particle=None, **stream):
@@ -107,28 +108,30 @@ def gaps(found, fall, floor):
 @pytest.mark.parametrize("kind", ["carried", "slipping", "dropped"])
 def test_interacting_particles_never_start_inside_each_other(kind, seed, rate, bed):
     stream = {"count": 100, "rate": rate, "bed_height": bed, "seed": seed, "interact": True}
+    small = {"radius": 0.004}
     fall, floor = 0.5 * G, -np.inf
     if kind == "carried":
-        found, fall = drawn(**stream), 0.0
+        found, fall = drawn(**stream, particle=small), 0.0
     elif kind == "slipping":
         # 5 mm apart, and 3 mm fallen where there is so much room above the belt
         slow = {"velocity": [0.2, 0.0], "rate": 40.0, "bed_height": 0.014}
-        found, floor = drawn(**{**stream, **slow}, incoming={"friction": 0.5}), RC
+        belt = {"friction": 0.5}
+        found, floor = drawn(**{**stream, **slow}, incoming=belt, particle=small), 0.104
     else:
-        found = drawn(**stream, at=[0.0, 3.0], velocity=[1.5, 0.4])
+        found = drawn(**stream, at=[0.0, 3.0], velocity=[1.5, 0.4], particle=small)
     assert min(gaps(found, fall, floor)) >= 0.008 * (1.0 - 1e-12)
     assert found.position[0, 1] == found.position[:, 1].min()
     assert np.ptp(found.position[:, 1]) <= bed
 
 
 def test_in_a_bed_with_no_room_everybody_is_due_all_the_same():
-    # one every millimetre of belt, in a single layer, 8 mm across: they wait, see test_summary
+    # one every millimetre of belt, in a single layer, 13 mm across: they wait, see test_summary
     found = drawn(count=20, rate=2000.0, interact=True)
     assert found.t.tolist() == [i / 2000.0 for i in range(20)]
     assert found.position.tolist() == [[-1.0, RC]] * 20
     # in two layers' height at most a few find a place, and nobody is put outside the bed
-    found = drawn(count=20, rate=2000.0, interact=True, bed_height=0.016)
-    assert np.ptp(found.position[:, 1]) <= 0.016
+    found = drawn(count=20, rate=2000.0, interact=True, bed_height=0.025)
+    assert np.ptp(found.position[:, 1]) <= 0.025
 
 
 def bed(*overrides):
@@ -153,11 +156,11 @@ def test_layers_on_a_slow_pulley_ride_into_each_other(speed):
     for i in range(40):
         apart = np.hypot(*np.moveaxis(place - place[:, i : i + 1], 2, 0))
         apart[:, i] = np.nan
-        depth[i] = np.nanmax(2.0 * 0.004 - apart, initial=0.0)
+        depth[i] = np.nanmax(2.0 * r - apart, initial=0.0)
     # Between two of these times they get up to 2 v Δt nearer to each other.
     assert depth.max() == pytest.approx(found.deepest, abs=2.0 * speed * 2.8 / 8000)
-    assert found.deepest > 0.1 * 0.004
-    assert abs(np.count_nonzero(depth > DEEP * 0.004) - found.particles) <= 1
+    assert found.deepest > 0.1 * r
+    assert abs(np.count_nonzero(depth > DEEP * r) - found.particles) <= 1
     highest = recording.select(Kind.RELEASE)["position"][:, 1].max()
     assert found.grip == pytest.approx(speed**2 / (G * highest), rel=1e-12, abs=0.0)
 
@@ -165,9 +168,9 @@ def test_layers_on_a_slow_pulley_ride_into_each_other(speed):
 @pytest.mark.parametrize(
     "overrides",
     [
-        # sqrt(g (0.104 + 0.05)) = 1.2291 m/s: all leave at the top.
-        ("incoming.speed=1.23",),
-        # One layer, 14 mm between centres of 8 mm: no one is nearer on the chord than its diameter.
+        # sqrt(g (0.1063 + 0.05)) = 1.2383 m/s: all leave at the top.
+        ("incoming.speed=1.24",),
+        # One layer, 14 mm between centres of 12.6 mm: nobody is nearer on the chord than that.
         ("incoming.speed=0.7", "stream.bed_height=0", "stream.rate=50"),
         ("incoming.speed=0.7", "incoming.friction=0.5"),
         ("incoming.speed=0.7", "stream.interact=false"),

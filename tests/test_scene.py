@@ -50,7 +50,7 @@ CONTRACT = {
     "particle": {
         "name": None,
         "shape": "disk",
-        "radius": 0.004,
+        "radius": 0.0063,
         "size": None,
         "points": None,
         "mass": 0.008,

@@ -135,6 +135,8 @@ def test_ctrl_c_ends_it(monkeypatch):
 # A run that gets stuck; a run that is interrupted
 
 ENDLESS = """
+[particle]
+radius = 0.004
 [[surface]]
 name = "floor"
 from = [-1.0, 0.0]

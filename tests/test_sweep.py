@@ -278,7 +278,7 @@ def test_what_the_belt_pays_is_that_of_solve_and_theory_only_where_runs_go_on_un
     from chutelab.studies.design import value
 
     m, vb, vx, mu = 0.008, 2.0, -1.0, 0.5
-    down = sqrt((9.81 * 0.298) ** 2 + 2.0 * 9.81 * 0.5)
+    down = sqrt((9.81 * 0.29685) ** 2 + 2.0 * 9.81 * 0.5)
     landed = sweep(load("perpendicular"), ["plate.restitution=0.5"])
     settled = sweep(load("perpendicular", ["run.until=settled"]), ["plate.restitution=0.5"])
     assert landed.columns["belt_work"][0] == pytest.approx(m * vb * mu * down, rel=1e-12, abs=0.0)

@@ -438,6 +438,7 @@ class TestDomain:
 
 def scene(**tables: Any) -> Any:
     base: dict[str, Any] = {
+        "particle": {"radius": 0.004},
         "incoming": {"speed": 2.0, "pulley_radius": 0.1},
         "plate": {"distance": 0.5},
         "outgoing": {"drop": 0.5},

@@ -17,7 +17,6 @@ from click.testing import CliRunner
 from PIL import Image
 
 from chutelab.engines.simulation import simulate
-from chutelab.machine.releases import draw as draw_releases
 from chutelab.util.files import tsv_text
 from chutelab.util.versions import environment
 from work_precision import main

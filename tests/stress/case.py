@@ -149,14 +149,15 @@ def by_name(engine: str) -> str:
 
 
 def scene_of(tables: Tables, name: str, engine: str, dt: float | None) -> Scene:
-    """Validate a scene for an engine and a step."""
+    """Validate a scene for an engine and a step; particles have 4 mm if it does not say."""
     run = {**tables.get("run", {})}
     run["engine"] = by_name(engine)
     if dt is not None:
         run["dt"] = dt
     if engine == "fixed":
         run["align"] = False
-    return from_dict({"title": name, **tables, "run": run}, name)
+    particle = {"radius": 0.004, **tables.get("particle", {})}
+    return from_dict({"title": name, **tables, "particle": particle, "run": run}, name)
 
 
 def merged(*tables: Tables) -> dict[str, Any]:

@@ -116,9 +116,8 @@ class Particle:
 
     def of(self, index: Any) -> Particle:
         """Return some of the particles, by their numbers."""
-        if np.ndim(self.radius) == 0:
-            return self
-        return Particle(self.radius[index], self.mass[index], self.inertia[index])
+        own = (value[index] if np.ndim(value) else value for value in vars(self).values())
+        return Particle(*own)
 
     def kinetic(self, vx: ArrayLike, vy: ArrayLike, omega: ArrayLike) -> Floats:
         """Return ½ m v² + ½ I ω² (J) for arrays of any one shape (m/s, rad/s)."""

@@ -56,7 +56,7 @@ class Particle(Table):
         " for the pymunk engine",
     )
     radius: Radius = described(
-        0.004,
+        0.0063,
         "Radius r, 0 is a mass point; or [from, to], drawn evenly for each particle, of which the"
         " first has the mean",
         "m",

@@ -49,20 +49,31 @@ def _hold(s: State, index: Ints, on: tuple[Ints, Floats], other: tuple[Ints, Flo
     onto = ~stays & (loads[0] < 0.0) & (s.weight_on(index, b.normal) > 0.0)
     falls = ~stays & ~onto
     s.fly(index[falls], other[0][falls], other[1][falls], 2)
-    rest = stays & ~moving & (s.machine.until == "settled")
+    # A gate lets it out of the corner when it opens, and that is at the end of the wait.
+    gone = np.stack([s.obstacles.vanishes[k] - s.released[index] for k, _ in (on, other)])
+    opens = stays & (gone.min(axis=0) < s.stop[index])
+    rest = stays & ~moving & (s.machine.until == "settled") & np.isinf(gone).all(axis=0)
     s.event(int(Kind.SETTLE), index[rest], a.surface[rest])
     s.finish(index[rest], "settled")
     waits = stays & ~rest
-    time = s.stop[index] - s.age[index]
+    until = np.where(opens, gone.min(axis=0), s.stop[index])
+    time = until - s.age[index]
     for c, load in zip((a, b), loads, strict=True):
         heat = np.where(
             waits & ~locked, mass * _grip(c) * np.abs(c.belt) * np.maximum(load, 0.0) * time, 0.0
         )
         s.book(index, c.surface, heat, 0.0, heat)
-    s.age[index[waits]] = s.stop[index[waits]]
+    s.age[index[waits]] = until[waits]
     s.knots(index[waits])
-    s.finish(index[waits], "time")
+    s.finish(index[waits & ~opens], "time")
     rest_on(s, index[onto], other[0][onto], other[1][onto], np.zeros(np.count_nonzero(onto)))
+    for n, (kept, normal) in enumerate(((other, b.normal), (on, a.normal))):
+        out = opens & (gone[n] <= until) & (gone[1 - n] > until)
+        s.fly(index[out], NONE, 0.0, 0)
+        lies = out & (s.weight_on(index, normal) > 0.0)
+        rest_on(s, index[lies], kept[0][lies], kept[1][lies], np.zeros(np.count_nonzero(lies)))
+    both = opens & (gone <= until).all(axis=0)
+    s.fly(index[both], NONE, 0.0, 0)
 
 
 def _grip(c: Contact) -> Floats:
@@ -121,6 +132,8 @@ def settle_law(s: State, index: Ints) -> None:
         # Rolling down a slope is not lying on it.
         steady = grips & ((pull == 0.0) | ~s.turns[index]) & ~(arc & (w != 0.0))
         lies = steady & ((c.belt == 0.0) | (c.surface == s.machine.landing))
+        if len(s.changes):
+            lies &= np.isinf(s.obstacles.vanishes[s.on[index]])
         s.event(int(Kind.SETTLE), index[lies], c.surface[lies])
         s.finish(index[lies], "settled")
 
@@ -318,7 +331,7 @@ def rest_on(s: State, index: Ints, obstacle: Ints, side: Floats, rebound: Floats
     s.mode[index] = np.where(flat, Mode.FACE, Mode.ARC)
     s.on[index], s.side[index] = obstacle, side
     s.left[index], s.left_side[index], s.order[index] = NONE, 0.0, 0
-    _ride(s, index[~flat])
+    look_round(s, index[~flat])
     settle_law(s, index)
 
 
@@ -357,8 +370,8 @@ def _last_bounces(s: State, index: Ints, obstacle: Ints, side: Floats, rebound: 
     s.knots(index)
 
 
-def _ride(s: State, index: Ints) -> None:
-    """Begin a ride round a circle, or round its other half: find where that ends."""
+def look_round(s: State, index: Ints) -> None:
+    """Find where a ride round a circle, or round its other half, ends."""
     if not len(index):
         return
     o, on, side = s.obstacles, s.on[index], s.side[index]
@@ -367,4 +380,6 @@ def _ride(s: State, index: Ints) -> None:
     s.side[index] = side
     phi = np.arctan2(normal[0], normal[1])
     rho, s.angle[index] = pick(o.rho, index, on - o.segments), phi
-    s.bounds[:, index] = bounds(o, index, on - o.segments, side, rho, phi, s.radius[index])
+    s.bounds[:, index] = bounds(
+        o, index, on - o.segments, side, rho, phi, s.radius[index], s.epoch(index)
+    )

@@ -51,10 +51,17 @@ class Motion:
     on: Ints | None = None  # segment they slide on, which they cannot meet, and its face
     on_side: Floats | None = None
     never: Bools | None = None  # (S + C,), obstacles that none of them can meet
+    gates: Floats | None = None  # (T, k), times until gates open or shut, s
 
     def after(self, t: Floats) -> Floats:
         """Return where they are after times (k,), (2, k), m."""
         return self.position + t * (self.velocity + 0.5 * t * self.acceleration)
+
+
+def there(obstacles: Obstacles, gates: Floats, t: Floats, obstacle: Ints) -> Bools:
+    """Tell which obstacles are there after times t (..., k), by the times `gates` (T, k)."""
+    epoch = sum((gate <= t for gate in gates), np.zeros(t.shape, dtype=np.int64))
+    return np.asarray(obstacles.present[epoch, obstacle])
 
 
 GLANCING = 1e-3
@@ -122,6 +129,9 @@ def first_circle(
     now = closing & ~leaving
     if obstacles.span.size:
         now &= obstacles.spanned(rows, circle, d)
+    if motion.gates is not None:
+        gates, number = motion.gates[:, index], circle + obstacles.segments
+        now &= there(obstacles, gates, np.zeros(len(index)), number)
     for n in range(1, 4):
         shift = order >= n
         gap[:-1, shift] = gap[1:, shift]
@@ -136,9 +146,10 @@ def first_circle(
         found = descents(gap[:, open_], until[index[open_]])
         if obstacles.span.size:
             for times in found:
-                there = d + times * (v + 0.5 * times * a)
-                beside = obstacles.spanned(rows[open_], circle[open_], there)
-                times[~beside] = np.inf
+                place = d + times * (v + 0.5 * times * a)
+                times[~obstacles.spanned(rows[open_], circle[open_], place)] = np.inf
+        if motion.gates is not None:
+            found[~there(obstacles, gates[:, open_], found, number[open_])] = np.inf
         t[open_] = _polished(
             found.min(axis=0), d, v, a, sense[open_] * rho[open_], order[open_] == 0
         )
@@ -337,6 +348,8 @@ def _faces(
         # Grazing the end on the way out is not lying on the face.
         outward = ((foot <= reach) & (pace < 0.0)) | ((foot >= length - reach) & (pace > 0.0))
         valid &= ~(grazing & outward)
+    if motion.gates is not None:
+        valid &= there(obstacles, motion.gates, time, segments[:, None, None])
     time[~valid] = np.inf
     flat = time.reshape(-1, time.shape[-1])
     nearest, column = flat.argmin(axis=0), np.arange(flat.shape[1])
@@ -368,13 +381,13 @@ changes its direction, the other half of the circle."""
 
 def bounds(
     obstacles: Obstacles, rows: Ints, circle: Ints, side: Floats, rho: Floats, phi: Floats,
-    radius: Floats,
+    radius: Floats, epoch: Ints,
 ) -> NDArray[Any]:  # fmt: skip
     """Return what stops rides round circles backwards and forwards, (2, k), dtype `BOUND`.
 
     Of particles `rows` on circles (obstacle number less S), on the half that `side` tells (see
     `Obstacles.rim_side`), whose centres move at a radius `rho` (m) and are now at `phi` (rad, from
-    the top, clockwise).
+    the top, clockwise). Only of what is there now, after so many changes as `epoch` tells.
     """
     found = np.zeros((2, len(rows)), dtype=BOUND)
     found["angle"], found["obstacle"] = WAYS * np.inf, NONE
@@ -385,9 +398,9 @@ def bounds(
     ) -> None:  # fmt: skip
         """Take in one more obstacle, whose gap falls with φ at the rate `closing` at `angle`."""
         ahead = np.maximum(np.mod(WAYS * (angle - phi) + NOW, 2.0 * np.pi) - NOW, 0.0)
-        there = phi + WAYS * ahead
-        nearer = met & (WAYS * closing > GRAZING) & (WAYS * (there - found["angle"]) < 0.0)
-        np.copyto(found["angle"], there, where=nearer)
+        place = phi + WAYS * ahead
+        nearer = met & (WAYS * closing > GRAZING) & (WAYS * (place - found["angle"]) < 0.0)
+        np.copyto(found["angle"], place, where=nearer)
         np.copyto(found["obstacle"], obstacle, where=nearer)
         np.copyto(found["side"], side, where=nearer)
         np.copyto(found["handover"], handover, where=nearer)
@@ -404,10 +417,11 @@ def bounds(
             level = (face * dot(start - center, normal) + radius) / rho
             half = np.arccos(np.clip(level, -1.0, 1.0))
             met = (np.abs(level) <= 1.0) & ~joints.beside[circle, segment, n]
+            met &= obstacles.present[epoch, segment]
             for angle in (tilt - half, tilt + half):
                 foot = dot(center + rho * _up(angle) - start, tangent)
-                there = met & (foot >= 0.0) & (foot <= length)
-                narrow(angle, facing * np.sin(angle - tilt), there, segment, face)
+                beside = met & (foot >= 0.0) & (foot <= length)
+                narrow(angle, facing * np.sin(angle - tilt), beside, segment, face)
     here = circle + obstacles.segments
     for this in np.unique(here).tolist():
         for piece, end, face, onto in joints.handovers.get(this, ()):
@@ -415,13 +429,14 @@ def bounds(
             tilt = np.arctan2(outward[0], outward[1])
             angle = tilt - 0.5 * np.pi if (face > 0) == (end > 0) else tilt + 0.5 * np.pi
             closing = facing * np.sin(angle - tilt)
-            n = FACES.index(face)
+            number = joints.obstacle(piece, face)
+            goes = (here == this) & obstacles.present[epoch, number]
             if onto:
-                obstacle, face_there = joints.obstacle(piece, face), face
+                narrow(angle, closing, goes, number, face, True)
             else:
-                closing = -closing
-                obstacle, face_there = (int(array[piece, end, n]) for array in joints.onward)
-            narrow(angle, closing, here == this, obstacle, face_there, True)
+                at = (epoch, piece, end, FACES.index(face))
+                obstacle, side_there = (array[at] for array in joints.onward)
+                narrow(angle, -closing, goes, obstacle, side_there, True)
     crown = pick(joints.crown, rows, circle)
     tilt = np.arctan2(crown[0], crown[1])
     moves = (crown != 0.0).any(axis=0) & (pick(obstacles.material, rows, here)[0] != 0.0)
@@ -433,6 +448,7 @@ def bounds(
         distance = np.hypot(apart[0], apart[1])
         distinct = (circle != other) & (distance > rows_of(obstacles.touch, rows))
         distinct &= ~joints.beside[circle, other + obstacles.segments, 0]
+        distinct &= obstacles.present[epoch, other + obstacles.segments]
         reach = rows_of(obstacles.rho[other], rows)
         level = (rho**2 + distance**2 - reach**2) / np.where(distinct, 2.0 * rho * distance, 1.0)
         met = distinct & (np.abs(level) < 1.0)
@@ -440,11 +456,11 @@ def bounds(
         tilt = np.arctan2(apart[0], apart[1])
         for angle in (tilt - half, tilt + half):
             closing = -np.sign(reach) * facing * np.sin(angle - tilt)
-            there = met
+            spans = met
             if obstacles.span.size:
                 which = np.full(len(rows), other)
-                there = met & obstacles.spanned(rows, which, rho * _up(angle) - apart)
-            narrow(angle, closing, there, other + obstacles.segments, 0)
+                spans = met & obstacles.spanned(rows, which, rho * _up(angle) - apart)
+            narrow(angle, closing, spans, other + obstacles.segments, 0)
     return found
 
 

@@ -77,19 +77,19 @@ class Joints:
             return o.pulley if face > 0 else NONE
         return piece - o.segments + o.first_arc + (0 if face > 0 else o.arcs)
 
-    @cached_property
-    def follow(self) -> Ints:
+    def _follow(self, present: Bools) -> Ints:
         """Return which piece goes on where another ends, and at which of its ends, (2, P, 2).
 
-        -1 if none does; the first one wins. Pieces that fold back onto each other do not go on from
-        each other.
+        Of the pieces that are there, (S + C,); -1 if none does; the first one wins. Pieces that
+        fold back onto each other do not go on from each other.
         """
         spots, ahead = self._o.spots, self.tips[1][..., 0]
         follow = np.full((2, len(spots), 2), NONE, dtype=np.int64)
         meeting: dict[int, list[tuple[int, int]]] = defaultdict(list)
         for piece, pair in enumerate(spots):
-            for end, spot in enumerate(pair):
-                meeting[spot].append((piece, end))
+            if present[self.obstacle(piece, 1)]:
+                for end, spot in enumerate(pair):
+                    meeting[spot].append((piece, end))
         for ends in meeting.values():
             for n, (s, e) in enumerate(ends):
                 for other, f in ends[n + 1 :]:
@@ -101,16 +101,22 @@ class Joints:
 
     @cached_property
     def onward(self) -> tuple[Ints, Floats]:
-        """Return what faces go over into at their ends, and its side, (P, 2, 2); -1 for nothing.
+        """Return what faces go over into at their ends, and its side, (T + 1, P, 2, 2).
 
-        Another face if that is flush, else the circle round the end, whose side is left open, 0.
+        Another face if that is flush, else the circle round the end, whose side is left open, 0;
+        -1 for nothing. Before the first change of what is there, and after each.
         """
+        found = [self._onward(self._follow(present)) for present in self._o.present]
+        obstacle, side = zip(*found, strict=True)
+        return np.stack(obstacle), np.stack(side)
+
+    def _onward(self, follow: Ints) -> tuple[Ints, Floats]:
         o = self._o
         place, _, left = (array[..., 0] for array in self.tips)
         obstacle = np.repeat(o.end_circle[: len(o.spots), :, None], 2, axis=2)
         side = np.zeros(obstacle.shape)
         for piece, end in np.ndindex(len(o.spots), 2):
-            normal, (other, there) = left[:, piece, end], self.follow[:, piece, end]
+            normal, (other, there) = left[:, piece, end], follow[:, piece, end]
             arc = o.rests[piece, end]
             if other != NONE:
                 against = left[:, other, there]
@@ -146,9 +152,10 @@ class Joints:
         which turn clockwise all round, have 0.
         """
         o, left = self._o, self.tips[2]
+        follow = self._follow(np.ones(len(o.surface), dtype=bool))
         crown = np.zeros((2, len(o.rho), left.shape[-1]))
         for piece, end in reversed(list(np.ndindex(len(o.spots), 2))):
-            circle, (other, there) = o.end_circle[piece, end], self.follow[:, piece, end]
+            circle, (other, there) = o.end_circle[piece, end], follow[:, piece, end]
             if circle == NONE:
                 continue
             crown[:, circle - o.segments] = left[:, piece, end]
@@ -168,7 +175,7 @@ class Joints:
                 circle, n = int(o.end_circle[piece, end]), FACES.index(face)
                 if circle != NONE:
                     found[circle].append(Handover(piece, end, face, True))
-                next_ = int(onward[piece, end, n])
+                next_ = int(onward[0, piece, end, n])
                 if o.rests[piece, end] != NONE and next_ != NONE:
                     found[next_].append(Handover(piece, end, face, True))
                 if piece >= o.segments:
@@ -193,7 +200,7 @@ class Joints:
 
         for piece, end, n in np.ndindex(len(o.spots), 2, 2):
             own, circle = self.obstacle(piece, FACES[n]), o.end_circle[piece, end]
-            for other in (int(circle), int(onward[piece, end, n])):
+            for other in (int(circle), *onward[:, piece, end, n].tolist()):
                 if other >= o.segments:
                     touch(own, FACES[n], other)
         return beside

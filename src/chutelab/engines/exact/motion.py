@@ -12,12 +12,13 @@ from chutelab.engines.exact.contacts import (
     end_slip,
     face_force,
     load_on,
+    look_round,
     rest_on,
     strike,
 )
 from chutelab.engines.exact.detect import FEW, Motion, bounds, first_contact
 from chutelab.engines.exact.joints import NONE
-from chutelab.engines.exact.obstacles import dot, pick, rows_of
+from chutelab.engines.exact.obstacles import dot, length_of, pick, rows_of
 from chutelab.engines.exact.particle_state import Mode, State
 from chutelab.mechanics.ballistics import descent
 from chutelab.mechanics.contact import STEP_ANGLE, Circle, Outcome, advance, normal_force
@@ -51,22 +52,29 @@ def carry_round(s: State, index: Ints, start: Floats, v: Floats) -> None:
     up[0], up[1] = np.sin(start), np.cos(start)
     rho = dot(s.p[:, index], up)
     s.p[:, index] = rho * up
-    left = s.stop[index] - s.age[index]
+    stop = s.next_change(index)
+    left = stop - s.age[index]
     cosine = np.minimum(v**2 / (s.gravity[index] * rho), 1.0)
-    end, struck, found = start.copy(), np.zeros(len(index), dtype=bool), None
+    end, found = start.copy(), None
+    struck = cut = np.zeros(len(index), dtype=bool)
     stays = cosine < up[1]
     if np.count_nonzero(stays):
         last = np.arctan2(np.sqrt((1.0 - cosine) * (1.0 + cosine)), cosine)
         end = np.where(stays, last, start)
         pulley = np.full(len(index), o.pulley - o.segments)
         clockwise = np.ones(len(index))
-        found = bounds(o, index, pulley, clockwise, rho, start, s.radius[index])[1]
+        found = bounds(o, index, pulley, clockwise, rho, start, s.radius[index], s.epoch(index))[1]
         struck = ~found["handover"] & (found["angle"] < end)
         end = np.where(struck, found["angle"], end)
-        end = np.where((end - start) * rho / v > left, start + left * v / rho, end)
+        cut = (end - start) * rho / v > left
+        end = np.where(cut, start + left * v / rho, end)
         _ease_round(s, index, rho, v, start, end)
+        if len(s.changes):
+            s.age[index[cut]] = stop[cut]
     over = s.age[index] >= s.stop[index]
-    hit, free = struck & ~over, ~struck & ~over
+    # Where a gate opens or shuts the ride goes on, with another look at what is in the way.
+    waits = cut & ~over if len(s.changes) else np.zeros(len(index), dtype=bool)
+    hit, free = struck & ~over & ~waits, ~struck & ~over & ~waits
     s.finish(index[over], "time")
     s.part(index[free], 0)
     s.fly(index[free], o.pulley, 0, 2 + (end[free] > start[free]))
@@ -95,7 +103,7 @@ def _ease_round(s: State, index: Ints, rho: Floats, v: Floats, first: Floats, en
 
 def ride(s: State, index: Ints) -> None:
     """Move riders on by one knot, or to the next event, and resolve it."""
-    circle = s.on[index]
+    o, circle = s.obstacles, s.on[index]
     c = s.contact(index, circle, s.side[index])
     rho = pick(s.obstacles.rho, index, circle - s.obstacles.segments)
     phi = np.arctan2(c.normal[0], c.normal[1])
@@ -115,7 +123,8 @@ def ride(s: State, index: Ints) -> None:
         high=s.bounds["angle"][1, index],
     )
     lifted = normal_force(state) <= 0.0
-    step = advance(state, s.stop[index] - s.age[index])
+    stop = s.next_change(index)
+    step = advance(state, stop - s.age[index])
     outcome = np.where(lifted, Outcome.LIFT, step.outcome)
     go = np.flatnonzero(~lifted)
     s.count_idle(index, np.where(lifted, 0.0, step.dt))
@@ -136,6 +145,12 @@ def ride(s: State, index: Ints) -> None:
 
     over = (outcome == Outcome.NOTHING) & (s.age[index] >= s.stop[index])
     s.finish(index[over], "time")
+    if len(s.changes):
+        changed = (outcome == Outcome.NOTHING) & (s.age[index] >= stop) & ~over
+        s.age[index[changed]] = stop[changed]
+        stays = o.present[s.epoch(index), circle]
+        look_round(s, index[changed & stays])
+        s.drop(index[changed & ~stays])
     lift = outcome == Outcome.LIFT
     s.part(index[lift], c.surface[lift])
     s.fly(index[lift], circle[lift], 0, np.where(lifted[lift], 2, 3))
@@ -198,6 +213,15 @@ def fly(s: State, index: Ints) -> None:
 
 def carry(s: State, index: Ints) -> None:
     """Move particles that the belt carries on to the pulley, or to what is in the way."""
+    if len(s.changes):
+        # Who was on the pulley when a gate opened or shut.
+        place = s.p[:, index]
+        round_ = dot(place, s.up_belt[:, index]) > rows_of(s.obstacles.touch, index)
+        turn, pace = np.arctan2(place[0], place[1]), length_of(s.v[:, index])
+        carry_round(s, index[round_], turn[round_], pace[round_])
+        index = index[~round_]
+        if not len(index):
+            return
     motion = _motion(s, index, AT_REST)
     motion.never = s.obstacles.under_belt
     before, up_belt = motion.position, rows_of(s.up_belt, index)
@@ -232,7 +256,9 @@ def slide(s: State, index: Ints) -> None:
     fading = s.slip[index] * rate < 0.0
     grips = np.where(fading, np.maximum(-slip / np.where(fading, rate, 1.0), 0.0), np.inf)
     ends = _end(s, motion)
-    stops = s.stop[index] - s.age[index]
+    # Whatever it lies on may vanish; that counts as a stop.
+    stop = np.minimum(s.stop[index], s.vanish(index)) if len(s.changes) else s.stop[index]
+    stops = np.maximum(stop - s.age[index], 0.0)
     dt, hits, obstacle, side = _next(s, motion, np.minimum(np.minimum(grips, ends), stops))
     mean = np.where(s.slip[index] == 0.0, 0.0, slip + 0.5 * rate * dt)
     mass = s.mass[index]
@@ -245,7 +271,13 @@ def slide(s: State, index: Ints) -> None:
     s.left[index[dt > 0.0]] = NONE
     s.knots(index)
     free = ~hits
-    _stop(s, index[free & (stops < grips) & (stops < ends)])
+    over = free & (stops < grips) & (stops < ends)
+    if len(s.changes):
+        opens = over & (stop < s.stop[index])
+        s.age[index[opens]] = np.maximum(s.age[index], stop)[opens]
+        s.drop(index[opens])
+        over &= ~opens
+    _stop(s, index[over])
     _leave_face(s, index[free & (ends < grips) & (ends <= stops)])
     end_slip(s, index[free & (grips <= ends) & (grips <= stops)])
     _strike(s, index, hits, obstacle, side)
@@ -261,6 +293,7 @@ def _motion(s: State, index: Ints, acceleration: Floats) -> Motion:
         s.left_side[index],
         s.order[index],
         s.past,
+        gates=s.changes[:, index] - s.age[index] if len(s.changes) else None,
     )
 
 
@@ -339,6 +372,7 @@ def _leave_face(s: State, index: Ints) -> None:
         s.p.take(index, axis=1) - pick(o.start, index, segment), pick(o.tangent, index, segment)
     )
     end = (foot > 0.5 * pick(o.length, index, segment)).astype(np.int64)
-    onward, onward_side = o.joints.onward
     face = (side < 0.0).astype(np.int64)
-    go_on(s, index, onward[segment, end, face], onward_side[segment, end, face])
+    at = (s.epoch(index), segment, end, face)
+    obstacle, obstacle_side = (array[at] for array in o.joints.onward)
+    go_on(s, index, obstacle, obstacle_side)

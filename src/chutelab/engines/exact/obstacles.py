@@ -58,6 +58,9 @@ class Obstacles:
     first_arc: int  # obstacle number of the first arc's outside
     pulley: int  # obstacle number of the pulley, or -1
     touch: Floats  # (n,), m; gaps smaller than this are rounding
+    changes: Floats  # (T,), when gates open or shut, ascending, s
+    present: Bools  # (T + 1, S + C), what is there before the first change, and after each
+    vanishes: Floats  # (S + C,), when an obstacle goes, s
 
     @property
     def segments(self) -> int:
@@ -199,6 +202,9 @@ TOUCH_ULPS = 256.0
 GIVEN_ULPS = 1.0
 """The same of a coordinate in the scene file, for one far from the origin."""
 
+NEVER = np.empty(0)
+"""Changes of a machine without gates."""
+
 BOX_TOUCHES = 64.0
 """Width, in `Obstacles.touch`, by which the boxes of faces are larger than they need be."""
 
@@ -259,9 +265,15 @@ def obstacles(machine: Machine, far: float = 0.0) -> Obstacles:
     touch = touch_of(size, far)
     near = JOINT * size
     spots = spots_of(corners[..., 0], near[0].item())
-    seen: dict[frozenset[int], int] = {}
+    came = np.concatenate([seg.appears, machine.arcs.appears])
+    went = np.concatenate([seg.vanishes, machine.arcs.vanishes])
+    times = np.concatenate([came, went])
+    changes = np.unique(times[np.isfinite(times)]) if np.isfinite(times).any() else NEVER
+    seen: dict[tuple[object, ...], int] = {}
     for s, pair in enumerate(spots[: len(length)]):
-        seen.setdefault(frozenset(pair), s)
+        # A gate that shuts again is there twice, at different times.
+        window = (came[s], went[s]) if len(changes) else ()
+        seen.setdefault((frozenset(pair), *window), s)
     kept = list(seen.values())
     if len(kept) < len(length):
         pieces = [*kept, *range(len(length), len(spots))]
@@ -269,19 +281,25 @@ def obstacles(machine: Machine, far: float = 0.0) -> Obstacles:
         spots, tangent, length = [spots[s] for s in pieces], tangent[:, kept], length[kept]
     flat, arcs = len(length), len(bends.order)
 
+    owner = [*kept, *(len(seg.surface) + bends.order).tolist()]
+    first_to_stay = list(range(len(spots)))
+    if len(changes):
+        stays = (np.isinf(came) & np.isinf(went))[owner]
+        first_to_stay.sort(key=lambda s: not stays[s])
     # Each place where pieces of disks end is a circle; a point meets it with probability zero. An
     # end that lies on an arc, or that of the belt on the pulley, cannot be met.
     rests = np.full((len(spots), 2), NONE)
     if arcs:
         for arc, on in enumerate(resting(corners, bends, near)[..., 0]):
-            rests[on.reshape(2, -1).T] = arc
+            if not len(changes) or stays[flat + arc]:
+                rests[on.reshape(2, -1).T] = arc
     if wheel is not None:
         rests[0, 1] = arcs
     known: dict[int, int] = {}
     ends: list[tuple[int, int]] = []
     end_circle = np.full((flat + arcs, 2), NONE)
-    for s, pair in enumerate(spots if radius[0] > 0.0 else ()):
-        for e, spot in enumerate(pair):
+    for s in first_to_stay if radius[0] > 0.0 else ():
+        for e, spot in enumerate(spots[s]):
             if rests[s, e] != NONE:
                 continue
             if spot not in known:
@@ -289,7 +307,6 @@ def obstacles(machine: Machine, far: float = 0.0) -> Obstacles:
                 ends.append((s, e))
             end_circle[s, e] = known[spot]
     where = [s + e * len(spots) for s, e in ends]
-    owner = [*kept, *(len(seg.surface) + bends.order).tolist()]
     own = [*owner[:flat], *(owner[s] for s, _ in ends), *owner[flat:], *owner[flat:]]
     center = [corners.take(np.array(where, dtype=np.int64), axis=1)]
     rho = [radius[None].repeat(len(ends), axis=0)]
@@ -325,6 +342,14 @@ def obstacles(machine: Machine, far: float = 0.0) -> Obstacles:
         # Nobody meets the inside of an arc that is too narrow.
         low[1] = np.where(np.isnan(low[1]), np.inf, low[1])
         high[1] = np.where(np.isnan(high[1]), -np.inf, high[1])
+    present, vanishes = np.ones((len(changes) + 1, len(which)), dtype=bool), went.take(which)
+    if len(changes):
+        since = np.concatenate([[-np.inf], changes])[:, None]
+        there = (came <= since) & (went > since)
+        present = there[:, which]
+        # An end is there with any of those that have it.
+        for s, e in np.argwhere(end_circle != NONE).tolist():
+            present[:, end_circle[s, e]] |= there[:, owner[s]]
     span = np.empty((2, 0, 1))
     if bends.open:
         span = np.zeros((2, *centers.shape[1:]))
@@ -347,6 +372,9 @@ def obstacles(machine: Machine, far: float = 0.0) -> Obstacles:
         first_arc=first,
         pulley=pulley,
         touch=touch,
+        changes=changes,
+        present=present,
+        vanishes=vanishes,
     )
 
 

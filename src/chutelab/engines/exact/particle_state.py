@@ -129,6 +129,8 @@ class State:
         self.staggered = np.count_nonzero(self.released) > 0
         self.stop = self.each(machine.end_time) - self.released  # age at which the run is over
         self.everyone = np.arange(count)
+        # Ages at which gates open or shut, (T, k).
+        self.changes = self.obstacles.changes[:, None] - self.released
 
         # Rows of a knot: age (s), position (m), velocity and r ω (m/s), ledger entries (J).
         self.state = np.zeros((9, count))
@@ -177,6 +179,27 @@ class State:
         assert self.machine.pulley is not None
         incline = self.each(self.machine.pulley.incline)
         return np.stack([np.cos(incline), np.sin(incline)])
+
+    def epoch(self, index: Ints) -> Ints:
+        """Return how many of the changes of what is there have been, (k,)."""
+        return np.asarray((self.changes[:, index] <= self.age[index]).sum(axis=0))
+
+    def next_change(self, index: Ints) -> Floats:
+        """Return the ages at which the next gate opens or shuts, or the run is over, (k,), s."""
+        if not len(self.changes):
+            return np.asarray(self.stop[index])
+        later = self.changes[:, index]
+        later = np.where(later > self.age[index], later, np.inf).min(axis=0)
+        return np.asarray(np.minimum(self.stop[index], later))
+
+    def vanish(self, index: Ints) -> Floats:
+        """Return the ages at which what the particles are on vanishes, (k,), s."""
+        return np.asarray(self.obstacles.vanishes[self.on[index]] - self.released[index])
+
+    def drop(self, index: Ints) -> None:
+        """Let particles go from what vanishes under them now."""
+        self.part(index, self.obstacles.surface[self.on[index]])
+        self.fly(index, NONE, 0.0, 0)
 
     def count_idle(self, index: Ints, dt: Floats) -> None:
         """Count events in a row that take no time, and raise rather than hang if they never end."""

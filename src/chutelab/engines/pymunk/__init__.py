@@ -3,9 +3,10 @@
 Nothing here is shared with the other engines but the machine and the recorder: the check from
 outside.
 
-- `world`: the machine as a `pymunk.Space`; rides on the belt that holds; tracks.
+- `world`: the surfaces as a `pymunk.Space`; rides on the belt that holds; tracks.
 - `lone`: one particle whose steps end at its contacts.
 - `shared`: all particles in one Space, in steps that are all alike.
+- `shapes`: their bodies and shapes, chains for arcs, and what Chipmunk is told at a contact.
 """
 
 from __future__ import annotations
@@ -40,9 +41,10 @@ def run(machine: Machine, progress: Progress | None = None) -> Recording:
     -------
     Recording
         With `align`, a lone particle's blows to rounding error and its lasting contacts of order 2
-        in the step, which is no longer than `dt` and half a radius' way. Particles that meet, and
-        steps that are all alike, of order 1: `dt` times the speed should be less than the radius,
-        or disks overlap by as much, and pass through surfaces.
+        in the step, which is no longer than `dt` and half a radius' way. Particles that meet,
+        boxes, what hangs on strings, and steps that are all alike, of order 1: `dt` times the speed
+        should be less than the radius, or half a box's width, or they overlap by as much, and pass
+        through surfaces.
 
     Raises
     ------
@@ -73,7 +75,8 @@ def run(machine: Machine, progress: Progress | None = None) -> Recording:
 
     world = World(machine)
     try:
-        if machine.interact or not machine.align:
+        boxes = any(outline is not None for outline in machine.outlines)
+        if machine.interact or not machine.align or boxes or machine.threads:
             shared = Shared(machine, world, recorder)
             try:
                 shared.run(report)

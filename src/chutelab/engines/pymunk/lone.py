@@ -131,7 +131,7 @@ class Lone:
         self.x = Vec2d(*start.position[particle].tolist())
         self.v = Vec2d(*start.velocity[particle].tolist())
         self.omega = 0.0
-        self.body, self.circle = world.disk()
+        self.body, self.circle = world.disk(particle)
         self.weight = self.body.mass * self.g
         # Rolling friction's arm, m; nothing of what does not turn.
         turns = self.body.moment < inf

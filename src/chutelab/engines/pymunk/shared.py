@@ -10,37 +10,32 @@ step's end. A ride that friction drives hops, ever longer towards its end, which
 surface pushed last. A disk rises from a rim like a t³/6, with a some 50 m/s³, so a place that is
 off by δ shifts the last push by (6 δ/a)^(1/3): in `slip` it is 21, 12, 5 and 4 ms early at 2, 1,
 0.5 and 0.25 ms, and no less at shorter steps, as `SLOP`, 4 µm there, stays.
+
+A pendulum's string keeps its length to v² h²/(2 L), and its period is of order 2. A string takes
+nothing while it is tight; what a jerk takes is a restitution loss of the particles. Balls that hang
+side by side hand a blow on one by one only if there are gaps between them, of 1e-4 r or more:
+contacts that touch Chipmunk solves all at once, and all balls move.
 """
 
 from __future__ import annotations
 
-from math import ceil, inf, sqrt
+from dataclasses import dataclass
+from math import ceil, inf
 from typing import Any
 
 import numpy as np
 import pymunk
 from pymunk import Vec2d, batch
 
-from chutelab.engines.pymunk.world import PARTICLE, Carriage, Flight, Tracks, World
+from chutelab.engines.pymunk.shapes import Shapes
+from chutelab.engines.pymunk.world import Bend, Carriage, Flight, Tracks, World
 from chutelab.machine import Machine
 from chutelab.results import REASONS, Kind
 from chutelab.results.recorder import EnoughError, Recorder
 from chutelab.util.arrays import Floats, Ints, Progress
 
-SLOP, BIAS = 1e-3, 1e-97
-"""Overlap that Chipmunk leaves alone, as a share of the radius, and the share of what is beyond it
-that it leaves after 1 s: it takes back a fifth in 1 ms. Its defaults are meant for pixels and 60
-steps a second: 0.1 (m here) and 0.9^60, 0.6 % in 1 ms. With those, disks that land without a
-rebound, a step late, stay where they sank: in `stream` at 1 ms 1 % of all contacts overlap by
-46 % of the radius, with these by 1.4 %. The residual is 3e-4 either way, as all of it is pushed out
-at last: that work is no contact's impulse, and the ledger shows it as residual. Without any slop
-disks that lie still lose contact every few steps."""
-
-ROLLER = 3
-"""Collision type of the ends of moving segments."""
-
-SMALLEST = 1e-12
-"""Pair value that stands for 0 where Chipmunk's product of two shapes' values is divided by it."""
+SOON = 1e-9
+"""Share of a step that a time may be ahead and count as now."""
 
 STAY, HOP = 5, 50
 """Pushes of one surface that make a ride, and steps without one that end it. A grip of large
@@ -67,6 +62,22 @@ TOWARDS = np.array([[1.0], [1.0], [-1.0], [-1.0]])
 """Turns Chipmunk's normal, but not its impulse."""
 
 
+LEFT = 0.9
+"""Share that is left, a step later, of what a string was stretched by when it was pulled tight."""
+
+TAUT, ROUNDING = 1e-9, 1e-13
+"""Shares of its length: by which a string that pulls may seem too short, and is kept stretched."""
+
+
+@dataclass
+class String:
+    """A string, as a joint that pulls; `over` (m) is what it is still stretched by."""
+
+    joint: pymunk.SlideJoint
+    length: float  # m
+    over: float = 0.0
+
+
 class Shared:
     """Runs all particles together.
 
@@ -81,18 +92,28 @@ class Shared:
 
     def __init__(self, machine: Machine, world: World, recorder: Recorder) -> None:
         self.machine, self.world, self.recorder = machine, world, recorder
-        self.tracks = Tracks(recorder, machine.particle.radius, range(machine.count))
-        self.r, self.g = machine.particle.radius, machine.gravity
-        self.pull = Vec2d(0.0, -self.g)
         count = self.count = machine.count
+        p, starts, faces = machine.particle, machine.releases, world.faces
+        rows = count + len(faces)
+        self.radius = np.zeros(rows)
+        self.radius[:count] = p.radius
+        self.shapes = Shapes(machine, world)
+        self.bodies, self.corners = self.shapes.bodies, self.shapes.corners
+        # The same for all, or each one's own.
+        self.r: Any = p.radius if not np.ndim(p.radius) else self.radius
+        self.alike = len(machine.pair_restitution) == 1 and not np.ndim(p.radius)
+        self.tracks = Tracks(recorder, self.shapes.smallest, range(count), turning=self.corners)
+        self.g = machine.gravity
+        self.pull = Vec2d(0.0, -self.g)
         # A whole number of steps ends the run.
-        self.t = self.begin = float(machine.releases.t[0])
+        self.t = self.begin = float(starts.t.min())
         span = machine.end_time - self.begin
         self.most = ceil(span / machine.dt - 1e-9)
         self.h, self.steps, self.clock = span / max(self.most, 1), 0, 0
-        self.waiting = np.flatnonzero(machine.releases.t < machine.end_time).tolist()
+        self.waiting = [
+            i for i in starts.t.argsort(kind="stable").tolist() if starts.t[i] < machine.end_time
+        ]
         self.rides: dict[int, Carriage] = {}
-        faces, rows = world.faces, count + len(world.faces)
         self.state, self.entries = np.zeros((2, 5, rows)), np.zeros((3, rows))
         recorder.entries = self.entries[:, :count].T
         self.free, self.inside, self.landed = np.zeros((3, count), dtype=bool)
@@ -106,55 +127,35 @@ class Shared:
         surface, self.speed, self.tx, self.ty = np.array(about).T
         self.surface = surface.astype(np.int64)
         self.throws = (self.speed != 0.0) & (self.surface != machine.landing)
-        self._fill()
-
-    def _fill(self) -> None:
-        """Set up the Space, and make all bodies, so that none gets the id of one that is gone."""
-        m, space = self.machine, self.world.space
-        space.gravity, space.collision_bias = self.pull, BIAS
-        space.collision_slop = SLOP * self.r + self.world.hair
-        # What Chipmunk remembers longer it reports in the impulse when two meet again, unapplied.
-        space.collision_persistence = 1
-        pairs = m.pair_restitution[0, 0], m.pair_friction[0, 0]
-        own, grip = (sqrt(max(value, SMALLEST)) for value in pairs)
-        space.on_collision(PARTICLE, ROLLER, pre_solve=self._round_end)
-        for face in self.world.faces:
-            shapes = [face.shape]
-            if isinstance(face.shape, pymunk.Segment) and face.speed != 0.0:
-                # Neighbours in line keep the segment from what is beyond its ends.
-                a, b = face.ends
-                face.shape.set_neighbors(a - (b - a), b + (b - a))
-                assert face.tangent is not None
-                face.shape.surface_velocity = face.speed * face.tangent
-                for end in face.ends:
-                    shapes.append(pymunk.Circle(face.shape.body, 0.0, end))
-                    shapes[-1].collision_type = ROLLER
-                    self.world.by_shape[shapes[-1]] = face
-                space.add(*shapes[1:])
-            for shape in shapes:
-                shape.elasticity, shape.friction = face.restitution / own, face.friction / grip
-        self.disks = [self.world.disk() for _ in range(self.count)]
-        for _, circle in self.disks:
-            circle.elasticity, circle.friction = own, grip
-            if not m.interact:
-                circle.filter = pymunk.ShapeFilter(group=1)
-        self.buffer = batch.Buffer()
-        # Rows by sorted id of their bodies; the one of the Space itself is nobody's.
-        bodies = [body for body, _ in self.disks]
-        bodies += [face.shape.body for face in self.world.faces if face.shape.body]
-        ids = np.array([body.id for body in bodies], dtype=np.uintp)
+        self.spin = np.zeros(rows)
+        self.spin[count:] = [face.spin for face in faces]
+        self.bent = np.array([False] * count + [isinstance(face, Bend) for face in faces])
+        self.bends = bool(self.bent.any())
+        self.before = np.zeros(0, dtype=np.int64)
+        self.center = np.zeros((2, rows))
+        for row, face in enumerate(faces, count):
+            if isinstance(face, Bend):
+                self.center[:, row] = face.center
+        # Of those who turn: 1/I, and rolling friction's arm over the radius, if any has it.
+        self.ease, share = np.zeros((2, rows))
+        inertia = np.broadcast_to(p.inertia, count)
+        np.divide(1.0, inertia, out=self.ease[:count], where=inertia > 0.0)
+        share[:count] = machine.rolling[starts.kind]
+        self.arm = share if share.any() else None
+        self.couples: tuple[Any, ...] = (*np.zeros((2, 0), dtype=np.int64), np.zeros(0))
+        self.strings: dict[int, list[String]] = {}
+        for thread in machine.threads:
+            body = self.bodies[thread.particle][0]
+            joint = pymunk.SlideJoint(
+                world.space.static_body, body, thread.anchor, (0.0, 0.0), 0.0, thread.length
+            )
+            joint.error_bias = 0.0
+            self.strings.setdefault(thread.particle, []).append(String(joint, thread.length))
+        # Rows by sorted id of their bodies; that of the Space's own is nobody's.
+        self.nobody = world.space.static_body.id
+        self.buffer, ids = batch.Buffer(), np.array(list(self.shapes.rank), dtype=np.uintp)
         self.row = ids.argsort()
         self.ids = ids[self.row]
-
-    def _round_end(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
-        """Have the end of a belt move along its rim; beside the face it is not met."""
-        disk, end = arbiter.shapes
-        assert isinstance(end, pymunk.Circle)
-        assert disk.body is not None
-        face, normal = self.world.by_shape[end], -arbiter.normal
-        out = sum(face.ends, Vec2d(0.0, 0.0)) * -0.5 + end.offset
-        arbiter.process_collision = out.dot(disk.body.position - end.offset) > 0.0
-        arbiter.surface_velocity = face.belt(normal) * Vec2d(normal.y, -normal.x)
 
     def run(self, report: Progress) -> None:
         """Run to the end."""
@@ -166,6 +167,8 @@ class Shared:
                 clock = min(int((due - self.begin) / self.h), self.most - 1)
                 self.clock = max(self.clock, clock)
                 self.t = self.begin + self.clock * self.h
+            if self.shapes.gates:
+                self.shapes.open_and_shut(self.t + SOON * self.h)
             self._release()
             self._step()
             try:
@@ -190,25 +193,20 @@ class Shared:
         starts = self.machine.releases
         for i in list(self.waiting):
             due = float(starts.t[i])
-            if due > self.t + 1e-9 * self.h:
+            if due > self.t + SOON * self.h:
                 break
             t = due if self.t - due < self.h else self.t
             x, v = Vec2d(*starts.position[i].tolist()), Vec2d(*starts.velocity[i].tolist())
-            others = np.flatnonzero(self.inside)
-            if self.machine.interact and len(others):
-                # Apart now, and when it was due.
-                late = max(self.t - t, 0.0)
-                now = self.state[1, :2, others] - (x + late * v)
-                apart = now, now - late * (self.state[1, 2:4, others] - v)
-                if min(float((d * d).sum(axis=1).min()) for d in apart) < 4.0 * self.r**2:
-                    continue
+            if self.machine.interact and self._taken(i, x, v, max(self.t - t, 0.0)):
+                continue
             self.waiting.remove(i)
             self.inside[i] = True
             self.recorder.events(Kind.RELEASE, i, t, tuple(x), tuple(v))
-            body, circle = self.disks[i]
-            self.world.space.add(body, circle)
+            body = self.bodies[i][0]
+            self.world.space.add(*self.bodies[i])
             if starts.carried[i]:
-                ride = self.rides[i] = Carriage(self.machine, self.world, i, t)
+                world = self.world if self.alike else World(self.machine, i)
+                ride = self.rides[i] = Carriage(self.machine, world, i, t)
                 body.body_type = pymunk.Body.KINEMATIC
                 body.position, body.velocity = ride.at(self.t - 0.5 * self.h - t)
                 self.state[1, :2, i], self.state[1, 2:4, i] = ride.at(self.t - t)
@@ -217,9 +215,23 @@ class Shared:
             else:
                 self._free(i, t, x, v)
 
+    def _taken(self, i: int, x: Vec2d, v: Vec2d, late: float) -> bool:
+        """Tell whether somebody is where a particle is to start, now or when it was due."""
+        others = np.flatnonzero(self.inside)
+        if not len(others):
+            return False
+        if self.corners:
+            return self.shapes.taken(i, x + late * v)
+        now = self.state[1, :2, others] - (x + late * v)
+        apart = now, now - late * (self.state[1, 2:4, others] - v)
+        near = 4.0 * self.r**2
+        if np.ndim(self.r):
+            near = (self.radius[i] + self.radius[others]) ** 2
+        return any(bool(((d * d).sum(axis=1) < near).any()) for d in apart)
+
     def _free(self, i: int, t: float, x: Vec2d, v: Vec2d) -> None:
         """Let a particle fly from where it is at a time (s) up to now."""
-        body = self.disks[i][0]
+        body = self.bodies[i][0]
         self.tracks.knot(i, t, x, v)
         late = self.t - t
         now = v + late * self.pull
@@ -229,13 +241,14 @@ class Shared:
             self.tracks.knot(i, self.t, x, now)
         body.position, body.velocity = x - 0.5 * self.h * now, now
         self.state[1, :, i] = *x, *now, 0.0
+        self.world.space.add(*(string.joint for string in self.strings.get(i, ())))
         self.free[i], self.calm[i] = True, 0.0
 
     def _ride(self) -> None:
         """Steer who is carried round the pulley through this step; let go whose ride is over."""
         ahead = self.t + 0.5 * self.h
         for i, ride in list(self.rides.items()):
-            body, circle = self.disks[i]
+            body, shape = self.bodies[i]
             if ride.until <= self.t:
                 ride.write(self.recorder, ride.until)
                 x, v = ride.at(ride.until - ride.t)
@@ -243,12 +256,11 @@ class Shared:
                     Kind.SEPARATION, i, ride.until, tuple(x), tuple(v), surface=ride.surface
                 )
                 del self.rides[i]
-                p = self.machine.particle
                 # Put in anew, what it is in touch with counts as met for the first time.
-                self.world.space.remove(body, circle)
+                self.world.space.remove(body, shape)
                 body.body_type = pymunk.Body.DYNAMIC
-                body.mass, body.moment = p.mass, p.inertia or inf
-                self.world.space.add(body, circle)
+                body.mass, body.moment = self.world.heft(i)
+                self.world.space.add(body, shape)
                 self._free(i, ride.until, x, v)
             elif ahead > ride.top:
                 body.velocity = (ride.at(ahead - ride.t)[0] - body.position) / self.h
@@ -260,6 +272,10 @@ class Shared:
         space = self.world.space
         if self.rides:
             self._ride()
+        if self.strings:
+            self._tighten()
+        if self.arm is not None:
+            self._turn()
         space.step(self.h)
         self.steps += 1
         self.clock += 1
@@ -269,44 +285,61 @@ class Shared:
         batch.get_space_bodies(space, _BODY, self.buffer)
         ids = np.frombuffer(self.buffer.int_buf(), dtype=np.uintp)
         self.state[0], after = self.state[1], self.state[1]
-        rows = self.row[self.ids.searchsorted(ids)]
-        after[:, rows] = np.frombuffer(self.buffer.float_buf()).reshape(-1, 5).T
+        known = ids != self.nobody
+        rows = self.row[self.ids.searchsorted(ids[known])]
+        after[:, rows] = np.frombuffer(self.buffer.float_buf()).reshape(-1, 5)[known].T
         after[:2] += (0.5 * self.h) * after[2:4]
         after[:, self.count :] = 0.0
         self._contacts()
+        if self.strings:
+            self._pulled()
         self.tracks.step(self.free, (t, self.t), self.state[..., : self.count], entries)
         self._endings(t, entries)
 
     def _contacts(self) -> None:
         """Book what pushes, and tell blows, landings and who rides what."""
-        self.buffer.clear()
-        batch.get_space_arbiters(self.world.space, _ARBITER, self.buffer)
-        values = np.frombuffer(self.buffer.float_buf()).reshape(-1, 4).T
-        ids = np.frombuffer(self.buffer.int_buf(), dtype=np.uintp).reshape(-1, 3).T
+        a, b, first, values = self._touches()
         # The impulse acts on A, the normal points from A to B.
         push = -values[0] * values[2] - values[1] * values[3]
         pushing = push > 0.0
-        push, values, ids = push[pushing], values[:, pushing], ids[:, pushing]
-        a, b = self.row[self.ids.searchsorted(ids[:2])]
+        a, b, first, push, values = (part[..., pushing] for part in (a, b, first, push, values))
         one, other = np.minimum(a, b), np.maximum(a, b)
         # They come in the order of a hash of addresses, on which no sum may depend.
-        order = np.lexsort((push, other, one))
-        a, one, other, push = a[order], one[order], other[order], push[order]
-        values, ids = values[:, order], ids[:, order]
-        jx, jy, nx, ny = np.where(a == one, 1.0, -1.0) * values * TOWARDS
+        order = np.lexsort((*values[4:], push, other, one))
+        a, one, other, push, first = (part[order] for part in (a, one, other, push, first))
+        values, straight = values[:, order], a == one
+        jx, jy, nx, ny = np.where(straight, 1.0, -1.0) * values[:4] * TOWARDS
         rub = jx * ny - jy * nx
         speed = self.speed[other]
-        belt = np.where(self.tx[other] * ny - self.ty[other] * nx < 0.0, -speed, speed)
+        side = self.tx[other] * ny - self.ty[other] * nx
+        if self.bends:
+            away = self.state[1, :2].take(one, axis=1) - self.center.take(other, axis=1)
+            side = np.where(self.bent[other], away[0] * nx + away[1] * ny, side)
+        belt = np.where(side < 0.0, -speed, speed)
         # Of the contact points to each other, before and after: (2, k).
         mine, others = (self.state[:, 2:].take(row, axis=2) for row in (one, other))
         u, v = mine[:, 0] - others[:, 0], mine[:, 1] - others[:, 1]
         rate = u * nx + v * ny
-        slip = u * ny - v * nx + self.r * (mine[:, 2] + others[:, 2]) - belt
+        slip = u * ny - v * nx
+        if self.corners:
+            # Both levers, from the centres to the point: r × n turns into the rate.
+            arms = np.where(straight, values[4:], values[[6, 7, 4, 5]])
+            for (x, y), spin in ((arms[:2], mine[:, 2]), (arms[2:], -others[:, 2])):
+                rate = rate + spin * (x * ny - y * nx)
+                slip = slip - spin * (x * nx + y * ny)
+        elif np.ndim(self.r):
+            slip = slip + self.radius[one] * mine[:, 2] + self.radius[other] * others[:, 2]
+        else:
+            slip = slip + self.r * (mine[:, 2] + others[:, 2])
+        slip = slip - belt
         # J (u before + u after)/2; then whether the contact is still, and that it is one.
         sums = np.ones((5, len(one)))
         sums[0], sums[1] = rub * belt, -0.5 * push * (rate[0] + rate[1])
         sums[2] = -0.5 * rub * (slip[0] + slip[1])
         sums[3] = (np.abs(rate[1]) < STILL) & (np.abs(slip[1]) < STILL) & ~self.throws[other]
+        if self.arm is not None:
+            rolls = self.radius[one] * np.abs(mine[1, 2] - others[1, 2] - self.spin[other])
+            sums[3] *= (self.arm[one] == 0.0) | (rolls < STILL)
         pair = other < self.count
         self.recorder.by_surface[-1] += sums[:3] @ pair
         for k in np.flatnonzero(pair) if self.rides else ():
@@ -324,12 +357,24 @@ class Shared:
         weights = np.concatenate((sums, sums), axis=1)
         added = np.bincount(places.ravel(), weights.ravel(), 5 * rows).reshape(5, rows)
         self.entries += added[:3]
+        if self.arm is not None:
+            self._brake(one, other, push)
         calm = (added[4] > 0.0) & (added[3] == added[4])
         self.calm = np.where(calm[: self.count] | ~self.free, self.calm + self.h, 0.0)
         surface = self.surface[other]
         self._riding(one[~pair], surface[~pair])
         lands = (surface == self.machine.landing) & ~self.landed[one]
-        told = np.flatnonzero(lands | (ids[2] != 0) & (rate[0] < -self.g * self.h))
+        if self.bends:
+            # From one link of a chain to the next is no blow.
+            contact = one * rows + other
+            first &= ~np.isin(contact, self.before)
+            self.before = contact
+        told = np.flatnonzero(lands | first & (rate[0] < -self.g * self.h))
+        if self.corners and len(told):
+            # Of all points of a contact one event.
+            _, which = np.unique(one * rows + other, return_inverse=True)
+            push, rub = (np.bincount(which, part)[which] for part in (push, rub))
+            told = told[np.unique(which[told], return_index=True)[1]]
         if len(told):
             self.landed[one[lands]] = True
             self.recorder.contacts += len(told)
@@ -341,6 +386,105 @@ class Shared:
                 other=np.where(pair, other, -1)[told],
                 normal_impulse=push[told], tangential_impulse=rub[told],
             )  # fmt: skip
+
+    def _touches(self) -> tuple[Any, ...]:
+        """Return both bodies' rows, whether they met now, and impulse on A, normal and levers."""
+        if self.corners:
+            points = np.array(self.shapes.points).reshape(-1, 11).T
+            self.shapes.points.clear()
+            rows = points[:2].astype(np.int64)
+            return *rows, points[2] != 0.0, points[3:]
+        self.buffer.clear()
+        batch.get_space_arbiters(self.world.space, _ARBITER, self.buffer)
+        values = np.frombuffer(self.buffer.float_buf()).reshape(-1, 4).T
+        ids = np.frombuffer(self.buffer.int_buf(), dtype=np.uintp).reshape(-1, 3).T
+        return *self.row[self.ids.searchsorted(ids[:2])], ids[2] != 0, values
+
+    # Rolling friction
+
+    def _turn(self) -> None:
+        """Give the couples of rolling friction to those whose contacts of the last step last."""
+        one, other, couple = self.couples
+        kept = self.free[one] & (
+            (other >= self.count) | self.free[np.minimum(other, self.count - 1)]
+        )
+        one, other, couple = self.couples = one[kept], other[kept], couple[kept]
+        turned = self.ease * np.bincount(
+            np.concatenate((one, other)), np.concatenate((couple, -couple)), len(self.ease)
+        )
+        for i in np.flatnonzero(turned).tolist():
+            self.bodies[i][0].angular_velocity += float(turned[i])
+
+    def _brake(self, one: Ints, other: Ints, push: Floats) -> None:
+        """Book the couples of this step; find those of the next.
+
+        They are given before a step, so that friction bears them, and grow from step to step until
+        nothing turns, up to what the pushes of the step before allow.
+        """
+        assert self.arm is not None
+        last, mate, couple = self.couples
+        turning = self.state[:, 4] - self.spin
+        belt, heat = (
+            couple * self.spin[mate],
+            -0.5 * couple * (turning[:, last] - turning[:, mate]).sum(axis=0),
+        )
+        rows, pair = len(self.surface), mate < self.count
+        self.recorder.by_surface[-1, 2] += float(heat[pair].sum())
+        heat = np.where(pair, 0.5 * heat, heat)
+        for entry, part in ((0, belt), (2, heat)):
+            for row in (last, mate):
+                self.entries[entry] += np.bincount(row, part, rows)
+        before = dict(
+            zip(zip(last.tolist(), mate.tolist(), strict=True), couple.tolist(), strict=True)
+        )
+        held = [before.get(key, 0.0) for key in zip(one.tolist(), other.tolist(), strict=True)]
+        # Of two kinds the larger; between two disks on the radius of both together.
+        share = np.maximum(self.arm[one], self.arm[other])
+        r, its = self.radius[one], self.radius[other]
+        most = share * np.where(its > 0.0, r * its / (r + its), r) * push
+        contacts = np.bincount(np.concatenate((one, other)), minlength=rows)
+        contacts[self.count :] = 1
+        ease = (self.ease[one] + self.ease[other]) * np.maximum(contacts[one], contacts[other])
+        rolls = (most > 0.0) & (ease > 0.0)
+        one, other, most = one[rolls], other[rolls], most[rolls]
+        change = (turning[1, one] - turning[1, other]) / ease[rolls]
+        self.couples = one, other, np.clip(np.array(held)[rolls] - change, -most, most)
+
+    # Strings
+
+    def _tighten(self) -> None:
+        """Set the lengths of strings for the next step.
+
+        Chipmunk lets a string go that is not longer than its length: one that pulls is kept longer
+        by rounding. One that is pulled tight has overshot by up to a step; that is taken back
+        slowly, or what hangs on it would be thrown back.
+        """
+        for i, strings in self.strings.items():
+            if not self.free[i]:
+                continue
+            body = self.bodies[i][0]
+            ahead = body.position + self.h * body.velocity
+            for string in strings:
+                length = (ahead - string.joint.anchor_a).length
+                if string.joint.impulse > 0.0:
+                    string.over *= LEFT
+                else:
+                    string.over = max(length - string.length, 0.0)
+                string.joint.max = string.length + string.over
+                if length > string.length * (1.0 - TAUT):
+                    string.joint.max = min(string.joint.max, length * (1.0 - ROUNDING))
+
+    def _pulled(self) -> None:
+        """Book what strings take: nothing but in a jerk, to the order of the step."""
+        for i, strings in self.strings.items():
+            if not self.free[i]:
+                continue
+            v = Vec2d(*(0.5 * (self.state[0, 2:4, i] + self.state[1, 2:4, i])).tolist())
+            for string in strings:
+                towards = (string.joint.anchor_a - self.bodies[i][0].position).normalized()
+                loss = -string.joint.impulse * float(towards.dot(v))
+                self.entries[1, i] += loss
+                self.recorder.by_surface[-1, 1] += loss
 
     def _riding(self, who: Ints, surface: Ints) -> None:
         """Count pushes of surfaces in a row; tell separations at the last one's time."""
@@ -402,5 +546,6 @@ class Shared:
             surface = self.on[i] if kind == Kind.SETTLE else -1
             self.recorder.events(kind, i, t, x, v, omega, surface=surface)
         self.recorder.ended[i] = REASONS.index(reason)
-        self.world.space.remove(*self.disks[i])
+        self.world.space.remove(*(string.joint for string in self.strings.get(i, ())))
+        self.world.space.remove(*self.bodies[i])
         self.inside[i] = self.free[i] = False

@@ -231,6 +231,12 @@ class Flight(NamedTuple):
         )  # fmt: skip
 
 
+def own(values: ArrayLike, particle: int) -> float:
+    """Return a particle's own of a property that all share or each has."""
+    values = np.asarray(values)
+    return float(values[particle] if values.ndim else values)
+
+
 def falls(gap: float, rate: float, pull: float) -> float:
     """Return the first time (s) at which gap + rate τ + pull τ²/2 falls to 0, inf if never."""
     ahead = max(gap, 0.0)
@@ -253,7 +259,7 @@ class World:
         self.machine, self.particle = machine, particle
         self.space = pymunk.Space()
         parts, arcs, wheel = machine.segments, machine.arcs, machine.pulley
-        r = self.radius = self.of(machine.particle.radius)
+        r = self.radius = own(machine.particle.radius, particle)
         size = float(np.abs([*machine.corners.ravel(), r]).max())
         self.rounding = DIGITS * size
         self.hair = max(HAIR * r, 4.0 * self.rounding)
@@ -285,11 +291,6 @@ class World:
         values, kinds = np.asarray(values), len(self.machine.pair_restitution)
         return values[self.machine.releases.kind[self.particle]] if kinds > 1 else values
 
-    def of(self, values: ArrayLike) -> float:
-        """Return the particle's own of a property that all share or each has."""
-        values = np.asarray(values)
-        return float(values[self.particle] if values.ndim else values)
-
     def _about(self, parts: Segments | Arcs, n: int) -> dict[str, Any]:
         """Return what a face knows of a segment or arc."""
         restitution, friction = (
@@ -308,6 +309,7 @@ class World:
         radius, begin, extent = (
             float(values[n]) for values in (arcs.radius, arcs.begin, arcs.extent)
         )
+        whole = extent >= 2.0 * pi
         body = pymunk.Body(body_type=pymunk.Body.STATIC)
         body.position = center
         # A shape that is not in the Space does not keep its body.
@@ -315,7 +317,7 @@ class World:
         circle = pymunk.Circle(body, radius)
         circle.cache_bb()
         foot = pymunk.Circle(pymunk.Body(body_type=pymunk.Body.KINEMATIC), 0.0)
-        if extent >= 2.0 * pi:
+        if whole:
             about["spin"] = -about["speed"] / radius
             self._add(Bend(circle, tangent=None, foot=foot, begin=0.0, extent=inf, **about))
             return
@@ -323,15 +325,12 @@ class World:
         self._add(Bend(
             circle, tangent=None, foot=foot, begin=begin - more, extent=extent + 2.0 * more, **about
         ))  # fmt: skip
-        for end, angle in zip(
-            (part[n].tolist() for part in arcs.ends), (begin, begin + extent), strict=True
-        ):
+        # Out of it is along the surface at the first end, against it at the last.
+        for end, angle, way in zip(arcs.ends, (begin, begin + extent), (1.0, -1.0), strict=True):
             still = pymunk.Body(body_type=pymunk.Body.STATIC)
-            self._add(
-                Face(
-                    pymunk.Circle(still, 0.0, end), tangent=Vec2d(sin(angle), -cos(angle)), **about
-                )
-            )
+            out = way * Vec2d(sin(angle), -cos(angle))
+            point = pymunk.Circle(still, 0.0, end[n].tolist())
+            self._add(Face(point, tangent=out, **about | {"speed": way * about["speed"]}))
 
     def _add(self, face: Face) -> None:
         shape = face.touched
@@ -340,14 +339,18 @@ class World:
         self.space.add(shape.body, shape)
         self.by_shape[shape] = face
 
-    def disk(self) -> tuple[pymunk.Body, pymunk.Circle]:
+    def disk(self, particle: int) -> tuple[pymunk.Body, pymunk.Circle]:
         """Return a new body with its shape, not yet in the Space."""
         p = self.machine.particle
-        mass, inertia = self.of(p.mass), self.of(p.inertia)
-        body = pymunk.Body(mass, inertia if inertia > 0.0 else inf)
-        circle = pymunk.Circle(body, self.radius + self.hair)
+        body = pymunk.Body(*self.heft(particle))
+        circle = pymunk.Circle(body, own(p.radius, particle) + self.hair)
         circle.collision_type = PARTICLE
         return body, circle
+
+    def heft(self, particle: int) -> tuple[float, float]:
+        """Return mass (kg) and moment of inertia (kg m²), inf of what does not turn."""
+        p = self.machine.particle
+        return own(p.mass, particle), own(p.inertia, particle) or inf
 
     def curved(self, face: Face, x: Vec2d) -> bool:
         """Tell whether what is nearest of a surface is an arc, the pulley or the end of a face."""
@@ -425,7 +428,7 @@ class Carriage:
         assert machine.pulley is not None
         start, self.incline = machine.releases, machine.pulley.incline
         self.particle, self.surface, self.t = particle, machine.pulley.surface, t
-        self.weight = world.of(machine.particle.mass) * machine.gravity
+        self.weight = own(machine.particle.mass, particle) * machine.gravity
         # Along the belt and square to it.
         self.along = Vec2d(cos(self.incline), sin(self.incline))
         self.up = self.along.perpendicular()
@@ -478,19 +481,24 @@ class Tracks:
     """Knots of particles that are stepped, only as many as the curve through them needs.
 
     Between knots a track is a cubic, which a constant acceleration makes exact: a new knot is due
-    when the one of the first step since the last knot does not lead to where the particle is.
+    when the one of the first step since the last knot does not lead to where the particle is. With
+    `turning` that goes for the angle too, which is what ω, linear between knots, adds up to.
     """
 
-    def __init__(self, recorder: Recorder, radius: float, particles: range) -> None:
+    def __init__(
+        self, recorder: Recorder, radius: float, particles: range, *, turning: bool = False
+    ) -> None:
         self.recorder, self.first, count = recorder, particles.start, len(particles)
-        self.tolerance = ROUGH * radius
+        self.turning, self.radius, self.tolerance = turning, radius, ROUGH * radius
         self.t, self.x, self.v = np.zeros(count), np.zeros((2, count)), np.zeros((2, count))
         self.pull, self.fresh = np.zeros((2, count)), np.ones(count, dtype=bool)
+        self.omega, self.twist = np.zeros((2, count))
 
     def knot(self, i: int, t: float, x: ArrayLike, v: ArrayLike, omega: float = 0.0) -> None:
         """Write a knot of the particle in a row, with the entries booked so far."""
         self.recorder.knots(self.first + i, t, x, v, omega)
         self.t[i], self.x[:, i], self.v[:, i], self.fresh[i] = t, x, v, True
+        self.omega[i] = omega
 
     def step(self, rows: Bools, times: tuple[float, float], state: Floats, entries: Floats) -> None:
         """Note a step of the particles in some rows; write knots of the states before where due.
@@ -507,7 +515,12 @@ class Tracks:
         off = np.abs(x - self.x - tau * (self.v + 0.5 * gain))
         # A cubic is off by 4/27 τ of what one of its end velocities is.
         off += 4.0 / 27.0 * tau * np.abs(v - self.v - gain)
-        due = np.flatnonzero((off[0] + off[1] > self.tolerance) & rows & ~new)
+        apart = off[0] + off[1]
+        if self.turning:
+            omega = state[1, 4]
+            self.twist[new] = (omega[new] - self.omega[new]) / tau[new]
+            apart += 0.5 * self.radius * tau * np.abs(omega - self.omega - tau * self.twist)
+        due = np.flatnonzero((apart > self.tolerance) & rows & ~new)
         self.fresh &= ~rows
         if len(due):
             knots = np.empty(len(due), dtype=KNOT)
@@ -517,6 +530,8 @@ class Tracks:
             self.recorder.add(self.first + due, knots)
             self.t[due], self.x[:, due], self.v[:, due] = times[0], before[:2], before[2:4]
             self.pull[:, due] = (v[:, due] - before[2:4]) / (times[1] - times[0])
+            self.omega[due] = before[4]
+            self.twist[due] = (state[1, 4, due] - before[4]) / (times[1] - times[0])
 
 
 def bisected(test: Callable[[float], object], low: float, high: float) -> tuple[float, float]:

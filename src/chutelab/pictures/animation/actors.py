@@ -50,9 +50,8 @@ SHAFT, HEAD = 1.3, 6.0
 SEEN = 0.75
 """Heads that a component must be long to be drawn, beside an arrow that it hardly differs from."""
 
-DRAWN, DRAWN_MEETING = 300, 3000
-"""Particles that are drawn at most, particle 0 included; and of those that meet each other, where
-one left out would leave a hole."""
+DRAWN, DRAWN_ALL = 300, 3000
+"""Particles that are drawn at most, particle 0 included; and where all of them are the picture."""
 
 SMALLEST = 6.0
 """pt; the diameter the largest particle is drawn with if to scale it would be smaller."""
@@ -146,14 +145,15 @@ def crowd(
 ) -> tuple[list[Moving], list[Line2D]]:
     """Return the other particles, in the colours of their streams, and what a legend says of them.
 
-    They are evenly thinned out to `DRAWN`, those that meet to `DRAWN_MEETING`. Trails reach back
-    `reach` seconds of the recording, to the picture before at least; 0: there are none, nor are
-    there of more than `DRAWN`.
+    They are evenly thinned out to `DRAWN`; those that meet, or are many, to `DRAWN_ALL`. Trails
+    reach back `reach` seconds of the recording, to the picture before at least; 0: there are none,
+    nor are there of more than `DRAWN`.
     """
     first, last = recording.ends()
     during = np.flatnonzero(recording.released)[(first["t"] <= times[-1]) & (last["t"] >= times[0])]
     others = during[during != 0]
-    most = DRAWN_MEETING if recording.machine.interact else DRAWN
+    all_of_them = recording.machine.interact or one_of_many(recording)
+    most = DRAWN_ALL if all_of_them else DRAWN
     particles = others[spread(len(others), most - 1)]
     thinned = len(particles) < len(others)
     of_all = f"{recording.count:,}"

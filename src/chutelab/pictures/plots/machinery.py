@@ -189,6 +189,9 @@ LOOKED_AT = 8
 BEFORE = 0.3
 """Share of the window's width by which the incoming belt's name may stand before the belt."""
 
+FALL = 0.3
+"""Share of the window's height below a gate in which a name would be in the way of what falls."""
+
 FARTHER = (1.0, 2.5, 4.0)
 """Gaps between a surface and its name, the best first."""
 
@@ -222,6 +225,12 @@ class _Names:
             for parts in self.parts.values()
             for piece, _ in parts
         ]
+        # What a gate lets through falls.
+        fall = np.array([[0.0, 0.0], [0.0, -FALL * shown.height]])
+        for piece in found:
+            if piece.gate:
+                below = piece.points[len(piece.points) // 2 - 1 :][:2].mean(axis=0) + fall
+                self.lines.append((Path(ax.transData.transform(below)), False))
         if machine.pulley is not None:
             rim = Path.circle((0.0, 0.0), machine.pulley.radius)
             self.lines.append((rim.transformed(ax.transData), True))
@@ -232,7 +241,7 @@ class _Names:
         """Write all names. One for which there is no room is left out."""
         for surface, parts in self.parts.items():
             label = self.ax.annotate(
-                style.plain(self._said(surface, parts[0][0]).replace("-", "−")), (0.0, 0.0),
+                style.plain(self._said(surface, parts[0][0])), (0.0, 0.0),
                 xytext=(0.0, 0.0), textcoords="offset points", fontsize=style.SMALL,
                 color=colour_of(self.machine, parts[0][0]), path_effects=HALO, zorder=4.0,
             )  # fmt: skip
@@ -290,7 +299,8 @@ class _Names:
             x, y = machine.segments.tangent[piece.index]
             angle = float(np.degrees(np.arctan2(-x, y))) + 0.0  # no -0
             values = np.unique(np.atleast_2d(machine.segments.restitution)[:, piece.index])
-            return f"plate, {angle:.3g}°\nε = {' / '.join(f'{one:.3g}' for one in values)}"
+            leans = f"{angle:.3g}°".replace("-", "−")
+            return f"plate, {leans}\nε = {' / '.join(f'{one:.3g}' for one in values)}"
         if np.isnan(piece.radius):
             moves = _motion(speed, piece.points[1] - piece.points[0])
         else:

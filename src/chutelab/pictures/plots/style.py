@@ -153,16 +153,18 @@ def note(ax: Axes, text: str) -> None:
 
 def legend_above(ax: Axes, columns: int, handles: list[Any] | None = None) -> None:
     """Add a legend right above axes, in one line if it fits; by default of all that has a label."""
-    ax.legend(
-        handles=handles,
-        loc="lower left",
-        bbox_to_anchor=(-0.01, 1.0),
-        ncols=columns,
-        fontsize=SMALL,
-        frameon=False,
-        borderaxespad=0.3,
-        handlelength=2.2,
-    )
+    options: dict[str, Any] = {
+        "handles": handles,
+        "loc": "lower left",
+        "bbox_to_anchor": (-0.01, 1.0),
+        "fontsize": SMALL,
+        "frameon": False,
+        "borderaxespad": 0.3,
+        "handlelength": 2.2,
+    }
+    legend = ax.legend(**options, ncols=max(columns, len(handles or ())))
+    if legend.get_window_extent().x1 > ax.get_window_extent().x1:
+        ax.legend(**options, ncols=columns)
 
 
 DASHED: dict[str, Any] = {"color": ANALYTIC, "lw": 4.0, "ls": (0, (2.2, 1.1))}

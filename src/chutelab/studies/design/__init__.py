@@ -5,7 +5,7 @@
 >>> scene = chutelab.load("inclined-20")
 >>> found = design.solve(scene, "plate.angle_deg=0:60", "landing.vx=1")
 >>> round(found.answer.values[0], 3)
-47.255
+47.829
 
 - `quantities`: what can be aimed at.
 - `evaluation`: what can be varied, and the one place where variants are run.

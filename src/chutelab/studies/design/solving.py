@@ -138,7 +138,7 @@ def solve(
     >>> from chutelab.scene import load
     >>> found = solve(load("inclined-20"), "plate.angle_deg=0:60", "landing.vx=1.0")
     >>> round(found.answer.values[0], 6)
-    47.254812
+    47.828951
     """
     texts = [target] if isinstance(target, str) else list(target)
     if not texts:

@@ -1,0 +1,300 @@
+"""All bodies and shapes of a machine in one Space, and what Chipmunk is told at a contact."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from math import acos, ceil, inf, pi, sqrt
+from typing import Any
+
+import numpy as np
+import pymunk
+from pymunk import Vec2d
+
+from chutelab.engines.pymunk.world import GRIP, PARTICLE, SURFACE, Bend, Face, World
+from chutelab.machine import Machine
+from chutelab.util.arrays import Floats
+
+SLOP, BIAS = 1e-3, 1e-97
+"""Overlap that Chipmunk leaves alone, as a share of the radius, and the share of what is beyond it
+that it leaves after 1 s: it takes back a fifth in 1 ms. Its defaults are meant for pixels and 60
+steps a second: 0.1 (m here) and 0.9^60, 0.6 % in 1 ms. With those, disks that land without a
+rebound, a step late, stay where they sank: in `stream` at 1 ms 1 % of all contacts overlap by
+46 % of the radius, with these by 1.4 %. The residual is 3e-4 either way, as all of it is pushed out
+at last: that work is no contact's impulse, and the ledger shows it as residual. Without any slop
+disks that lie still lose contact every few steps."""
+
+ROUND = 3e-3
+"""Share of its smallest half-width by which a polygon's corners are rounded: `SLOP` and more. How
+two faces lie on each other Chipmunk tells from a distance above 0 between what is not rounded; at
+0 its normal may be anything."""
+
+FACES = 30
+"""Iterations of Chipmunk's solver where particles have corners: the two points of a face share
+a blow to 1e-11. Its default, 10, which is right for disks, leaves 1e-4."""
+
+ROLLER = 3
+"""Collision type of the ends of moving segments."""
+
+SMALLEST = 1e-12
+"""Pair value that stands for 0 where Chipmunk's product of two shapes' values is divided by it."""
+
+SAGITTA = 1e-5
+"""Share of the smallest radius r by which a chain of segments is off the arc of radius R that it
+stands for. Its links turn by δ = 2 √(2 SAGITTA r/R); without restitution a disk that slides in a
+hollow loses δ/4 of its speed for each rad that it turns: 0.03 % where R is 50 r."""
+
+
+class Shapes:
+    """Bodies and shapes of all particles and surfaces; particles are put into the Space by others.
+
+    Attributes
+    ----------
+    smallest : float
+        Radius of the smallest particle, or a polygon's smallest half-width, m.
+    corners : bool
+        Whether some particles are no disks.
+    bodies : list
+        Body and shape of each particle.
+    rank : dict
+        Row of each body, by its id: particles, then faces.
+    gates : dict
+        Shapes of the surfaces that are not always there.
+    points : list
+        If there are corners, what was done at each point of each contact in the last step: rows of
+        bodies A and B, whether they met now, impulse on A (N s), normal from A to B, and the levers
+        of A and B (m), each x and y.
+    """
+
+    def __init__(self, machine: Machine, world: World) -> None:
+        self.machine, self.world = machine, world
+        m, space = machine, world.space
+        sizes = np.broadcast_to(m.particle.radius, m.count).astype(float)
+        for kind, outline in enumerate(m.outlines):
+            if outline is not None:
+                sizes[m.releases.kind == kind] = self._faces(outline)[0]
+        self.smallest = float(sizes.min())
+        self.corners = any(outline is not None for outline in m.outlines)
+        space.gravity, space.collision_bias = Vec2d(0.0, -m.gravity), BIAS
+        space.collision_slop = SLOP * self.smallest + world.hair
+        # What Chipmunk remembers longer it reports in the impulse when two meet again, unapplied.
+        space.collision_persistence = 1
+        # All are made now, so that none gets the id of one that is gone.
+        self.bodies = [self._body(i) for i in range(m.count)]
+        shapes = (shape for _, shape in self.bodies)
+        self.kind = dict(zip(shapes, m.releases.kind.tolist(), strict=True))
+        self._pairs()
+        # Ends of belts, with the direction in which they are out of them.
+        self.out: dict[pymunk.Shape, Vec2d] = {}
+        self.gates: dict[Face, list[pymunk.Shape]] = {}
+        # Gates that are there, and particles that a gate shut on, with the gate.
+        self.up, self.shut = set[Face](), set[tuple[pymunk.Shape, Face]]()
+        for face in world.faces:
+            parts = self._shapes(face)
+            for shape in parts:
+                world.by_shape[shape] = face
+                shape.elasticity = face.restitution / self.own
+                shape.friction = face.friction / self.grip
+            new = [shape for shape in parts if shape is not face.touched]
+            if face.appears > -inf or face.vanishes < inf:
+                self.gates[face] = parts
+                if len(new) < len(parts):
+                    space.remove(face.touched)
+            else:
+                space.add(*new)
+        bodies = [body for body, _ in self.bodies]
+        bodies += [face.shape.body for face in world.faces if face.shape.body]
+        self.rank = {body.id: row for row, body in enumerate(bodies)}
+        self.points: list[tuple[float, ...]] = []
+        space.on_collision(PARTICLE, ROLLER, pre_solve=self._met)
+        if self.table is not None or self.gates:
+            space.on_collision(PARTICLE, SURFACE, pre_solve=self._met)
+        if self.table is not None:
+            space.on_collision(PARTICLE, PARTICLE, pre_solve=self._meet)
+        if self.corners:
+            space.iterations = FACES
+        for kind in (PARTICLE, SURFACE, ROLLER) if self.corners else ():
+            space.on_collision(PARTICLE, kind, post_solve=self._note)
+
+    def _body(self, i: int) -> tuple[pymunk.Body, pymunk.Shape]:
+        """Return a particle's body with its shape, not yet in the Space."""
+        shape: pymunk.Shape
+        body, shape = self.world.disk(i)
+        outline = self.machine.outlines[self.machine.releases.kind[i]]
+        if outline is not None:
+            width, out = self._faces(outline)
+            by = ROUND * width
+            # Corners of the polygon whose faces are further in by as much as it is rounded.
+            back = np.roll(out, 1, axis=0)
+            share = 1.0 + (out * back).sum(axis=1, keepdims=True)
+            inner = outline - by * (out + back) / share
+            shape = pymunk.Poly(body, inner.tolist(), radius=by + self.world.hair)
+            shape.collision_type = PARTICLE
+        if not self.machine.interact:
+            shape.filter = pymunk.ShapeFilter(group=1)
+        return body, shape
+
+    @staticmethod
+    def _faces(outline: Floats) -> tuple[float, Floats]:
+        """Return a polygon's smallest distance from centre to face (m), and its faces' normals."""
+        along = np.roll(outline, -1, axis=0) - outline
+        out = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.hypot(*along.T)[:, None]
+        distance = (outline * out).sum(axis=1)
+        # Corners may go round either way.
+        out *= np.sign(distance)[:, None]
+        return float(np.abs(distance).min()), out
+
+    def _pairs(self) -> None:
+        """Give particles values of which Chipmunk's products are those of pairs.
+
+        Where none are, pairs have theirs from `table`, (2, K, K + F), at each contact.
+        """
+        m, kinds = self.machine, self.machine.releases.kind
+        values = np.array([m.pair_restitution, np.minimum(m.pair_friction, GRIP)])
+        own, self.grip = (sqrt(max(value, SMALLEST)) for value in values[:, 0, 0].tolist())
+        self.own, self.table = own, None
+        for _, shape in self.bodies:
+            shape.elasticity, shape.friction = own, self.grip
+        if len(values[0]) == 1:
+            return
+        worlds = [World(m, int(np.argmax(kinds == k))) for k in range(len(values[0]))]
+        met = [[(f.restitution, f.friction) for f in world.faces] for world in worlds]
+        table = np.concatenate(
+            [values, np.moveaxis(np.reshape(met, (len(worlds), -1, 2)), -1, 0)], axis=2
+        )
+        if (table != table[:, :1]).any():
+            self.table = table
+            self.column = {face: k for k, face in enumerate(self.world.faces, len(values[0]))}
+
+    def _shapes(self, face: Face) -> list[pymunk.Shape]:
+        """Return the shapes of a surface: an arc is a chain of segments, belts have end rollers."""
+        shape, space = face.shape, self.world.space
+        assert shape.body is not None
+        if isinstance(face, Bend):
+            assert face.foot.body is not None
+            space.remove(face.foot, face.foot.body)
+            return self._chain(face)
+        if not isinstance(shape, pymunk.Segment):
+            if not face.turns and face.speed == 0.0:
+                # The chain ends there by itself.
+                space.remove(shape)
+                return []
+            if not face.turns:
+                shape.collision_type = ROLLER
+                assert face.tangent is not None
+                self.out[shape] = face.tangent
+            return [shape]
+        if face.speed == 0.0:
+            return [shape]
+        # Neighbours in line keep the segment from what is beyond its ends.
+        a, b = face.ends
+        shape.set_neighbors(a - (b - a), b + (b - a))
+        assert face.tangent is not None
+        shape.surface_velocity = face.speed * face.tangent
+        rollers = [pymunk.Circle(shape.body, 0.0, end) for end in face.ends]
+        for roller, out in zip(rollers, (-face.tangent, face.tangent), strict=True):
+            roller.collision_type = ROLLER
+            self.out[roller] = out
+        return [shape, *rollers]
+
+    def _chain(self, face: Bend) -> list[pymunk.Shape]:
+        """Return what stands for an arc, or for a whole circle: that itself if all are outside."""
+        body, circle = face.shape.body, face.shape
+        assert body is not None
+        assert isinstance(circle, pymunk.Circle)
+        starts = self.machine.releases.position - np.array(face.center)
+        if face.extent == inf and (np.hypot(*starts.T) >= circle.radius).all():
+            circle.collision_type = SURFACE
+            body.body_type, body.angular_velocity = pymunk.Body.KINEMATIC, face.spin
+            return [circle]
+        begin, extent = face.begin, min(face.extent, 2.0 * pi)
+        bow = min(SAGITTA * self.smallest / circle.radius, 1.0)
+        angles = np.linspace(
+            begin, begin + extent, max(ceil(extent / (2.0 * acos(1.0 - bow))), 3) + 1
+        )
+        points = [Vec2d.from_polar(circle.radius, angle) for angle in angles.tolist()]
+        # A belt goes on in line at both ends, where rollers are met; what stands still ends there.
+        a, b = points[0], points[-1]
+        if face.extent == inf:
+            before, after = points[-2], points[1]
+        else:
+            goes = float(face.speed != 0.0)
+            before, after = a + goes * (a - points[1]), b + goes * (b - points[-2])
+        chain = list[pymunk.Shape]()
+        for k, (start, end) in enumerate(pairwise(points)):
+            link = pymunk.Segment(body, start, end, 0.0)
+            link.set_neighbors(points[k - 1] if k else before, (*points, after)[k + 2])
+            link.surface_velocity = face.speed * (start - end).normalized()
+            link.collision_type = SURFACE
+            chain.append(link)
+        return chain
+
+    def _met(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
+        """Give a contact with a surface what its shapes do not have.
+
+        The end of a belt moves along its rim, and beside the face it is not met; nor is a gate by
+        whom it shut on.
+        """
+        shape, met = arbiter.shapes
+        face = self.world.by_shape[met]
+        if met in self.out:
+            assert shape.body is not None
+            assert isinstance(met, pymunk.Circle)
+            normal = -arbiter.normal
+            beyond = self.out[met].dot(shape.body.position - met.offset) > 0.0
+            arbiter.process_collision = beyond
+            arbiter.surface_velocity = face.belt(normal) * Vec2d(normal.y, -normal.x)
+        if (shape, face) in self.shut:
+            arbiter.process_collision = False
+        if self.table is not None:
+            pair = self.table[:, self.kind[shape], self.column[face]]
+            arbiter.restitution, arbiter.friction = pair.tolist()
+
+    def _meet(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
+        """Give a contact of two particles the values of their kinds."""
+        assert self.table is not None
+        one, other = (self.kind[shape] for shape in arbiter.shapes)
+        arbiter.restitution, arbiter.friction = self.table[:, one, other].tolist()
+
+    def _note(self, arbiter: pymunk.Arbiter, _space: pymunk.Space, _data: Any) -> None:
+        """Note what was done at each point of a contact; what Pymunk tells itself are sums."""
+        raw = arbiter._arbiter
+        a, b = reversed(arbiter.bodies) if raw.swapped else arbiter.bodies
+        rows, first, n = (self.rank[a.id], self.rank[b.id]), arbiter.is_first_contact, raw.n
+        for k in range(raw.count):
+            c = raw.contacts[k]
+            jx, jy = n.x * c.jnAcc - n.y * c.jtAcc, n.x * c.jtAcc + n.y * c.jnAcc
+            self.points.append((*rows, first, -jx, -jy, n.x, n.y, c.r1.x, c.r1.y, c.r2.x, c.r2.y))
+
+    def open_and_shut(self, now: float) -> None:
+        """Put in gates that are there at a time (s), take out the others, see whom they shut on."""
+        space = self.world.space
+        for face, shapes in self.gates.items():
+            if (face.appears <= now < face.vanishes) == (face in self.up):
+                continue
+            if face in self.up:
+                self.up.remove(face)
+                space.remove(*shapes)
+                continue
+            self.up.add(face)
+            space.add(*shapes)
+            self.shut |= {(shape, face) for shape in self._in(shapes)}
+        for face in {face for _, face in self.shut}:
+            inside = self._in(self.gates[face]) if face in self.up else set()
+            self.shut -= {(s, f) for s, f in self.shut if f is face and s not in inside}
+
+    def _in(self, shapes: list[pymunk.Shape]) -> set[pymunk.Shape]:
+        """Return the particles that overlap shapes of a surface."""
+        hits = {info.shape for shape in shapes for info in self.world.space.shape_query(shape)}
+        return {shape for shape in hits if shape is not None and shape.collision_type == PARTICLE}
+
+    def taken(self, i: int, place: Vec2d) -> bool:
+        """Tell whether a particle that is not yet in the Space would overlap another one there."""
+        body, shape = self.bodies[i]
+        body.position = place
+        touch = SLOP * self.smallest + 2.0 * self.world.hair
+        return any(
+            point.distance < -touch
+            for hit in self.world.space.shape_query(shape)
+            if hit.shape is not None and hit.shape.collision_type == PARTICLE
+            for point in hit.contact_point_set.points
+        )

@@ -176,6 +176,13 @@ def test_the_first_particle_of_the_first_stream_is_of_its_own_kind() -> None:
     assert told.reynolds == pytest.approx(2 * 0.004 * float(found.v3) * 1.2 / 1.8e-5)
 
 
+def test_an_incline_of_next_to_nothing_overflows_nowhere() -> None:
+    # A segment that is level to 1e-310 has next to no bend across it.
+    for degrees in (1e-300, -5e-324, 1e-310, 1e-200):
+        found = predict(scene(incoming={"incline_deg": degrees}))
+        assert found.x3 == pytest.approx(float(predict(scene()).x3), rel=1e-14)
+
+
 @settings(max_examples=60)
 @given(
     st.floats(-25.0, 25.0), st.floats(0.8, 4.0), st.floats(0.05, 0.4), st.floats(-0.3, 1.2),

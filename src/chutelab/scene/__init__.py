@@ -24,7 +24,17 @@ from chutelab.scene.loading import (
 )
 from chutelab.scene.overrides import schema
 from chutelab.scene.rules import Expect
-from chutelab.scene.schema import Incoming, Outgoing, Particle, Plate, Run, Scene, Stream, Surface
+from chutelab.scene.schema import (
+    Conveyor,
+    Incoming,
+    Outgoing,
+    Particle,
+    Plate,
+    Run,
+    Scene,
+    Stream,
+    Surface,
+)
 from chutelab.scene.units import RESERVED_NAMES
 from chutelab.util.errors import MISSING, Fault, shown
 from chutelab.util.versions import need_all
@@ -33,6 +43,7 @@ __all__ = [
     "MISSING",
     "RESERVED_NAMES",
     "About",
+    "Conveyor",
     "Expect",
     "Fault",
     "Incoming",

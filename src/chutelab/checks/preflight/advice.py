@@ -80,7 +80,7 @@ def advice(
     if steps is not None and scene.particle.radius < SMALL:
         small = write_size(SMALL, "m")
         warning = f"particles of less than {small} radius are beyond what pymunk resolves"
-        if scene.stream.crowded:
+        if scene.crowded:
             yield _advised(warning, {"particle.radius": SMALL})
         else:
             yield _advised(warning, {"run.engine": "auto"}, after=", for the exact engine")
@@ -107,7 +107,9 @@ def advice(
             {"stream.rate": _down((1.0 - MARGIN) / period)},
             after=", or a larger stream.bed_height",
         )
-    pressed = squeeze(scene, machine.releases.t, machine.releases.position)
+    start, rides = machine.releases, machine.releases.carried
+    radius = np.broadcast_to(machine.particle.radius, machine.count)[rides]
+    pressed = squeeze(scene, start.t[rides], start.position[rides], radius)
     if pressed is not None and scene.incoming is not None:
         bed = scene.stream.bed_height
         highest = scene.incoming.pulley_radius + scene.particle.radius + bed

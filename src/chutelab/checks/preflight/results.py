@@ -142,7 +142,7 @@ WORDS = {
 
 def coverage(scene: Scene) -> Coverage:
     """Ask the theory about a scene; it speaks of particle 0."""
-    found, lone = predict(scene), scene.stream.count == 1
+    found, lone = predict(scene), scene.count == 1
     given = tuple(name for name in QUANTITIES if isfinite(float(getattr(found, name))))
     reason = str(found.reason)
     kind = Reason.of(reason)

@@ -357,7 +357,7 @@ class World:
         if not face.ends:
             return True
         point = face.shape.point_query(x).point
-        return min((point - end).length for end in face.ends) <= self.hair
+        return bool(min((point - end).length for end in face.ends) <= self.hair)
 
     def meets(
         self, path: Flight | Carriage, face: Face, span: float, leaving: bool = False,

@@ -151,13 +151,13 @@ def study(
 
 def _check(scenes: Sequence[Scene]) -> None:
     """Refuse, before anything runs, what would be too much for a page or for the one who waits."""
-    most = max((scene.stream.count for scene in scenes), default=0)
+    most = max((scene.count for scene in scenes), default=0)
     if most > MOST_PARTICLES:
         raise InputError(
             f"stream.count = {most}: a page shows at most {MOST_PARTICLES} particles; add"
             f" --set stream.count={MOST_PARTICLES}"
         )
-    stepped = sum(scene.run.engine == "pymunk" or scene.stream.crowded for scene in scenes)
+    stepped = sum(scene.run.engine == "pymunk" or scene.crowded for scene in scenes)
     if stepped > MOST_STEPPED:
         raise InputError(
             f"{stepped} variants are stepped, at most {MOST_STEPPED} are allowed,"

@@ -78,7 +78,7 @@ def arcs(prediction: Transfer, scene: Scene) -> tuple[Arc, ...]:
     riding = belt.pulley_radius + scene.particle.radius
     if scene.plate is None:
         carried = on_belt(scene) and release_velocity(scene) == (belt.speed, 0.0) and belt.speed > 0
-        met = scene.surface or scene.stream.crowded
+        met = scene.surface or scene.crowded
         if out is None or met or not g or not carried:
             return ()
         left = separation(

@@ -59,7 +59,7 @@ def machine(seed):
 
 
 def blows(run, particle):
-    """Return the impacts of a particle up to the first slow or grazing one, where rounding rules."""
+    """Return the impacts of a particle up to the first slow or grazing one."""
     hits = run.select(Kind.IMPACT)
     hits = hits[hits["particle"] == particle]
     push = hits["normal_impulse"] / run.machine.particle.mass[particle]

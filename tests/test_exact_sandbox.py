@@ -201,8 +201,7 @@ def test_the_nominal_particle_is_let_go_where_the_engine_lets_it_go(
         stream=stream,
         run={"until": 4.0},
     )  # fmt: skip
-    with np.errstate(invalid="ignore", divide="ignore"):
-        place, velocity = discharge(built.scene)
+    place, velocity = discharge(built.scene)
     left = exact.run(built).select(Kind.SEPARATION)[0]
     np.testing.assert_allclose(np.array(place), left["position"], atol=1e-12)
     np.testing.assert_allclose(np.array(velocity), left["velocity_after"], atol=1e-12)

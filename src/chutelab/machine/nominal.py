@@ -87,6 +87,8 @@ def _slip_round(scene: Scene, rho: Numbers, speed: Numbers, distance: Numbers) -
     return (rho * sine, rho * cosine), (w * cosine, -w * sine)
 
 
+# A way that is never gone comes out as inf or NaN.
+@np.errstate(divide="ignore", invalid="ignore")
 def _along_belt(circle: Circle, distance: Floats, length: Floats) -> tuple[Floats, Floats]:
     """Return speed and r ω where the belt meets the pulley, NaN if the particle never gets there.
 

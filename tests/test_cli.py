@@ -149,6 +149,7 @@ def test_json_is_one_object_with_the_keys_of_the_contract_and_nothing_else():
     books = found["ledger"]
     assert list(books) == [
         "kinetic", "potential", *ENTRIES, "residual", "turned_over", "by_surface",
+        "by_stream",
     ]  # fmt: skip
     assert list(books["by_surface"]) == ["incoming", "plate", "outgoing", "particles"]
     assert all(list(entries) == ENTRIES for entries in books["by_surface"].values())

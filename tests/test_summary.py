@@ -26,7 +26,7 @@ TOP = [
 BEFORE = ["t", "x", "y", "vx", "vy"]
 LEDGER = [
     "kinetic", "potential", "belt_work", "restitution_loss", "friction_loss", "residual",
-    "turned_over", "by_surface",
+    "turned_over", "by_surface", "by_stream",
 ]  # fmt: skip
 THEORY = [
     "phi1_deg", "t2", "x2", "y2", "v2", "phi2_deg", "phi2r_deg", "v2r", "t3", "x3", "y3", "v3x",

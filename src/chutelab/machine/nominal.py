@@ -118,7 +118,8 @@ def _round_pulley(circle: Circle) -> tuple[Floats, Floats]:
 
 
 def _some(circle: Circle, which: Ints | Bools) -> Circle:
-    return Circle(**{name: array[which] for name, array in vars(circle).items()})
+    given = {name: array for name, array in vars(circle).items() if array is not None}
+    return Circle(**{name: array[which] for name, array in given.items()})
 
 
 def plate_hit(scene: Scene) -> Pair:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.machine.releases import Squeeze, schedule, squeeze
+from chutelab.machine.releases import Squeeze, squeeze
 from chutelab.results.ledger import ledger
 from chutelab.results.recording import ENTRIES, EVENT, REASONS, Kind, Recording
 from chutelab.scene import Scene
@@ -242,7 +242,7 @@ def stopped(recording: Recording) -> Stopped | None:
     if not recording.machine.interact:
         # Each by itself: some are ahead of others.
         last = recording.knots["t"][recording.offsets[1:][under_way] - 1]
-        due = schedule(recording.scene)[halted & ~recording.released]
+        due = recording.machine.releases.t[halted & ~recording.released]
         t = min(float(last.min(initial=t)), float(due.min(initial=t)))
     released = int(np.count_nonzero(under_way))
     return Stopped(released, int(np.count_nonzero(halted)) - released, t)
@@ -276,7 +276,7 @@ class Waits:
 
 def waits(recording: Recording) -> Waits | None:
     """Return who waited for its place; None if nobody did."""
-    due, dt = schedule(recording.scene), recording.scene.run.dt
+    due, dt = recording.machine.releases.t, recording.machine.dt
     # The pymunk engine releases at the beginning of a step: up to a step late is not waiting.
     least = (1.0 + 1e-6) * dt if recording.engine == "pymunk" else 1e-9
     released = recording.select(Kind.RELEASE)
@@ -313,7 +313,9 @@ def air_drag(recording: Recording) -> Drag | None:
 def squeezed(recording: Recording) -> Squeeze | None:
     """Return who rode into others by adhesion, see `machine.releases.squeeze`; None if nobody."""
     released = recording.select(Kind.RELEASE)
-    return squeeze(recording.scene, released["t"], released["position"])
+    released = released[recording.machine.releases.carried[released["particle"]]]
+    radius = np.broadcast_to(recording.particle.radius, recording.count)[released["particle"]]
+    return squeeze(recording.scene, released["t"], released["position"], radius)
 
 
 @dataclass(frozen=True)
@@ -345,13 +347,14 @@ class Rolling:
 def rolling(recording: Recording) -> Rolling | None:
     """Return what settled on the outgoing belt without being carried; None if nothing did."""
     belt = recording.scene.outgoing
-    if belt is None or belt.speed is None or recording.particle.inertia == 0.0:
+    if belt is None or belt.speed is None or np.all(recording.particle.inertia == 0.0):
         return None
     settled = recording.select(Kind.SETTLE, surface="outgoing")
     missing = belt.speed - settled["velocity_after"][:, 0]
-    missing = missing[np.abs(missing) > CARRIED]
-    if not len(missing):
+    astray = np.abs(missing) > CARRIED
+    if not astray.any():
         return None
     paid = ledger(recording).by_surface["outgoing"]["belt_work"]
-    due = recording.particle.mass * belt.speed * float(missing.sum())
-    return Rolling(len(missing), paid, paid + due)
+    masses = np.broadcast_to(recording.particle.mass, recording.count)[settled["particle"]]
+    due = belt.speed * float((masses * missing)[astray].sum())
+    return Rolling(int(astray.sum()), paid, paid + due)

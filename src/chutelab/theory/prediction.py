@@ -195,7 +195,7 @@ def _outside(scene: Scene) -> str:
             return "the release point stream.at is not on the incoming belt"
     if velocity is not None and tuple(velocity) != (scene.incoming.speed, 0.0):
         return "the release velocity stream.velocity is not the incoming belt's"
-    if scene.stream.crowded:
+    if scene.crowded:
         return "particles interact"
     return ""
 

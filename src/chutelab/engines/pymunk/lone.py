@@ -319,7 +319,7 @@ class Lone:
         pushed = self._step(self.x, self.v, self.omega, INSTANT, Vec2d(0, 0))
         self.v, self.omega = self.body.velocity, self.body.angular_velocity
         if self.arm:
-            pushed = [self._braked(contact, before[1]) for contact in pushed]
+            pushed = self._braked(pushed, before[1])
         for contact in pushed:
             self._book(contact, before)
             lands = contact.face.surface == self.machine.landing and not self.landed
@@ -338,12 +338,16 @@ class Lone:
                 " the surfaces there apart, or lower their restitution",
             )  # fmt: skip
 
-    def _braked(self, contact: Contact, omega: float) -> Contact:
-        """Give a blow's rolling friction, which stops the turning there was, at most."""
-        turning = self.body.moment * (omega - contact.face.spin)
-        couple = -copysign(min(self.arm * contact.push, abs(turning)), turning)
-        self.omega += couple / self.body.moment
-        return contact._replace(couple=couple)
+    def _braked(self, pushed: list[Contact], omega: float) -> list[Contact]:
+        """Give blows their rolling friction, which stops the turning there was, at most."""
+        braked = []
+        for contact in pushed:
+            turning = self.body.moment * (omega - contact.face.spin)
+            couple = -copysign(min(self.arm * contact.push, abs(turning)), turning)
+            omega += couple / self.body.moment
+            self.omega += couple / self.body.moment
+            braked.append(contact._replace(couple=couple))
+        return braked
 
     def _rebound(self, face: Face, normal: Vec2d) -> float:
         """Return ε, or 0 where a rebound would be too slow or too low."""
@@ -424,10 +428,12 @@ class Lone:
         gap, normal = min(gaps.values(), key=itemgetter(0))
         if gap < inf:
             middle -= gap * normal
-        self.restitution = {
-            face: float(self.v.dot(n) > 0.0 or face.hollow(middle) > 0.0)
-            for face, (_, n) in gaps.items()
-        }
+        self.restitution = {}
+        for face, (_, n) in gaps.items():
+            into, before = self.v.dot(n), min(self.v.dot(touching[face]), 0.0)
+            # In a hollow, what it moved into the surface by from the start is no bend of the way.
+            bends = into > 0.0 or (into < before and face.hollow(middle) > 0.0)
+            self.restitution[face] = 1.0 - max(before / into, 0.0) if bends else 0.0
         contacts = self._rolled(middle - h * self.v, self.v, h)
         if abs(self.v.dot(normal)) > SEAM * (1.0 + self.v.length):
             turn = (self.body.velocity.length / self.v.length) ** 2
@@ -457,8 +463,9 @@ class Lone:
             self._tell(Kind.SLIP if slips else Kind.STICK, surface)
         for contact in end.contacts:
             self._book(contact, motion)
-        state = np.array([before, (*self.x, *self.v, self.omega)])[:, :, None]
-        self.tracks.step(np.array([True]), (self.t - h, self.t), state, entries)
+        if self.t > self.tracks.t[0]:
+            state = np.array([before, (*self.x, *self.v, self.omega)])[:, :, None]
+            self.tracks.step(np.array([True]), (self.t - h, self.t), state, entries)
         if self.t >= self.machine.end_time:
             self._end("time")
 

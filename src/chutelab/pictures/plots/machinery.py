@@ -220,6 +220,7 @@ class _Names:
             if part is not None:
                 self.parts.setdefault(piece.surface, []).append((piece, part))
         self.found = found
+        self.plates = {"plate", *(plate.name for plate in machine.scene.plates)}
         self.lines = [
             (Path(ax.transData.transform(piece.points)), piece.whole)
             for parts in self.parts.values()
@@ -241,7 +242,7 @@ class _Names:
         """Write all names. One for which there is no room is left out."""
         for surface, parts in self.parts.items():
             label = self.ax.annotate(
-                style.plain(self._said(surface, parts[0][0]).replace("-", "−")), (0.0, 0.0),
+                style.plain(self._said(surface, parts[0][0])), (0.0, 0.0),
                 xytext=(0.0, 0.0), textcoords="offset points", fontsize=style.SMALL,
                 color=colour_of(self.machine, parts[0][0]), path_effects=HALO, zorder=4.0,
             )  # fmt: skip
@@ -295,11 +296,12 @@ class _Names:
         """Return what is written at a surface, of which a piece is shown."""
         name, machine = self.machine.surfaces[surface], self.machine
         speed = piece.speed
-        if name == "plate":
+        if name in self.plates:
             x, y = machine.segments.tangent[piece.index]
             angle = float(np.degrees(np.arctan2(-x, y))) + 0.0  # no -0
             values = np.unique(np.atleast_2d(machine.segments.restitution)[:, piece.index])
-            return f"plate, {angle:.3g}°\nε = {' / '.join(f'{one:.3g}' for one in values)}"
+            leans = f"{angle:.3g}°".replace("-", "−")
+            return f"{name}, {leans}\nε = {' / '.join(f'{one:.3g}' for one in values)}"
         if np.isnan(piece.radius):
             moves = _motion(speed, piece.points[1] - piece.points[0])
         else:
@@ -320,7 +322,7 @@ class _Names:
         piece, part = parts[0]
         name = self.machine.surfaces[piece.surface]
         low, high = sorted((part[0], part[-1]), key=lambda point: (point[1], point[0]))
-        if name == "plate":
+        if name in self.plates:
             x, y = self.machine.segments.tangent[piece.index]
             angle = degrees(np.arctan2(-x, y))
             # Two lines need room above where they begin.

@@ -127,10 +127,13 @@ def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
     """
     books = recording.energy_at(times)
     first, _ = recording.ends()
-    order = np.argsort(first["t"], kind="stable")
-    at_release = np.concatenate([[0.0], np.cumsum(sum(recording.energies(first[order])))])
+    order, who = np.argsort(first["t"], kind="stable"), np.flatnonzero(recording.released)
+    at_release = np.concatenate(
+        [[0.0], np.cumsum(sum(recording.energies(first[order], who[order])))]
+    )
     released = np.searchsorted(first["t"][order], times, side="right")
-    weight = released * recording.particle.mass * recording.gravity
+    masses = np.broadcast_to(recording.particle.mass, recording.count)[who][order]
+    weight = np.concatenate([[0.0], np.cumsum(masses)])[released] * recording.gravity
     heights = recording.knots["position"][:, 1]
     stays = recording.ended != REASONS.index("exit")
     staying = heights[np.repeat(stays, np.diff(recording.offsets))]
@@ -257,8 +260,9 @@ def window_of(recording: Recording) -> Window:
     of the other particles, as much as does not make all else small. Where particle 0 is not the
     one that matters, see `bodily`, or there are several streams, it holds all particles alike.
     """
-    path, tail = _path(recording)
-    machine, crowd = recording.machine, _crowd(recording)
+    machine, many = recording.machine, one_of_many(recording)
+    crowd = _crowd(recording, 0 if many else 1)
+    path, tail = (crowd, crowd[:0]) if many else _path(recording)
     together = bodily(recording) or len(machine.streams) > 1
     points = [np.concatenate([path, crowd]) if together else path]
     for thread in machine.threads:
@@ -304,8 +308,10 @@ def _path(recording: Recording) -> tuple[Floats, Floats]:
     return position[times <= last], position[times > last]
 
 
-def _crowd(recording: Recording) -> Floats:
-    """Corners of the box around where the others strike something, or the middle 96 % of many.
+def _crowd(recording: Recording, begin: int) -> Floats:
+    """Corners of the box around where particles strike something, or the middle 96 % of many.
+
+    Particles from the number `begin` on.
 
     Where they are released counts too if no belt carries them from there.
     """
@@ -315,7 +321,7 @@ def _crowd(recording: Recording) -> Floats:
     carried = np.isin(events["particle"], left["particle"])
     counts = np.isin(events["kind"], STRUCK)
     counts |= ~carried & (events["kind"] == Kind.RELEASE)
-    others = events[counts & (events["particle"] != 0)]
+    others = events[counts & (events["particle"] >= begin)]
     if not len(others):
         return np.empty((0, 2))
     strays = 0.02 if recording.count > MANY else 0.0

@@ -160,7 +160,9 @@ def rows(recording: Recording, variants: int = 1) -> Columns:
         found[name], spread = _mean_and_spread(value.reshape(shape))
         if f"{name}_spread" in found:
             found[f"{name}_spread"] = spread
-    (kinetic_first, potential_first), (kinetic, potential) = map(recording.energies, (begin, end))
+    who = np.flatnonzero(released)
+    kinetic_first, potential_first = recording.energies(begin, who)
+    kinetic, potential = recording.energies(end, who)
     change = (kinetic - kinetic_first) + (potential - potential_first)
     whole = np.zeros((2, recording.count))
     whole[0, released] = change - balance(end["entries"])

@@ -18,6 +18,7 @@ import numpy as np
 
 from chutelab.engines.simulation import simulate
 from chutelab.pictures.animation.moments import sentence
+from chutelab.pictures.live.picture import refuse
 from chutelab.pictures.plots import analytic_of, style, window_of
 from chutelab.pictures.plots.scenery import STRUCK, action, strobe_step
 from chutelab.results import ENTRIES, REASONS, Kind, Recording
@@ -150,7 +151,9 @@ def study(
 
 
 def _check(scenes: Sequence[Scene]) -> None:
-    """Refuse, before anything runs, what would be too much for a page or for the one who waits."""
+    """Refuse, before anything runs, what a page cannot show, or is too much for who waits."""
+    for scene in scenes:
+        refuse(scene)
     most = max((scene.count for scene in scenes), default=0)
     if most > MOST_PARTICLES:
         raise InputError(

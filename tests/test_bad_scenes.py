@@ -159,7 +159,10 @@ def test_all_faults_of_a_file_come_in_one_message_conflicts_too():
 def test_a_key_at_fault_starts_no_quarrel_with_others():
     text = IN + PLATE + "[particle]\nradius = 'small'\nspin = true\n[stream]\ninteract = true\n"
     said = message(scene.parse, text)
-    assert said == ('<scene>: particle.radius = "small": must be a number from 0 to 1000000, in m')
+    assert said == (
+        '<scene>: particle.radius = "small":'
+        " must be a number from 0 to 1000000 or a range [from, to], in m"
+    )
 
 
 def test_a_coulomb_belt_takes_what_an_adhesive_one_refuses():
@@ -204,7 +207,8 @@ def test_a_message_carries_no_terminal_commands():
         ("plate.below=nan", "(from --set plate.below=nan)"),
         ("title.x=1", "--set title.x=1: title is no table"),
         ("stream.at[0]=1", "--set stream.at[0]=1: stream.at is not there"),
-        ("plate[0]=1", "--set plate[0]=1: plate is no list"),
+        ("plate[0]=1", "plate = 1: must be a table of keys and values"),
+        ("plate[1]=1", "--set plate[1]=1: plate is no list"),
         ("surface[1].speed=1", "--set surface[1].speed=1: surface has 1 entries"),
         ("surface.hod.speed=1", "--set surface.hod.speed=1: no surface has the name hod; did you"),
         ("surface.q.speed=1", "no surface has the name q; there are: hood"),

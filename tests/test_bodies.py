@@ -24,7 +24,7 @@ from chutelab.pictures.plots.bodies import (
     strings,
     turned,
 )
-from chutelab.pictures.plots.scenery import places, window_of
+from chutelab.pictures.plots.scenery import energies, places, window_of
 from chutelab.results import Recording
 from handmade import Line, machine_of, recording_of, seen
 
@@ -252,3 +252,13 @@ def test_the_overlay_of_boxes_and_streams_has_no_text_on_another() -> None:
         one for one in figure.axes[0].collections if str(one.get_gid()).endswith("turned")
     ]
     assert sum(len(one.get_paths()) for one in turned_ones) == 9  # 8, and particle 0 over them
+
+
+def test_potential_energy_of_different_masses_can_be_stacked() -> None:
+    spots = [(0.0, 0.5), (0.2, 0.3)]
+    machine = machine_of(FLOOR, at=spots)
+    machine = replace(machine, particle=replace(machine.particle, mass=np.array([0.2, 0.7])))
+    books = energies(recording_of(machine, *map(still, spots)), np.array([0.0, 1.0]))
+    # Above 0.3 m, the lowest place.
+    assert books["potential"] == pytest.approx(0.2 * 9.81 * 0.2)
+    assert books["start"] == pytest.approx(0.2 * 9.81 * 0.2)

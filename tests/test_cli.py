@@ -36,7 +36,7 @@ FILES = [
 # The contract of section 4, copied by hand.
 KEYS = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
-    "impact", "landing", "ended", "stopped", "rolling", "waited", "squeezed", "drag",
+    "impact", "landing", "ended", "stopped", "rolling", "waited", "squeezed", "drag", "steady",
     "ledger", "theory",
     "theory_as_printed", "error", "accuracy",
 ]  # fmt: skip
@@ -149,6 +149,7 @@ def test_json_is_one_object_with_the_keys_of_the_contract_and_nothing_else():
     books = found["ledger"]
     assert list(books) == [
         "kinetic", "potential", *ENTRIES, "residual", "turned_over", "by_surface",
+        "by_stream",
     ]  # fmt: skip
     assert list(books["by_surface"]) == ["incoming", "plate", "outgoing", "particles"]
     assert all(list(entries) == ENTRIES for entries in books["by_surface"].values())

@@ -10,6 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from chutelab.engines import exact
+from chutelab.machine.nominal import discharge
 from chutelab.results import REASONS, Kind
 from chutelab.results.ledger import ledger
 from machines import bent, face, gated, of_sizes, scene_of, thrown
@@ -170,6 +171,40 @@ def test_a_belt_that_is_too_steep_lets_it_slide_back():
     time = slip_ends + (0.5 + sqrt(0.5**2 + 2.0 * back * way)) / back
     assert end["t"] == pytest.approx(time, rel=1e-12)
     assert end["velocity_after"][0] < 0.0
+
+
+@pytest.mark.parametrize(
+    ("degrees", "speed", "friction", "given", "shape"),
+    [
+        (12.0, 1.2, "adhesion", None, "disk"),
+        (35.0, 1.7, "adhesion", None, "disk"),
+        (-15.0, 0.6, "adhesion", None, "disk"),
+        (15.0, 1.2, 0.45, 0.2, "disk"),
+        (25.0, 1.0, 0.9, 2.5, "disk"),
+        (20.0, 0.5, 0.3, 3.5, "disk"),
+        (15.0, 1.0, 0.6, 3.5, "spinning disk"),
+        (-10.0, 0.8, 0.2, 0.8, "spinning sphere"),
+    ],
+)
+def test_the_nominal_particle_is_let_go_where_the_engine_lets_it_go(
+    degrees, speed, friction, given, shape
+):
+    beta = radians(degrees)
+    along, up = np.array([cos(beta), sin(beta)]), np.array([-sin(beta), cos(beta)])
+    stream = {"at": (RHO * up - 0.9 * along).tolist(), "velocity": None}
+    if given is not None:
+        stream["velocity"] = (given * along).tolist()
+    built = scene_of(
+        particle={"radius": RADIUS, "spin": "spin" in shape, "shape": shape.split()[-1]},
+        incoming={"speed": speed, "pulley_radius": WHEEL, "friction": friction,
+                  "incline_deg": degrees},
+        stream=stream,
+        run={"until": 4.0},
+    )  # fmt: skip
+    place, velocity = discharge(built.scene)
+    left = exact.run(built).select(Kind.SEPARATION)[0]
+    np.testing.assert_allclose(np.array(place), left["position"], atol=1e-12)
+    np.testing.assert_allclose(np.array(velocity), left["velocity_after"], atol=1e-12)
 
 
 # Kinds of particles
@@ -445,3 +480,114 @@ def test_gates_across_the_way_of_a_carried_particle():
         hits = run.select(Kind.IMPACT)
         hits = hits[np.abs(hits["t"] - there) < 1e-9]
         assert bool(len(hits)) is struck
+
+
+# Rolling friction
+
+
+def rolling(built, share, kappa, radius=0.02):
+    """Return the machine with one particle, I = share m r², and rolling friction."""
+    return of_sizes(built, np.array([radius]), 0.1, np.array([share]), rolling=np.array([kappa]))
+
+
+@pytest.mark.parametrize("share", [0.5, 0.4])
+def test_a_roller_slows_down_and_stops(share):
+    """m v' = -F and I ω' = F r - κ N r: v' = -κ g/(1 + I/m r²), and what it has becomes heat."""
+    floor = face("floor", [-1.0, 0.0], [9.0, 0.0], friction=0.5, restitution=0.0)
+    built = scene_of(surface=[floor], stream={"at": [0.0, 0.5]}, run={"until": "settled"})
+    built = thrown(built, [[0.0, 0.02]], velocity=(0.9, 0.0))
+    run = exact.run(rolling(built, share, 0.02))
+    grip = run.select(Kind.STICK)[0]
+    speed, x = grip["velocity_after"][0], grip["position"][0]
+    end = run.track(0)[-1]
+    slower = 0.02 * G / (1.0 + share)
+    assert end["position"][0] - x == pytest.approx(speed**2 / (2.0 * slower), rel=1e-12)
+    assert end["t"] - grip["t"] == pytest.approx(speed / slower, rel=1e-12)
+    assert (REASONS[run.ended[0]], end["omega"]) == ("settled", 0.0)
+    books = ledger(run)
+    assert books.friction_loss == pytest.approx(0.5 * 0.1 * 0.9**2, rel=1e-12)
+    assert books.relative_residual < 1e-14
+
+
+@pytest.mark.parametrize(("slope", "kappa"), [(0.3, 0.1), (0.3, 0.2), (0.05, 0.2)])
+def test_down_a_ramp_it_rolls_only_if_that_is_steeper_than_rolling_friction(slope, kappa):
+    """a = g (sin - κ cos)/(1 + I/m r²), none for tan ≤ κ."""
+    down, up = np.array([cos(slope), -sin(slope)]), np.array([sin(slope), cos(slope)])
+    ramp = face("ramp", (-down).tolist(), (20.0 * down).tolist(), friction=1.0, restitution=0.0)
+    built = scene_of(surface=[ramp], stream={"at": [0.0, 1.0]}, run={"until": 1.0})
+    run = exact.run(rolling(thrown(built, [0.02 * up]), 0.4, kappa))
+    pull = max(G * (sin(slope) - kappa * cos(slope)), 0.0) / 1.4
+    end = run.track(0)[-1]
+    np.testing.assert_allclose(end["velocity"], pull * down, atol=1e-12)
+    assert ledger(run).relative_residual < 1e-13
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_in_a_bowl_it_rolls_to_and_fro_until_it_stops(seed):
+    """(1 + I/m r²) w' = -g sin θ - τ κ N, N = g cos θ + w²/L, from stop to stop, then none."""
+    draw = np.random.default_rng(seed)
+    share, kappa, theta = draw.uniform(0.3, 0.6), draw.uniform(0.02, 0.2), draw.uniform(0.3, 1.0)
+    arc = {"center": (0.0, 0.0), "radius": 1.0, "begin": pi, "extent": pi, "friction": 3.0}
+    length, radius = 0.9, 0.1
+    built = bent(scene_of(surface=[FAR], stream={"at": [0.0, 5.0]}, run={"until": 9.0}), arc)
+    built = thrown(built, [[length * sin(theta), -length * cos(theta)]])
+    run = exact.run(rolling(built, share, kappa, radius))
+    track, began = run.track(0), 0.0
+    for _ in range(100):
+        if abs(np.tan(theta)) <= kappa:
+            break
+        way = -np.sign(theta)
+
+        def rates(_t, y, way=way):
+            normal = G * cos(y[0]) + y[1] ** 2 / length
+            return [y[1] / length, (-G * sin(y[0]) - way * kappa * normal) / (1.0 + share)]
+
+        def stops(_t, y, way=way):
+            return way * y[1]
+
+        stops.terminal, stops.direction = True, -1.0
+        true = solve_ivp(rates, (0.0, 5.0), [theta, 0.0], method="DOP853", rtol=1e-13,
+                         atol=1e-14, dense_output=True, events=stops)  # fmt: skip
+        lasts = true.t_events[0][0]
+        some = track[(track["t"] > began + 1e-6) & (track["t"] < min(began + lasts, 9.0) - 1e-6)]
+        angle, pace = true.sol(some["t"] - began)
+        found = np.arctan2(some["position"][:, 0], -some["position"][:, 1])
+        np.testing.assert_allclose(found, angle, atol=1e-10)
+        np.testing.assert_allclose(some["omega"] * radius, -pace, atol=1e-9)
+        theta, began = true.y[0, -1], began + lasts
+    if began < 8.0:
+        end = track[-1]
+        assert np.arctan2(end["position"][0], -end["position"][1]) == pytest.approx(theta, abs=1e-9)
+        np.testing.assert_allclose(end["velocity"], 0.0, atol=1e-12)
+    assert ledger(run).relative_residual < 1e-12
+
+
+def test_in_a_blow_rolling_friction_takes_from_the_spin_what_it_can():
+    """J3 = κ r J_n against the spin, and friction stops what slip is left: both laws at once."""
+    floor = face("floor", [-5.0, 0.0], [5.0, 0.0], restitution=0.5, friction=5.0)
+    built = scene_of(surface=[floor], stream={"at": [0.0, 0.5]}, run={"until": 0.5})
+    built = thrown(built, [[0.0, 0.5]], velocity=(2.0, 0.0))
+    hit = exact.run(rolling(built, 0.4, 0.03)).select(Kind.IMPACT)[0]
+    fall = sqrt(2.0 * G * 0.48)
+    push = 1.5 * fall
+    # It comes without spin, and leaves turning forwards (clockwise, ω < 0): the couple is > 0.
+    # v = 2 + t, r ω = 2.5 (t + κ n), v + r ω = 0.
+    t = -(2.0 + 2.5 * 0.03 * push) / 3.5
+    assert hit["velocity_after"][0] == pytest.approx(2.0 + t, rel=1e-12)
+    assert hit["omega_after"] * 0.02 == pytest.approx(2.5 * (t + 0.03 * push), rel=1e-12)
+
+
+def test_on_a_roller_that_turns_it_is_the_spin_against_the_rollers_that_counts():
+    """Held on top of a wheel by both frictions it goes round with it, as if it were glued on."""
+    wheel = {"center": (0.0, 0.0), "radius": 0.5, "begin": 0.0, "extent": 2.0 * pi,
+             "friction": 2.0, "speed": 0.2}  # fmt: skip
+    built = bent(scene_of(surface=[FAR], stream={"at": [0.0, 5.0]}, run={"until": 0.5}), wheel)
+    place = [-0.6 * sin(0.1), 0.6 * cos(0.1)]
+    velocity = (0.24 * cos(0.1), 0.24 * sin(0.1))
+    built = rolling(thrown(built, [place], velocity), 0.5, 1.5, radius=0.1)
+    run = exact.run(built)
+    end = run.track(0)[-1]
+    # The contact point moves at 0.2 round 0.5, ω = -0.4, so the centre at 0.2 + 0.1 · 0.4.
+    assert end["omega"] == pytest.approx(-0.4, rel=1e-12)
+    assert hypot(*end["velocity"]) == pytest.approx(0.24, rel=1e-12)
+    assert ledger(run).relative_residual < 1e-12

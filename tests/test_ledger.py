@@ -112,5 +112,5 @@ def test_a_wrong_entry_moves_the_residual_as_well():
 
 
 def test_nothing_turned_over_is_no_error():
-    empty = Ledger((0.0, 0.0), (1.0, 1.0), 0.0, 0.0, 0.0, 0.0, 0.0, {})
+    empty = Ledger((0.0, 0.0), (1.0, 1.0), 0.0, 0.0, 0.0, 0.0, 0.0, {}, {})
     assert empty.relative_residual == 0.0

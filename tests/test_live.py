@@ -12,12 +12,13 @@ from chutelab import theory
 from chutelab.engines.simulation import simulate
 from chutelab.pictures.live import sliders
 from chutelab.pictures.live.board import controls
-from chutelab.scene import SceneError, from_dict, load
+from chutelab.scene import SceneError, from_dict, load, parse
 
 pytest.importorskip("ipywidgets")
 
 from chutelab.pictures.live.board import Board
 from chutelab.pictures.live.picture import numbers as numbers_of
+from chutelab.pictures.live.runs import study
 
 LIMIT = 0.05
 """s of this process for one redrawing."""
@@ -48,6 +49,30 @@ def test_the_sliders_are_those_that_the_scene_has():
     assert found["plate.angle_deg"].value == 60.0
     for control in found.values():
         assert control.low <= control.value <= control.high
+
+
+NEW = {
+    "particle.shape": "[particle]\nshape = 'sphere'\nspin = true",
+    "particle.radius": "[particle]\nradius = [0.004, 0.005]",
+    "incoming.incline_deg": "[incoming]\nspeed = 2\npulley_radius = 0.1\nincline_deg = 10",
+    "conveyor": "[[conveyor]]\nname = 'second'\nfrom = [0, -1]\nto = [1, -1]\nspeed = 1",
+    "surface[0].center": "[[surface]]\nname = 'peg'\ncenter = [0, -1]\nradius = 0.1",
+    "surface[0].opens_at": "[[surface]]\nname = 'gate'\nfrom = [0, 0]\nto = [1, 0]\nopens_at = 0.0",
+    "surface[0].closes_at": "[[surface]]\nname = 'gate'\nfrom = [0, 0]\nto = [1, 0]\ncloses_at = 1",
+    "string": "[[string]]\nfrom = [0, 2]\nparticle = 0\n[run]\nengine = 'pymunk'",
+    "stream": "[[stream]]\nname = 'b'\nat = [0.5, 1]\nvelocity = [0, 0]",
+}
+
+
+@pytest.mark.parametrize("key", NEW)
+def test_what_a_live_picture_cannot_show_is_refused_by_its_key(key):
+    table = "stream" if key != "stream" else "[stream]"
+    text = f"[{table}]\nat = [0, 1]\nvelocity = [0, 0]\n{NEW[key]}\n"
+    scene = parse(text)
+    for show in (Board, study):
+        with pytest.raises(SceneError) as error:
+            show(scene)
+        assert [fault.key for fault in error.value.faults] == [key]
 
 
 def test_the_table_follows_the_slider_and_is_the_engine_s():

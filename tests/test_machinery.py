@@ -12,7 +12,8 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from chutelab.machine import Machine
+from chutelab import scene
+from chutelab.machine import Machine, build
 from chutelab.pictures.plots import Window, draw_scene, style, window_of
 from handmade import Line, Round, conveyor, machine_of, recording_of
 
@@ -125,6 +126,14 @@ def test_a_hyphen_in_a_name_stays_one() -> None:
 def test_a_roller_shows_how_it_turns(speed: float, arrow: str) -> None:
     ax = drawn(machine_of(Round("roller", (0.0, 0.0), 0.1, speed=speed)))
     assert said(ax) == [f"roller, 0.5 m/s {arrow}"]
+
+
+def test_a_further_plate_tells_its_angle_and_restitution() -> None:
+    text = (
+        "[[plate]]\nname = 'second'\npivot = [0.0, 1.0]\nangle_deg = 15\nrestitution = 0.25\n"
+        "[stream]\nat = [0.0, 2.0]\nvelocity = [0.0, 0.0]\n"
+    )
+    assert said(drawn(build(scene.parse(text)))) == ["second, 15°\nε = 0.25"]
 
 
 def test_a_surface_of_many_pieces_is_named_once_beside_them() -> None:

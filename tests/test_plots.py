@@ -542,10 +542,40 @@ def test_without_a_plate_a_slipping_belt_throws_too() -> None:
     assert arc.at([arc.end])[0][0] == pytest.approx(landing["position"], abs=1e-9)
 
 
+@pytest.mark.parametrize("shape", ["disk", "sphere"])
+def test_without_a_plate_what_rolls_over_the_pulley_is_thrown_too(shape: str) -> None:
+    text = f"[particle]\nshape = '{shape}'\nspin = true\n"
+    text += "[incoming]\nspeed = 1.0\npulley_radius = 0.2\nfriction = 0.6\n"
+    thrown = scene.parse(text + '[outgoing]\ndrop = 1.2\ndrop_from = "top"\n')
+    (arc,) = plots.arcs(theory.predict(thrown), thrown)
+    landing = simulate(thrown, engine="exact").select(Kind.LANDING)[0]
+    assert arc.at([arc.end])[0][0] == pytest.approx(landing["position"], abs=1e-9)
+
+
+@pytest.mark.parametrize("incline", [-15.0, 18.0, 40.0])
+@pytest.mark.parametrize("speed", [1.0, 2.5])
+def test_without_a_plate_an_inclined_belt_throws_too(incline: float, speed: float) -> None:
+    text = f"[incoming]\nspeed = {speed}\npulley_radius = 0.2\nincline_deg = {incline}\n"
+    thrown = scene.parse(
+        text + '[particle]\nradius = 0.01\n[outgoing]\ndrop = 1.2\ndrop_from = "top"\n'
+    )
+    (arc,) = plots.arcs(theory.predict(thrown), thrown)
+    # It leaves where it comes to the pulley, β before its top, if v² >= g Rc cos β, else at
+    # cos φ1 = v²/(g Rc), but not before it has come there.
+    beta, u = np.radians(incline), speed**2 / (9.81 * 0.21)
+    phi1 = -beta if u >= np.cos(beta) else max(np.arccos(u), -beta)
+    assert arc.position == pytest.approx((0.21 * np.sin(phi1), 0.21 * np.cos(phi1)), abs=1e-12)
+    assert arc.velocity == pytest.approx((speed * np.cos(phi1), -speed * np.sin(phi1)), abs=1e-12)
+    landing = simulate(thrown).select(Kind.LANDING)[0]
+    assert arc.at([arc.end])[0][0] == pytest.approx(landing["position"], abs=1e-12)
+
+
 @pytest.mark.parametrize(
     "more",
     [
         "start = 5.0", "speed = 1.0\n[[surface]]\nname = 'hood'\nfrom = [0, 1]\nto = [1, 1]",
+        "[[conveyor]]\nname = 'b'\nfrom = [2, -0.3]\nto = [3, -0.3]\nspeed = 1.0",
+        "[[plate]]\nname = 'p'\npivot = [1.0, 0.0]",
         "[stream]\nat = [0.5, 1.0]\nvelocity = [1.0, 0.0]", "[stream]\ncount = 9\ninteract = true",
     ],
 )  # fmt: skip

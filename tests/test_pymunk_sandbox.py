@@ -88,6 +88,62 @@ def test_an_arc_is_met_where_the_parabola_meets_its_circle(side):
     assert residual(got) < 1e-7
 
 
+def first_touch(start, velocity, center, radius, begin, extent, r, end=1.0):
+    """Return when a disk on a parabola first touches an arc, or inf: sampled, then bisected."""
+    ends = np.array([[cos(angle), sin(angle)] for angle in (begin, begin + extent)])
+
+    def gap(t):
+        t = np.atleast_1d(t)[:, None]
+        away = start + velocity * t - [0.0, 0.5 * G] * t * t - center
+        beside = np.mod(np.arctan2(away[:, 1], away[:, 0]) - begin, 2.0 * pi) > extent
+        rim = np.abs(np.hypot(*away.T) - radius)
+        tips = np.hypot(*np.moveaxis(away[:, None] - radius * ends, -1, 0)).min(axis=1)
+        return np.where(beside, tips, np.minimum(rim, tips)) - r
+
+    times = np.linspace(0.0, end, 20_001)
+    touching = gap(times) < 0.0
+    if not touching.any():
+        return inf
+    high = times[np.argmax(touching)]
+    low = high - times[1]
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if gap(middle)[0] < 0.0 else (middle, high)
+    return high
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_an_arc_is_met_from_wherever_it_is_met_first(seed):
+    # From inside, outside and beside it, on its face and on its ends.
+    draw = np.random.default_rng(seed)
+    arc = (0.0, 0.0), 0.3, draw.uniform(0.0, 2.0 * pi), draw.uniform(0.3, 5.5)
+    for _ in range(6):
+        start, velocity = draw.uniform(-0.6, 0.6, 2), draw.normal(0.0, 2.0, 2)
+        m = with_arcs(lone(start, velocity, until=1.0), (*arc, {"restitution": 0.5}))
+        want = first_touch(start, velocity, *arc, 0.01)
+        if want == 0.0 or first_touch(start, 0.0 * velocity, *arc, 0.01, 1e-9) < inf:
+            continue
+        hits = run(m).select(Kind.IMPACT)
+        got = hits["t"][0] if len(hits) else inf
+        assert got == pytest.approx(want, abs=1e-9)
+
+
+def test_a_ball_comes_to_rest_between_two_hollow_sides():
+    # Held by two arcs that bend towards it, it is pressed on both for good, and nothing rocks it.
+    r, held = 0.02, radians(60.0)
+    values = {"restitution": 0.3, "friction": 0.5}
+    m = lone((0.05, 0.2), until=1.2, particle={"radius": r, "spin": True})
+    arcs = (((-0.2, 0.3), 0.4, -held, 2.0 * held, values),
+            ((0.2, 0.3), 0.4, pi - held, 2.0 * held, values))  # fmt: skip
+    got = run(with_arcs(m, *arcs))
+    last = got.track(0)[-1]
+    # It touches both: the centre is R - r from both centres.
+    assert last["position"] == pytest.approx([0.0, 0.3 - sqrt(0.38**2 - 0.04)], abs=1e-6)
+    assert np.abs(last["velocity"]).max() < 1e-9
+    assert got.steps < 100_000
+    assert residual(got) < 1e-6
+
+
 def slid(theta, speed, radius, friction, steps=4000):
     """Return v² after sliding in a hollow from the angle θ left of the lowest point to it: RK4 of
     dv²/dθ = 2 g ρ (sin θ' - µ cos θ') - 2 µ v², θ' what is left."""
@@ -242,6 +298,23 @@ def test_rolling_friction_slows_a_rolling_ball(shape):
     way = settle["position"][0] - stick["position"][0]
     assert way == pytest.approx(v * v / (2.0 * slow), abs=1e-7)
     assert residual(got) < 1e-12
+
+
+@pytest.mark.parametrize("arm", [0.02, 0.5])
+def test_rolling_friction_shares_a_blow_with_friction(arm):
+    # Thrown on a rough floor with ω: it sticks, v = -r ω', and either the couple is used up,
+    # J3 = arm J_n, and (I + m r²) ω' = I ω - m r v + J3, or nothing turns: ω' = v' = 0.
+    r, mass, spin = 0.01, 0.1, 0.5 * 0.1 * 0.01**2
+    m = lone((0.0, 0.1), (0.5, 0.0), until=0.14, particle={"spin": True}, surface=[
+        face("floor", (-1.0, 0.0), (9.0, 0.0), restitution=0.5, friction=9.0)
+    ])  # fmt: skip
+    got = run(replace(m, rolling=np.array([arm])))
+    hit = got.select(Kind.IMPACT)[0]
+    whole = spin + mass * r * r
+    couple = min(arm * r * hit["normal_impulse"], mass * r * 0.5)
+    assert hit["omega_after"] == pytest.approx((couple - mass * r * 0.5) / whole, abs=1e-9)
+    assert hit["velocity_after"][0] == pytest.approx(-r * hit["omega_after"], abs=1e-10)
+    assert residual(got) < 1e-13
 
 
 @pytest.mark.parametrize(("slope", "rolls"), [(1.0, False), (2.0, True)])
@@ -404,6 +477,44 @@ def test_stepped_rolling_friction_stops_and_holds():
     )  # fmt: skip
     ends = run(replace(m, rolling=np.array([tan(radians(1.5))]))).track(0)["position"][[0, -1]]
     assert hypot(*(ends[1] - ends[0])) < 1e-5
+
+
+def conveyor(slope, length, speed, friction, run_table, radius=0.1, dt=1e-3):
+    """A conveyor that rises: its belt from (0, 0) on top, pulleys below both ends, return below."""
+    along, up = np.array([cos(slope), sin(slope)]), np.array([-sin(slope), cos(slope)])
+    low = -2.0 * radius * up
+    surface = face("top", (0.0, 0.0), (length * along).tolist(), friction=friction, speed=speed)
+    back = face(
+        "back", (length * along + low).tolist(), low.tolist(), friction=friction, speed=speed
+    )
+    start = 0.01 * up + 0.2 * along
+    m = lone(start, until=3.0, dt=dt, surface=[surface, back], run=run_table)
+    m = replace(m, segments=replace(m.segments, restitution=np.zeros(2)))
+    wheel = {"speed": speed, "friction": friction}
+    centers = [tuple(end - radius * up) for end in (0.0 * along, length * along)]
+    return with_arcs(m, *((center, radius, 0.0, 2.0 * pi, wheel) for center in centers)), along
+
+
+@pytest.mark.parametrize("run_table", [{}, STEPPED])
+def test_an_inclined_conveyor_lifts_what_grips_it_and_throws_it_off_its_pulley(run_table):
+    # a = g (µ cos β - sin β) up to the belt's speed v, then carried; v² >= g ρ cos β leaves at the
+    # tangent point; the belt pays m (g rise + v²/2) and the slip's heat.
+    slope, length, speed, friction = radians(10.0), 1.5, 1.5, 0.5
+    m, along = conveyor(slope, length, speed, friction, run_table)
+    got = run(m)
+    a = G * (friction * cos(slope) - sin(slope))
+    t = speed / a + (length - 0.2 - speed**2 / (2.0 * a)) / speed
+    left = got.select(Kind.SEPARATION)[-1]
+    off = 5e-3 if run_table else 1e-5
+    assert left["t"] == pytest.approx(t, abs=3.0 * off)
+    assert left["velocity_after"] == pytest.approx(speed * along, abs=3.0 * off)
+    work, heat = got.by_surface[:, 0].sum(), got.by_surface[:, 2].sum()
+    slips = 0.1 * G * friction * cos(slope) * (speed**2 / (2.0 * a))
+    assert heat == pytest.approx(slips, rel=0.02 if run_table else 1e-6)
+    rise = (length - 0.2) * sin(slope)
+    assert work == pytest.approx(0.1 * (G * rise + 0.5 * speed**2) + slips, rel=5e-3)
+    assert residual(got) < 1e-4
+    assert not len(got.select(Kind.IMPACT))
 
 
 # Strings

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from chutelab import scene
 from chutelab.engines import contact
 from chutelab.machine import build
-from chutelab.machine.releases import DEEP, draw, squeeze
+from chutelab.machine.releases import DEEP, squeeze
 from chutelab.results import Kind
 
 G, V, r = 9.81, 2.0, 0.0063
@@ -20,7 +20,7 @@ RC = 0.1 + r
 def drawn(*, incoming=None, particle=None, **stream):
     belt = {"speed": V, "pulley_radius": 0.1, **(incoming or {})}
     tables = {"incoming": belt, "particle": particle or {}, "stream": stream}
-    return draw(scene.from_dict(tables, "mine.toml"))
+    return build(scene.from_dict(tables, "mine.toml")).releases
 
 
 def same(one, other):

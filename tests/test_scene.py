@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from chutelab import scene as sc
+from chutelab.scene.schema import as_written
 
 CONVEYOR = """
 [incoming]
@@ -46,15 +47,31 @@ speed = 1
 CONTRACT = {
     "title": "machine",
     "gravity": 9.81,
-    "particle": {"radius": 0.0063, "mass": 0.008, "spin": False},
+    "particle": {
+        "name": None,
+        "shape": "disk",
+        "radius": 0.0063,
+        "size": None,
+        "points": None,
+        "mass": 0.008,
+        "density": None,
+        "material": None,
+        "spin": False,
+        "rolling_friction": 0.0,
+    },
+    "material": (),
+    "pair": (),
     "incoming": {
         "speed": 3.0,
         "pulley_radius": 0.2,
         "length": 1.0,
+        "incline_deg": 0.0,
         "friction": "adhesion",
         "restitution": 0.0,
     },
     "plate": {
+        "name": None,
+        "pivot": None,
         "distance": 0.5,
         "angle_deg": 0.0,
         "pivot_height": 0.2,
@@ -72,14 +89,21 @@ CONTRACT = {
         "restitution": 0.0,
         "friction": 0.5,
     },
+    "conveyor": (),
     "surface": (),
+    "string": (),
     "stream": {
+        "name": "stream",
+        "particle": None,
         "count": 1,
         "rate": 200.0,
+        "start": 0.0,
         "bed_height": 0.0,
         "speed_spread": 0.0,
         "seed": 0,
         "at": None,
+        "to": None,
+        "fill": None,
         "velocity": None,
         "interact": False,
         "restitution": 0.5,
@@ -94,7 +118,7 @@ EXPECT = {"quantity", "value", "tolerance", "tolerance_contact", "tolerance_pymu
 
 def test_the_defaults_are_the_contract():
     scene = sc.parse(MACHINE, "somewhere/machine.toml")
-    assert scene.model_dump() == CONTRACT
+    assert as_written(scene, defaults=True) == CONTRACT
     assert scene.source == "somewhere/machine.toml"
 
 
@@ -311,13 +335,18 @@ def test_the_starter_is_complete_and_valid_and_shows_the_defaults():
     # With what is commented out put in, it is still valid, and every key there is, is in it.
     keys = re.compile(r"^# (?=[a-z_]+ = |\[\[)", re.MULTILINE)
     everything = tomllib.loads(keys.sub("", text))
-    assert set(everything) == set(CONTRACT)
-    for table in ("particle", "incoming", "plate", "outgoing", "stream", "run"):
-        contract = CONTRACT[table]
-        assert isinstance(contract, dict)
-        assert set(everything[table]) == set(contract)
-    assert set(everything["surface"][0]) == {
-        *("name", "from", "to", "restitution", "friction", "speed")
+    assert set(everything) | {"pair"} == set(CONTRACT)
+    # What goes instead of something else is further in.
+    instead = re.compile(r"^# ( {2}(?=[a-z_]+ = |\[\[))?", re.MULTILINE)
+    blocks = instead.sub("", text).split("\n[")
+    said = {
+        block.strip("[").partition("]")[0]: set(re.findall(r"^(\w+) = ", block, re.MULTILINE))
+        for block in blocks[1:]
+    }
+    tables = {name.lower(): table for name, table in sc.schema()["$defs"].items()}
+    assert said == {
+        name: set(table["properties"]) - {"points"} | ({"points"} if name == "particle" else set())
+        for name, table in tables.items()
     }
     assert set(everything["expect"][0]) == EXPECT
     complete = sc.from_dict(everything)
@@ -363,8 +392,8 @@ def test_an_override_sets_its_key_and_no_other(override, path, value):
             return {above: tree}
         return {k: v for key, branch in branches for k, v in leaves(branch, (*above, key)).items()}
 
-    expected = leaves(plain.model_dump()) | {path: value}
-    assert leaves(changed.model_dump()) == expected
+    expected = leaves(as_written(plain, defaults=True)) | {path: value}
+    assert leaves(as_written(changed, defaults=True)) == expected
 
 
 def test_the_last_of_several_overrides_wins_and_tables_are_made():
@@ -399,10 +428,13 @@ def test_the_schema_describes_every_key_of_the_contract():
     assert set(tables["expect"]["properties"]) == EXPECT
     assert set(tables["expect"]["required"]) == EXPECT - {"tolerance_contact", "tolerance_pymunk"}
     assert set(tables["surface"]["properties"]) == {
-        *("name", "from", "to", "points", "restitution", "friction", "speed")
+        *("name", "from", "to", "points", "center", "radius", "from_deg", "to_deg", "repeat"),
+        *("restitution", "friction", "material", "speed", "opens_at", "closes_at"),
     }
     assert tables["incoming"]["required"] == ["speed", "pulley_radius"]
-    assert tables["plate"]["required"] == ["distance"]
+    assert tables["plate"]["oneOf"] == [
+        {"required": ["distance"]}, {"required": ["name", "pivot"]}
+    ]  # fmt: skip
     for table in tables.values():
         assert table["additionalProperties"] is False
         for key in table["properties"].values():

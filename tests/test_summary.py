@@ -18,7 +18,7 @@ from chutelab.results.summary import summary
 
 TOP = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
-    "impact", "landing", "ended", "stopped", "rolling", "waited", "squeezed", "drag",
+    "impact", "landing", "ended", "stopped", "rolling", "waited", "squeezed", "drag", "steady",
     "ledger", "theory", "theory_as_printed",
     "error",
     "accuracy",
@@ -26,7 +26,7 @@ TOP = [
 BEFORE = ["t", "x", "y", "vx", "vy"]
 LEDGER = [
     "kinetic", "potential", "belt_work", "restitution_loss", "friction_loss", "residual",
-    "turned_over", "by_surface",
+    "turned_over", "by_surface", "by_stream",
 ]  # fmt: skip
 THEORY = [
     "phi1_deg", "t2", "x2", "y2", "v2", "phi2_deg", "phi2r_deg", "v2r", "t3", "x3", "y3", "v3x",

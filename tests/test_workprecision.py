@@ -17,7 +17,7 @@ from click.testing import CliRunner
 from PIL import Image
 
 from chutelab.engines.simulation import simulate
-from chutelab.machine.releases import draw as draw_releases
+from chutelab.machine import build
 from chutelab.util.files import tsv_text
 from chutelab.util.versions import environment
 from work_precision import main
@@ -124,7 +124,7 @@ def test_the_reference_of_a_bounce_is_the_sum_of_all_bounces():
 def test_the_reference_of_many_is_that_of_each():
     case = KNOWN["independent"]
     found = case.reference(case.scenes[0]).values
-    heights = draw_releases(case.scenes[0]).position[:, 1] - R - RADIUS
+    heights = build(case.scenes[0]).releases.position[:, 1] - R - RADIUS
     assert len(heights) == 1000
     for i in (0, 1, 499, 999):
         expected = flight(0.5, heights[i])

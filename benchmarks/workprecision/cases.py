@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from chutelab.machine.releases import draw
+from chutelab.machine import build
 from chutelab.results import Kind, Recording
 from chutelab.results.comparison import relative_error, scales
 from chutelab.scene import Scene, from_dict
@@ -312,7 +312,7 @@ def of_many_transfers(scene: Scene) -> Reference:
     assert belt is not None
     assert plate is not None
     assert out is not None
-    starts = draw(scene)
+    starts = build(scene).releases
     layer = starts.position[:, 1] - belt.pulley_radius - r
     machine: dict[str, Any] = {
         "speed": starts.velocity[:, 0],

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from chutelab.machine.releases import draw
+from chutelab.machine import build
 from chutelab.scene import Scene
 from workprecision.cases import Answer
 
@@ -138,7 +138,7 @@ def bounce(scene: Scene, rtol: float) -> Answer:
 
 def independent(scene: Scene, rtol: float) -> Answer:
     """Integrate the particles of a stream one after the other."""
-    starts = draw(scene)
+    starts = build(scene).releases
     found = [
         _flight(scene, (*position, *velocity), rtol)[0]
         for position, velocity in zip(

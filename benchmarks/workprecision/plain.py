@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 import pymunk
 
-from chutelab.machine.releases import draw
+from chutelab.machine import build
 from chutelab.scene import Scene
 from chutelab.util.arrays import Floats
 from workprecision.cases import FRAME, Answer
@@ -130,7 +130,7 @@ def belt(scene: Scene, dt: float) -> Answer:
 def _alone(scene: Scene, dt: float, *, grip: bool) -> Answer:
     world, out = _World(scene), scene.outgoing
     assert out is not None
-    starts = draw(scene)
+    starts = build(scene).releases
     body = world.add(starts.position[0], starts.velocity[0])
     level = world.lowest + scene.particle.radius
     track = [(0.0, *body.position)]
@@ -182,7 +182,7 @@ def independent(scene: Scene, dt: float) -> Answer:
     Each is put in before the first step that begins no earlier than its release, and its times
     count from there.
     """
-    world, starts = _World(scene), draw(scene)
+    world, starts = _World(scene), build(scene).releases
     count, level = len(starts.t), world.lowest + scene.particle.radius
     names = ("t2", "y2", "t3", "x3", "v3x", "v3y")
     answer = {name: np.full(count, np.nan) for name in names}
@@ -222,7 +222,7 @@ def independent(scene: Scene, dt: float) -> Answer:
 
 def interacting(scene: Scene, dt: float) -> Floats:
     """Step all particles in one Space for the time asked for; return frames (T, N, 2)."""
-    world, starts = _World(scene), draw(scene)
+    world, starts = _World(scene), build(scene).releases
     count, end = len(starts.t), float(scene.run.until)
     bodies: list[pymunk.Body] = []
     frames: list[Floats] = []

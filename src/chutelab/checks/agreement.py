@@ -93,8 +93,7 @@ def agreement(scene: Scene) -> tuple[Agreement, ...]:
     SceneError
         If the geometry contradicts itself.
     """
-    lone = {"stream.count": 1, "stream.interact": False, "run.engine": "auto", "expect": None}
-    alone = scene.with_values(lone)
+    alone = scene.alone()
     build(alone)
     found: dict[str, Recording] = {}
     rows: list[Agreement] = []
@@ -339,11 +338,12 @@ def verify(scene: Scene, progress: Callable[[float], None] | None = None) -> Ver
 
 def _skipped(scene: Scene) -> dict[str, str]:
     """Return the engines that a scene is not for, with the reason."""
-    stream = scene.stream
-    if stream.crowded:
+    if any(kind.outline for kind in scene.particles) or scene.string:
+        return dict.fromkeys(("exact", "contact"), "it has disks only, and no strings")
+    if scene.crowded:
         return {"exact": "particles meet each other"}
-    if scene.particle.radius == 0.0:
+    if any(kind.radius == 0.0 for kind in scene.particles):
         return dict.fromkeys(("contact", "pymunk"), "it has no mass points")
-    if stream.count > MOST_ALONE:
-        return {"pymunk": f"{stream.count} particles that do not meet would take it minutes"}
+    if scene.count > MOST_ALONE:
+        return {"pymunk": f"{scene.count} particles that do not meet would take it minutes"}
     return {}

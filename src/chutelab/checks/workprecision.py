@@ -121,7 +121,7 @@ def measure(
     repeats : int
         Timed runs after the first, at most; fewer where they take longer than `PATIENCE`.
     """
-    many = scene.stream.count > 1
+    many = scene.count > 1
     steps = sorted(set(steps or (MANY_STEPS if many else STEPS)), reverse=True)
     methods = methods or (METHODS[:-1] if many else METHODS)
     finest = scene.with_values({"run.dt": steps[-1], "expect": None})

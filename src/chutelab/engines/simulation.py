@@ -6,6 +6,8 @@ from dataclasses import replace
 from math import inf
 from time import perf_counter
 
+import numpy as np
+
 from chutelab.machine import Machine, build
 from chutelab.results import Recording
 from chutelab.results.recorder import EnoughError
@@ -16,7 +18,7 @@ ENGINES = ("auto", "exact", "contact", "pymunk")
 
 
 def choose(machine: Machine, engine: str | None = None) -> str:
-    """Return the engine that runs first: exact, unless particles interact or another is asked for.
+    """Return the engine that runs first: exact, unless the scene needs or asks for another.
 
     Parameters
     ----------
@@ -35,6 +37,8 @@ def choose(machine: Machine, engine: str | None = None) -> str:
         raise ValueError(f"engine = {wanted!r}: one of {', '.join(ENGINES)}")
     if wanted != "auto":
         return wanted
+    if any(outline is not None for outline in machine.outlines) or machine.threads:
+        return "pymunk"
     return "contact" if machine.interact else "exact"
 
 
@@ -95,6 +99,16 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
     """Run a machine with the engine that is asked for, or the one it needs; see `simulate`."""
     scene = machine.scene
     name = choose(machine, engine)
+    if name in ("exact", "contact"):
+        for n, outline in enumerate(machine.outlines):
+            if outline is not None:
+                several = f"[{n}]" * (len(machine.outlines) > 1)
+                raise _refused(
+                    scene, f"particle{several}.shape", scene.particles[n].shape,
+                    f'a disk or sphere with run.engine = "{name}"; the pymunk engine has it',
+                )  # fmt: skip
+        if machine.threads:
+            raise _refused(scene, "string", len(machine.threads), "none, or the pymunk engine")
     if name == "exact":
         if machine.interact:
             allowed = "contact or pymunk, because stream.interact = true"
@@ -107,7 +121,7 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
             if "exact" in (engine, scene.run.engine):
                 raise _refused(scene, "run.engine", "exact", str(error)) from error
             name = "contact"
-    if machine.particle.radius == 0.0:
+    if np.any(machine.particle.radius == 0.0):
         raise _refused(scene, "particle.radius", 0.0, f'more than 0 with run.engine = "{name}"')
     if name == "contact":
         from chutelab.engines.contact import run as stepped

@@ -8,10 +8,11 @@ of machines: NumPy's functions take a number and an array (N,) alike.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
-from math import ceil, inf, prod
+from math import ceil, hypot, inf, pi, prod
 from sys import float_info
 from typing import Any
 
@@ -19,11 +20,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chutelab.machine.nominal import plate_hit
-from chutelab.machine.parts import Arcs, Caution, Machine, Particle, Pulley, Segments
-from chutelab.machine.releases import Releases, draw, release_point
-from chutelab.scene import Fault, Scene, SceneError
+from chutelab.machine.parts import Arcs, Caution, Machine, Particle, Pulley, Segments, Thread
+from chutelab.machine.releases import Releases, draw, up_belt
+from chutelab.scene import Conveyor, Fault, Plate, Scene, SceneError, Surface
 from chutelab.scene.rules import ON_BELT
-from chutelab.util.arrays import Floats, Numbers
+from chutelab.scene.units import polygon_moment
+from chutelab.util.arrays import Bools, Floats, Ints, Numbers
 
 
 class RefusedError(SceneError):
@@ -46,61 +48,117 @@ ROUNDING = 64.0 * float_info.epsilon
 """Share of the largest coordinate by which a contact may seem to overlap: the engines see to it."""
 
 
-def _cleared(
-    scene: Scene, releases: Releases, ends: Floats, owner: Sequence[int], names: Sequence[str]
-) -> Releases:
-    """Return releases of which none lies in a surface, or raise a `RefusedError`.
-
-    One less than `ON_BELT` inside, as one written with ten digits may be, is moved out. ``ends``,
-    (4, S) or (4, S, N), are each segment's x0, y0, x1, y1 (m); ``owner`` says which of the surfaces
-    in ``names`` a segment belongs to.
-    """
-    r = scene.particle.radius
-    # All start in one column, above the release point.
-    x, low = release_point(scene)
-    high = low + scene.stream.bed_height
+def _on_segment(places: Floats, ends: Floats) -> Floats:
+    """Return the nearest points of a segment, (4,) or (4, N): x0, y0, x1, y1, (2, n), m."""
     x0, y0, x1, y1 = ends
-    near = (np.maximum(x0, x1) > x - r) & (np.minimum(x0, x1) < x + r)
-    near &= (np.maximum(y0, y1) > low - r) & (np.minimum(y0, y1) < high + r)
-    carried = bool(releases.carried[0])
-    for n, surface in enumerate(owner):
-        if np.count_nonzero(near[n]) and not (carried and surface == 0):
-            releases = _out(scene, releases, ends[:, n], r, names[surface])
-    if scene.incoming is not None and not carried:
-        # A point may start anywhere.
-        reach = np.where(np.greater(r, 0.0), scene.incoming.pulley_radius + r, 0.0)
-        releases = _out(scene, releases, np.zeros(4), reach, "incoming")
-    return releases
-
-
-def _out(scene: Scene, releases: Releases, ends: Floats, reach: Numbers, name: str) -> Releases:
-    """Return releases at least `reach` (m) away from a segment, (4,) or (4, N), or from a point."""
-    x0, y0, x1, y1 = ends
-    (x, y), dx, dy = releases.position.T, x1 - x0, y1 - y0
+    (x, y), dx, dy = places.T, x1 - x0, y1 - y0
     square = dx * dx + dy * dy
     along = (x - x0) * dx + (y - y0) * dy
     share = np.clip(along / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
-    away = np.stack([x - x0 - share * dx, y - y0 - share * dy])
-    distance = np.hypot(*away)
-    depth = reach - distance
-    rounding = ROUNDING * np.maximum(np.abs(ends).max(axis=0), np.maximum(np.abs(x), np.abs(y)))
-    inside = np.flatnonzero(depth > np.maximum(ON_BELT, rounding))
-    if len(inside):
-        every = len(depth) // prod(scene.shape)
-        deepest = {i // every: i for i in sorted(inside.tolist(), key=depth.__getitem__)}
-        reach = np.broadcast_to(reach, depth.shape)
-        faults = {}
-        for member, i in deepest.items():
-            allowed = (
-                f"at least {reach[i]:g} m from {name}: particle {i % every} would start"
-                f" {distance[i]:.6g} m from it, inside; move stream.at, or the surface"
-            )
-            faults[member] = Fault("stream.at", scene.stream.at, allowed)
-        raise RefusedError(scene.source, faults)
-    if not np.any(depth > rounding):
+    return np.stack([x0 + share * dx, y0 + share * dy])
+
+
+def _on_arc(places: Floats, arcs: Arcs, n: int) -> Floats:
+    """Return the nearest points of arc n, (2, n), m."""
+    center, radius = arcs.center[..., n, :].T, arcs.radius[..., n]
+    away = places.T - (center[:, None] if center.ndim == 1 else center)
+    away = np.where(np.hypot(*away) > 0.0, away, np.array([[1.0], [0.0]]))
+    angle = np.mod(np.arctan2(away[1], away[0]) - arcs.begin[..., n], 2.0 * pi)
+    on_it = radius * away / np.hypot(*away)
+    first, last = (end[..., n, :].T - center for end in arcs.ends)
+    if first.ndim == 1:
+        first, last = first[:, None], last[:, None]
+    nearer = np.hypot(*(away - first)) <= np.hypot(*(away - last))
+    found = np.where(angle <= arcs.extent[..., n], on_it, np.where(nearer, first, last))
+    return np.asarray(found + (center[:, None] if center.ndim == 1 else center))
+
+
+@dataclass(frozen=True, eq=False)
+class _Room:
+    """Where disks may be released: not in a surface that is there then."""
+
+    scene: Scene
+    names: Sequence[str]
+    ends: Floats  # (4, S) or (4, S, N): x0, y0, x1, y1 of the segments, m
+    owner: Sequence[int]  # (S,), into the names
+    gates: Floats  # (S, 2), s
+    arcs: Arcs
+
+    def surfaces(self, low: Floats, high: Floats) -> Iterator[tuple[int, Floats, Any]]:
+        """Yield what may reach into a box (m): its owner, its gate, and its nearest points."""
+        x0, y0, x1, y1 = self.ends
+        near = (np.maximum(x0, x1) > low[0]) & (np.minimum(x0, x1) < high[0])
+        near &= (np.maximum(y0, y1) > low[1]) & (np.minimum(y0, y1) < high[1])
+        for n, surface in enumerate(self.owner):
+            if np.count_nonzero(near[n]):
+                yield surface, self.gates[n], partial(_on_segment, ends=self.ends[:, n])
+        for n, surface in enumerate(self.arcs.surface.tolist()):
+            gate = np.array([self.arcs.appears[n], self.arcs.vanishes[n]])
+            yield surface, gate, partial(_on_arc, arcs=self.arcs, n=n)
+
+    def clear(self, places: Floats, radius: float) -> Bools:
+        """Tell which places (n, 2), m, a disk (m) can be in."""
+        free = np.ones(len(places), dtype=bool)
+        if not len(places):
+            return free
+        for _, _, nearest in self.surfaces(
+            places.min(axis=0) - radius, places.max(axis=0) + radius
+        ):
+            free &= np.hypot(*(places.T - nearest(places))) >= radius
+        return free
+
+    def cleared(self, releases: Releases, radius: Numbers) -> Releases:
+        """Return releases of which none lies in a surface, or raise a `RefusedError`.
+
+        One less than `ON_BELT` inside, as one written with ten digits may be, is moved out.
+        """
+        places = releases.position
+        low, high = (places.T - radius), (places.T + radius)
+        if not self.scene.shape:
+            low, high = low.min(axis=1), high.max(axis=1)
+        for surface, gate, nearest in self.surfaces(low, high):
+            there = (gate[0] <= releases.t) & (releases.t < gate[1])
+            if surface == 0 and self.scene.incoming is not None:
+                there &= ~releases.carried
+            if np.count_nonzero(there):
+                releases = self.out(releases, nearest, radius, there, self.names[surface])
+        belt = self.scene.incoming
+        if belt is not None and not releases.carried.all():
+            # A point may start anywhere.
+            reach = np.where(np.greater(radius, 0.0), belt.pulley_radius + radius, 0.0)
+            axis = np.zeros((2, 1))
+            releases = self.out(releases, lambda _: axis, reach, ~releases.carried, "incoming")
         return releases
-    moved = np.where(depth > rounding, away * (depth / distance), 0.0)
-    return replace(releases, position=releases.position + moved.T)
+
+    def out(
+        self, releases: Releases, nearest: Any, reach: Numbers, who: Bools, name: str
+    ) -> Releases:
+        """Return releases of which those told are at least `reach` (m) away from a surface."""
+        scene, places = self.scene, releases.position
+        points = nearest(places)
+        away = places.T - points
+        distance = np.hypot(*away)
+        depth = np.where(who, reach - distance, -inf)
+        rounding = ROUNDING * np.maximum(np.abs(points).max(axis=0), np.abs(places).max(axis=1))
+        inside = np.flatnonzero(depth > np.maximum(ON_BELT, rounding))
+        if len(inside):
+            every = len(depth) // prod(scene.shape)
+            deepest = {i // every: i for i in sorted(inside.tolist(), key=depth.__getitem__)}
+            reach = np.broadcast_to(reach, depth.shape)
+            faults = {}
+            for member, i in deepest.items():
+                number = int(releases.stream[i])
+                key = f"stream[{number}].at" if len(scene.streams) > 1 else "stream.at"
+                allowed = (
+                    f"at least {reach[i]:g} m from {name}: particle {i % every} would start"
+                    f" {distance[i]:.6g} m from it, inside; move {key}, or the surface"
+                )
+                faults[member] = Fault(key, scene.streams[number].at, allowed)
+            raise RefusedError(scene.source, faults)
+        if not np.any(depth > rounding):
+            return releases
+        shift = np.where(depth > rounding, away * (depth / distance), 0.0)
+        return replace(releases, position=places + shift.T)
 
 
 REACH_WITHOUT_BELT = 2.0
@@ -113,8 +171,25 @@ CLEARANCE_RADII = 3.0
 """The same in radii: a disk that lies on the belt passes under the plate, with one to spare."""
 
 
-Part = tuple[str, Sequence[tuple[Numbers, Numbers]], Numbers, Numbers, Numbers]
-"""A surface: its name, its points (m), its speed (m/s), restitution and friction."""
+REACH_HANGING = 0.5
+"""m of a further plate below its pivot."""
+
+Point = tuple[Numbers, Numbers]
+Line = tuple[Sequence[Point], Numbers]
+"""A polyline (m), and the speed along it (m/s)."""
+
+Bend = tuple[Numbers, Numbers, Numbers, Numbers, Numbers, Numbers]
+"""An arc: centre x, y, radius (m), begin, extent (rad), clockwise speed (m/s), as `Arcs` has it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One surface of the machine: its lines and arcs, and when they are there, s."""
+
+    name: str
+    lines: Sequence[Line] = ()
+    bends: Sequence[Bend] = ()
+    gates: Sequence[tuple[float, float]] = ((-inf, inf),)
 
 
 # A flight that never meets the plate's line has NaN for its impact.
@@ -136,70 +211,196 @@ def build(scene: Scene) -> Machine:
         surface.
     """
     parts, warnings = _conveyors(scene)
-    parts += [(s.name, s.points, s.speed, s.restitution, s.friction) for s in scene.surface]
-    names = [name for name, *_ in parts]
-    segments = sum(len(points) - 1 for _, points, *_ in parts)
-    columns, owner = np.empty((7, segments, *scene.shape)), list[int]()
-    for number, (_, points, *numbers) in enumerate(parts):
-        for start, end in pairwise(points):
-            for column, value in zip(columns, (*start, *end, *numbers), strict=True):
-                column[len(owner)] = value
-            owner.append(number)
-    speed, restitution, friction = columns[4:]
+    lay: Any = {Plate: _hanging, Conveyor: _conveyor, Surface: _free}
+    parts += [lay[type(table)](table) for table in scene.free]
+    names = [part.name for part in parts]
+    lines: list[tuple[int, tuple[float, float], tuple[Numbers, ...]]] = []
+    bends: list[tuple[int, tuple[float, float], Bend]] = []
+    for number, part in enumerate(parts):
+        for gate in part.gates:
+            for points, speed in part.lines:
+                lines += [(number, gate, (*a, *b, speed)) for a, b in pairwise(points)]
+            bends += [(number, gate, bend) for bend in part.bends]
+    columns = _columns(scene, [values for *_, values in lines], 5)
+    owner = np.array([number for number, *_ in lines], dtype=np.int64)
+    gates = np.array([gate for _, gate, _ in lines]).reshape(-1, 2)
     along = columns[2:4] - columns[0:2]
     length = np.hypot(along[0], along[1])
-    disk, belt, until = scene.particle, scene.incoming, scene.run.until
-    releases = _cleared(scene, draw(scene), columns[:4], owner, names)
-    bound = releases.t[-1].item() + scene.run.max_time
+    kinds = range(1 if scene.shape else len(scene.particles))
+    met = [[_with_grip(*scene.met(kind, name)) for name in names] for kind in kinds]
+    segments = Segments(
+        start=columns[0:2].T,
+        tangent=(along / length).T,
+        length=length.T,
+        speed=columns[4].T,
+        **_values(scene, met, owner),
+        surface=owner,
+        appears=gates[:, 0].copy(),
+        vanishes=gates[:, 1].copy(),
+    )
+    arcs = _arcs(scene, bends, met)
+    belt, until, particles = scene.incoming, scene.run.until, scene.particles
+    room = _Room(scene, names, columns[:4], owner.tolist(), gates, arcs)
+    releases, radius = draw(scene, room.clear)
+    particle = _particle(scene, releases.kind, radius)
+    releases = room.cleared(releases, particle.radius)
+    bound = releases.t.max().item() + scene.run.max_time
+    pulley = None
+    if belt is not None:
+        bounce, grip = zip(*(row[0] for row in met), strict=True)
+        pulley = Pulley(
+            radius=belt.pulley_radius,
+            speed=belt.speed,
+            friction=np.array(grip) if len(grip) > 1 else grip[0],
+            restitution=np.array(bounce) if len(grip) > 1 else bounce[0],
+            surface=0,
+            incline=belt.incline_deg * (pi / 180.0),
+        )
+    every = range(len(particles))
+    pairs = np.array([[scene.met(a, b) for b in every] for a in every])
     return Machine(
         scene=scene,
         surfaces=tuple(names),
         gravity=scene.gravity,
-        particle=Particle(
-            radius=disk.radius,
-            mass=disk.mass,
-            inertia=0.5 * disk.mass * (disk.radius * disk.radius) if disk.spin else 0.0,
-        ),
-        segments=Segments(
-            start=columns[0:2].T,
-            tangent=(along / length).T,
-            length=length.T,
-            speed=speed.T,
-            restitution=restitution.T,
-            friction=friction.T,
-            surface=np.array(owner, dtype=np.int64),
-            appears=np.full(segments, -inf),
-            vanishes=np.full(segments, inf),
-        ),
-        arcs=Arcs(
-            center=np.empty((*scene.shape, 0, 2)),
-            **{
-                name: np.empty((*scene.shape, 0))
-                for name in ("radius", "begin", "extent", "speed", "restitution", "friction")
-            },
-            surface=np.empty(0, dtype=np.int64),
-            appears=np.empty(0),
-            vanishes=np.empty(0),
-        ),
-        pulley=None
-        if belt is None
-        else Pulley(belt.pulley_radius, belt.speed, _grip(belt.friction), belt.restitution, 0),
+        particle=particle,
+        segments=segments,
+        arcs=arcs,
+        pulley=pulley,
         releases=releases,
         landing=names.index("outgoing") if "outgoing" in names else -1,
         until=until if isinstance(until, str) else "time",
         end_time=bound if isinstance(until, str) else np.minimum(bound, until),
         dt=scene.run.dt,
         align=scene.run.align,
-        interact=scene.stream.crowded,
-        pair_restitution=np.full((1, 1), scene.stream.restitution),
-        pair_friction=np.full((1, 1), scene.stream.friction),
-        rolling=np.zeros(1),
-        outlines=(None,),
-        threads=(),
-        streams=("stream",),
+        interact=scene.crowded,
+        pair_restitution=pairs[..., 0],
+        pair_friction=pairs[..., 1],
+        rolling=np.array([kind.rolling_friction for kind in particles]),
+        outlines=tuple(np.array(kind.outline) if kind.outline else None for kind in particles),
+        threads=_threads(scene, releases),
+        streams=tuple(str(stream.name) for stream in scene.streams),
         engine=scene.run.engine,
         plate_warnings=tuple(warnings),
     )
+
+
+def _columns(scene: Scene, rows: Sequence[Sequence[Numbers]], count: int) -> Floats:
+    """Return `count` numbers of each of S rows, (count, S) or, of a family, (count, S, N)."""
+    columns = np.empty((count, len(rows), *scene.shape))
+    for n, row in enumerate(rows):
+        for column, value in zip(columns, row, strict=True):
+            column[n] = value
+    return columns
+
+
+Met = Sequence[Sequence[tuple[Any, Any]]]
+"""Restitution and friction of each kind of particles with each surface."""
+
+
+def _values(scene: Scene, met: Met, owner: Ints) -> dict[str, Floats]:
+    """Return restitution and friction of pieces of surfaces: (S,), (K, S), or (N, S)."""
+    found = {}
+    for n, name in enumerate(("restitution", "friction")):
+        table = [
+            _columns(scene, [[row[surface][n]] for surface in owner.tolist()], 1)[0].T
+            for row in met
+        ]
+        found[name] = np.stack(table) if len(table) > 1 else table[0]
+    return found
+
+
+def _arcs(scene: Scene, bends: Sequence[tuple[int, tuple[float, float], Bend]], met: Met) -> Arcs:
+    columns = _columns(scene, [bend for *_, bend in bends], 6)
+    owner = np.array([number for number, *_ in bends], dtype=np.int64)
+    gates = np.array([gate for _, gate, _ in bends]).reshape(-1, 2)
+    return Arcs(
+        center=columns[:2].T,
+        radius=columns[2].T,
+        begin=columns[3].T,
+        extent=columns[4].T,
+        speed=columns[5].T,
+        **_values(scene, met, owner),
+        surface=owner,
+        appears=gates[:, 0].copy(),
+        vanishes=gates[:, 1].copy(),
+    )
+
+
+def _particle(scene: Scene, kind: Ints, radius: Floats | None) -> Particle:
+    """Return the particles: numbers if all are alike, else arrays (N,)."""
+    masses, inertias = [], []
+    for one in scene.particles:
+        masses.append(one.mass)
+        turning = one.moment * one.mass * (one.radius * one.radius)
+        if one.outline:
+            turning = one.mass * polygon_moment(one.outline) if one.spin else 0.0
+        inertias.append(turning)
+    if radius is None and (len(masses) == 1 or len({*zip(masses, inertias, strict=True)}) == 1):
+        return Particle(scene.particle.radius, masses[0], inertias[0])
+    nominal = np.array([one.radius for one in scene.particles])[kind]
+    radius = nominal if radius is None else radius
+    size = radius / nominal
+    return Particle(radius, np.array(masses)[kind] * size**3, np.array(inertias)[kind] * size**5)
+
+
+def _threads(scene: Scene, releases: Releases) -> tuple[Thread, ...]:
+    threads = []
+    for string in scene.string:
+        x, y = releases.position[string.particle].tolist()
+        reach = hypot(x - string.from_[0], y - string.from_[1])
+        threads.append(Thread(string.from_, string.particle, string.length or reach))
+    return tuple(threads)
+
+
+def _turned(x: Numbers, y: Numbers, alpha: Numbers, below: Numbers, above: Numbers) -> list[Point]:
+    """Return the ends of a plate that hangs from a pivot (m), at an angle (rad) from upright."""
+    # Upwards, so that the struck face (-cos α, -sin α) lies to the left of the tangent.
+    sine, cosine = np.sin(alpha), np.cos(alpha)
+    return [(x - reach * sine, y + reach * cosine) for reach in (-below, above)]
+
+
+def _hanging(plate: Plate) -> Part:
+    assert plate.pivot is not None
+    below = REACH_HANGING if plate.below is None else plate.below
+    ends = _turned(*plate.pivot, np.radians(plate.angle_deg), below, plate.above)
+    return Part(str(plate.name), [(ends, 0.0)])
+
+
+def _conveyor(belt: Conveyor) -> Part:
+    """Lay a belt round two pulleys: forward on top, which is clockwise to the right, and back."""
+    (x0, y0), (x1, y1), r = belt.from_, belt.to, belt.pulley_radius
+    way = hypot(x1 - x0, y1 - y0)
+    dx, dy = (x1 - x0) / way, (y1 - y0) / way
+    clockwise = 1.0 if dx >= 0.0 else -1.0
+    nx, ny = -clockwise * dy * r, clockwise * dx * r
+    top = [(x0 + nx, y0 + ny), (x1 + nx, y1 + ny)]
+    back = [(x1 - nx, y1 - ny), (x0 - nx, y0 - ny)]
+    speed = clockwise * belt.speed
+    pulleys: list[Bend] = [(x, y, r, 0.0, 2.0 * pi, speed) for x, y in (belt.from_, belt.to)]
+    return Part(belt.name, [(top, belt.speed), (back, belt.speed)], pulleys)
+
+
+def _free(surface: Surface) -> Part:
+    """Lay a free surface, with its copies and its gate."""
+    shifts = [(0.0, 0.0)]
+    for count, dx, dy in surface.repeat:
+        shifts = [(x + n * dx, y + n * dy) for n in range(count) for x, y in shifts]
+    opens, closes = surface.opens_at, surface.closes_at
+    gates: list[tuple[float, float]]
+    if opens is not None and closes is not None and opens < closes:
+        gates = [(-inf, opens), (closes, inf)]
+    else:
+        gates = [(-inf if closes is None else closes, inf if opens is None else opens)]
+    if surface.center is None:
+        lines = [([(x + a, y + b) for x, y in surface.points], surface.speed) for a, b in shifts]
+        return Part(surface.name, lines, gates=gates)
+    assert surface.radius is not None
+    (x, y), r = surface.center, surface.radius
+    first, last = np.radians(surface.from_deg), np.radians(surface.to_deg)
+    speed = surface.speed if surface.to_deg < surface.from_deg else -surface.speed
+    begin, extent = np.minimum(first, last), np.abs(last - first)
+    bends = [(x + a, y + b, r, begin, extent, speed) for a, b in shifts]
+    return Part(surface.name, bends=bends, gates=gates)
 
 
 def _conveyors(scene: Scene) -> tuple[list[Part], list[Caution]]:
@@ -207,9 +408,10 @@ def _conveyors(scene: Scene) -> tuple[list[Part], list[Caution]]:
     belt, plate, out, r = scene.incoming, scene.plate, scene.outgoing, scene.particle.radius
     if belt is None:
         return [], []
-    top, grip = belt.pulley_radius, _grip(belt.friction)
-    ends: list[tuple[Numbers, Numbers]] = [(-belt.length, top), (0.0, top)]
-    parts: list[Part] = [("incoming", ends, belt.speed, belt.restitution, grip)]
+    top, (cosine, sine) = belt.pulley_radius, up_belt(scene)
+    x, y = -top * sine, top * cosine
+    ends: list[Point] = [(x - belt.length * cosine, y - belt.length * sine), (x, y)]
+    parts = [Part("incoming", [(ends, belt.speed)])]
     warnings: list[Caution] = []
     hit = plate_hit(scene)
     missed = np.isnan(hit[1])
@@ -236,16 +438,14 @@ def _conveyors(scene: Scene) -> tuple[list[Part], list[Caution]]:
         none = np.less_equal(below + plate.above, 0.0)
         least = "above + below must be more than 0 m"
         _refuse(scene, none, "plate.above", plate.above, lambda _: least)
-        # Upwards, so that the struck face (-cos α, -sin α) lies to the left of the tangent.
-        ends = [(x - reach * sine, y + reach * cosine) for reach in (-below, plate.above)]
-        parts.append(("plate", ends, 0.0, plate.restitution, plate.friction))
+        parts.append(Part("plate", [(_turned(x, y, alpha, below, plate.above), 0.0)]))
         if np.count_nonzero(missed):
             warnings.append(Caution("plate"))
         warnings += _off_plate(scene, (y - hit[1]) * -cosine + (x - hit[0]) * sine, below)
     if out is not None:
         assert height is not None
         ends = [(out.start, height), (out.start + out.length, height)]
-        parts.append(("outgoing", ends, out.speed, out.restitution, out.friction))
+        parts.append(Part("outgoing", [(ends, out.speed)]))
     return parts, warnings
 
 
@@ -291,5 +491,6 @@ def _at(scene: Scene, value: ArrayLike, place: int) -> Any:
     return np.broadcast_to(value, scene.shape).flat[place].item()
 
 
-def _grip(friction: float | str) -> float:
-    return inf if isinstance(friction, str) else friction
+def _with_grip(restitution: Any, friction: Any) -> tuple[Any, Any]:
+    """Return restitution and friction, where adhesion is friction without a bound."""
+    return restitution, inf if isinstance(friction, str) else friction

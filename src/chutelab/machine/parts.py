@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 from math import ceil, inf, isnan, log2, nan, pi
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -105,14 +105,19 @@ class Particle:
         Moment of inertia about the centre, kg m²; 0 for a particle that does not turn.
     """
 
-    radius: float
-    mass: float
-    inertia: float
+    radius: Any
+    mass: Any
+    inertia: Any
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Particle):
             return NotImplemented
         return all(np.array_equal(vars(self)[name], vars(other)[name]) for name in vars(self))
+
+    def of(self, index: Any) -> Particle:
+        """Return some of the particles, by their numbers."""
+        own = (value[index] if np.ndim(value) else value for value in vars(self).values())
+        return Particle(*own)
 
     def kinetic(self, vx: ArrayLike, vy: ArrayLike, omega: ArrayLike) -> Floats:
         """Return ½ m v² + ½ I ω² (J) for arrays of any one shape (m/s, rad/s)."""
@@ -251,8 +256,8 @@ class Pulley:
 
     radius: float
     speed: float
-    friction: float
-    restitution: float
+    friction: Any
+    restitution: Any
     surface: int
     incline: float = 0.0
 

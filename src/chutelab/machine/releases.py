@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import acos, degrees, inf, prod
+from math import acos, degrees, floor, inf, prod, sqrt
 
 import numpy as np
 
-from chutelab.scene import Scene
-from chutelab.scene.rules import ON_BELT
-from chutelab.util.arrays import Bools, Floats, Ints
+from chutelab.scene import Fault, Scene, SceneError, Stream
+from chutelab.scene.rules import beside
+from chutelab.util.arrays import Bools, Floats, Ints, Numbers
 from chutelab.util.tables import number
 
 TRIES = 1000
@@ -50,41 +51,52 @@ class Releases:
             array.flags.writeable = False
 
 
-def release_point(scene: Scene) -> tuple[float, float]:
-    """Return the nominal release point, m; on the belt exactly at the riding height."""
-    belt = scene.incoming
-    if belt is None:
-        assert scene.stream.at is not None
-        return scene.stream.at
-    riding = belt.pulley_radius + scene.particle.radius
-    if scene.stream.at is None:
-        return -belt.length, riding
-    x, y = scene.stream.at
-    return (x, riding) if abs(y - riding) <= ON_BELT and -belt.length <= x <= 0.0 else (x, y)
-
-
-def release_velocity(scene: Scene) -> tuple[float, float]:
-    """Return the nominal release velocity, m/s."""
-    if scene.stream.velocity is not None:
-        return scene.stream.velocity
+def up_belt(scene: Scene) -> tuple[float, float]:
+    """Return the direction in which the incoming belt runs, (cos β, sin β)."""
     assert scene.incoming is not None
-    return scene.incoming.speed, 0.0
+    incline: float = np.radians(scene.incoming.incline_deg)
+    cosine: float = np.cos(incline)
+    sine: float = np.sin(incline)
+    return cosine, sine
 
 
-def on_belt(scene: Scene) -> bool:
-    """Tell whether the stream is released on the incoming belt."""
-    if scene.incoming is None:
+def release_point(scene: Scene, stream: int = 0) -> tuple[float, float]:
+    """Return the nominal release point of a stream, m; on the belt exactly at the riding height."""
+    its, belt = scene.streams[stream], scene.incoming
+    if belt is None:
+        assert its.at is not None
+        return its.at
+    radius = scene.particles[scene.kinds[stream]].radius
+    riding = belt.pulley_radius + radius
+    if its.at is not None and not on_belt(scene, stream):
+        return its.at
+    cosine, sine = up_belt(scene)
+    along = -belt.length if its.at is None else its.at[0] * cosine + its.at[1] * sine
+    return along * cosine - riding * sine, along * sine + riding * cosine
+
+
+def release_velocity(scene: Scene, stream: int = 0) -> tuple[float, float]:
+    """Return the nominal release velocity of a stream, m/s."""
+    its = scene.streams[stream]
+    if its.velocity is not None:
+        return its.velocity
+    if its.fill is not None:
+        return 0.0, 0.0
+    assert scene.incoming is not None
+    speed, (cosine, sine) = scene.incoming.speed, up_belt(scene)
+    # 0 is a number, also where the speeds of a family are an array.
+    return speed * cosine, speed * sine if np.any(sine) else 0.0
+
+
+def on_belt(scene: Scene, stream: int = 0) -> bool:
+    """Tell whether a stream is released on the incoming belt."""
+    its, belt = scene.streams[stream], scene.incoming
+    if belt is None or its.fill is not None or its.to is not None:
         return False
-    if scene.stream.at is None:
+    if its.at is None:
         return True
-    x, y = release_point(scene)
-    riding = scene.incoming.pulley_radius + scene.particle.radius
-    return y == riding and -scene.incoming.length <= x <= 0.0
-
-
-def schedule(scene: Scene) -> Floats:
-    """Return when each particle is due, s (N,); those of each scene of a family follow another."""
-    return np.tile(np.arange(scene.stream.count), prod(scene.shape)) / scene.stream.rate
+    riding = belt.pulley_radius + scene.particles[scene.kinds[stream]].radius
+    return beside(*its.at, riding, belt.length, belt.incline_deg)
 
 
 @dataclass(frozen=True)
@@ -108,7 +120,9 @@ class Squeeze:
         )
 
 
-def squeeze(scene: Scene, t: Floats, position: Floats) -> Squeeze | None:
+def squeeze(
+    scene: Scene, t: Floats, position: Floats, radius: Numbers | None = None
+) -> Squeeze | None:
     """Return who rides into others; None if nobody does.
 
     A ride that something ends early counts as if it went on. Two that would be in each other on the
@@ -119,82 +133,233 @@ def squeeze(scene: Scene, t: Floats, position: Floats) -> Squeeze | None:
     scene : Scene
         What is released, and where.
     t, position : ndarray, (N,) and (N, 2)
-        When and where particles are released, s and m: planned, or of a run.
+        When and where riders are released, s and m: planned, or of a run.
+    radius : float or ndarray, (N,), optional
+        Of the riders, m; by default that of the first kind of particles.
     """
-    belt, radius = scene.incoming, scene.particle.radius
-    if belt is None or not isinstance(belt.friction, str) or not on_belt(scene):
+    belt = scene.incoming
+    if belt is None or not len(t) or not isinstance(belt.friction, str):
         return None
-    if not scene.stream.interact or belt.speed == 0.0 or scene.gravity == 0.0:
+    if not scene.crowded or belt.speed == 0.0 or scene.gravity == 0.0:
         return None
-    x, rho = position.T
-    top = t - x / belt.speed
+    (cosine, sine), (x, y) = up_belt(scene), position.T
+    along, rho = x * cosine + y * sine, y * cosine - x * sine
+    top = t - along / belt.speed
     grip = belt.speed**2 / (scene.gravity * rho)
+    turn = np.arccos(np.minimum(grip, 1.0)) + np.radians(belt.incline_deg)
+    turn = np.where(grip >= cosine, 0.0, turn)
     order = np.argsort(top)
     top, rho = top[order], rho[order]
-    leaves = top + rho * np.arccos(np.minimum(grip[order], 1.0)) / belt.speed
+    radii = np.broadcast_to(scene.particle.radius if radius is None else radius, t.shape)[order]
+    leaves = top + rho * turn[order] / belt.speed
     depth = np.zeros(len(top))
     for lag in range(1, len(top)):
         # The later one is on the pulley from its own top, both are until one leaves.
         begin, end = top[lag:], np.minimum(leaves[:-lag], leaves[lag:])
         if (begin >= leaves[:-lag]).all():
             break
-        mine, its = rho[:-lag], rho[lag:]
-        waits_for = np.hypot(belt.speed * (begin - top[:-lag]), mine - its) < 2.0 * radius
+        mine, its, reach = rho[:-lag], rho[lag:], radii[:-lag] + radii[lag:]
+        waits_for = np.hypot(belt.speed * (begin - top[:-lag]), mine - its) < reach
         angle = belt.speed * np.array(
             [(now - top[:-lag]) / mine - (now - begin) / its for now in (begin, end)]
         )
         angle = np.where(angle[1] > 0.0, angle.min(axis=0), 0.0)
         apart = np.hypot(mine - its, 2.0 * np.sqrt(mine * its) * np.sin(0.5 * angle))
-        found = np.where((begin < end) & ~waits_for, 2.0 * radius - apart, 0.0)
+        found = np.where((begin < end) & ~waits_for, reach - apart, 0.0)
         depth[:-lag] = np.maximum(depth[:-lag], found)
         depth[lag:] = np.maximum(depth[lag:], found)
-    particles = int(np.count_nonzero(depth > DEEP * radius))
+    particles = int(np.count_nonzero(depth > DEEP * radii))
     return Squeeze(particles, float(depth.max()), float(grip.min())) if particles else None
 
 
-def draw(scene: Scene) -> Releases:
+@dataclass(frozen=True, eq=False)
+class Draw:
+    """What was drawn of one stream: its releases, arrays of n, and radii (m) if they differ."""
+
+    t: Floats
+    position: Floats
+    velocity: Floats
+    carried: bool
+    radius: Floats | None
+
+
+Clear = Callable[[Floats, float], Bools]
+"""Tells which of some places (n, 2), m, a disk of a radius (m) can be in: not in any surface."""
+
+
+def draw(scene: Scene, clear: Clear) -> tuple[Releases, Floats | None]:
     """Draw the releases of a scene; the same scene and seed give the same numbers.
 
-    Of a family each scene has one particle. Particles that meet start where no other is, as far as
-    the bed has room: an engine lets the others wait until their place is free.
+    Of a family each scene has one particle. Particles that meet start where no other of their
+    stream is, as far as the bed has room: an engine lets the others wait until their place is free.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is released.
+    clear : callable
+        Which places a packed box may use.
+
+    Returns
+    -------
+    releases : Releases
+        Of all streams, one after the other.
+    radius : ndarray, (N,), or None
+        Radii, m; None if all particles are alike.
+
+    Raises
+    ------
+    SceneError
+        If a box has not room for all.
     """
-    stream, t = scene.stream, schedule(scene)
-    crowded, count = stream.crowded, len(t)
-    position, velocity = np.empty((2, count, 2))
-    velocity[:, 0], velocity[:, 1] = release_velocity(scene)
-    height = np.zeros(count)
+    drawn: list[Draw] = []
+    for n, stream in enumerate(scene.streams):
+        if stream.fill is None:
+            drawn.append(_draw(scene, n))
+        else:
+            drawn.append(_pour(scene, n, drawn, clear))
+    counts = [len(one.t) for one in drawn]
+    kinds = np.arange(counts[0]) if scene.shape else np.repeat(scene.kinds, counts)
+    first, *others = drawn
+    t, position, velocity = first.t, first.position, first.velocity
+    if others:
+        t, position, velocity = (
+            np.concatenate([getattr(one, name) for one in drawn])
+            for name in ("t", "position", "velocity")
+        )
+    carried = np.repeat([one.carried for one in drawn], counts)
+    stream_of = np.repeat(np.arange(len(drawn)), counts)
+    releases = Releases(t, position, velocity, carried, stream_of, kinds)
+    alike = len({particle.radius for particle in scene.particles}) == 1 if others else True
+    if alike and all(one.radius is None for one in drawn):
+        return releases, None
+    radii = [
+        np.full(len(one.t), scene.particles[kind].radius) if one.radius is None else one.radius
+        for one, kind in zip(drawn, scene.kinds, strict=True)
+    ]
+    return releases, np.concatenate(radii)
+
+
+def _dice(scene: Scene, n: int) -> np.random.Generator:
+    seed = scene.streams[n].seed
+    return np.random.default_rng([seed, n] if n else seed)
+
+
+def _radii(scene: Scene, n: int, rng: np.random.Generator) -> Floats | None:
+    """Draw radii from the range of a stream's kind, m; the first has the mean."""
+    particle = scene.particles[scene.kinds[n]]
+    if particle.span is None:
+        return None
+    radii = rng.uniform(*particle.span, scene.streams[n].count)
+    radii[0] = particle.radius
+    return radii
+
+
+def _draw(scene: Scene, n: int) -> Draw:
+    """Draw the releases of one stream, at a point or along a line."""
+    stream, particle = scene.streams[n], scene.particles[scene.kinds[n]]
+    every = stream.count * prod(scene.shape)
+    # Those of each scene of a family follow another.
+    t = np.tile(np.arange(stream.count), prod(scene.shape)) / stream.rate
+    if stream.at_once:
+        t = np.zeros(every)
+    if stream.start:
+        t += stream.start
+    position, velocity = np.empty((2, every, 2))
+    velocity[:, 0], velocity[:, 1] = release_velocity(scene, n)
+    height, radii, faster = np.zeros(every), None, np.zeros(every)
+    crowded = scene.crowded and stream.count > 1
     # The first one has no spread. Making a generator takes as long as all other preparations.
-    if stream.count > 1 and (stream.bed_height > 0.0 or stream.speed_spread > 0.0 or crowded):
-        rng = np.random.default_rng(stream.seed)
-        height = stream.bed_height * rng.random(count)
+    drawn = stream.bed_height > 0.0 or stream.speed_spread > 0.0 or stream.to or particle.span
+    if stream.count > 1 and (drawn or crowded):
+        rng = _dice(scene, n)
+        height = stream.bed_height * rng.random(every)
         height[0] = 0.0
-        spread = stream.speed_spread * rng.uniform(-1.0, 1.0, count)
-        spread[0] = 0.0
-        x, y = release_velocity(scene)
+        faster = stream.speed_spread * rng.uniform(-1.0, 1.0, every)
+        faster[0] = 0.0
+        x, y = release_velocity(scene, n)
         speed = float(np.hypot(x, y))
-        velocity += spread[:, None] * ((x / speed, y / speed) if speed > 0.0 else (1.0, 0.0))
-    rides = on_belt(scene)
+        velocity += faster[:, None] * ((x / speed, y / speed) if speed > 0.0 else (1.0, 0.0))
+        radii = _radii(scene, n, rng)
+    if stream.to is not None:
+        assert stream.at is not None
+        share = np.linspace(0.0, 1.0, every)
+        if not stream.at_once and every > 1:
+            share[1:] = rng.random(every - 1)
+        begin, end = np.array(stream.at), np.array(stream.to)
+        return Draw(t, begin + share[:, None] * (end - begin), velocity, False, radii)
+    rides = on_belt(scene, n)
     adheres = rides and scene.incoming is not None and isinstance(scene.incoming.friction, str)
+    cosine, sine = up_belt(scene) if rides else (1.0, 0.0)
     if crowded:
         fall = 0.0 if adheres else 0.5 * scene.gravity
-        floor = 0.0 if rides else -inf
-        _spread_apart(scene, t, height, velocity, fall, floor, rng)
-    position[:, 0], low = release_point(scene)
-    position[:, 1] = low + height
-    carried = np.zeros(count, dtype=bool)
-    carried[:] = adheres
-    stream_of = np.zeros(count, dtype=np.int64)
-    kind = np.arange(count) if scene.shape else stream_of.copy()
-    return Releases(t, position, velocity, carried, stream_of, kind)
+        lowest = 0.0 if rides else -inf
+        # Seen from the belt, if it rises.
+        along = np.stack([
+            velocity[:, 0] * cosine + velocity[:, 1] * sine,
+            velocity[:, 1] * cosine - velocity[:, 0] * sine,
+        ], axis=1)  # fmt: skip
+        each = np.full(every, particle.radius) if radii is None else radii
+        _spread_apart(stream, t, height, along, each, fall, lowest, rng)
+    if rides and radii is not None:
+        height += radii - particle.radius
+    x, low = release_point(scene, n)
+    position[:, 0], position[:, 1] = x - sine * height, low + cosine * height
+    return Draw(t, position, velocity, adheres, radii)
+
+
+PITCH = 2.04
+"""Distance of neighbours in a packed box, in radii of the largest."""
+
+JITTER = 0.01
+"""How far a place in it is moved at random each way, in the same unit: no pile is that even."""
+
+
+def _pour(scene: Scene, n: int, before: Sequence[Draw], clear: Clear) -> Draw:
+    """Pack a stream's box from below: rows of places, every other one shifted by half a pitch."""
+    stream, particle = scene.streams[n], scene.particles[scene.kinds[n]]
+    assert stream.fill is not None
+    (left, bottom), (right, top) = stream.fill
+    rng = _dice(scene, n)
+    radii = _radii(scene, n, rng)
+    largest = particle.radius if particle.span is None else particle.span[1]
+    pitch, room = PITCH * largest, largest * (1.0 + JITTER)
+    rise = pitch * sqrt(0.75)
+    rows = max(0, floor((top - bottom - 2.0 * room) / rise) + 1)
+    across = max(0, floor((right - left - 2.0 * room) / pitch) + 1)
+    x, y = np.meshgrid(np.arange(across) * pitch, np.arange(rows) * rise)
+    x += 0.5 * pitch * (np.arange(rows) % 2)[:, None]
+    places = np.stack([left + room + x.ravel(), bottom + room + y.ravel()], axis=1)
+    places = places[places[:, 0] <= right - room]
+    places += JITTER * largest * rng.uniform(-1.0, 1.0, places.shape)
+    free = clear(places, largest)
+    for kind, one in zip(scene.kinds, before, strict=False):
+        other = scene.particles[kind].radius if one.radius is None else one.radius
+        for place, r in zip(one.position, np.broadcast_to(other, len(one.t)), strict=True):
+            free &= np.hypot(*(places - place).T) >= largest + r
+    places = places[free]
+    if len(places) < stream.count:
+        several = f"[{n}]" * (len(scene.streams) > 1)
+        allowed = (
+            f"a larger box, or stream{several}.count = {len(places)} at most: so many of radius"
+            f" {largest:.4g} m have room in it, away from all surfaces"
+        )
+        value = [list(corner) for corner in stream.fill]
+        raise SceneError(scene.source, [Fault(f"stream{several}.fill", value, allowed)])
+    velocity = np.empty((stream.count, 2))
+    velocity[:] = release_velocity(scene, n)
+    t = np.full(stream.count, stream.start)
+    return Draw(t, places[: stream.count].copy(), velocity, False, radii)
 
 
 def _spread_apart(
-    scene: Scene,
+    stream: Stream,
     t: Floats,
     height: Floats,
     velocity: Floats,
+    radius: Floats,
     fall: float,
-    floor: float,
+    lowest: float,
     rng: np.random.Generator,
 ) -> None:
     """Redraw heights, in place, so that no particle starts inside one released before it.
@@ -202,21 +367,22 @@ def _spread_apart(
     One that finds no free place in the bed keeps what was drawn last, and waits when it is due.
 
     Earlier particles are taken to have moved on at their release velocity, and to have fallen by
-    ``fall`` (m/s²) times their age squared, but not below ``floor`` (m above the lowest layer).
+    ``fall`` (m/s²) times their age squared, but not below ``lowest`` (m above the lowest layer).
     """
-    stream, diameter = scene.stream, 2.0 * scene.particle.radius
     # Who may still be in the way: whoever has moved on by a diameter, or has fallen below the bed
     # by one, stays away for good.
     close = np.zeros(0, dtype=np.int64)
+    diameter = 2.0 * radius.max()
     for i in range(1, stream.count):
         close = np.append(close, i - 1)
         age = t[i] - t[close]
         dx = velocity[close, 0] * age
         dy = height[close] + velocity[close, 1] * age - fall * age**2
         sinks = velocity[close, 1] <= 2.0 * fall * age
-        near = (np.abs(dx) < diameter) & ~(sinks & (np.maximum(dy, floor) <= -diameter))
-        close, dx, dy = close[near], dx[near], np.maximum(dy[near], floor)
+        near = (np.abs(dx) < diameter) & ~(sinks & (np.maximum(dy, lowest) <= -diameter))
+        close, dx, dy = close[near], dx[near], np.maximum(dy[near], lowest)
+        reach = radius[close] + radius[i]
         for _ in range(TRIES if stream.bed_height > 0.0 else 0):
-            if np.all(dx**2 + (dy - height[i]) ** 2 >= diameter**2):
+            if np.all(dx**2 + (dy - height[i]) ** 2 >= reach**2):
                 break
             height[i] = stream.bed_height * rng.random()

@@ -9,7 +9,9 @@ the speed along (n_y, -n_x), z = r ω, N the normal and F the tangential force p
     φ' = w/ρ,   w' = g sin φ + F,   z' = (m r²/I) F,   N = g cos φ - w²/ρ,
 
 and F = stick · g sin φ + load · N: gripping without turning is stick = -1, rolling -I/(I + m r²),
--1/3 of a disk; slipping is load = -σ µ, with σ the sign of the slip u = w + z - belt. Everything is
+-1/3 of a disk; slipping is load = -σ µ, with σ the sign of the slip u = w + z - belt. Rolling
+friction adds a couple q m r, at most κ N, that opposes the spin against the surface's own,
+z' = (m r²/I) (F + q), and holds it where it can. Everything is
 expanded in a Taylor series in time, which holds for any mixture of turning back, spinning and
 slipping; a step is as long as a knot may be, so the series costs no extra steps.
 """
@@ -82,6 +84,40 @@ def limited(slip: ArrayLike, normal: Floats, friction: Floats, share: ArrayLike)
     return np.asarray(np.minimum(np.maximum(wanted, -most), most))
 
 
+ROUNDS = 100
+"""Bound on the turns in which friction and rolling friction take their shares of a blow: each
+changes what the other has to stop by 5/7 at most."""
+
+
+def shared(
+    slip: Floats, spin: Floats, normal: Floats, friction: Floats, rolling: Floats, share: Floats
+) -> tuple[Floats, Floats]:
+    """Return tangential impulse and couple over r of a blow, per mass (m/s).
+
+    Friction stops the slip as far as µ J_n allows, rolling friction the spin as far as κ J_n does.
+
+    Parameters
+    ----------
+    slip, spin : ndarray, (k,)
+        Before: slip, and r times the angular velocity against the surface's own, m/s.
+    normal : ndarray, (k,)
+        Normal impulse per mass, m/s.
+    friction, rolling, share : ndarray, (k,)
+        µ, κ, and m*/m.
+    """
+    tangential = limited(slip, normal, friction, share)
+    couple, lever, most = np.zeros_like(tangential), 1.0 / share - 1.0, rolling * normal
+    grip, turns = grip_limit(friction, normal), (lever > 0.0) & (most > 0.0)
+    for _ in range(ROUNDS):
+        wanted = -spin / np.where(turns, lever, 1.0) - tangential
+        couple = np.where(turns, np.clip(wanted, -most, most), 0.0)
+        new = np.clip(-share * (slip + lever * couple), -grip, grip)
+        if np.array_equal(new, tangential):
+            break
+        tangential = new
+    return tangential, couple
+
+
 def grip_limit(friction: Floats, normal: Floats) -> Floats:
     """Return µ N, the most that friction can give; inf where µ is, also without a normal force."""
     sticks = np.isinf(friction)
@@ -115,6 +151,17 @@ class Outcome(IntEnum):
     GRIP = 3
     LOW = 4
     HIGH = 5
+    HALT = 6
+    ROLL = 7
+
+
+GAUGES = np.array(
+    [
+        Outcome.LIFT, Outcome.ONSET, Outcome.ONSET, Outcome.GRIP, Outcome.LOW, Outcome.HIGH,
+        Outcome.HALT, Outcome.ROLL, Outcome.ROLL,
+    ]
+)  # fmt: skip
+"""What the gauges of a step tell, in their order."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +179,23 @@ class Circle:
     share: Floats  # m*/m, see `rim_share`
     low: Floats  # angles where the circle ends or something is met, rad
     high: Floats
+    # Rolling friction: arm over radius κ; sign τ of the spin z - `turn` against the surface's own,
+    # 0 while it is held; that of the surface, r times its angular velocity, m/s. None: no κ.
+    rolling: Floats | None = None
+    roll: Floats | None = None
+    turn: Floats | None = None
+
+    @property
+    def lever(self) -> Floats:
+        """Return m r²/I, or 0: how much more an impulse moves the rim by spin than by its pace."""
+        return np.asarray(1.0 / self.share - 1.0)
+
+    def couple(self, force: Floats, normal: Floats) -> Floats:
+        """Return rolling friction's couple over m r, m/s², at a friction and a normal force."""
+        if self.rolling is None or self.roll is None:
+            return np.zeros_like(force)
+        held = (self.roll == 0.0) & (self.rolling > 0.0)
+        return np.where(held, -force, -self.roll * self.rolling * normal)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +208,8 @@ class Step:
     w: Floats
     z: Floats
     work: Floats  # ∫F dt, m/s: times mass and belt speed it is the belt's work
-    heat: Floats  # -∫F u dt, m²/s²: times mass it is the friction loss
+    heat: Floats  # -∫F u dt, m²/s²: times mass it is the friction loss; with that of the couple
+    twist: Floats  # ∫q dt, m/s: times mass and the surface's r ω it is the belt's work too
 
 
 def normal_force(circle: Circle) -> Floats:
@@ -182,13 +247,11 @@ def advance(circle: Circle, longest: Floats) -> Step:
         at = _first_negative(gauges[:, :, hit], dt[hit], passed[:, hit])
         which = np.argmin(at, axis=0)
         dt[hit] = at[which, np.arange(len(hit))]
-        outcome[hit] = np.array(
-            [Outcome.LIFT, Outcome.ONSET, Outcome.ONSET, Outcome.GRIP, Outcome.LOW, Outcome.HIGH]
-        )[which]
-    phi, w, z, work, heat = polynomial(series[:, :5], dt)
+        outcome[hit] = GAUGES[which]
+    phi, w, z, work, heat, twist = polynomial(series[:, :6], dt)
     phi = np.where(outcome == Outcome.LOW, circle.low, phi)
     phi = np.where(outcome == Outcome.HIGH, circle.high, phi)
-    return Step(dt, outcome, phi, w, z, work, heat)
+    return Step(dt, outcome, phi, w, z, work, heat, twist)
 
 
 def _step_length(c: Circle) -> Floats:
@@ -207,10 +270,10 @@ def _step_length(c: Circle) -> Floats:
 
 
 def _series(c: Circle) -> Floats:
-    """Taylor coefficients in time, (ORDER + 1, 7, k): φ, w, z, ∫F, -∫F u, N, F."""
+    """Taylor coefficients in time, (ORDER + 1, 9, k): φ, w, z, ∫F, heat, ∫q, N, F, q."""
     k = len(c.phi)
-    out = np.zeros((ORDER + 1, 7, k))
-    phi, w, z, work, heat, normal, force = (out[:, i] for i in range(7))
+    out = np.zeros((ORDER + 1, 9, k))
+    phi, w, z, work, heat, twist, normal, force, couple = (out[:, i] for i in range(9))
     sine, cosine, slip = np.zeros((3, ORDER + 1, k))
     phi[0], w[0], z[0] = c.phi, c.w, c.z
     sine[0], cosine[0] = np.sin(c.phi), np.cos(c.phi)
@@ -219,14 +282,22 @@ def _series(c: Circle) -> Floats:
     stick = np.where(gripping, -c.share, 0.0)
     load = np.where(gripping, 0.0, -c.slip * np.where(gripping, 0.0, c.friction))
     slip[0] = np.where(gripping, 0.0, slip[0])
-    spin = 1.0 / c.share - 1.0  # m r²/I, or 0
+    lever, rolls = c.lever, c.rolling is not None
+    if c.rolling is not None and c.roll is not None and c.turn is not None:
+        held = (c.roll == 0.0) & (c.rolling > 0.0)
+        stick = np.where(gripping & held, -1.0, stick)
+        load = np.where(gripping, c.share * lever * c.roll * c.rolling, load)
+        spin = np.zeros((ORDER + 1, k))
+        spin[0] = np.where(held, 0.0, c.z - c.turn)
     for n in range(ORDER + 1):
         normal[n] = c.gravity * cosine[n] - np.einsum("ik,ik->k", w[: n + 1], w[n::-1]) / c.rho
         force[n] = stick * c.gravity * sine[n] + load * normal[n]
+        if rolls:
+            couple[n] = c.couple(force[n], normal[n])
         if n == ORDER:
             break
         w[n + 1] = (c.gravity * sine[n] + force[n]) / (n + 1)
-        z[n + 1] = spin * force[n] / (n + 1)
+        z[n + 1] = lever * (force[n] + couple[n] if rolls else force[n]) / (n + 1)
         phi[n + 1] = w[n] / c.rho / (n + 1)
         rates = np.arange(1, n + 2)[:, None] * phi[1 : n + 2]
         sine[n + 1] = np.einsum("ik,ik->k", rates, cosine[n::-1]) / (n + 1)
@@ -234,13 +305,18 @@ def _series(c: Circle) -> Floats:
         work[n + 1] = force[n] / (n + 1)
         heat[n + 1] = -np.einsum("ik,ik->k", force[: n + 1], slip[n::-1]) / (n + 1)
         slip[n + 1] = np.where(gripping, 0.0, w[n + 1] + z[n + 1])
+        if rolls:
+            twist[n + 1] = couple[n] / (n + 1)
+            heat[n + 1] -= np.einsum("ik,ik->k", couple[: n + 1], spin[n::-1]) / (n + 1)
+            spin[n + 1] = z[n + 1]
     return out
 
 
 def _gauges(c: Circle, series: Floats) -> Floats:
-    """Series that turn negative at an event, (ORDER + 1, 6, k): lift, onset twice, grip, bounds."""
-    phi, w, z, _, _, normal, force = (series[:, i] for i in range(7))
-    gauges = np.zeros((ORDER + 1, 6, len(c.phi)))
+    """Series that turn negative at an event, (ORDER + 1, G, k), in the order of `GAUGES`."""
+    phi, w, z, _, _, _, normal, force, couple = (series[:, i] for i in range(9))
+    rolls = c.rolling is not None
+    gauges = np.zeros((ORDER + 1, len(GAUGES) if rolls else 6, len(c.phi)))
     gauges[:, 0] = normal
     limited = (c.slip == 0.0) & np.isfinite(c.friction)
     grip = np.where(limited, c.friction, 0.0) * normal
@@ -252,6 +328,13 @@ def _gauges(c: Circle, series: Floats) -> Floats:
     gauges[:, 5] = -phi
     gauges[0, 4] -= np.where(np.isfinite(c.low), c.low, -1e3)
     gauges[0, 5] += np.where(np.isfinite(c.high), c.high, 1e3)
+    if c.rolling is not None and c.roll is not None and c.turn is not None:
+        gauges[:, 6] = c.roll * z
+        gauges[0, 6] -= c.roll * c.turn
+        # What slips with less friction than that stays held.
+        held = (c.roll == 0.0) & (c.rolling > 0.0) & (c.slip == 0.0)
+        gauges[:, 7] = np.where(held, c.rolling * normal - couple, 0.0)
+        gauges[:, 8] = np.where(held, c.rolling * normal + couple, 0.0)
     return gauges
 
 

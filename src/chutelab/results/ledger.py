@@ -8,8 +8,12 @@ residual is the numerical error, and is shown as such.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from chutelab.results.recording import ENTRIES, Recording, balance
+from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet, Shown, number
 
 
@@ -35,6 +39,10 @@ class Ledger(Shown):
         potential energy.
     by_surface : dict of dict of float
         The three entries of each surface, and of ``"particles"``.
+    by_stream : dict of dict
+        ``kinetic``, ``potential``, the three entries, and ``from_others``, of each stream; empty if
+        there is one. The last is what the balance of a stream leaves over: the energy that it got
+        from particles of others, in contacts. Over all streams it is the residual.
     """
 
     kinetic: tuple[float, float]
@@ -45,6 +53,7 @@ class Ledger(Shown):
     residual: float
     turned_over: float
     by_surface: dict[str, dict[str, float]]
+    by_stream: dict[str, dict[str, Any]]
 
     @property
     def relative_residual(self) -> float:
@@ -58,14 +67,15 @@ class Ledger(Shown):
             f"{name} {number(before)} -> {number(after)} J"
             for name, (before, after) in (("kinetic", self.kinetic), ("potential", self.potential))
         )
+        rows = [(name, [*entries.values()]) for name, entries in self.by_surface.items()]
+        rows += [
+            (f"of {name}", [books[entry] for entry in ENTRIES])
+            for name, books in self.by_stream.items()
+        ]
         return Sheet(
             "Energy ledger, J",
             ("", *(name.replace("_", " ") for name in ENTRIES)),
-            tuple(
-                (name, *map(number, entries.values()))
-                for name, entries in self.by_surface.items()
-                if any(entries.values())
-            ),
+            tuple((name, *map(number, entries)) for name, entries in rows if any(entries)),
             foot=(("total", *map(number, total)),),
             notes=(
                 ", ".join(moved),
@@ -78,23 +88,44 @@ class Ledger(Shown):
 def ledger(recording: Recording) -> Ledger:
     """Close the books of a recording."""
     first, last = recording.ends()
-    kinetic_first, potential_first = recording.energies(first)
-    kinetic_last, potential_last = recording.energies(last)
-    change = (kinetic_last - kinetic_first) + (potential_last - potential_first)
-    belt_work, restitution_loss, friction_loss = last["entries"].sum(axis=0).tolist()
-    kinetic = float(kinetic_first.sum()), float(kinetic_last.sum())
-    potential = float(potential_first.sum()), float(potential_last.sum())
-    sizes = map(abs, (belt_work, restitution_loss, friction_loss, potential[1] - potential[0]))
+    who = np.flatnonzero(recording.released)
+    energies = np.stack([*recording.energies(first, who), *recording.energies(last, who)])
+    streams, stream = recording.machine.streams, recording.machine.releases.stream[who]
     return Ledger(
-        kinetic=kinetic,
-        potential=potential,
-        belt_work=belt_work,
-        restitution_loss=restitution_loss,
-        friction_loss=friction_loss,
-        residual=float((change - balance(last["entries"])).sum()),
-        turned_over=sum(sizes, kinetic[0]),
+        **_closed(energies, last["entries"]),
         by_surface={
             name: dict(zip(ENTRIES, row, strict=True))
             for name, row in zip(recording.surfaces, recording.by_surface.tolist(), strict=True)
         },
+        by_stream={
+            name: _of_stream(_closed(energies[:, stream == n], last["entries"][stream == n]))
+            for n, name in enumerate(streams if len(streams) > 1 else ())
+        },
     )
+
+
+def _of_stream(books: dict[str, Any]) -> dict[str, Any]:
+    kept = {name: books[name] for name in ("kinetic", "potential", *ENTRIES)}
+    return {**kept, "from_others": books["residual"]}
+
+
+def _closed(energies: Floats, entries: Floats) -> dict[str, Any]:
+    """Close the books of n particles.
+
+    `energies`, (4, n), are kinetic and potential energy at the start, then at the end; `entries`,
+    (n, 3), those at the end, J.
+    """
+    change = (energies[2] - energies[0]) + (energies[3] - energies[1])
+    belt_work, restitution_loss, friction_loss = entries.sum(axis=0).tolist()
+    kinetic = float(energies[0].sum()), float(energies[2].sum())
+    potential = float(energies[1].sum()), float(energies[3].sum())
+    sizes = map(abs, (belt_work, restitution_loss, friction_loss, potential[1] - potential[0]))
+    return {
+        "kinetic": kinetic,
+        "potential": potential,
+        "belt_work": belt_work,
+        "restitution_loss": restitution_loss,
+        "friction_loss": friction_loss,
+        "residual": float((change - balance(entries)).sum()),
+        "turned_over": sum(sizes, kinetic[0]),
+    }

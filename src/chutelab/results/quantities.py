@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from chutelab.machine.releases import Squeeze, schedule, squeeze
+from chutelab.machine.releases import Squeeze, squeeze
 from chutelab.results.ledger import ledger
 from chutelab.results.recording import ENTRIES, EVENT, REASONS, Kind, Recording
 from chutelab.scene import Scene
 from chutelab.scene.rules import NEEDED, SYMBOLS
-from chutelab.theory import Drag, drag
-from chutelab.util.arrays import Floats
+from chutelab.theory import Drag, belt_power, drag
+from chutelab.util.arrays import Floats, Numbers
 from chutelab.util.tables import number
 
 KINDS = {
@@ -157,7 +157,8 @@ def symbols(recording: Recording) -> dict[str, Floats]:
     hit[np.isnan(left["t"])] = never(1)
     down[np.isnan(hit["t"])] = never(1)
     unpaid = dict.fromkeys(("belt_work", "slip_heat"), np.full(recording.count, nan))
-    found = from_events(recording.scene, left, hit, down) | unpaid
+    own = recording.particle
+    found = from_events(recording.scene, left, hit, down, own.radius, own.mass) | unpaid
     # What the belt pays until there is no slip is known only of a particle that got there, and had
     # nothing but the belt to do with since it landed.
     if recording.count == 1 and REASONS[recording.ended[0]] == "settled":
@@ -171,12 +172,18 @@ def symbols(recording: Recording) -> dict[str, Floats]:
 
 
 def from_events(
-    scene: Scene, left: NDArray[Any], hit: NDArray[Any], down: NDArray[Any]
+    scene: Scene,
+    left: NDArray[Any],
+    hit: NDArray[Any],
+    down: NDArray[Any],
+    radius: Numbers,
+    mass: Numbers,
 ) -> dict[str, Floats]:
     """Return what separation, impact and landing tell of the `QUANTITIES`, in the paper's frame.
 
     x2, y2 are counted from the separation point, y down; x3 and v3x back from the plate. The events
-    are (N,), of one scene or a family of N, and NaN, as `never` has it, where one did not happen.
+    are (N,), of one scene or a family of N, and NaN, as `never` has it, where one did not happen;
+    radius (m) and mass (kg) are the particles'.
     """
     plate = scene.plate
     top = nan if scene.incoming is None else scene.incoming.pulley_radius
@@ -189,7 +196,7 @@ def from_events(
     away, along = -(wx * cosine + wy * sine), wx * sine - wy * cosine
     # Rounding must not choose between π and -π for a rebound up along the plate.
     away = np.where(np.abs(away) <= ALONG * np.hypot(wx, wy), 0.0, away)
-    energy = 0.5 * scene.particle.mass * (vx * vx + belt * belt)
+    energy = 0.5 * mass * (vx * vx + belt * belt)
     return {
         "phi1": np.arctan2(x1, y1),
         "t2": hit["t"] - left["t"],
@@ -205,7 +212,7 @@ def from_events(
         "v3x": -vx,
         "v3y": -vy,
         "v3": np.hypot(vx, vy),
-        "d3": top + scene.particle.radius - y3,
+        "d3": top + radius - y3,
         "dEk": energy,
         "P": energy * scene.stream.rate,
     }
@@ -242,7 +249,7 @@ def stopped(recording: Recording) -> Stopped | None:
     if not recording.machine.interact:
         # Each by itself: some are ahead of others.
         last = recording.knots["t"][recording.offsets[1:][under_way] - 1]
-        due = schedule(recording.scene)[halted & ~recording.released]
+        due = recording.machine.releases.t[halted & ~recording.released]
         t = min(float(last.min(initial=t)), float(due.min(initial=t)))
     released = int(np.count_nonzero(under_way))
     return Stopped(released, int(np.count_nonzero(halted)) - released, t)
@@ -276,7 +283,7 @@ class Waits:
 
 def waits(recording: Recording) -> Waits | None:
     """Return who waited for its place; None if nobody did."""
-    due, dt = schedule(recording.scene), recording.scene.run.dt
+    due, dt = recording.machine.releases.t, recording.machine.dt
     # The pymunk engine releases at the beginning of a step: up to a step late is not waiting.
     least = (1.0 + 1e-6) * dt if recording.engine == "pymunk" else 1e-9
     released = recording.select(Kind.RELEASE)
@@ -310,10 +317,45 @@ def air_drag(recording: Recording) -> Drag | None:
     return drag(recording.scene, recording.prediction, speed, radius, mass)
 
 
+@dataclass(frozen=True)
+class Steady:
+    """What the outgoing belt needs for streams that go on and on, if it carries what lands.
+
+    `rate` (t/h) is that of the streams whose rate was given as a mass per time, `power` (W) what it
+    takes to bring them to the belt's speed from how their particles landed, slip heat included.
+    """
+
+    rate: float
+    power: float
+
+    def __str__(self) -> str:
+        return f"outgoing belt, steady: P = {number(self.power)} W at {number(self.rate)} t/h"
+
+
+def steady(recording: Recording) -> Steady | None:
+    """Return what streams in t/h take of the outgoing belt; None without any that has landed."""
+    scene, belt = recording.scene, recording.scene.outgoing
+    if belt is None or all(stream.mass_rate is None for stream in scene.streams):
+        return None
+    vx = column(first(recording, "landing"), "vx")
+    mass = np.broadcast_to(recording.particle.mass, recording.count)
+    rate = power = 0.0
+    for index, stream in enumerate(scene.streams):
+        own = (recording.machine.releases.stream == index) & np.isfinite(vx)
+        if stream.mass_rate is not None and own.any():
+            fed = float(np.average(vx[own], weights=mass[own]))
+            tonnes = 3.6 * stream.mass_rate
+            rate += tonnes
+            power += float(belt_power(rate_t_h=tonnes, belt_speed=belt.speed, feed_speed=fed))
+    return Steady(rate, power) if rate else None
+
+
 def squeezed(recording: Recording) -> Squeeze | None:
     """Return who rode into others by adhesion, see `machine.releases.squeeze`; None if nobody."""
     released = recording.select(Kind.RELEASE)
-    return squeeze(recording.scene, released["t"], released["position"])
+    released = released[recording.machine.releases.carried[released["particle"]]]
+    radius = np.broadcast_to(recording.particle.radius, recording.count)[released["particle"]]
+    return squeeze(recording.scene, released["t"], released["position"], radius)
 
 
 @dataclass(frozen=True)
@@ -345,13 +387,14 @@ class Rolling:
 def rolling(recording: Recording) -> Rolling | None:
     """Return what settled on the outgoing belt without being carried; None if nothing did."""
     belt = recording.scene.outgoing
-    if belt is None or belt.speed is None or recording.particle.inertia == 0.0:
+    if belt is None or belt.speed is None or np.all(recording.particle.inertia == 0.0):
         return None
     settled = recording.select(Kind.SETTLE, surface="outgoing")
     missing = belt.speed - settled["velocity_after"][:, 0]
-    missing = missing[np.abs(missing) > CARRIED]
-    if not len(missing):
+    astray = np.abs(missing) > CARRIED
+    if not astray.any():
         return None
     paid = ledger(recording).by_surface["outgoing"]["belt_work"]
-    due = recording.particle.mass * belt.speed * float(missing.sum())
-    return Rolling(len(missing), paid, paid + due)
+    masses = np.broadcast_to(recording.particle.mass, recording.count)[settled["particle"]]
+    due = belt.speed * float((masses * missing)[astray].sum())
+    return Rolling(int(astray.sum()), paid, paid + due)

@@ -263,6 +263,11 @@ class Recording(Shown):
 
         return to_csv(self, folder, step=step, only=only)
 
+    @property
+    def owner(self) -> Ints:
+        """Whose each knot is, (K,)."""
+        return np.repeat(np.arange(self.count), np.diff(self.offsets))
+
     def track(self, particle: int) -> NDArray[Any]:
         """Return the knots of one particle, shape (k,)."""
         return self.knots[self.offsets[particle] : self.offsets[particle + 1]]
@@ -342,36 +347,41 @@ class Recording(Shown):
         times = np.atleast_1d(np.asarray(times, dtype=np.float64))
         firsts, lasts = self.ends()
         at_release = np.zeros(self.count)
-        at_release[self.released] = sum(self.energies(firsts))
+        who = np.flatnonzero(self.released)
+        at_release[who] = sum(self.energies(firsts, who))
 
         final = np.empty((6, len(lasts)))
-        final[:2] = self.energies(lasts)
+        final[:2] = self.energies(lasts, who)
         final[2:5] = lasts["entries"].T
-        final[5] = final[:2].sum(axis=0) - at_release[self.released] - balance(lasts["entries"])
+        final[5] = final[:2].sum(axis=0) - at_release[who] - balance(lasts["entries"])
         order = np.argsort(lasts["t"], kind="stable")
         sums = np.concatenate([np.zeros((6, 1)), final[:, order].cumsum(axis=1)], axis=1)
         out = sums[:, np.searchsorted(lasts["t"][order], times, side="left")]
 
         for row, particle, left, share in blocks(self.knots, self.offsets, times):
-            values = self._under_way(left, share, at_release[particle])
+            values = self._under_way(particle, left, share, at_release[particle])
             for total, value in zip(out, values, strict=True):
                 np.add.at(total, row, value)
         return dict(zip(("kinetic", "potential", *ENTRIES, "residual"), out, strict=True))
 
-    def _under_way(self, left: Ints, share: Floats, at_release: Floats) -> tuple[Floats, ...]:
+    def _under_way(
+        self, particle: Ints, left: Ints, share: Floats, at_release: Floats
+    ) -> tuple[Floats, ...]:
         """Return what `energy_at` does, of each cell, (c,)."""
         a, b = self.knots[left], self.knots[left + 1]
         (_, vx), (y, vy) = (hermite(self.knots, left, share, axis) for axis in (0, 1))
         omega = a["omega"] + share * (b["omega"] - a["omega"])
-        kinetic = self.particle.kinetic(vx, vy, omega)
-        potential = self.particle.mass * self.gravity * y
+        body = self.particle.of(particle)
+        kinetic = body.kinetic(vx, vy, omega)
+        potential = body.mass * self.gravity * y
         gain = kinetic + potential - at_release
 
         (belt_a, restitution_a, friction_a), (belt_b, restitution_b, friction_b) = (
             knot["entries"].T for knot in (a, b)
         )
         residual_a, residual_b = (
-            sum(self.energies(knot)) - at_release - balance(knot["entries"]) for knot in (a, b)
+            sum(self.energies(knot, particle)) - at_release - balance(knot["entries"])
+            for knot in (a, b)
         )
         slips, driven = friction_a != friction_b, belt_a != belt_b
         restitution = np.where(share < 1.0, restitution_a, restitution_b)
@@ -385,8 +395,14 @@ class Recording(Shown):
         residual = np.where(slips | driven, residual, gain - (belt - restitution - friction))
         return kinetic, potential, belt, restitution, friction, residual
 
-    def energies(self, knots: NDArray[Any]) -> tuple[Floats, Floats]:
-        """Return kinetic (rotation included) and potential energy (J) of knots of any shape."""
+    def energies(
+        self, knots: NDArray[Any], particle: Ints | int | None = None
+    ) -> tuple[Floats, Floats]:
+        """Return kinetic (rotation included) and potential energy (J) of knots of any shape.
+
+        `particle` says whose each is; it is not needed where all particles are alike.
+        """
+        body = self.particle if particle is None else self.particle.of(particle)
         vx, vy = knots["velocity"][..., 0], knots["velocity"][..., 1]
-        potential = self.particle.mass * self.gravity * knots["position"][..., 1]
-        return self.particle.kinetic(vx, vy, knots["omega"]), potential
+        potential = body.mass * self.gravity * knots["position"][..., 1]
+        return body.kinetic(vx, vy, knots["omega"]), potential

@@ -24,6 +24,7 @@ from chutelab.results.recording import ENTRIES, EVENT, KNOT, REASONS, Kind, Reco
 from chutelab.scene import from_dict
 from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, whole, write_lines
+from chutelab.util.tables import plain
 
 FORMAT = 1
 """Version of the file; a reader refuses what it does not know."""
@@ -153,7 +154,7 @@ def _about(recording: Recording) -> dict[str, Any]:
         "scene": recording.scene.model_dump_json(by_alias=True),
         "title": recording.title,
         "engine": recording.engine,
-        "particle": asdict(recording.particle),
+        "particle": plain(asdict(recording.particle)),
         "gravity": recording.gravity,
         "surfaces": list(recording.surfaces),
         "steps": recording.steps,
@@ -173,7 +174,7 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Recording:
         raise _UnfitError("steps and contacts in the header have to be whole numbers")
     scene = from_dict(json.loads(about["scene"]), about["title"])
     # Of particles that were never released, any number is packed into next to nothing.
-    room = 8 * (scene.stream.count + 1)
+    room = 8 * (scene.count + 1)
     arrays: dict[str, Any] = {name: _array(archive, name, room) for name in ARRAYS}
     about.pop("seconds", None)  # earlier files tell how long the run took
     told = {name: about[name] for name in ("engine", "steps", "contacts")}

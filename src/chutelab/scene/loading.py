@@ -18,8 +18,8 @@ import tomli_w
 from pydantic import ValidationError
 
 from chutelab.scene.overrides import Override, apply, at_path, joined, rule_at
-from chutelab.scene.rules import ConflictError, Look, conflicts
-from chutelab.scene.schema import Scene
+from chutelab.scene.rules import EITHER, ConflictError, Look, conflicts
+from chutelab.scene.schema import Scene, as_written
 from chutelab.util.errors import MISSING, Fault, InputError, cut, did_you_mean, printable
 from chutelab.util.files import first_bytes
 
@@ -116,8 +116,8 @@ Location = tuple[str | int, ...]
 _NEAR: Final = 0.55
 """Likeness of a misspelt key and the one that was meant: pivot is taken for pivot_height."""
 
-LISTS: Final = ("surface", "expect")
-"""Tables of which there may be several."""
+LISTS: Final = ("material", "pair", "conveyor", "surface", "string", "expect")
+"""Tables that are always lists; of those in `EITHER` there may be one or several."""
 
 _WORDS: Final = {
     "number": "a number",
@@ -140,6 +140,8 @@ def faults_of(error: ValidationError, document: Mapping[str, Any]) -> list[Fault
         if isinstance(cause, ConflictError):
             continue
         parts, missing = detail["loc"], detail["type"] == "missing"
+        if parts[0] in EITHER and isinstance(document.get(str(parts[0])), Mapping):
+            parts = (parts[0], *parts[2:])
         if detail["type"] == "extra_forbidden":
             text = _unknown(parts)
         else:
@@ -162,6 +164,7 @@ def faults_of(error: ValidationError, document: Mapping[str, Any]) -> list[Fault
         for depth in range(1, len(parts))
         if all(isinstance(part, int) for part in parts[depth:])
     }
+    broken_lists |= {parts[:1] for parts in faults if len(parts) > 1 and parts[0] in EITHER}
     return [fault for parts, fault in faults.items() if parts not in broken_lists]
 
 
@@ -169,6 +172,10 @@ def _phrases(rule: Mapping[str, Any]) -> list[str]:
     """Say a rule of the JSON Schema in words: a phrase for each alternative."""
     if "anyOf" in rule:
         return [phrase for choice in rule["anyOf"] for phrase in _phrases(choice)]
+    if "x-words" in rule:
+        return [str(rule["x-words"])]
+    if "$ref" in rule:
+        return ["a table of keys and values"]
     if "enum" in rule or "const" in rule:
         return [f'"{choice}"' for choice in rule.get("enum", [rule.get("const")])]
     if rule["type"] == "object":
@@ -223,6 +230,8 @@ def _unknown(parts: Location) -> str:
 
 def _keys(table: Sequence[str | int]) -> list[str]:
     rule = rule_at(table)
+    rule = rule["anyOf"][0] if rule and "anyOf" in rule else rule
+    rule = rule_at([*table, 0]) if rule and "$ref" in rule else rule
     return list(rule["properties"]) if rule else []
 
 
@@ -311,8 +320,9 @@ def from_dict(
         found = faults_of(error, document)
         faulty = {fault.key for fault in found}
         # A table that is only misspelt is not missing.
-        for key in document.keys() - Scene.model_fields.keys():
-            faulty.update(_nearest(key, Scene.model_fields))
+        tables = [field.alias or name for name, field in Scene.model_fields.items()]
+        for key in document.keys() - set(tables):
+            faulty.update(_nearest(key, tables))
         found += conflicts(Look(document, Scene, faulty))
         faults += [_traced(fault, given) for fault in found]
     if scene is None or faults:
@@ -342,7 +352,7 @@ def _texts(
 
 def to_dict(scene: Scene) -> dict[str, Any]:
     """Return the keys that were set, nested as in the file: `from_dict` makes the scene again."""
-    return scene.model_dump(by_alias=True, exclude_unset=True)
+    return as_written(scene)
 
 
 _POINT: Final = re.compile(r"\[\n\s+([-+\w.]+),\n\s+([-+\w.]+),\n\s*\]")
@@ -364,9 +374,8 @@ def to_toml(scene: Scene, comment: str = "") -> str:
     >>> parse(to_toml(scene)).plate == scene.plate
     True
     """
-    tables = scene.model_dump(
-        by_alias=True, exclude_unset=True, exclude_none=True, exclude={"expect"}
-    )
+    tables = as_written(scene)
+    tables.pop("expect", None)
     # tomli-w writes a line for each number of a list; no text holds a line break as it stands.
     text = _POINT.sub(r"[\1, \2]", tomli_w.dumps(tables))
     remark = "".join(f"# {printable(line)}".rstrip() + "\n" for line in comment.splitlines())

@@ -10,7 +10,6 @@ import json
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from math import inf, nextafter
@@ -20,7 +19,8 @@ from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
-from chutelab.scene.schema import Scene
+from chutelab.scene.rules import EITHER
+from chutelab.scene.schema import Scene, as_written
 from chutelab.util.errors import MISSING, Fault, InputError, printable
 
 
@@ -55,15 +55,20 @@ def schema() -> dict[str, Any]:
 
 _schema = cache(schema)
 
+NAMED: Final = ("particle", "material", "plate", "conveyor", "surface", "stream")
+"""Tables of which there may be several, with names."""
+
+NOBODY: Final[Mapping[str, Sequence[object]]] = {}
+
 _SEGMENT: Final = re.compile(r"([^\s.=\[\]\"']+)((?:\[\d{1,9}\])*)")
 _FORM: Final = "must be KEY=VALUE, such as plate.angle_deg=20 or surface[0].speed=1"
 _BARE_KEY: Final = re.compile(r"[\w-]+")
 
 
-def parts_of(path: str, surfaces: Sequence[object] = ()) -> list[str | int]:
+def parts_of(path: str, names: Mapping[str, Sequence[object]] = NOBODY) -> list[str | int]:
     """Return the keys and indices of a full path, such as ``stream.at[0]``.
 
-    A free surface goes by index or, if it is one of the names given, by name.
+    A table of which there are several goes by index or, if it is one of the names given, by name.
 
     Raises
     ------
@@ -72,8 +77,10 @@ def parts_of(path: str, surfaces: Sequence[object] = ()) -> list[str | int]:
 
     Examples
     --------
-    >>> parts_of("surface[1].speed"), parts_of("surface.hood.speed", ["floor", "hood"])
-    (['surface', 1, 'speed'], ['surface', 1, 'speed'])
+    >>> parts_of("surface[1].speed")
+    ['surface', 1, 'speed']
+    >>> parts_of("surface.hood.speed", {"surface": ["floor", "hood"]})
+    ['surface', 1, 'speed']
     """
     parts: list[str | int] = []
     for segment in path.split("."):
@@ -81,10 +88,18 @@ def parts_of(path: str, surfaces: Sequence[object] = ()) -> list[str | int]:
         if match is None:
             raise InputError(_FORM)
         parts += [match[1], *(int(index) for index in re.findall(r"\d+", match[2]))]
-    if parts[0] == "surface" and len(parts) > 1 and isinstance(parts[1], str):
-        with suppress(ValueError):
-            parts[1] = list(surfaces).index(parts[1])
+    if len(parts) > 1 and parts[1] in names.get(str(parts[0]), ()):
+        parts[1] = list(names[str(parts[0])]).index(parts[1])
     return parts
+
+
+def names_of(document: Mapping[str, Any]) -> dict[str, list[object]]:
+    """Return the names of tables of which there are several in a scene's file."""
+    return {
+        table: [row.get("name") if isinstance(row, Mapping) else None for row in rows]
+        for table in NAMED
+        if isinstance(rows := document.get(table), list | tuple)
+    }
 
 
 def joined(parts: Sequence[str | int]) -> str:
@@ -117,9 +132,12 @@ def value_at(scene: Scene, path: str) -> Any:
     `MISSING` if there is no such thing; an array for a varied key of a family of scenes.
     """
     try:
-        return at_path(scene, parts_of(path, [free.name for free in scene.surface]))
+        parts = parts_of(path, names_of(as_written(scene)))
     except InputError:
         return MISSING
+    if len(parts) > 1 and isinstance(parts[1], int):
+        parts[0] = EITHER.get(str(parts[0]), parts[0])
+    return at_path(scene, parts)
 
 
 def rule_at(parts: Sequence[str | int]) -> Mapping[str, Any] | None:
@@ -128,14 +146,22 @@ def rule_at(parts: Sequence[str | int]) -> Mapping[str, Any] | None:
     for part in parts:
         if rule is None:
             return None
-        rule = _referred(rule)
-        if isinstance(part, str):
-            rule = rule.get("properties", {}).get(part)
-        elif part < len(rule.get("prefixItems", [])):
-            rule = rule["prefixItems"][part]
-        else:
-            rule = rule.get("items")
+        # Of what may be a table or a list of tables the one that the path goes on in.
+        below = (_below(_referred(choice), part) for choice in rule.get("anyOf", [_referred(rule)]))
+        rule = next((found for found in below if found is not None), None)
     return None if rule is None else _referred(rule)
+
+
+def _below(rule: Mapping[str, Any], part: str | int) -> Mapping[str, Any] | None:
+    """Return what a rule says of a key, or of an entry of a list."""
+    below: Mapping[str, Any] | None
+    if isinstance(part, str):
+        below = rule.get("properties", {}).get(part)
+    elif part < len(rule.get("prefixItems", [])):
+        below = rule["prefixItems"][part]
+    else:
+        below = rule.get("items")
+    return below
 
 
 def limits_of(rule: Mapping[str, Any]) -> tuple[float, float] | None:
@@ -218,19 +244,27 @@ def value_of(text: str) -> object:
 
 
 def _resolved(document: dict[str, Any], key: str) -> list[str | int]:
-    """Return the parts of a key, free surfaces by index."""
-    surfaces = document.get("surface")
-    free = surfaces if isinstance(surfaces, list) else []
-    names = [s.get("name") if isinstance(s, dict) else None for s in free]
+    """Return the parts of a key, with the index of a table of which there are several."""
+    names = names_of(document)
     path = parts_of(key, names)
-    if path[0] != "surface" or len(path) < 2 or isinstance(path[1], int):
+    table = str(path[0])
+    if table not in NAMED or len(path) < 2:
         return path
-    if not isinstance(surfaces, list):
-        raise InputError("the scene has no [[surface]]")
-    known = [name for name in names if isinstance(name, str)]
+    if table in EITHER and path[1] == 0 and table not in names:
+        return [table, *path[2:]]
+    if not isinstance(path[1], str) or (table in EITHER and table not in names):
+        return path
+    if table not in names:
+        raise InputError(f"the scene has no [[{table}]]")
+    if len(names[table]) == 1 and table in EITHER:
+        return [table, 0, *path[1:]]
+    if path[1] in (rule_at([table, 0]) or {}).get("properties", {}):
+        text = f"the scene has several [[{table}]]: {table}[0].{path[1]}, or by name"
+        raise InputError(text)
+    known = [name for name in names[table] if isinstance(name, str)]
     near = difflib.get_close_matches(path[1], known, n=1)
-    hint = f"did you mean surface.{near[0]}?" if near else f"there are: {', '.join(known)}"
-    raise InputError(f"no surface has the name {path[1]}; {hint}")
+    hint = f"did you mean {table}.{near[0]}?" if near else f"there are: {', '.join(known)}"
+    raise InputError(f"no {table} has the name {path[1]}; {hint}")
 
 
 def _put(document: dict[str, Any], path: list[str | int], value: object) -> None:

@@ -4,10 +4,19 @@ from __future__ import annotations
 
 import re
 from itertools import pairwise
-from math import isfinite
-from typing import Annotated, Any, Final
+from math import isfinite, nan
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, WithJsonSchema
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    PrivateAttr,
+    SerializerFunctionWrapHandler,
+    WithJsonSchema,
+    model_serializer,
+)
 
 
 class Table(BaseModel):
@@ -15,10 +24,22 @@ class Table(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
+    _typed: dict[str, object] = PrivateAttr(default_factory=dict)
+
     def _fill(self, key: str, value: object) -> None:
         # A default that depends on another key: not counted among the keys that were set, so that
         # a scene taken apart and changed gets it anew.
         object.__setattr__(self, key, value)
+
+    def _resolve(self, key: str, value: object) -> None:
+        # What a key means, in place of how it was given, which the scene's file keeps.
+        self._typed = {**self._typed, key: getattr(self, key)}
+        self._fill(key, value)
+
+    @model_serializer(mode="wrap")
+    def _as_typed(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        told: dict[str, Any] = handler(self)
+        return told | {key: value for key, value in self._typed.items() if key in told}
 
 
 _PREFIXES: Final = {"n": 1e-9, "µ": 1e-6, "u": 1e-6, "m": 1e-3, "c": 1e-2, "": 1.0, "k": 1e3}
@@ -115,6 +136,8 @@ MOST_PARTICLES: Final = 10_000_000
 """Their knots alone would be gigabytes beyond this."""
 
 MOST_SURFACES: Final = 1_000
+MOST_KINDS: Final = 100
+"""Of particles, and of streams."""
 MOST_POINTS: Final = 10_000
 MOST_EXPECTATIONS: Final = 1_000
 
@@ -149,6 +172,113 @@ Polyline = Annotated[
 ]
 Positive = Annotated[Number, Field(gt=0.0, le=LARGEST)]
 Share = Annotated[Number, Field(ge=0.0, le=1.0)]
+Angle = Annotated[Number, Field(ge=-720.0, le=720.0)]
+
+
+def _ascending(span: tuple[float, float]) -> tuple[float, float]:
+    if not span[0] < span[1]:
+        raise ValueError("must be a number, or [from, to] with from < to")
+    return span
+
+
+def _said(words: str) -> Any:
+    """Say what a list is in words, for messages."""
+    return Field(json_schema_extra={"x-words": words})
+
+
+Span = Annotated[
+    tuple[Positive, Positive],
+    AfterValidator(_ascending),
+    _said("a range [from, to]"),
+]
+"""A range [from, to]."""
+
+
+def _box(corners: tuple[Point, Point]) -> tuple[Point, Point]:
+    (left, bottom), (right, top) = corners
+    if not (left < right and bottom < top):
+        raise ValueError("must be [[left, bottom], [right, top]]")
+    return corners
+
+
+Box = Annotated[
+    tuple[Point, Point], AfterValidator(_box), _said("a box [[left, bottom], [right, top]]")
+]
+Size = Annotated[tuple[Positive, Positive], _said("[width, height] of two numbers > 0")]
+Two = Annotated[tuple[Text, Text], _said('two names ["a", "b"]')]
+
+
+def _convex(points: tuple[Point, ...]) -> tuple[Point, ...]:
+    turns = [
+        (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
+        for a, b, c in zip(points, points[1:] + points[:1], points[2:] + points[:2], strict=True)
+    ]
+    if not (all(turn > 0.0 for turn in turns) or all(turn < 0.0 for turn in turns)):
+        raise ValueError("must be the corners of a convex polygon, in their order")
+    return points
+
+
+def about_centroid(points: tuple[Point, ...]) -> tuple[Point, ...]:
+    """Return the corners of a polygon, counterclockwise, moved so that its centroid is (0, 0)."""
+    following = points[1:] + points[:1]
+    crosses = [a[0] * b[1] - a[1] * b[0] for a, b in zip(points, following, strict=True)]
+    twice = sum(crosses)
+    x, y = (
+        sum((a[n] + b[n]) * c for a, b, c in zip(points, following, crosses, strict=True))
+        / (3.0 * twice)
+        for n in (0, 1)
+    )
+    moved = tuple((px - x, py - y) for px, py in points)
+    return moved if twice > 0.0 else moved[::-1]
+
+
+def polygon_moment(points: tuple[Point, ...]) -> float:
+    """Return I/m (m²) of a polygon about its centroid, which is the origin, counterclockwise."""
+    following = points[1:] + points[:1]
+    crosses = [a[0] * b[1] - a[1] * b[0] for a, b in zip(points, following, strict=True)]
+    squares = [
+        a[0] * a[0] + a[0] * b[0] + b[0] * b[0] + a[1] * a[1] + a[1] * b[1] + b[1] * b[1]
+        for a, b in zip(points, following, strict=True)
+    ]
+    return sum(c * s for c, s in zip(crosses, squares, strict=True)) / (6.0 * sum(crosses))
+
+
+Corners = Annotated[tuple[Point, ...], Field(min_length=3, max_length=32), AfterValidator(_convex)]
+
+Copies = Annotated[
+    tuple[Annotated[Whole, Field(ge=1, le=1_000)], Coordinate, Coordinate],
+    _said("[n, dx, dy]: a whole number from 1 to 1000, and a shift"),
+]
+Repeats = Annotated[tuple[Copies, ...], _said("one or two copies [[n, dx, dy], ...]")]
+
+
+def tonnes_per_hour(text: str) -> float:
+    """Read a rate such as "120 t/h"; NaN if it is none.
+
+    >>> tonnes_per_hour("120 t/h")
+    120.0
+    """
+    match = re.fullmatch(r" *(\d+\.?\d*(?:[eE][+-]?\d+)?) *t/h *", text)
+    return float(match[1]) if match else nan
+
+
+def _rate(rate: float | str) -> float | str:
+    if isinstance(rate, str) and not 1e-6 <= tonnes_per_hour(rate) <= 1e6:
+        raise ValueError('must be a number from 1e-06 to 1000000000, or a text such as "120 t/h"')
+    return rate
+
+
+# A scene resolves both to a number, which is all that others see.
+if TYPE_CHECKING:
+    Rate = float
+    Radius = float
+else:
+    Radius = Amount | Span
+    Rate = Annotated[
+        Annotated[Number, Field(ge=1e-6, le=1e9)]
+        | Annotated[Text, Field(max_length=40), _said('a text such as "120 t/h"')],
+        AfterValidator(_rate),
+    ]
 
 
 def described(default: Any, what: str, unit: str = "", **limits: Any) -> Any:
@@ -161,11 +291,11 @@ def described(default: Any, what: str, unit: str = "", **limits: Any) -> Any:
     )
 
 
-def pair_restitution(default: float, pair: str) -> Any:
+def pair_restitution(default: float | None, pair: str) -> Any:
     """Describe the restitution of a pair, such as particle-plate."""
     return described(default, f"Coefficient of restitution of the pair {pair}")
 
 
-def pair_friction(default: float, pair: str) -> Any:
+def pair_friction(default: float | None, pair: str) -> Any:
     """Describe the friction of a pair, such as particle-plate."""
     return described(default, f"Coulomb coefficient of friction µ of the pair {pair}")

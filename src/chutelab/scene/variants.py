@@ -14,8 +14,16 @@ from typing import Any, Final
 import numpy as np
 
 from chutelab.scene.loading import SceneError, from_dict, plain, to_dict
-from chutelab.scene.overrides import Override, apply, joined, limits_of, parts_of, rule_at
-from chutelab.scene.rules import Look, conflicts
+from chutelab.scene.overrides import (
+    Override,
+    apply,
+    joined,
+    limits_of,
+    names_of,
+    parts_of,
+    rule_at,
+)
+from chutelab.scene.rules import EITHER, Look, conflicts
 from chutelab.scene.schema import Scene, plain_number
 from chutelab.scene.units import SIZE, read_size
 from chutelab.util.arrays import Bools, Floats
@@ -169,7 +177,7 @@ def quantity(scene: Scene, vary: Vary) -> Quantity:
     faults, _ = apply(document, [Override(vary.key, plain_number(vary.values[0]))])
     if faults:
         raise InputError(faults[0].allowed, vary.typed)
-    parts = parts_of(vary.key, [free.name for free in scene.surface])
+    parts = parts_of(vary.key, names_of(document))
     path, indexed = joined(parts), isinstance(parts[-1], int)
     while isinstance(parts[-1], int):
         parts.pop()
@@ -194,8 +202,10 @@ def quantity(scene: Scene, vary: Vary) -> Quantity:
         return Quantity(path, path, unit)
     label = re.split("[;:]", str(about.get("description", path)))[0].removesuffix(".")
     label = label.removesuffix(f" ({unit})").replace("->", "→")
-    if parts[0] == "surface" and isinstance(parts[1], int):
-        label = f"{scene.surface[parts[1]].name}: {label[0].lower()}{label[1:]}"
+    if len(parts) > 2 and isinstance(parts[1], int):
+        row = getattr(scene, EITHER.get(str(parts[0]), str(parts[0])))[parts[1]]
+        name = getattr(row, "name", None) or f"{parts[0]}[{parts[1]}]"
+        label = f"{name}: {label[0].lower()}{label[1:]}"
     return Quantity(path, label, unit, whole="number" not in kinds)
 
 
@@ -223,10 +233,6 @@ def count_of(varies: Sequence[Vary], most: float = inf) -> int:
 def reason(error: SceneError) -> str:
     """Return the faults of a scene without its file, in one line."""
     return "; ".join(str(fault) for fault in error.faults)
-
-
-_DEPENDENT: Final = {"plate": "pivot_height", "outgoing": "speed"}
-"""Keys whose defaults are other keys."""
 
 
 def is_plain(path: str) -> bool:
@@ -264,17 +270,24 @@ def family(scene: Scene, columns: Mapping[str, Floats]) -> Scene:
         match parts_of(path):
             case [str(key)]:
                 changes[key] = values
-            case [str(table), str(key)]:
+            case [str(table), str(key)] if table not in EITHER:
                 given = changes.get(table, getattr(scene, table))
                 changes[table] = given.model_copy(update={key: values})
-            case [_, int(index), key]:
-                surfaces = list(changes.get("surface", scene.surface))
-                surfaces[index] = surfaces[index].model_copy(update={key: values})
-                changes["surface"] = tuple(surfaces)
-    for table, key in _DEPENDENT.items():
-        given = changes.get(table, getattr(scene, table))
-        if given is not None and key not in given.model_fields_set:
-            changes[table] = given.model_copy(update={key: None})
+            case [str(table), *index, str(key)]:
+                rows = EITHER.get(table, table)
+                tables = list(changes.get(rows, getattr(scene, rows)))
+                number = int(index[0]) if index else 0
+                tables[number] = tables[number].model_copy(update={key: values})
+                changes[rows] = tuple(tables)
+    out, plates = changes.get("outgoing", scene.outgoing), changes.get("plates", scene.plates)
+    if out is not None and "speed" not in out.model_fields_set:
+        changes["outgoing"] = out.model_copy(update={"speed": None})
+    changes["plates"] = tuple(
+        plate
+        if "pivot_height" in plate.model_fields_set or plate.pivot is not None
+        else plate.model_copy(update={"pivot_height": None})
+        for plate in plates
+    )
     many = scene.model_copy(update=changes)
     many._source, many._shape = scene.source, next(iter(columns.values())).shape
     many._fill_defaults()

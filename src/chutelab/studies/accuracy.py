@@ -118,7 +118,7 @@ def each(recording: Recording) -> Iterator[Answer]:
             if event != "separation":
                 pushed = np.stack([found["normal_impulse"], found["tangential_impulse"]], axis=1)
                 what = f"impulse per mass of the {where}"
-                yield Answer(what, "speed", pushed / recording.particle.mass)
+                yield Answer(what, "speed", pushed / np.asarray(recording.particle.mass)[..., None])
     # Others than those at rest, or at the end of a run of given length, end where they do because a
     # run has to stop somewhere.
     segments = recording.machine.segments
@@ -382,7 +382,7 @@ class Search:
         known = self.by_theory(found)
         if known is not None:
             return known
-        if self.scene.stream.crowded:
+        if self.scene.crowded:
             return self.crowd(found)
         if found.engine not in self.witnesses:
             self.witnesses[found.engine] = self.witness(found)

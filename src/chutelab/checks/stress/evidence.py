@@ -129,7 +129,7 @@ class Evidence:
         """
         if self.crowd or not len(self.recording.knots):
             return ledger(self.recording).turned_over
-        kinetic, potential = self.recording.energies(self.recording.knots)
+        kinetic, potential = self.recording.energies(self.recording.knots, self.recording.owner)
         height = kinetic + np.abs(potential) + np.abs(self.recording.knots["entries"]).sum(axis=1)
         offsets = self.recording.offsets
         starts = offsets[:-1][offsets[1:] > offsets[:-1]]
@@ -141,10 +141,15 @@ class Evidence:
         return ROUNDINGS * EPS * self.length
 
     @property
+    def radius(self) -> float:
+        """Radius of the largest particle, m."""
+        return float(np.max(self.machine.particle.radius))
+
+    @property
     def arcs(self) -> float:
         """How far a cubic between two knots may leave the ride round the pulley or an end, m."""
         pulley = self.machine.pulley
-        return ON_ARCS * (self.machine.particle.radius + (pulley.radius if pulley else 0.0))
+        return ON_ARCS * (self.radius + (pulley.radius if pulley else 0.0))
 
     @property
     def late(self) -> float:
@@ -159,9 +164,9 @@ class Evidence:
         if self.dt is None:
             return 0.0
         if self.alike:
-            return self.speed * self.dt + SLOP * self.machine.particle.radius
+            return self.speed * self.dt + SLOP * self.radius
         if self.crowd:
-            return PRESSED * self.machine.particle.radius
+            return PRESSED * self.radius
         return 2.0 * self.machine.gravity * self.dt**2
 
 

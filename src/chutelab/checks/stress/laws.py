@@ -92,7 +92,7 @@ def energy(e: Evidence) -> Verdict | None:
     if e.crowd:
         return _energy_of_crowd(e)
     knots, offsets = e.recording.knots, e.recording.offsets
-    total = np.sum(e.recording.energies(knots), axis=0) - knots["entries"][:, 0]
+    total = np.sum(e.recording.energies(knots, e.recording.owner), axis=0) - knots["entries"][:, 0]
     rises = []
     for i in range(e.recording.count):
         own = total[offsets[i] : offsets[i + 1]]
@@ -102,7 +102,13 @@ def energy(e: Evidence) -> Verdict | None:
             t = knots["t"][offsets[i] + at]
             rises.append((rise[at] / e.energy, f"particle {i} at t = {t:.6g} s"))
     # A knot in contact holds the mean velocity of a step, half a step's pull off its books.
-    known = e.speed * e.machine.gravity * (e.dt or 0.0) * e.machine.particle.mass / e.energy
+    known = (
+        e.speed
+        * e.machine.gravity
+        * (e.dt or 0.0)
+        * float(np.max(e.machine.particle.mass))
+        / e.energy
+    )
     return worst(rises, _energy_bound(e) + known, f"of {e.energy:.3g} J")
 
 
@@ -121,7 +127,9 @@ def _energy_of_crowd(e: Evidence) -> Verdict:
         times = times[np.linspace(0, len(times) - 1, BALANCES).astype(int)]
     books = e.recording.energy_at(times)
     first, _ = e.recording.ends()
-    brought = np.sum(e.recording.energies(first), axis=0)[np.argsort(first["t"], kind="stable")]
+    who = np.flatnonzero(e.recording.released)
+    brought = np.sum(e.recording.energies(first, who), axis=0)
+    brought = brought[np.argsort(first["t"], kind="stable")]
     entered = np.searchsorted(np.sort(first["t"]), times, side="right")
     start = np.concatenate([[0.0], np.cumsum(brought)])[entered]
     gain = books["kinetic"] + books["potential"] - start - books["belt_work"]
@@ -161,7 +169,9 @@ def _energy_bound(e: Evidence) -> float:
     touched = max(1, e.recording.contacts)
     if e.engine != "contact":
         steps += touched * HAIR
-    return rounding + steps + touched * m.particle.mass * m.gravity * e.late / e.energy
+    return (
+        rounding + steps + touched * float(np.max(m.particle.mass)) * m.gravity * e.late / e.energy
+    )
 
 
 def momentum(e: Evidence) -> Verdict | None:

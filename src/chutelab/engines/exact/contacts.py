@@ -7,8 +7,8 @@ import numpy as np
 from chutelab.engines.exact.detect import bounds
 from chutelab.engines.exact.joints import NONE
 from chutelab.engines.exact.obstacles import dot, length_of, pick
-from chutelab.engines.exact.particle_state import COLLAPSE, Contact, Mode, State
-from chutelab.mechanics.contact import grip_limit, impulses, limited
+from chutelab.engines.exact.particle_state import COLLAPSE, NO_SLIP, Contact, Mode, State
+from chutelab.mechanics.contact import grip_limit, impulses, limited, shared
 from chutelab.results import Kind
 from chutelab.util.arrays import Bools, Floats, Ints
 
@@ -106,6 +106,24 @@ def load_on(s: State, index: Ints, obstacle: Ints, c: Contact) -> Floats:
     return load
 
 
+def pressed(s: State, index: Ints, obstacle: Ints, c: Contact) -> Bools:
+    """Tell which particles an obstacle bears: by a positive load, or one that is about to be.
+
+    Where a path round a circle gets steeper towards the weight, what hops along it lands in ever
+    shorter hops where the load is 0; by rounding that is never above 0.
+    """
+    load = load_on(s, index, obstacle, c)
+    bears = load > 0.0
+    if np.count_nonzero(bears) < len(index):
+        near = ~bears & (load >= -WEIGHTLESS * s.gravity[index])
+        near &= obstacle >= s.obstacles.segments
+        if np.count_nonzero(near):
+            rho = pick(s.obstacles.rho, index, np.maximum(obstacle - s.obstacles.segments, 0))
+            w = dot(s.v.take(index, axis=1), c.tangent)
+            bears |= near & (w * s.weight_along(index, c.normal) / rho < 0.0)
+    return bears
+
+
 def settle_law(s: State, index: Ints) -> None:
     """Choose between gripping and slipping, and end tracks that have settled.
 
@@ -124,18 +142,61 @@ def settle_law(s: State, index: Ints) -> None:
         w[still] = s.stop_slip(halted, c.belt[still], w[still])
     s.v[:, index] = w * c.tangent
     pull, load = s.weight_along(index, c.normal), load_on(s, index, s.on[index], c)
-    grips = still & (s.share[index] * np.abs(pull) <= grip_limit(c.friction, load))
+    # What makes the contact point slip if nothing holds it, and that makes the rim turn.
+    tends, grip, share = pull, grip_limit(c.friction, load), s.share[index]
+    rests = ~s.turns[index] | (pull == 0.0)
+    if s.rolls:
+        tends, share, rests = _roll(s, index, c, slip, pull, load, grip)
+    grips = still & (share * np.abs(tends) <= grip)
     begins = grips & (s.slip[index] != 0.0)
-    s.slip[index] = np.where(grips, 0.0, np.where(still, np.sign(pull), np.sign(slip)))
+    s.slip[index] = np.where(grips, 0.0, np.where(still, np.sign(tends), np.sign(slip)))
     s.event(int(Kind.STICK), index[begins], c.surface[begins])
     if s.machine.until == "settled":
         # Rolling down a slope is not lying on it.
-        steady = grips & ((pull == 0.0) | ~s.turns[index]) & ~(arc & (w != 0.0))
+        steady = grips & rests & ~(arc & (w != 0.0))
         lies = steady & ((c.belt == 0.0) | (c.surface == s.machine.landing))
         if len(s.changes):
             lies &= np.isinf(s.obstacles.vanishes[s.on[index]])
         s.event(int(Kind.SETTLE), index[lies], c.surface[lies])
         s.finish(index[lies], "settled")
+
+
+def _roll(
+    s: State, index: Ints, c: Contact, slip: Floats, pull: Floats, load: Floats, grip: Floats
+) -> tuple[Floats, Floats, Bools]:
+    """Choose between turning and not where rolling friction acts; of the others nothing changes.
+
+    Returns what makes the contact point slip, m/s², the share of it that friction must take up to
+    hold it, and who can rest there.
+    """
+    o, lever, most = s.on[index], s.lever[index], s.rolling[index] * load
+    acts, share = s.rolling[index] > 0.0, s.share[index]
+    spin = s.z[index] - s.surface_spin(index, o)
+    turns = np.abs(spin) > NO_SLIP * (np.abs(s.z[index]) + np.abs(c.belt))
+    s.z[index] -= np.where(acts & ~turns, spin, 0.0)
+    still = slip == 0.0
+    # Without slip the pull must turn it, with slip friction does.
+    holds = np.where(still, (np.abs(pull) <= most) & (np.abs(pull) <= grip), grip <= most)
+    # It starts to turn as the force at the rim has it; sliding wins where friction gives way.
+    slides = still & (grip <= most)
+    begins = -np.sign(np.where(still, pull, slip))
+    roll = np.where(turns, np.sign(spin), np.where(holds | slides, 0.0, begins))
+    s.roll[index] = np.where(acts, roll, 0.0)
+    held = acts & (roll == 0.0)
+    tends = np.where(acts & ~held, pull - lever * roll * most, pull)
+    rests = np.where(acts, held, ~s.turns[index] | (pull == 0.0))
+    return tends, np.where(held, 1.0, share), rests
+
+
+def end_roll(s: State, index: Ints) -> None:
+    """Make a spin that is used up exactly that of the surface, then see what goes on."""
+    if not len(index):
+        return
+    c, spin = s.contact(index), s.surface_spin(index, s.on[index])
+    s.z[index] = spin
+    grips = s.slip[index] == 0.0
+    s.v[:, index[grips]] = ((c.belt - spin) * c.tangent)[:, grips]
+    settle_law(s, index)
 
 
 def end_slip(s: State, index: Ints) -> None:
@@ -149,14 +210,25 @@ def end_slip(s: State, index: Ints) -> None:
     settle_law(s, index)
 
 
-def face_force(s: State, index: Ints, c: Contact) -> tuple[Floats, Floats]:
-    """Return acceleration (2, k) and friction force per mass along the tangent (k,) on a face."""
+def face_force(s: State, index: Ints, c: Contact) -> tuple[Floats, Floats, Floats]:
+    """Return what acts on a face, per mass.
+
+    That is: acceleration (2, k), friction along the tangent and, over r, the couple of rolling
+    friction, (k,).
+    """
     pull, load = s.weight_along(index, c.normal), s.weight_on(index, c.normal)
     slip = s.slip[index]
     gripping = slip == 0.0
     finite = np.where(np.isinf(c.friction) | gripping, 0.0, c.friction)
-    force = np.where(gripping, -s.share[index] * pull, -slip * finite * load)
-    return (pull + force) * c.tangent, force
+    couple, tends, share = np.zeros(len(index)), pull, s.share[index]
+    if s.rolls:
+        held = (s.rolling[index] > 0.0) & (s.roll[index] == 0.0)
+        couple = -s.roll[index] * s.rolling[index] * load
+        tends, share = pull + s.lever[index] * couple, np.where(held, 1.0, share)
+    force = np.where(gripping, -share * tends, -slip * finite * load)
+    if s.rolls:
+        couple = np.where(held, -force, couple)
+    return (pull + force) * c.tangent, force, couple
 
 
 NEGLIGIBLE = 1e-12
@@ -220,13 +292,13 @@ def _after(
         on = index[held]
         under = s.contact(on)
         leaving = np.abs(dot(s.v.take(on, axis=1), under.normal)) > NEGLIGIBLE
-        held[held] = ~leaving & (load_on(s, on, s.on[on], under) > 0.0)
+        held[held] = ~leaving & pressed(s, on, s.on[on], under)
         slides = held & live
         _slide_past(s, index[slides], obstacle[slides], side[slides], rebound[slides])
         live &= ~held
     rests = live & (rebound <= REST)
     if np.count_nonzero(rests):
-        rests &= load_on(s, index, obstacle, c) > 0.0
+        rests &= pressed(s, index, obstacle, c)
         rest_on(s, index[rests], obstacle[rests], side[rests], rebound[rests])
         live &= ~rests
     if np.count_nonzero(live) < len(live):
@@ -281,17 +353,16 @@ def _blow(
     slip = s.slip_of(index, c, along)
     share = s.share[index]
     normal, tangential = impulses(approach, slip, c.restitution, c.friction, share)
+    tangential, change, work, heat = _rub(s, index, c, slip, normal, tangential)
     # The normal speed is set, not added to: ε |v_n| to the last bit.
     s.v[:, s.at(index)] = rebound * c.normal + (along + tangential) * c.tangent
-    if s.spins:
-        s.z[index] += s.lever[index] * tangential
-    after, mass = slip + tangential / share, s.mass[index]
+    after, mass = slip + change, s.mass[index]
     s.book(
         index,
         c.surface,
-        mass * tangential * c.belt,
+        mass * tangential * c.belt + work,
         0.5 * mass * (approach - rebound) * (approach + rebound),
-        -0.5 * mass * tangential * (slip + after),
+        -0.5 * mass * tangential * (slip + after) + heat,
     )
     s.knots(index)
     told = (approach > NEGLIGIBLE) | (tangential != 0.0)
@@ -314,7 +385,7 @@ def _slide_past(s: State, index: Ints, obstacle: Ints, side: Floats, rebound: Fl
     settle_law(s, index)
     kept = s.mode[index] == Mode.FACE
     index, other, other_side = index[kept], obstacle[kept], side[kept]
-    pull, _ = face_force(s, index, s.contact(index))
+    pull, _, _ = face_force(s, index, s.contact(index))
     against = s.contact(index, other, other_side)
     pressed = dot(pull, against.normal) < -OPPOSED * length_of(pull)
     stuck = (rebound[kept] <= REST) & pressed
@@ -354,20 +425,41 @@ def _last_bounces(s: State, index: Ints, obstacle: Ints, side: Floats, rebound: 
     s.p[:, index] += (time * (w + 0.5 * pull * time)) * c.tangent
     w = w + pull * time
     slip = s.slip_of(index, c, w)
-    share = s.share[index]
-    tangential = limited(slip, np.maximum(weight * time - u, 0.0), c.friction, share)
+    normal = np.maximum(weight * time - u, 0.0)
+    tangential = limited(slip, normal, c.friction, s.share[index])
+    tangential, change, work, heat = _rub(s, index, c, slip, normal, tangential)
     s.v[:, index] = (w + tangential) * c.tangent
-    if s.spins:
-        s.z[index] += s.lever[index] * tangential
     mass = s.mass[index]
     s.book(
         index,
         c.surface,
-        mass * tangential * c.belt,
+        mass * tangential * c.belt + work,
         0.5 * mass * u * u,
-        -0.5 * mass * tangential * (2.0 * slip + tangential / share),
+        -0.5 * mass * tangential * (2.0 * slip + change) + heat,
     )
     s.knots(index)
+
+
+def _rub(
+    s: State, index: Ints, c: Contact, slip: Floats, normal: Floats, tangential: Floats
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Change the spin by the tangential impulse that goes with a normal one, per mass.
+
+    Rolling friction has its share in that. Returns tangential impulse per mass and change of the
+    slip (m/s), and the work and heat of rolling friction (J), (k,).
+    """
+    share, lever, mass, none = s.share[index], s.lever[index], s.mass[index], np.zeros(len(index))
+    if not s.rolls:
+        if s.spins:
+            s.z[index] += lever * tangential
+        return tangential, tangential / share, none, none
+    turn = s.surface_spin(index, c.obstacle)
+    spin = s.z[index] - turn
+    tangential, couple = shared(slip, spin, normal, c.friction, s.rolling[index], share)
+    gain = lever * (tangential + couple)
+    s.z[index] += gain
+    heat = -0.5 * mass * couple * (2.0 * spin + gain)
+    return tangential, tangential + gain, mass * couple * turn, heat
 
 
 def look_round(s: State, index: Ints) -> None:

@@ -6,13 +6,16 @@ goes step by step along the arc.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from chutelab.engines.exact.contacts import (
+    end_roll,
     end_slip,
     face_force,
-    load_on,
     look_round,
+    pressed,
     rest_on,
     strike,
 )
@@ -33,7 +36,7 @@ def go_on(s: State, index: Ints, obstacle: Ints, side: Floats) -> None:
     o, left, face = s.obstacles, s.on[index], s.side[index]
     ends = obstacle == NONE
     obstacle, side = np.where(ends, left, obstacle), np.where(ends, face, side)
-    stays = ~ends & (load_on(s, index, obstacle, s.contact(index, obstacle, side)) > 0.0)
+    stays = ~ends & pressed(s, index, obstacle, s.contact(index, obstacle, side))
     off = ~stays
     s.part(index[off], o.surface[left[off]])
     # From a tangential joint it flies off what follows; from an end it leaves what ends.
@@ -122,7 +125,10 @@ def ride(s: State, index: Ints) -> None:
         low=s.bounds["angle"][0, index],
         high=s.bounds["angle"][1, index],
     )
-    lifted = normal_force(state) <= 0.0
+    if s.rolls:
+        turn = s.surface_spin(index, circle)
+        state = replace(state, rolling=s.rolling[index], roll=s.roll[index], turn=turn)
+    lifted = ~pressed(s, index, circle, c)
     stop = s.next_change(index)
     step = advance(state, stop - s.age[index])
     outcome = np.where(lifted, Outcome.LIFT, step.outcome)
@@ -133,11 +139,13 @@ def ride(s: State, index: Ints) -> None:
     _place(s, index[go], rho[go], step.phi[go], step.w[go], center[:, go])
     s.angle[index[go]] = step.phi[go]
     s.z[index[go]] = step.z[go]
-    mass = s.mass[index]
+    mass, work = s.mass[index], step.work * c.belt
+    if s.rolls:
+        work += step.twist * turn
     s.book(
         index[go],
         c.surface[go],
-        (mass * step.work * c.belt)[go],
+        (mass * work)[go],
         0.0,
         (mass * step.heat)[go],
     )
@@ -155,7 +163,15 @@ def ride(s: State, index: Ints) -> None:
     s.part(index[lift], c.surface[lift])
     s.fly(index[lift], circle[lift], 0, np.where(lifted[lift], 2, 3))
     onset = outcome == Outcome.ONSET
-    s.slip[index[onset]] = np.sign(np.sin(step.phi[onset]))
+    tends = np.sin(step.phi)
+    if s.rolls:
+        state = replace(state, phi=step.phi, w=step.w)
+        load = normal_force(state)
+        tends = state.gravity * tends - state.lever * s.roll[index] * s.rolling[index] * load
+        starts = outcome == Outcome.ROLL
+        s.roll[index[starts]] = -np.sign(np.sin(step.phi[starts]))
+        end_roll(s, index[outcome == Outcome.HALT])
+    s.slip[index[onset]] = np.sign(tends[onset])
     s.event(int(Kind.SLIP), index[onset], c.surface[onset])
     grip = outcome == Outcome.GRIP
     end_slip(s, index[grip])
@@ -247,30 +263,44 @@ def slide(s: State, index: Ints) -> None:
     """Move particles on a face on to their next event and resolve it."""
     on, face = s.on[index], s.side[index]
     c = s.contact(index, on, face)
-    pull, force = face_force(s, index, c)
+    pull, force, couple = face_force(s, index, c)
     motion = _motion(s, index, pull)
     motion.on, motion.on_side = on, face
     # The slip is linear in time, while there is one.
     slip = dot(motion.velocity, c.tangent) + s.z[index] - c.belt
-    rate = dot(pull, c.tangent) + (s.lever[index] * force if s.spins else 0.0)
+    twist = s.lever[index] * (force + couple) if s.spins else np.zeros(len(index))
+    rate = dot(pull, c.tangent) + twist
     fading = s.slip[index] * rate < 0.0
     grips = np.where(fading, np.maximum(-slip / np.where(fading, rate, 1.0), 0.0), np.inf)
+    halts = np.full(len(index), np.inf)
+    if s.rolls:
+        spin = s.z[index].copy()
+        halting = s.roll[index] * twist < 0.0
+        halts[halting] = np.maximum(-spin[halting] / twist[halting], 0.0)
     ends = _end(s, motion)
     # Whatever it lies on may vanish; that counts as a stop.
     stop = np.minimum(s.stop[index], s.vanish(index)) if len(s.changes) else s.stop[index]
     stops = np.maximum(stop - s.age[index], 0.0)
-    dt, hits, obstacle, side = _next(s, motion, np.minimum(np.minimum(grips, ends), stops))
+    soonest = np.minimum(np.minimum(grips, halts), np.minimum(ends, stops))
+    dt, hits, obstacle, side = _next(s, motion, soonest)
     mean = np.where(s.slip[index] == 0.0, 0.0, slip + 0.5 * rate * dt)
     mass = s.mass[index]
-    s.book(index, c.surface, mass * force * c.belt * dt, 0.0, -mass * force * mean * dt)
+    heat = -mass * force * mean * dt
+    if s.rolls:
+        heat -= mass * couple * (spin + 0.5 * twist * dt) * dt
+    s.book(index, c.surface, mass * force * c.belt * dt, 0.0, heat)
     _move(s, motion, dt)
     s.snap(index, on, face)
     if s.spins:
-        s.z[index] += s.lever[index] * force * dt
+        s.z[index] += twist * dt
     # What was left at the beginning is some way off now.
     s.left[index[dt > 0.0]] = NONE
     s.knots(index)
     free = ~hits
+    if s.rolls:
+        halt = free & (halts <= soonest)
+        end_roll(s, index[halt])
+        free &= ~halt
     over = free & (stops < grips) & (stops < ends)
     if len(s.changes):
         opens = over & (stop < s.stop[index])

@@ -101,6 +101,19 @@ class Obstacles:
         return held
 
     @cached_property
+    def turning(self) -> Floats:
+        """Angular velocities of arcs and their ends, 0 of all else, (S + C, n), rad/s."""
+        turning = np.zeros((len(self.surface), max(self.rho.shape[-1], self.material.shape[-1])))
+        arcs = slice(self.first_arc, self.first_arc + 2 * self.arcs)
+        turning[arcs] = -self.material[0, arcs] / np.concatenate([self.bend[0], self.bend[0]])
+        # Of several pieces that end there the first one counts.
+        for piece in reversed(range(len(self.spots))):
+            ends = [circle for circle in self.end_circle[piece] if circle != NONE]
+            arc = piece - self.segments
+            turning[ends] = turning[self.first_arc + arc] if arc >= 0 else 0.0
+        return turning
+
+    @cached_property
     def joints(self) -> Joints:
         """How the pieces join."""
         return Joints(self)

@@ -59,6 +59,7 @@ class Contact(NamedTuple):
     friction: Floats
     restitution: Floats
     surface: Ints
+    obstacle: Ints
 
 
 Blow = tuple[Floats, Floats, Floats, Floats]
@@ -124,6 +125,10 @@ class State:
         if self.spins:
             self.share = rim_share(self.radius, self.mass, inertia)
             self.lever = 1.0 / self.share - 1.0
+        # Rolling friction, of those that turn; the sign of the spin it opposes, 0 while it holds.
+        kind = machine.releases.kind[mine] if len(machine.rolling) > 1 else np.zeros(count, int)
+        self.rolling = np.where(self.turns, machine.rolling[kind], 0.0)
+        self.rolls, self.roll = np.count_nonzero(self.rolling) > 0, np.zeros(count)
         start = machine.releases
         self.released = start.t[mine]
         self.staggered = np.count_nonzero(self.released) > 0
@@ -237,6 +242,18 @@ class State:
         """Angular velocities, rad/s."""
         return self.z[index] / self.radius[index] if self.spins else np.zeros(len(index))
 
+    def surface_spin(self, index: Ints, obstacle: Ints) -> Floats:
+        """Return r times the angular velocity of surfaces, (k,), m/s."""
+        o = self.obstacles
+        spin = self.radius[index] * pick(o.turning, index, obstacle)
+        on_pulley = obstacle == o.pulley
+        if o.pulley != NONE and np.count_nonzero(on_pulley):
+            pulley = np.full(len(index), o.pulley)
+            wheel = pick(o.rho, index, pulley - o.segments) - self.radius[index]
+            speed = pick(o.material, index, pulley)[0]
+            spin = np.where(on_pulley, -self.radius[index] * speed / wheel, spin)
+        return np.asarray(spin)
+
     def stop_slip(self, index: Ints, belt: Floats, w: Floats) -> Floats:
         """Take a slip that is used up to exactly zero: off the spin, else off the pace returned."""
         if not self.spins:
@@ -263,7 +280,9 @@ class State:
             side[open_] = o.rim_side(index[open_], obstacle[open_], normal[:, open_])
         speed, restitution, friction = pick(o.material, index, obstacle)
         surface = o.surface[obstacle]
-        return Contact(normal, along(normal), side * speed, friction, restitution, surface)
+        return Contact(
+            normal, along(normal), side * speed, friction, restitution, surface, obstacle
+        )
 
     def snap(self, index: Ints, obstacle: Ints, side: Floats) -> None:
         """Put particles exactly at contact distance, so that rounding cannot add up."""

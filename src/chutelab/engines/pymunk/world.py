@@ -191,8 +191,8 @@ class Bend(Face):
             sides = [line.perpendicular() for line in lines]
             sides = [side if away.dot(side) >= 0.0 else -side for side in sides]
             ahead = min(falls(away.dot(n), v.dot(n), path.pull(n)) for n in sides)
-            # Past the line, or it would stay there.
-            return max(ahead, CREEP * self.radius / max(v.length, sqrt(path.most * self.radius)))
+            # Past the line, or it might take itself to be on either side of it.
+            return ahead + CREEP * self.radius / max(v.length, sqrt(path.most * self.radius))
         if not (hollow := self.hollow(x)):
             return falls(gap, v.dot(normal), path.pull(normal))
         rho, c = 1.0 / hollow, away.length
@@ -316,9 +316,10 @@ class World:
         self.space.add(body)
         circle = pymunk.Circle(body, radius)
         circle.cache_bb()
-        foot = pymunk.Circle(pymunk.Body(body_type=pymunk.Body.KINEMATIC), 0.0)
+        base = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
+        foot = pymunk.Circle(base, 0.0)
+        about["spin"] = -about["speed"] / radius
         if whole:
-            about["spin"] = -about["speed"] / radius
             self._add(Bend(circle, tangent=None, foot=foot, begin=0.0, extent=inf, **about))
             return
         more = sqrt(2.0 * JOINT * self.hair / radius)
@@ -357,7 +358,7 @@ class World:
         if not face.ends:
             return True
         point = face.shape.point_query(x).point
-        return min((point - end).length for end in face.ends) <= self.hair
+        return bool(min((point - end).length for end in face.ends) <= self.hair)
 
     def meets(
         self, path: Flight | Carriage, face: Face, span: float, leaving: bool = False,

@@ -14,7 +14,7 @@ import ipywidgets
 
 from chutelab.engines.exact import CornerError, run
 from chutelab.machine import build
-from chutelab.pictures.live.picture import View, draw, numbers, table, tracks, view_of
+from chutelab.pictures.live.picture import View, draw, numbers, refuse, table, tracks, view_of
 from chutelab.scene import Scene, SceneError
 from chutelab.util.arrays import Floats
 
@@ -116,10 +116,11 @@ class Board:
     Raises
     ------
     SceneError
-        If the scene cannot be run.
+        If the scene cannot be run, or shown.
     """
 
     def __init__(self, scene: Scene) -> None:
+        refuse(scene)
         self.scene = scene.with_values(_simpler(scene))
         self.controls = controls(self.scene)
         self.view = self._view()

@@ -18,6 +18,7 @@ import numpy as np
 
 from chutelab.engines.simulation import simulate
 from chutelab.pictures.animation.moments import sentence
+from chutelab.pictures.live.picture import refuse
 from chutelab.pictures.plots import analytic_of, style, window_of
 from chutelab.pictures.plots.scenery import STRUCK, action, strobe_step
 from chutelab.results import ENTRIES, REASONS, Kind, Recording
@@ -150,14 +151,16 @@ def study(
 
 
 def _check(scenes: Sequence[Scene]) -> None:
-    """Refuse, before anything runs, what would be too much for a page or for the one who waits."""
-    most = max((scene.stream.count for scene in scenes), default=0)
+    """Refuse, before anything runs, what a page cannot show, or is too much for who waits."""
+    for scene in scenes:
+        refuse(scene)
+    most = max((scene.count for scene in scenes), default=0)
     if most > MOST_PARTICLES:
         raise InputError(
             f"stream.count = {most}: a page shows at most {MOST_PARTICLES} particles; add"
             f" --set stream.count={MOST_PARTICLES}"
         )
-    stepped = sum(scene.run.engine == "pymunk" or scene.stream.crowded for scene in scenes)
+    stepped = sum(scene.run.engine == "pymunk" or scene.crowded for scene in scenes)
     if stepped > MOST_STEPPED:
         raise InputError(
             f"{stepped} variants are stepped, at most {MOST_STEPPED} are allowed,"

@@ -19,7 +19,8 @@ from chutelab.results import Recording
 from chutelab.results.recording import blocks
 from chutelab.util.arrays import Floats, Ints
 
-HUES = (style.STREAM, ORANGE, PURPLE, BLUE, GREEN)
+HUES = (style.STREAM, PURPLE, ORANGE, BLUE, GREEN)
+"""Of streams: orange, that of what is known analytically, as late as may be."""
 
 
 def stream_colours(count: int) -> list[str]:

@@ -220,6 +220,7 @@ class _Names:
             if part is not None:
                 self.parts.setdefault(piece.surface, []).append((piece, part))
         self.found = found
+        self.plates = {"plate", *(plate.name for plate in machine.scene.plates)}
         self.lines = [
             (Path(ax.transData.transform(piece.points)), piece.whole)
             for parts in self.parts.values()
@@ -295,12 +296,12 @@ class _Names:
         """Return what is written at a surface, of which a piece is shown."""
         name, machine = self.machine.surfaces[surface], self.machine
         speed = piece.speed
-        if name == "plate":
+        if name in self.plates:
             x, y = machine.segments.tangent[piece.index]
             angle = float(np.degrees(np.arctan2(-x, y))) + 0.0  # no -0
             values = np.unique(np.atleast_2d(machine.segments.restitution)[:, piece.index])
             leans = f"{angle:.3g}°".replace("-", "−")
-            return f"plate, {leans}\nε = {' / '.join(f'{one:.3g}' for one in values)}"
+            return f"{name}, {leans}\nε = {' / '.join(f'{one:.3g}' for one in values)}"
         if np.isnan(piece.radius):
             moves = _motion(speed, piece.points[1] - piece.points[0])
         else:
@@ -321,7 +322,7 @@ class _Names:
         piece, part = parts[0]
         name = self.machine.surfaces[piece.surface]
         low, high = sorted((part[0], part[-1]), key=lambda point: (point[1], point[0]))
-        if name == "plate":
+        if name in self.plates:
             x, y = self.machine.segments.tangent[piece.index]
             angle = degrees(np.arctan2(-x, y))
             # Two lines need room above where they begin.

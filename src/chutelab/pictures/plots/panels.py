@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from numpy.typing import ArrayLike
 
-from chutelab.machine.releases import on_belt, release_velocity
+from chutelab.machine.releases import on_belt, release_velocity, up_belt
 from chutelab.pictures.plots import style
 from chutelab.pictures.plots.bodies import stream_colours
 from chutelab.pictures.plots.scenery import (
@@ -77,9 +77,12 @@ def arcs(prediction: Transfer, scene: Scene) -> tuple[Arc, ...]:
         return ()
     riding = belt.pulley_radius + scene.particle.radius
     if scene.plate is None:
-        carried = on_belt(scene) and release_velocity(scene) == (belt.speed, 0.0) and belt.speed > 0
-        met = scene.surface or scene.stream.crowded
-        if out is None or met or not g or not carried:
+        up, v = np.array(up_belt(scene)), belt.speed
+        carried = on_belt(scene) and np.array_equal(release_velocity(scene), v * up) and v > 0
+        met = scene.surface or scene.crowded or scene.plates or scene.conveyor
+        # Where on the belt it starts matters to one that slips.
+        somewhere = up[1] != 0.0 and belt.friction != "adhesion" and scene.stream.at is not None
+        if out is None or met or not g or not carried or somewhere:
             return ()
         left = separation(
             speed=np.array([belt.speed]),
@@ -87,10 +90,14 @@ def arcs(prediction: Transfer, scene: Scene) -> tuple[Arc, ...]:
             gravity=np.array([g]),
             friction=np.array([np.inf if belt.friction == "adhesion" else float(belt.friction)]),
             spin=np.array([scene.particle.spin]),
+            inertia=scene.particle.moment or 0.5,
+            incline=np.array([np.radians(belt.incline_deg)]),
+            ride_length=belt.length,
         )
         sine, cosine, speed = (float(part[0]) for part in (left.sin, left.cos, left.v1))
         fall = riding * cosine - (riding - out.drop)
-        if fall <= 0.0:
+        # Thrown up slowly, it comes down on the pulley again.
+        if fall <= 0.0 or isfinite(left.again[0]):
             return ()
         duration = (sqrt((speed * sine) ** 2 + 2.0 * g * fall) - speed * sine) / g
         legs = [(speed * cosine * duration, fall, duration)]

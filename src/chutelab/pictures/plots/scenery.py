@@ -127,10 +127,13 @@ def energies(recording: Recording, times: Floats) -> dict[str, Floats]:
     """
     books = recording.energy_at(times)
     first, _ = recording.ends()
-    order = np.argsort(first["t"], kind="stable")
-    at_release = np.concatenate([[0.0], np.cumsum(sum(recording.energies(first[order])))])
+    order, who = np.argsort(first["t"], kind="stable"), np.flatnonzero(recording.released)
+    at_release = np.concatenate(
+        [[0.0], np.cumsum(sum(recording.energies(first[order], who[order])))]
+    )
     released = np.searchsorted(first["t"][order], times, side="right")
-    weight = released * recording.particle.mass * recording.gravity
+    masses = np.broadcast_to(recording.particle.mass, recording.count)[who][order]
+    weight = np.concatenate([[0.0], np.cumsum(masses)])[released] * recording.gravity
     heights = recording.knots["position"][:, 1]
     stays = recording.ended != REASONS.index("exit")
     staying = heights[np.repeat(stays, np.diff(recording.offsets))]

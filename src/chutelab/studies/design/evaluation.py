@@ -114,7 +114,7 @@ def suits(scene: Scene, keys: Sequence[str], quantities: Sequence[Quantity]) -> 
         return False
 
     return (
-        scene.stream.count == 1
+        scene.count == 1
         and scene.stream.at is None
         and scene.run.engine not in ("contact", "pymunk")
         and all(map(is_plain, keys))

@@ -177,7 +177,7 @@ def fit(scene: Scene, track: Track, keys: Sequence[str], *, robust: bool = False
     """
     _scipy("optimize")
     parameters = resolve(scene, track, keys)
-    if scene.stream.crowded:
+    if scene.crowded:
         text = "must be false for a fit, which follows one particle that meets no others"
         raise MeasuredError(scene.source, [Fault("stream.interact", True, text)])
     if "t0" in keys:

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from chutelab.scene import MISSING, Fault, Scene, shown
-from chutelab.scene.overrides import at_path, joined, limits_of, parts_of, rule_at
+from chutelab.scene.overrides import at_path, joined, limits_of, names_of, parts_of, rule_at
+from chutelab.scene.schema import as_written
 from chutelab.studies.measured.track import LARGEST, MeasuredError, Track
 from chutelab.util.errors import did_you_mean
 
@@ -62,7 +63,7 @@ def resolve(scene: Scene, track: Track, keys: Sequence[str]) -> tuple[Parameter,
     MeasuredError
         With all keys that are unknown, no number, without a value to start from, or given twice.
     """
-    document, placed = scene.model_dump(by_alias=True), placements(track)
+    document, placed = as_written(scene, defaults=True), placements(track)
     faults: list[Fault] = []
     found: list[Parameter] = []
     if not keys:
@@ -101,7 +102,7 @@ def _of_scene(document: Mapping[str, Any], key: str, others: Iterable[str]) -> P
     """Return the parameter of a key of the scene, or why there is none, with other known keys."""
     rule = None
     with suppress(ValueError):
-        parts = parts_of(key, [surface["name"] for surface in document["surface"]])
+        parts = parts_of(key, names_of(document))
         rule = rule_at(parts)
     if rule is None:
         known = [*numbers(document), *others]
@@ -127,6 +128,7 @@ def numbers(document: Mapping[str, Any]) -> Iterator[str]:
     """Yield the keys of a scene's tables whose values are numbers that can be fitted."""
     tables = {"": document}
     tables |= {f"{head}.": table for head, table in document.items() if isinstance(table, dict)}
-    tables |= {f"surface.{surface['name']}.": surface for surface in document["surface"]}
+    for head, names in names_of(document).items():
+        tables |= {f"{head}.{n}.": row for n, row in zip(names, document[head], strict=True)}
     for head, table in tables.items():
         yield from (f"{head}{key}" for key, value in table.items() if isinstance(value, float))

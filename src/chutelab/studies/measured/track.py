@@ -278,8 +278,8 @@ def inside(recording: Recording, track: Track) -> Bools:
 
 def run(scene: Scene) -> Recording:
     """Simulate what particle 0 does; of a stream that ignores each other, only particle 0."""
-    if scene.stream.count > 1 and not scene.stream.interact:
-        scene = scene.with_values({"stream.count": 1})
+    if scene.count > 1 and not scene.crowded:
+        scene = scene.alone()
     return simulate(scene)
 
 

@@ -133,7 +133,7 @@ def together(block: Block) -> tuple[list[tuple[Recording, Ints]], dict[int, str]
     stepped = (block.engine or template.run.engine) in ("contact", "pymunk")
     # Whether a release lies on the belt is a matter of the last digits.
     close = {"particle.radius", "incoming.pulley_radius", "incoming.length"} & {*block.paths}
-    if stepped or template.stream.count > 1 or (close and template.stream.at is not None):
+    if stepped or template.count > 1 or (close and template.stream.at is not None):
         return [], faults, which.tolist()
 
     def scenes(some: Ints) -> Scene:

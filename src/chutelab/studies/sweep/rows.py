@@ -85,7 +85,9 @@ def deviation(recording: Recording, shape: tuple[int, int]) -> Floats:
     (x, y), (vx, vy) = release["position"].T, release["velocity"].T
     begins = released & (y == belt.pulley_radius + scene.particle.radius) & (x <= 0.0)
     begins &= (-belt.length <= x) & (vx == belt.speed) & (vy == 0.0)
-    simulated = from_events(scene, *_described(recording, begins))
+    left, hit, down = _described(recording, begins)
+    own = scene.particle
+    simulated = from_events(scene, left, hit, down, own.radius, own.mass)
     if every == 1 and "outgoing" in recording.surfaces:
         # What the outgoing belt paid is comparable where nothing slips on it any more.
         paid, over = _paid(recording, count), recording.ended == REASONS.index("settled")
@@ -160,7 +162,9 @@ def rows(recording: Recording, variants: int = 1) -> Columns:
         found[name], spread = _mean_and_spread(value.reshape(shape))
         if f"{name}_spread" in found:
             found[f"{name}_spread"] = spread
-    (kinetic_first, potential_first), (kinetic, potential) = map(recording.energies, (begin, end))
+    who = np.flatnonzero(released)
+    kinetic_first, potential_first = recording.energies(begin, who)
+    kinetic, potential = recording.energies(end, who)
     change = (kinetic - kinetic_first) + (potential - potential_first)
     whole = np.zeros((2, recording.count))
     whole[0, released] = change - balance(end["entries"])

@@ -508,7 +508,7 @@ def test_nobody_settles_on_the_belt_that_throws(friction):
     recording = run(machine)
     assert recording.select(Kind.SETTLE, surface="incoming").size == 0
     # Thrown over the belt's end, all of them; some come to rest on others and never touch the belt:
-    # over ten seeds 39 to 44 land.
+    # 39 to 44 of them land, over five seeds each.
     assert len(np.unique(recording.select(Kind.LANDING)["particle"])) > 35
     assert recording.ends()[1]["position"][:, 0].min() > 0.6
     assert {REASONS[k] for k in recording.ended} == {"settled"}

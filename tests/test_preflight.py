@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from math import cos, inf, radians
+from math import cos, inf, pi, radians
 
 import pytest
 
@@ -432,7 +432,9 @@ def test_pymunk_for_what_exact_does_at_once_is_noticed():
     (advice,) = look("stream-independent", "run.engine=pymunk").advice
     assert "10000 particles one after the other" in advice.warning
     assert advice.change.startswith('run.engine = "auto"')
-    small = look("perpendicular", "run.engine=pymunk", "particle.radius=1e-4").advice
+    small = look(
+        "perpendicular", "run.engine=pymunk", "particle.radius=1e-4", "particle.mass=1e-8"
+    ).advice
     assert [advice.change for advice in small] == ['run.engine = "auto", for the exact engine']
 
 
@@ -447,3 +449,16 @@ def test_geometry_that_contradicts_itself_is_refused_as_by_a_run():
     scene = sc.load("perpendicular", ["plate.angle_deg=80", "outgoing.drop_from=top"])
     assert build(scene).warnings
     assert REASONS[simulate(scene).ended[0]] == "landed"
+
+
+def test_a_density_that_no_solid_has_is_noticed():
+    def said(*overrides):
+        found = look("perpendicular", *overrides).advice
+        return [one.warning for one in found if "density" in one.warning]
+
+    assert not said()
+    assert not said("particle.radius=0")
+    # 8 g in a sphere of 4 mm: m / (4/3 π r³)
+    (warning,) = said("particle.radius=0.004")
+    assert f"{0.008 / (4.0 / 3.0 * pi * 0.004**3):,.0f} kg/m³, more than any solid" in warning
+    assert "less than any solid" in said("particle.mass=1e-5")[0]

@@ -3,7 +3,8 @@
 - `units`: sizes with their units, and what a key may hold: strict types and ranges.
 - `materials`: ``[[material]]``, and presets with their spread and sources.
 - `rules`: conflicts between keys and between tables; ``[[expect]]``.
-- `schema`: the tables of a scene as frozen Pydantic models, with the defaults.
+- `tables`: the tables of a scene as frozen Pydantic models, with the defaults.
+- `schema`: `Scene`, all tables together, and what follows from one for another.
 - `overrides`: keys by their full path: JSON Schema, limits, ``KEY=VALUE`` texts.
 - `loading`: read, parse, override, validate, write; the shipped scenes.
 - `variants`: one scene with other values: ``--vary``, combinations, families.
@@ -24,14 +25,14 @@ from chutelab.scene.loading import (
 )
 from chutelab.scene.overrides import schema
 from chutelab.scene.rules import Expect
-from chutelab.scene.schema import (
+from chutelab.scene.schema import Scene
+from chutelab.scene.tables import (
     Conveyor,
     Incoming,
     Outgoing,
     Particle,
     Plate,
     Run,
-    Scene,
     Stream,
     Surface,
 )

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import suppress
-from math import ceil, cos, floor, inf, isnan, log10, radians, sqrt
+from math import ceil, cos, floor, inf, isnan, log10, pi, radians, sqrt
 from typing import Any
 
 import numpy as np
@@ -32,6 +32,7 @@ from chutelab.results import REASONS, Recording
 from chutelab.results.quantities import waits
 from chutelab.results.recording import blocks, hermite
 from chutelab.scene import Scene, SceneError, shown
+from chutelab.scene.materials import DENSEST, LIGHTEST, PRESETS
 from chutelab.scene.units import write_size
 from chutelab.util.arrays import Floats, Ints
 
@@ -57,6 +58,26 @@ LANDING_ROOM = 0.5
 """m of belt to spare before and behind a landing."""
 
 
+def _densities(scene: Scene) -> Iterator[Advice]:
+    """Warn of masses that no solid has at that size."""
+    for n, kind in enumerate(scene.particles):
+        if kind.outline or kind.radius == 0.0:
+            continue
+        density = kind.mass / (4.0 / 3.0 * pi * kind.radius**3)
+        if LIGHTEST <= density <= DENSEST:
+            continue
+        path = f"particle[{n}]" if len(scene.particles) > 1 else "particle"
+        steel = (kind.mass / (4.0 / 3.0 * pi * PRESETS["steel"].material.density)) ** (1.0 / 3.0)
+        yield Advice(
+            f"{path}: a sphere of {kind.radius:.4g} m radius and {kind.mass:.4g} kg would have a"
+            f" density of {density:,.0f} kg/m³, {'less' if density < LIGHTEST else 'more'} than any"
+            " solid",
+            f"{path}.density or {path}.material instead of the mass; of steel, this mass has a"
+            f" radius of {steel:.2g} m",
+            {},
+        )
+
+
 def advice(
     scene: Scene, machine: Machine, tried: Trial, steps: Stepping | None, cost: Effort
 ) -> Iterator[Advice]:
@@ -70,6 +91,7 @@ def advice(
                     mended = settings
                     break
         yield _advised(str(caution), mended, otherwise=LEAVE if caution.crosses else LOOK)
+    yield from _densities(scene)
     if steps is not None and not steps.safe and steps.way is not None and steps.longest is not None:
         yield _advised(
             f"a particle covers {write_size(steps.way, 'm')} in a step, but a surface catches it"
@@ -148,7 +170,12 @@ def _advised(
 
 def _candidates(scene: Scene, machine: Machine, caution: Caution) -> Iterator[Settings]:
     """Yield settings that might do away with a warning of the machine, the mildest first."""
-    plate, out, pulley, r = scene.plate, scene.outgoing, machine.pulley, machine.particle.radius
+    plate, out, pulley, r = (
+        scene.plate,
+        scene.outgoing,
+        machine.pulley,
+        machine.particle.of(0).radius,
+    )
     if caution.surface == "plate" and plate is not None and pulley is not None:
         if caution.crosses == DRIVE_PULLEY:
             for share in (1.25, 1.5, 2.0, 4.0):
@@ -182,7 +209,7 @@ def _candidates(scene: Scene, machine: Machine, caution: Caution) -> Iterator[Se
 
 def _shortened(points: Floats, machine: Machine, other: int) -> Iterator[list[list[float]]]:
     """Yield a polyline with its last or first piece cut off before it crosses another surface."""
-    room = max(MARGIN, 3.0 * machine.particle.radius)
+    room = max(MARGIN, 3.0 * float(np.max(machine.particle.radius)))
     for end, inner in ((-1, -2), (0, 1)):
         a, b = points[inner], points[end]
         for k in np.flatnonzero(machine.segments.surface == other):
@@ -231,7 +258,7 @@ def _ending(scene: Scene, machine: Machine, tried: Recording) -> Iterator[Advice
 
 def _at_belt_height(machine: Machine, tried: Recording, particles: Ints) -> list[float]:
     """Return x (m) where particles are at the height of the outgoing belt for the last time."""
-    level = _belt_height(machine) + machine.particle.radius
+    level = _belt_height(machine) + machine.particle.of(0).radius
     found = []
     for particle in particles[:SOME]:
         track = tried.track(particle)

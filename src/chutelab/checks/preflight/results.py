@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from chutelab.machine import Machine
+from chutelab.machine import Arcs, Machine, Segments
 from chutelab.results.quantities import QUANTITIES, air_drag
 from chutelab.results.recording import Recording
 from chutelab.scene import Scene
 from chutelab.scene.units import write_size
 from chutelab.theory import Reason, drag, predict
+from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet, Shown
 
 
@@ -157,25 +158,91 @@ def coverage(scene: Scene) -> Coverage:
     return Coverage(given, tuple(name for name in QUANTITIES if name not in given), reason, words)
 
 
+MANY = 12
+"""Pieces of one surface that are listed; of more only how many they are."""
+
+
 def built(machine: Machine) -> Iterator[Part]:
     """Yield the parts of a machine, world frame."""
-    segments, ends = machine.segments, machine.segments.end
+    segments, arcs = machine.segments, machine.arcs
+    ends = segments.end
     for index, surface in enumerate(machine.surfaces):
-        for k in (segments.surface == index).nonzero()[0]:
+        lines = (segments.surface == index).nonzero()[0].tolist()
+        bends = (arcs.surface == index).nonzero()[0].tolist()
+        if len(lines) + len(bends) > MANY:
+            corners = [segments.start[lines], ends[lines], arcs.center[bends]]
+            points = np.round(np.concatenate(corners), 12) + 0.0
+            (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0)
+            box = f"from ({x0:.6g}, {y0:.6g}) to ({x1:.6g}, {y1:.6g}) m"
+            yield Part(surface, f"{len(lines) + len(bends)} pieces, {box}")
+            continue
+        for k in lines:
             # Rounding leaves 1e-17 where 0 is meant.
             (x0, y0), (x1, y1) = np.round([segments.start[k], ends[k]], 12) + 0.0
-            moving = f", moving at {segments.speed[k]:.6g} m/s" if segments.speed[k] else ""
-            yield Part(surface, f"from ({x0:.6g}, {y0:.6g}) to ({x1:.6g}, {y1:.6g}) m{moving}")
+            where = f"from ({x0:.6g}, {y0:.6g}) to ({x1:.6g}, {y1:.6g}) m"
+            yield Part(surface, where + _moves(segments, k))
+        for k in bends:
+            x, y = np.round(arcs.center[k], 12) + 0.0
+            where = f"radius {arcs.radius[k]:.6g} m, about ({x:.6g}, {y:.6g}) m"
+            if not arcs.whole[k]:
+                first, last = np.degrees([arcs.begin[k], arcs.begin[k] + arcs.extent[k]])
+                where += f", {first:.6g}° to {last:.6g}°"
+            yield Part(surface, where + _moves(arcs, k))
         if machine.pulley is not None and machine.pulley.surface == index:
             yield Part("pulley", f"radius {machine.pulley.radius:.6g} m, axis at (0, 0)")
-    releases, p = machine.releases, machine.particle
-    (x, y), (vx, vy) = releases.position[0], releases.velocity[0]
-    turning = "a free disk" if p.inertia else "not turning"
-    kind = "a mass point" if p.radius == 0.0 else f"radius {p.radius:.6g} m"
-    many = f"{machine.count:,} of them, each " if machine.count > 1 else ""
-    yield Part("particle", f"{many}{kind}, mass {p.mass:.6g} kg, {turning}")
-    last = f", the last at t = {releases.t[-1]:.6g} s" if machine.count > 1 else ""
-    yield Part("release", f"the first from ({x:.6g}, {y:.6g}) m at ({vx:.6g}, {vy:.6g}) m/s{last}")
+    for thread in machine.threads:
+        x, y = thread.anchor
+        held = f"({x:.6g}, {y:.6g}) m to particle {thread.particle}, {thread.length:.6g} m long"
+        yield Part("string", f"from {held}")
+    yield from _kinds(machine)
+    yield from _releases(machine)
+
+
+def _moves(parts: Segments | Arcs, k: int) -> str:
+    """Say how fast a piece of a surface moves, and when it is there."""
+    said = f", moving at {parts.speed[k]:.6g} m/s" if parts.speed[k] else ""
+    if np.isfinite(parts.appears[k]):
+        said += f", from t = {parts.appears[k]:.6g} s"
+    if np.isfinite(parts.vanishes[k]):
+        said += f", until t = {parts.vanishes[k]:.6g} s"
+    return said
+
+
+def _kinds(machine: Machine) -> Iterator[Part]:
+    """Yield what particles there are, kind by kind."""
+    for n, kind in enumerate(machine.scene.particles):
+        which = (machine.releases.kind == n).nonzero()[0]
+        if not len(which):
+            continue
+        p = machine.particle.of(which)
+        radii, masses = np.atleast_1d(p.radius), np.atleast_1d(p.mass)
+        turning = f"a free {kind.shape}" if np.any(p.inertia) else "not turning"
+        size = _span(radii, "radius", "m") if np.any(radii) else "a mass point"
+        if kind.outline:
+            size = f"a {kind.shape}, {2.0 * kind.radius:.6g} m across"
+        many = f"{len(which):,} of them, each " if len(which) > 1 else ""
+        yield Part(
+            kind.name or "particle", f"{many}{size}, {_span(masses, 'mass', 'kg')}, {turning}"
+        )
+
+
+def _span(values: Floats, name: str, unit: str) -> str:
+    low, high = values.min(), values.max()
+    to = f" to {high:.6g}" if high > low else ""
+    return f"{name} {low:.6g}{to} {unit}"
+
+
+def _releases(machine: Machine) -> Iterator[Part]:
+    """Yield where each stream begins, and when it ends."""
+    releases = machine.releases
+    for n, name in enumerate(machine.streams):
+        which = (releases.stream == n).nonzero()[0]
+        (x, y), (vx, vy) = releases.position[which[0]], releases.velocity[which[0]]
+        first, last = releases.t[which[0]], releases.t[which[-1]]
+        begin = f" at t = {first:.6g} s" if first else ""
+        end = f", the last at t = {last:.6g} s" if len(which) > 1 else ""
+        where = f"the first from ({x:.6g}, {y:.6g}) m at ({vx:.6g}, {vy:.6g}) m/s"
+        yield Part("release" if len(machine.streams) == 1 else name, f"{where}{begin}{end}")
 
 
 def skipped(
@@ -187,7 +254,7 @@ def skipped(
             written = f"[[{table}]]" if table == "surface" else f"[{table}]"
             name = "surfaces" if table == "surface" else table
             yield Part(name, f"the scene has no {written}")
-    if machine.particle.inertia == 0.0:
+    if not np.any(machine.particle.inertia):
         yield Part("rotation", "particle.spin = false")
     if not machine.interact:
         why = "stream.count = 1" if machine.count == 1 else "stream.interact = false"

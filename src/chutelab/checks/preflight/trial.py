@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import inf, log, log1p
+from math import ceil, inf, log, log1p
 from time import process_time
 
 import numpy as np
@@ -60,17 +60,22 @@ def trial(machine: Machine, engine: str) -> Trial:
     """
     scene = machine.scene
     few = machine
-    if engine != "exact" and machine.count > MOST:
-        few = build(scene.with_values({"stream.count": MOST, "expect": None}))
+    if engine != "exact" and machine.count > MOST and not scene.string:
+        share = MOST / machine.count
+        fewer = {
+            f"stream[{n}].count": ceil(share * stream.count)
+            for n, stream in enumerate(scene.streams)
+        }
+        few = build(scene.with_values({**fewer, "expect": None}))
     found = _timed(few, PATIENCE)
     if found.whole and found.seconds <= WARMING:
         warm = _timed(few, PATIENCE)
         found = replace(warm, warming=max(0.0, found.seconds - warm.seconds))
     if engine == "exact":
         return found
-    alone = {"stream.count": 1, "stream.interact": False, "run.engine": "auto", "expect": None}
     try:
-        lone = _timed(build(scene.with_values(alone)), LONE_PATIENCE).recording
+        alone = scene.alone().with_values({"run.engine": "auto"})
+        lone = _timed(build(alone), LONE_PATIENCE).recording
     except SceneError:
         lone = None
     return replace(found, lone=lone)
@@ -105,7 +110,7 @@ def stepping(machine: Machine, engine: str, tried: Trial) -> Stepping:
     particle with aligned steps. Otherwise a contact is seen at the end of a step, and must be
     before the centre is on the other side: surfaces have no thickness.
     """
-    bound = machine.particle.radius
+    bound = float(np.min(machine.particle.radius))
     runs = (run for run in (tried.lone, tried.recording) if run is not None and len(run.knots))
     speed = way = None
     if (run := next(runs, None)) is not None:

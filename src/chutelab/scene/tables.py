@@ -1,0 +1,363 @@
+"""The tables of a scene file as frozen Pydantic models, with their units, ranges and defaults.
+
+Attributes mirror the TOML keys. Angles are degrees here (``_deg``) and nowhere else.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+from pydantic import ConfigDict, Field, model_validator
+
+from chutelab.scene.rules import ConflictError, surface_conflicts
+from chutelab.scene.units import (
+    MOST_PARTICLES,
+    Amount,
+    Angle,
+    Box,
+    Coordinate,
+    Corners,
+    Name,
+    Number,
+    Point,
+    Polyline,
+    Positive,
+    Radius,
+    Rate,
+    Repeats,
+    Share,
+    Size,
+    Switch,
+    Table,
+    Text,
+    Two,
+    Whole,
+    about_centroid,
+    described,
+    pair_friction,
+    pair_restitution,
+    tonnes_per_hour,
+)
+
+
+class Particle(Table):
+    """One kind of particles: disks, or mass points with radius 0; boxes and polygons."""
+
+    name: Name | None = described(None, "Name of this kind; needed where there are several")
+    shape: Literal["disk", "sphere", "box", "polygon"] = described(
+        "disk",
+        "What turns, with spin: a disk has I = m r²/2, a sphere 2/5 m r²; boxes and polygons are"
+        " for the pymunk engine",
+    )
+    radius: Radius = described(
+        0.0063,
+        "Radius r, 0 is a mass point; or [from, to], drawn evenly for each particle, of which the"
+        " first has the mean",
+        "m",
+    )
+    size: Size | None = described(None, "Of a box: [width, height]", "m")
+    points: Corners | None = described(
+        None, "Of a polygon, convex: [[x, y], ...]; it turns about its centroid", "m"
+    )
+    mass: Positive = described(0.008, "Mass m; or a density, or a material that has one", "kg")
+    density: Positive | None = described(
+        None, "Instead of a mass: that of a solid sphere of the radius", "kg/m³"
+    )
+    material: Text | None = described(
+        None,
+        "Where density, restitution and friction come from, if not given: a name of `chutelab"
+        " materials`, or of a [[material]]",
+        max_length=40,
+    )
+    spin: Switch = described(False, "true: it turns freely; false: never turns")
+    rolling_friction: Amount = described(
+        0.0, "Rolling friction on everything, as the arm of the load over the radius; needs spin"
+    )
+
+    @property
+    def outline(self) -> tuple[tuple[float, float], ...]:
+        """Corners of a box or polygon about its centroid, m; () of what is round."""
+        if self.size is not None:
+            x, y = 0.5 * self.size[0], 0.5 * self.size[1]
+            return ((-x, -y), (x, -y), (x, y), (-x, y))
+        return about_centroid(self.points) if self.points is not None else ()
+
+    @property
+    def span(self) -> tuple[float, float] | None:
+        """The range of its radii, m; None if all are alike."""
+        span: tuple[float, float] | None = self._typed.get("radius")  # type: ignore[assignment]
+        return span
+
+    @property
+    def mean_mass(self) -> float:
+        """Mean mass, kg, which goes with the cube of the radius."""
+        if self.span is None:
+            return self.mass
+        low, high = self.span
+        return self.mass * 0.5 * (low + high) * (low * low + high * high) / self.radius**3
+
+    @property
+    def moment(self) -> float:
+        """I/(m r²) of a disk or sphere that turns, 0 of one that does not."""
+        return 0.0 if not self.spin else 0.4 if self.shape == "sphere" else 0.5
+
+
+class Pair(Table):
+    """What two meet with, instead of what their tables or materials say."""
+
+    between: Two = described(..., "Two kinds of particles by name, or one and a surface")
+    restitution: Share | None = pair_restitution(None, "of these two")
+    friction: Amount | None = pair_friction(None, "of these two")
+
+
+class Incoming(Table):
+    """The incoming conveyor and its drive pulley, whose axis is the origin."""
+
+    speed: Amount = described(..., "Belt speed v0", "m/s")
+    pulley_radius: Positive = described(..., "Radius R of the drive pulley, with the belt", "m")
+    length: Positive = described(1.0, "Length of belt before the pulley", "m")
+    incline_deg: Number = described(
+        0.0,
+        "Angle β at which the belt rises to the pulley, which it meets where it is tangential",
+        "degrees",
+        ge=-60.0,
+        le=60.0,
+    )
+    friction: Literal["adhesion"] | Amount = described(
+        "adhesion",
+        'Grip of belt and pulley on a particle: "adhesion" (no slip until separation) or a Coulomb '
+        "coefficient µ",
+    )
+    restitution: Share = pair_restitution(0.0, "particle-belt")
+
+
+class Plate(Table):
+    """A plate that hangs from a pivot: the damping plate, at a distance, or a further one."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"oneOf": [{"required": ["distance"]}, {"required": ["name", "pivot"]}]}
+    )
+
+    name: Name | None = described(None, "Name of a further plate, for events and the ledger")
+    pivot: Point | None = described(None, "Of a further plate: its pivot [x, y]", "m")
+    distance: Positive = described(
+        None,
+        "Of the damping plate: d_okr, from the pulley's leading edge x = R to the pivot",
+        "m",
+    )
+    angle_deg: Number = described(
+        0.0,
+        "Angle α from the vertical; positive leans the top back toward the incoming conveyor",
+        "degrees",
+        gt=-90.0,
+        lt=90.0,
+    )
+    pivot_height: Coordinate = described(
+        None, "Height y of the damping plate's pivot; default: the pulley's radius", "m"
+    )
+    above: Amount = described(0.3, "Length of plate above the pivot, along the plate", "m")
+    below: Amount | None = described(
+        None,
+        "Length of plate below the pivot; default: down to max(0.05 m, 3 r) above the outgoing "
+        "belt, 2.0 m without [outgoing]; of a further plate 0.5 m",
+        "m",
+    )
+    restitution: Share = pair_restitution(0.5, "particle-plate")
+    friction: Amount = pair_friction(0.0, "particle-plate")
+
+
+class Outgoing(Table):
+    """The outgoing conveyor's belt."""
+
+    speed: Coordinate = described(
+        None, "Belt speed v_dop, may be negative; default: the incoming belt's", "m/s"
+    )
+    drop: Positive = described(..., "Fall to the belt, measured as drop_from says", "m")
+    drop_from: Literal["impact", "top"] = described(
+        "impact",
+        '"impact": drop is d2, the fall of a particle\'s centre from plate impact to landing; '
+        '"top": drop is d3, from the top of the pulley (y = R) down to the belt surface',
+    )
+    start: Coordinate = described(-2.0, "World x where the belt begins; it reaches forward", "m")
+    length: Positive = described(6.0, "Length of the belt", "m")
+    restitution: Share = pair_restitution(0.0, "particle-belt")
+    friction: Amount = pair_friction(0.5, "particle-belt")
+
+
+class Conveyor(Table):
+    """A further belt between two pulleys: forward on top, and back below."""
+
+    name: Name = described(..., "Unique name, for events and the ledger")
+    from_: Point = Field(
+        ..., alias="from", description="Axis [x, y] of the first pulley (m).",
+        json_schema_extra={"x-unit": "m"},
+    )  # fmt: skip
+    to: Point = described(..., "Axis [x, y] of the second pulley", "m")
+    pulley_radius: Positive = described(0.1, "Radius of both pulleys, with the belt", "m")
+    speed: Coordinate = described(
+        ..., "Speed on top, from the first to the second pulley; may be negative", "m/s"
+    )
+    restitution: Share = pair_restitution(0.0, "particle-belt")
+    friction: Amount = pair_friction(0.5, "particle-belt")
+
+
+class Surface(Table):
+    """A free surface, two-sided and without thickness: a chute, a hood, a floor, a peg, a gate.
+
+    Straight, given by ``from`` and ``to`` or by ``points``; or an arc, by ``center`` and
+    ``radius``. The attribute `points`, ((x, y), ...), always has the answer of a straight one, and
+    `from_` and `to` are empty once it does; of an arc it is empty.
+    """
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "oneOf": [
+                {"required": ["from", "to"]},
+                {"required": ["points"]},
+                {"required": ["center", "radius"]},
+            ]
+        }
+    )
+
+    name: Name = described(..., "Unique name, for events and the ledger")
+    from_: Point | None = Field(
+        None, alias="from", description="First end [x, y] (m).", json_schema_extra={"x-unit": "m"}
+    )
+    to: Point | None = described(None, "Second end [x, y]", "m")
+    points: Polyline = described(None, "Instead of from and to: a polyline [[x, y], ...]", "m")
+    center: Point | None = described(None, "Of an arc: its centre [x, y]", "m")
+    radius: Positive | None = described(None, "Of an arc: its radius", "m")
+    from_deg: Angle = described(
+        0.0, "Of an arc: where it begins, counterclockwise from the x axis", "degrees"
+    )
+    to_deg: Angle = described(
+        360.0, "Where it ends; less than from_deg if it goes clockwise", "degrees"
+    )
+    restitution: Share = pair_restitution(0.3, "particle-surface")
+    friction: Amount = pair_friction(0.4, "particle-surface")
+    material: Literal["steel", "rubber"] = described(
+        "steel", "Which of a particle's material's values hold where none are given here"
+    )
+    speed: Coordinate = described(0.0, "Speed along from -> to; a belt when not 0", "m/s")
+    opens_at: Coordinate | None = described(
+        None, "When it goes, and what it held falls: a gate", "s"
+    )
+    closes_at: Coordinate | None = described(None, "When it comes", "s")
+    repeat: Repeats = described(
+        (),
+        "Copies [[n, dx, dy], ...]: n of it, each moved on by (dx, dy) m; a second entry repeats"
+        " that row. All are one surface",
+        max_length=2,
+    )
+
+    @model_validator(mode="after")
+    def _ends_become_points(self) -> Self:
+        values = {name.rstrip("_"): getattr(self, name) for name in Surface.model_fields}
+        given = {name.rstrip("_") for name in self.model_fields_set}
+        values = {name: value if name in given else None for name, value in values.items()}
+        if faults := list(surface_conflicts("surface", values)):
+            raise ConflictError(faults)
+        if self.from_ is not None:
+            self._fill("points", (self.from_, self.to))
+            self._fill("from_", None)
+            self._fill("to", None)
+            self.model_fields_set.difference_update({"from_", "to"})
+            self.model_fields_set.add("points")
+        return self
+
+
+class String(Table):
+    """A string without mass from a point to a particle's centre, for the pymunk engine."""
+
+    from_: Point = Field(
+        ..., alias="from", description="Fixed end [x, y] (m).", json_schema_extra={"x-unit": "m"}
+    )
+    particle: Whole = described(0, "Number of the particle, over all streams, from 0", ge=0)
+    length: Positive | None = described(
+        None, "Length; default: the distance at the particle's release", "m"
+    )
+
+
+class Stream(Table):
+    """A stream of particles: how many, of what kind, when, where and how fast they are released."""
+
+    name: Name | None = described(
+        None, "Name of the stream; default: stream, then stream2, stream3 ..."
+    )
+    particle: Text | None = described(
+        None, "Name of its kind of particles; default: the first", max_length=40
+    )
+    count: Whole = described(1, "Number of particles", ge=1, le=MOST_PARTICLES)
+    rate: Rate = described(
+        200.0,
+        'Particles per second, or a text such as "120 t/h"; particle i is released at start +'
+        " i / rate",
+        "1/s",
+    )
+    start: Amount = described(0.0, "When the first is released", "s")
+    bed_height: Amount = described(
+        0.0, "Centres spread uniformly over this height above the lowest layer", "m"
+    )
+    speed_spread: Amount = described(0.0, "Uniform half-width around the release speed", "m/s")
+    seed: Whole = described(0, "Seed of the random draws", ge=0, le=2**63 - 1)
+    at: Point | None = described(
+        None, "Release point [x, y] of the lowest layer; default: on the incoming belt's start", "m"
+    )
+    to: Point | None = described(
+        None,
+        "With at: releases along this line, each anywhere on it, drawn evenly; without a rate all"
+        " at once, evenly spaced",
+        "m",
+    )
+    fill: Box | None = described(
+        None,
+        "Instead of at: a box [[x, y], [x, y]] that is packed with all particles at once, from"
+        " below, at rest",
+        "m",
+    )
+    velocity: Point | None = described(
+        None, "Release velocity [vx, vy]; default: the incoming belt's", "m/s"
+    )
+    interact: Switch = described(False, "Particle-particle contacts, of all streams if one says so")
+    restitution: Share = pair_restitution(0.5, "particle-particle")
+    friction: Amount = pair_friction(0.3, "particle-particle")
+
+    @property
+    def mass_rate(self) -> float | None:
+        """The rate in kg/s, if it was given as a mass per time."""
+        typed = self._typed.get("rate")
+        return tonnes_per_hour(typed) / 3.6 if isinstance(typed, str) else None
+
+    @property
+    def at_once(self) -> bool:
+        """Whether all of its particles are released at once."""
+        return self.fill is not None or (
+            self.to is not None and "rate" not in self.model_fields_set
+        )
+
+
+class Run(Table):
+    """How the scene is simulated, and until when."""
+
+    engine: Literal["auto", "exact", "contact", "pymunk"] = described(
+        "auto", '"auto" takes exact where particles do not interact, else contact'
+    )
+    until: Literal["landed", "settled"] | Positive = described(
+        None,
+        'Ending: "landed", "settled" or a number of seconds; default: "landed" with [outgoing], '
+        'else "settled"',
+        "s",
+    )
+    max_time: Positive = described(
+        30.0, "Bound on every ending, counted from the last release", "s"
+    )
+    dt: Number = described(
+        0.001,
+        "Step of contacts that last (contact engine), longest step (pymunk engine)",
+        "s",
+        ge=1e-7,
+        le=0.1,
+    )
+    align: bool = described(
+        True, "Whether the pymunk engine's steps of a lone particle end at contacts, or all last dt"
+    )

@@ -42,7 +42,7 @@ def discharge(scene: Scene) -> tuple[Pair, Pair]:
     if scene.incoming is None or not on_belt(scene) or velocity[1] != 0.0:
         return position, velocity
     rho, speed = scene.incoming.pulley_radius + scene.particle.radius, scene.incoming.speed
-    if not isinstance(scene.incoming.friction, str):
+    if not isinstance(scene.met(scene.kinds[0], "incoming")[1], str):
         return _slip_round(scene, rho, velocity[0], -position[0])
     # Adhesion lets go where cos φ1 = v²/(g ρ), at the top if that is 1 or more: Eq. (2).
     ratio = np.divide(speed * speed, scene.gravity * rho)
@@ -55,7 +55,7 @@ def _slip_round(scene: Scene, rho: Numbers, speed: Numbers, distance: Numbers) -
     """Go along belt and pulley with Coulomb friction."""
     assert scene.incoming is not None
     given = (
-        rho, speed, distance, scene.gravity, scene.incoming.friction, scene.incoming.speed,
+        rho, speed, distance, scene.gravity, scene.met(scene.kinds[0], "incoming")[1], scene.incoming.speed,
     )  # fmt: skip
     shape = np.broadcast_shapes(*map(np.shape, given))
     rho, speed, distance, gravity, friction, belt = (

@@ -54,8 +54,8 @@ def _several(default: Any, **limits: Any) -> Any:
 class Scene(Table):
     """A validated scene, all defaults filled in that need no geometry.
 
-    Of tables of which there may be one or several, `particles`, `plates` and `streams` are all, and
-    `particle`, `plate` and `stream` the first ones; of plates that at a distance from the pulley.
+    Of tables of which there may be one or several, `particles`, `plates` and `streams` are all;
+    `stream` is the first, `particle` its kind, and `plate` the one at a distance from the pulley.
 
     Raises
     ------
@@ -108,8 +108,8 @@ class Scene(Table):
 
     @property
     def particle(self) -> Particle:
-        """The first kind of particles."""
-        return self.particles[0]
+        """The kind of particles of the first stream."""
+        return self.particles[self.kinds[0]]
 
     @property
     def plate(self) -> Plate | None:

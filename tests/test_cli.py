@@ -36,7 +36,7 @@ FILES = [
 # The contract of section 4, copied by hand.
 KEYS = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
-    "impact", "landing", "ended", "stopped", "rolling", "waited", "squeezed", "drag",
+    "impact", "landing", "ended", "stopped", "rolling", "waited", "squeezed", "drag", "steady",
     "ledger", "theory",
     "theory_as_printed", "error", "accuracy",
 ]  # fmt: skip

@@ -145,6 +145,8 @@ def test_the_share_of_the_weight() -> None:
     assert told.share_of_weight == pytest.approx(force / (m * G), rel=1e-14)
     point = scene(particle={"radius": 0.0})
     assert drag(point, predict(point), v) is None
+    still = from_dict({"stream": {"at": [0.0, 1.0], "velocity": [0.0, 0.0]}}, "test")
+    assert drag(still, predict(still), 0.0) is None
     weightless = scene(particle={"radius": r}, plate={"angle_deg": 20.0})
     floating = weightless.with_values({"gravity": 0.0})
     told = drag(floating, predict(floating), v)

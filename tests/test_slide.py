@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
+from chutelab.engines.simulation import simulate
+from chutelab.scene import from_dict
 from chutelab.theory import belt_power, slide
 
 G = 9.81
@@ -216,3 +218,45 @@ def test_the_power_of_a_belt_is_what_its_load_gains_and_its_slip_heats() -> None
     power = belt_power(rate_t_h=120.0, belt_speed=belt, feed_speed=fed, lift=rise)
     assert power == pytest.approx(gain + heat, rel=1e-14)
     assert belt_power(rate_t_h=[0.0, 36.0], belt_speed=2.0).tolist() == [0.0, 40.0]
+
+
+@pytest.mark.parametrize(("engine", "off"), [("exact", 1e-12), ("contact", 2e-5), ("pymunk", 2e-5)])
+@pytest.mark.parametrize(
+    ("start", "end", "speed", "mu", "inside", "spin"),
+    [
+        (200.0, 265.0, 1.0, 0.3, True, False),
+        (85.0, 60.0, 0.6, 0.1, False, False),
+        (235.0, 300.0, 0.0, 0.4, True, True),
+        (85.0, 30.0, 0.0, 0.4, False, True),
+    ],
+)
+def test_engines_find_the_same_on_a_chute(
+    start: float, end: float, speed: float, mu: float, inside: bool, spin: bool, engine: str,
+    off: float,
+) -> None:  # fmt: skip
+    radius, r = 1.0, 0.01
+    first, last = math.radians(start), math.radians(end)
+    found = slide(
+        radius=radius, start=first, end=last, speed=speed, friction=mu, particle_radius=r,
+        inside=inside, spin=spin,
+    )  # fmt: skip
+    rho, sense = radius - r if inside else radius + r, math.copysign(1.0, last - first)
+    chute = {
+        "name": "chute", "center": [0.0, 0.0], "radius": radius, "restitution": 0.0,
+        "from_deg": 190.0 if inside else 0.0, "to_deg": 350.0 if inside else 180.0, "friction": mu,
+    }  # fmt: skip
+    stream = {
+        "at": [rho * math.cos(first), rho * math.sin(first)],
+        "velocity": [-sense * speed * math.sin(first), sense * speed * math.cos(first)],
+    }
+    one = from_dict(
+        {"particle": {"radius": r, "mass": 0.01, "spin": spin}, "surface": [chute],
+         "stream": stream, "run": {"until": float(found.time)}}, "test",
+    )  # fmt: skip
+    knot = simulate(one, engine=engine).track(0)[-1]
+    x, y = knot["position"]
+    assert math.remainder(math.atan2(y, x) - float(found.angle), 2.0 * math.pi) == pytest.approx(
+        0.0, abs=off
+    )
+    assert math.hypot(*knot["velocity"]) == pytest.approx(float(found.speed), abs=10.0 * off)
+    assert knot["omega"] == pytest.approx(float(found.omega), abs=1e3 * off)

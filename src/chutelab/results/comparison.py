@@ -130,7 +130,7 @@ def scales(scene: Scene, prediction: Transfer) -> dict[str, Any]:
     Floats, or arrays (N,) where scene and prediction have such.
     """
     v2, t2, t3 = prediction.v2, prediction.t2, prediction.t3
-    energy = 0.5 * scene.particle.mass * (v2 * v2)
+    energy = 0.5 * scene.particles[scene.kinds[0]].mass * (v2 * v2)
     d1: Any = nan
     if scene.incoming is not None and scene.plate is not None:
         d1 = scene.incoming.pulley_radius + scene.plate.distance

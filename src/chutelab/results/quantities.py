@@ -21,8 +21,8 @@ from chutelab.results.ledger import ledger
 from chutelab.results.recording import ENTRIES, EVENT, REASONS, Kind, Recording
 from chutelab.scene import Scene
 from chutelab.scene.rules import NEEDED, SYMBOLS
-from chutelab.theory import Drag, drag
-from chutelab.util.arrays import Floats
+from chutelab.theory import Drag, belt_power, drag
+from chutelab.util.arrays import Floats, Numbers
 from chutelab.util.tables import number
 
 KINDS = {
@@ -157,7 +157,8 @@ def symbols(recording: Recording) -> dict[str, Floats]:
     hit[np.isnan(left["t"])] = never(1)
     down[np.isnan(hit["t"])] = never(1)
     unpaid = dict.fromkeys(("belt_work", "slip_heat"), np.full(recording.count, nan))
-    found = from_events(recording.scene, left, hit, down) | unpaid
+    own = recording.particle
+    found = from_events(recording.scene, left, hit, down, own.radius, own.mass) | unpaid
     # What the belt pays until there is no slip is known only of a particle that got there, and had
     # nothing but the belt to do with since it landed.
     if recording.count == 1 and REASONS[recording.ended[0]] == "settled":
@@ -171,12 +172,18 @@ def symbols(recording: Recording) -> dict[str, Floats]:
 
 
 def from_events(
-    scene: Scene, left: NDArray[Any], hit: NDArray[Any], down: NDArray[Any]
+    scene: Scene,
+    left: NDArray[Any],
+    hit: NDArray[Any],
+    down: NDArray[Any],
+    radius: Numbers,
+    mass: Numbers,
 ) -> dict[str, Floats]:
     """Return what separation, impact and landing tell of the `QUANTITIES`, in the paper's frame.
 
     x2, y2 are counted from the separation point, y down; x3 and v3x back from the plate. The events
-    are (N,), of one scene or a family of N, and NaN, as `never` has it, where one did not happen.
+    are (N,), of one scene or a family of N, and NaN, as `never` has it, where one did not happen;
+    radius (m) and mass (kg) are the particles'.
     """
     plate = scene.plate
     top = nan if scene.incoming is None else scene.incoming.pulley_radius
@@ -189,7 +196,7 @@ def from_events(
     away, along = -(wx * cosine + wy * sine), wx * sine - wy * cosine
     # Rounding must not choose between π and -π for a rebound up along the plate.
     away = np.where(np.abs(away) <= ALONG * np.hypot(wx, wy), 0.0, away)
-    energy = 0.5 * scene.particle.mass * (vx * vx + belt * belt)
+    energy = 0.5 * mass * (vx * vx + belt * belt)
     return {
         "phi1": np.arctan2(x1, y1),
         "t2": hit["t"] - left["t"],
@@ -205,7 +212,7 @@ def from_events(
         "v3x": -vx,
         "v3y": -vy,
         "v3": np.hypot(vx, vy),
-        "d3": top + scene.particle.radius - y3,
+        "d3": top + radius - y3,
         "dEk": energy,
         "P": energy * scene.stream.rate,
     }
@@ -308,6 +315,39 @@ def air_drag(recording: Recording) -> Drag | None:
         for part in (recording.particle.radius, recording.particle.mass)
     )
     return drag(recording.scene, recording.prediction, speed, radius, mass)
+
+
+@dataclass(frozen=True)
+class Steady:
+    """What the outgoing belt needs for streams that go on and on, if it carries what lands.
+
+    `rate` (t/h) is that of the streams whose rate was given as a mass per time, `power` (W) what it
+    takes to bring them to the belt's speed from how their particles landed, slip heat included.
+    """
+
+    rate: float
+    power: float
+
+    def __str__(self) -> str:
+        return f"outgoing belt, steady: P = {number(self.power)} W at {number(self.rate)} t/h"
+
+
+def steady(recording: Recording) -> Steady | None:
+    """Return what streams in t/h take of the outgoing belt; None without any that has landed."""
+    scene, belt = recording.scene, recording.scene.outgoing
+    if belt is None or all(stream.mass_rate is None for stream in scene.streams):
+        return None
+    vx = column(first(recording, "landing"), "vx")
+    mass = np.broadcast_to(recording.particle.mass, recording.count)
+    rate = power = 0.0
+    for index, stream in enumerate(scene.streams):
+        own = (recording.machine.releases.stream == index) & np.isfinite(vx)
+        if stream.mass_rate is not None and own.any():
+            fed = float(np.average(vx[own], weights=mass[own]))
+            tonnes = 3.6 * stream.mass_rate
+            rate += tonnes
+            power += float(belt_power(rate_t_h=tonnes, belt_speed=belt.speed, feed_speed=fed))
+    return Steady(rate, power) if rate else None
 
 
 def squeezed(recording: Recording) -> Squeeze | None:

@@ -15,6 +15,7 @@ from chutelab.results.quantities import (
     first,
     rolling,
     squeezed,
+    steady,
     stopped,
     waits,
 )
@@ -40,7 +41,8 @@ def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> 
     `results.quantities.Stopped`), ``rolling`` unless disks settled on the outgoing belt without
     being carried by it (see `rolling`), ``waited`` unless particles found their place taken (see
     `results.quantities.Waits`), and ``squeezed`` unless riders by adhesion got into each other (see
-    `machine.releases.Squeeze`). ``drag`` is what air drag, left out, would do (see `theory.Drag`).
+    `machine.releases.Squeeze`). ``drag`` is what air drag, left out, would do (see `theory.Drag`),
+    and ``steady`` is None unless streams were given in t/h (see `results.quantities.Steady`).
     """
     error, scene = compare(recording), recording.scene
     as_printed = None
@@ -69,6 +71,7 @@ def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> 
         "waited": waits(recording),
         "squeezed": squeezed(recording),
         "drag": air_drag(recording),
+        "steady": steady(recording),
         "ledger": ledger(recording),
         "theory": _theory(recording.prediction),
         "theory_as_printed": as_printed,

@@ -102,7 +102,7 @@ def drag(
     scene: Scene, found: Transfer, speed: float, radius: float | None = None,
     mass: float | None = None,
 ) -> Drag | None:  # fmt: skip
-    """Estimate air drag in a scene; None for mass points, which have none.
+    """Estimate air drag in a scene; None for mass points, which have none, and where nothing moves.
 
     Parameters
     ----------
@@ -115,11 +115,11 @@ def drag(
     radius, mass : float, optional
         Of the particle that has it, if it is not particle 0.
     """
-    own = scene.particle
+    own = scene.particles[scene.kinds[0]]
     fastest = [speed, *(float(part) for part in (found.v2, found.v3) if np.isfinite(part))]
     if max(fastest) > speed or radius is None or mass is None:
         radius, mass, speed = own.radius, own.mass, max(fastest)
-    if radius == 0.0:
+    if radius == 0.0 or speed == 0.0:
         return None
     reynolds = 2.0 * radius * speed * AIR_DENSITY / AIR_VISCOSITY
     slowed = slowing(speed, radius, mass) * speed
@@ -140,8 +140,8 @@ def drag(
 
 def _shifts(course: Course) -> tuple[float, float]:
     """Return `Drag.impact_shift` and `Drag.landing_shift`."""
-    found, own, plate = course.found, course.scene.particle, course.scene.plate
-    assert plate is not None
+    found, own = course.found, course.own
+    restitution, friction = course.scene.met(course.kind, "plate")
 
     def rate(vx: float, vy: float) -> tuple[float, float]:
         slow = slowing(hypot(vx, vy), own.radius, own.mass)
@@ -163,8 +163,8 @@ def _shifts(course: Course) -> tuple[float, float]:
         return shift, nan
     away, down, _ = rebound(
         normal=np.array(-vx * nx - vy * ny), tangential=np.array(-vx * ux - vy * uy),
-        rim=np.array(own.radius * float(found.omega1)), restitution=np.array(plate.restitution),
-        friction=np.array(plate.friction), spin=np.array(own.spin), inertia=np.array(0.5),
+        rim=np.array(own.radius * float(found.omega1)), restitution=np.array(restitution),
+        friction=np.array(friction), spin=np.array(own.spin), inertia=np.array(own.moment or 0.5),
     )  # fmt: skip
     level = float(course.impact[1] - found.y3)
     after = (x, y, float(away * nx - down * ux), float(away * ny - down * uy))

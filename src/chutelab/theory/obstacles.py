@@ -11,13 +11,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from chutelab.util.arrays import Bools, Floats
 
-Line = tuple[str, Sequence[float], Sequence[float]]
+Line = tuple[str, ArrayLike, ArrayLike]
 """A straight surface: its name and both ends, m."""
 
-Bend = tuple[str, Sequence[float], float, float, float]
+Bend = tuple[str, ArrayLike, float, float, float]
 """A round one: its name, centre and radius, m, begin and extent, rad, as `Arcs` has them."""
 
 HALVINGS = 60
@@ -261,7 +262,7 @@ def first_in_flight(
     for side in (1.0, -1.0):
         # Where c + b t + a t² falls through 0, without cancellation; NaN if nowhere.
         c, b, a = side * height - radius, side * speed, side * bend
-        with np.errstate(invalid="ignore", divide="ignore"):
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             root = np.sqrt(b**2 - 4.0 * a * c)
             t = np.where(b > 0.0, -(b + root) / (2.0 * a), 2.0 * c / (root - b))
         met = (t >= 0.0) & (t <= horizon)

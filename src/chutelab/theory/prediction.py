@@ -7,17 +7,20 @@ the plate is there, what is touched between rebound and landing, whether the bel
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from chutelab.theory.obstacles import (
+    Bend,
     Flight,
+    Line,
     Obstacles,
     corner_times,
     first_in_flight,
     first_on_pulley,
+    ring_times,
 )
 from chutelab.theory.results import Reason, Transfer, cut, unanswered
 from chutelab.theory.transfer import Rebound, transfer
@@ -35,6 +38,9 @@ RADII_CLEARANCE = 3.0
 REACH_WITHOUT_BELT = 2.0
 """m of the default plate below its pivot where there is no outgoing belt."""
 
+REACH_HANGING = 0.5
+"""m of a further plate below its pivot by default."""
+
 
 class Course:
     """Particle 0 on its way through one scene that has an incoming belt and a plate.
@@ -48,7 +54,9 @@ class Course:
         assert scene.plate is not None
         self.scene, self.found = scene, found
         self.belt, plate, out = scene.incoming, scene.plate, scene.outgoing
-        self.radius = scene.particle.radius
+        self.kind = scene.kinds[0]
+        self.own = scene.particles[self.kind]
+        self.radius = self.own.radius
         self.ride_radius = self.belt.pulley_radius + self.radius
         self.angle = np.radians(plate.angle_deg)
         # Up along the plate, and out of its struck face.
@@ -56,6 +64,10 @@ class Course:
         self.normal = np.array([-np.cos(self.angle), -np.sin(self.angle)])
         ahead = self.belt.pulley_radius + plate.distance
         self.pivot = np.array([ahead, plate.pivot_height], dtype=np.float64)
+        self.incline = float(np.radians(self.belt.incline_deg))
+        # Up along the incoming belt, and out of its upper side.
+        self.along = np.array([np.cos(self.incline), np.sin(self.incline)])
+        self.above = np.array([-np.sin(self.incline), np.cos(self.incline)])
 
         cos, sin = np.cos(found.phi1), np.sin(found.phi1)
         left = self.ride_radius * np.array([sin, cos])
@@ -79,15 +91,63 @@ class Course:
                 below = max((self.pivot[1] - lowest) / np.cos(self.angle), 0.0)
         # From the pivot upwards along the plate.
         self.plate_reach = -below, plate.above
-        # Plate, outgoing belt and free surfaces, in this order.
-        self.lines: list[tuple[str, Any, Any]] = [
+        # Plate, outgoing belt and free surfaces, in this order; and round ones.
+        self.lines: list[Line] = [
             ("plate", self.pivot - below * self.up, self.pivot + plate.above * self.up)
         ]
         if out is not None and self.belt_height is not None:
             y = self.belt_height
             self.lines.append(("outgoing", (out.start, y), (out.start + out.length, y)))
-        for free in scene.surface:
-            self.lines += [(free.name, first, second) for first, second in pairwise(free.points)]
+        lines, self.bends = free_surfaces(scene)
+        self.lines += lines
+        self.gates = {
+            free.name for free in scene.surface if (free.opens_at, free.closes_at) != (None, None)
+        }
+
+    @property
+    def belt_line(self) -> Line:
+        """The straight part of the incoming belt."""
+        end = self.belt.pulley_radius * self.above
+        return "incoming", end - self.belt.length * self.along, end
+
+    def meets(self, claim: Reason, name: str, how: str) -> str:
+        """Return the reason for which the equations end at a surface."""
+        if name in self.gates:
+            return Reason.OUTSIDE.because(f"{name}: it is a gate, and in the way while it is shut")
+        return claim.because(f"{name}: {how}")
+
+
+def free_surfaces(scene: Scene) -> tuple[list[Line], list[Bend]]:
+    """Return the straight and round pieces of further plates, conveyors and free surfaces."""
+    lines: list[Line] = []
+    bends: list[Bend] = []
+    for plate in scene.plates:
+        if plate.pivot is not None:
+            angle = np.radians(plate.angle_deg)
+            up = np.array([-np.sin(angle), np.cos(angle)])
+            below = REACH_HANGING if plate.below is None else plate.below
+            pivot = np.array(plate.pivot)
+            lines.append((str(plate.name), pivot - below * up, pivot + plate.above * up))
+    for belt in scene.conveyor:
+        axes, r = np.array([belt.from_, belt.to]), belt.pulley_radius
+        way = axes[1] - axes[0]
+        off = r / np.hypot(*way) * np.array([-way[1], way[0]])
+        lines += [(belt.name, axes[0] + side, axes[1] + side) for side in (off, -off)]
+        bends += [(belt.name, axis, r, 0.0, 2.0 * np.pi) for axis in axes]
+    for free in scene.surface:
+        shifts = np.zeros((1, 2))
+        for count, *step in free.repeat:
+            rows = np.arange(count)[:, None, None] * np.array(step)
+            shifts = (shifts + rows).reshape(-1, 2)
+        for shift in shifts:
+            if free.center is None or free.radius is None:
+                points = shift + np.array(free.points)
+                lines += [(free.name, first, second) for first, second in pairwise(points)]
+            else:
+                first, last = np.radians([free.from_deg, free.to_deg])
+                place = shift + np.array(free.center)
+                bends.append((free.name, place, free.radius, min(first, last), abs(last - first)))
+    return lines, bends
 
 
 ON_BELT = 1e-12
@@ -114,8 +174,9 @@ def predict(scene: Scene, rebound: Rebound = "corrected") -> Transfer:
 
     Notes
     -----
-    Surface names in reasons are the scene's own, with ``plate``, ``outgoing``, ``incoming`` (the
-    belt's straight part) and ``pulley``. What happens after the landing is not looked at. Contacts
+    It is the first particle of the first stream. Surface names in reasons are the scene's own, with
+    ``plate``, ``outgoing``, ``incoming`` (the belt's straight part) and ``pulley``. A gate in the
+    way ends the answer, shut or open. What happens after the landing is not looked at. Contacts
     that graze to within rounding may be judged either way.
     """
     fault = _outside(scene)
@@ -149,6 +210,14 @@ def unbounded(scene: Scene, rebound: Rebound = "corrected") -> Transfer:
     belt, plate, out = scene.incoming, scene.plate, scene.outgoing
     assert belt is not None
     assert plate is not None
+    kind, stream = scene.kinds[0], scene.stream
+    own = scene.particles[kind]
+    restitution, plate_friction = scene.met(kind, "plate")
+    _, friction = scene.met(kind, "incoming")
+    incline = np.radians(belt.incline_deg)
+    ride_length = belt.length
+    if stream.at is not None:
+        ride_length = -(stream.at[0] * np.cos(incline) + stream.at[1] * np.sin(incline))
 
     def found(drop: ArrayLike, belt_speed: ArrayLike) -> Transfer:
         return transfer(
@@ -157,16 +226,19 @@ def unbounded(scene: Scene, rebound: Rebound = "corrected") -> Transfer:
             distance=plate.distance,
             angle=np.radians(plate.angle_deg),
             pivot_height=plate.pivot_height,
-            restitution=plate.restitution,
+            restitution=restitution,
             drop=drop,
             belt_speed=belt_speed,
-            particle_radius=scene.particle.radius,
-            mass=scene.particle.mass,
+            particle_radius=own.radius,
+            mass=own.mass,
             gravity=scene.gravity,
-            friction=np.inf if isinstance(belt.friction, str) else belt.friction,
-            spin=scene.particle.spin,
-            plate_friction=plate.friction,
-            interval=1.0 / scene.stream.rate,
+            friction=np.inf if isinstance(friction, str) else friction,
+            spin=own.spin,
+            inertia=0.4 if own.shape == "sphere" else 0.5,
+            incline=incline,
+            ride_length=ride_length,
+            plate_friction=plate_friction,
+            interval=1.0 / stream.rate,
             rebound=rebound,
             unbounded_plate=False,
         )
@@ -177,7 +249,7 @@ def unbounded(scene: Scene, rebound: Rebound = "corrected") -> Transfer:
         return found(out.drop, out.speed)
     impact = found(0.0, out.speed)
     # Eq. (16) solved for d2; `predict` refuses a belt above the impact
-    ride_radius = belt.pulley_radius + scene.particle.radius
+    ride_radius = belt.pulley_radius + own.radius
     sunk = ride_radius * (1.0 - np.cos(impact.phi1)) + impact.y2
     return found(np.maximum(out.drop - sunk, 0.0), out.speed)
 
@@ -188,12 +260,22 @@ def _outside(scene: Scene) -> str:
         return "there is no incoming conveyor"
     if scene.plate is None:
         return "there is no damping plate"
-    at, velocity = scene.stream.at, scene.stream.velocity
-    if at is not None:
-        above = at[1] - scene.incoming.pulley_radius - scene.particle.radius
-        if abs(above) > ON_BELT or not -scene.incoming.length <= at[0] <= 0.0:
+    own, stream, belt = scene.particles[scene.kinds[0]], scene.stream, scene.incoming
+    if own.outline:
+        return "it is about disks and spheres"
+    if own.spin and own.rolling_friction > 0.0:
+        return "rolling friction"
+    if any(string.particle == 0 for string in scene.string):
+        return "the particle hangs on a string"
+    if stream.fill is not None or stream.to is not None:
+        return "the stream is not released at a point of the incoming belt"
+    cos, sin = np.cos(np.radians(belt.incline_deg)), np.sin(np.radians(belt.incline_deg))
+    if stream.at is not None:
+        x, y = stream.at
+        above = y * cos - x * sin - belt.pulley_radius - own.radius
+        if abs(above) > ON_BELT or not -belt.length <= x * cos + y * sin <= 0.0:
             return "the release point stream.at is not on the incoming belt"
-    if velocity is not None and tuple(velocity) != (scene.incoming.speed, 0.0):
+    if stream.velocity is not None and stream.velocity != (belt.speed * cos, belt.speed * sin):
         return "the release velocity stream.velocity is not the incoming belt's"
     if scene.crowded:
         return "particles interact"
@@ -205,20 +287,21 @@ Trouble = tuple[str, str] | None
 
 
 def _on_the_ride(course: Course) -> Trouble:
-    obstacles = Obstacles.of(course.lines)
-    at, radius = course.scene.stream.at, course.radius
-    start = np.array([-course.belt.length if at is None else at[0], course.ride_radius])
+    obstacles = Obstacles.of(course.lines, course.bends)
+    at, radius, begin = course.scene.stream.at, course.radius, -course.incline
+    way = course.belt.length if at is None else -float(np.array(at) @ course.along)
+    start = course.ride_radius * course.above - way * course.along
     index = obstacles.overlapped(start, radius)
     if index < 0:
-        straight = Flight(start, np.array([1.0, 0.0]), 0.0)
-        index = first_in_flight(straight, obstacles, radius, float(-start[0]))[1]
+        straight = Flight(start, course.along, 0.0)
+        index = first_in_flight(straight, obstacles, radius, way)[1]
     if index < 0:
         last = float(course.found.phi1)
-        index = first_on_pulley(course.ride_radius, 0.0, last, obstacles, radius)[1]
+        index = first_on_pulley(course.ride_radius, begin, last, obstacles, radius)[1]
     if index < 0:
         return None
-    what = f"{obstacles.names[index]}: it is in the way of the ride"
-    return "separation", Reason.EARLY.because(what)
+    what = "it is in the way of the ride"
+    return "separation", course.meets(Reason.EARLY, obstacles.names[index], what)
 
 
 def _before_the_plate(course: Course) -> Trouble:
@@ -227,15 +310,21 @@ def _before_the_plate(course: Course) -> Trouble:
     foot = float((course.impact - course.pivot) @ course.up)
     hit = low <= foot <= high  # false for NaN: the line is not met
     plate = Obstacles.of(course.lines[:1])
-    obstacles = Obstacles.of(course.lines[1:] if hit else course.lines)
+    obstacles = Obstacles.of(course.lines[1:] if hit else course.lines, course.bends)
     horizon = float(found.t2) if hit else flight.horizon(plate, radius)
-    index = first_in_flight(flight, obstacles, radius, horizon)[1]
+    # Thrown up slowly, it may come down on the pulley again.
+    centre, rides = np.zeros(2), course.ride_radius
+    again = next(ring_times(flight, centre, rides, horizon), np.inf) if found.phi1 < 0.0 else np.inf
+    hops = again < horizon
+    index = first_in_flight(flight, obstacles, radius, min(horizon, again))[1]
     # What is in the way of a flight that misses the plate anyway does not matter.
-    stopped = hit or np.isfinite(first_in_flight(flight, plate, radius, horizon)[0])
+    stopped = hit or hops or np.isfinite(first_in_flight(flight, plate, radius, horizon)[0])
     if stopped and index >= 0:
         name = obstacles.names[index]
         how = "its end or its back is touched" if name == "plate" else "it is touched first"
-        return "impact", Reason.EARLY.because(f"{name}: {how}")
+        return "impact", course.meets(Reason.EARLY, name, how)
+    if hops:
+        return "impact", Reason.EARLY.because("pulley: the flight comes down on it again")
     if hit:
         return None
     if np.isnan(foot):
@@ -254,9 +343,9 @@ def _after_the_rebound(course: Course) -> Trouble:
         return "landing", Reason.MISSES.because("the plate is met below the belt")
     lands = bool(np.isfinite(found.t3))
     flight, top = course.rebounded, course.belt.pulley_radius
-    around = Obstacles.of([("pulley", (-top, -top), (top, top)), *course.lines])
+    around = Obstacles.of([("pulley", (-top, -top), (top, top)), *course.lines], course.bends)
     horizon = float(found.t3) if lands else flight.horizon(around, radius)
-    solid = Obstacles.of([("incoming", (-course.belt.length, top), (0.0, top)), *course.lines[2:]])
+    solid = Obstacles.of([course.belt_line, *course.lines[2:]], course.bends)
     time, index = first_in_flight(flight, solid, radius, horizon)
     time, name = min(
         (time, solid.names[index]),
@@ -265,8 +354,8 @@ def _after_the_rebound(course: Course) -> Trouble:
     )
     # The outgoing belt is not among them: no part of it, ends included, is met above its level.
     if np.isfinite(time):
-        what = f"{name}: {time:.4g} s after the rebound"
-        return "landing", Reason.SECOND.because(what)
+        what = f"{time:.4g} s after the rebound"
+        return "landing", course.meets(Reason.SECOND, name, what)
     x = float(course.impact[0] - found.x3)
     if lands and not out.start <= x <= out.start + out.length:
         what = f"it comes down at x = {x:.4g} m, off the belt"

@@ -96,7 +96,8 @@ def arcs(prediction: Transfer, scene: Scene) -> tuple[Arc, ...]:
         )
         sine, cosine, speed = (float(part[0]) for part in (left.sin, left.cos, left.v1))
         fall = riding * cosine - (riding - out.drop)
-        if fall <= 0.0:
+        # Thrown up slowly, it comes down on the pulley again.
+        if fall <= 0.0 or isfinite(left.again[0]):
             return ()
         duration = (sqrt((speed * sine) ** 2 + 2.0 * g * fall) - speed * sine) / g
         legs = [(speed * cosine * duration, fall, duration)]

@@ -85,7 +85,9 @@ def deviation(recording: Recording, shape: tuple[int, int]) -> Floats:
     (x, y), (vx, vy) = release["position"].T, release["velocity"].T
     begins = released & (y == belt.pulley_radius + scene.particle.radius) & (x <= 0.0)
     begins &= (-belt.length <= x) & (vx == belt.speed) & (vy == 0.0)
-    simulated = from_events(scene, *_described(recording, begins))
+    left, hit, down = _described(recording, begins)
+    own = scene.particle
+    simulated = from_events(scene, left, hit, down, own.radius, own.mass)
     if every == 1 and "outgoing" in recording.surfaces:
         # What the outgoing belt paid is comparable where nothing slips on it any more.
         paid, over = _paid(recording, count), recording.ended == REASONS.index("settled")

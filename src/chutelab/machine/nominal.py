@@ -55,7 +55,8 @@ def _slip_round(scene: Scene, rho: Numbers, speed: Numbers, distance: Numbers) -
     """Go along belt and pulley with Coulomb friction."""
     assert scene.incoming is not None
     given = (
-        rho, speed, distance, scene.gravity, scene.met(scene.kinds[0], "incoming")[1], scene.incoming.speed,
+        rho, speed, distance, scene.gravity, scene.met(scene.kinds[0], "incoming")[1],
+        scene.incoming.speed,
     )  # fmt: skip
     shape = np.broadcast_shapes(*map(np.shape, given))
     rho, speed, distance, gravity, friction, belt = (

@@ -8,8 +8,9 @@ from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
+from chutelab.scene.conflicts import EITHER, ConflictError, Look, conflicts, stream_name
 from chutelab.scene.materials import PRESETS, Material
-from chutelab.scene.rules import EITHER, ConflictError, Expect, Look, conflicts
+from chutelab.scene.rules import Expect
 from chutelab.scene.tables import (
     Conveyor,
     Incoming,
@@ -327,7 +328,7 @@ class Scene(Table):
             return stream
         filled = stream.model_copy()
         if stream.name is None:
-            filled._fill("name", f"stream{number + 1}" if number else "stream")
+            filled._fill("name", stream_name(number))
         if isinstance(typed, str):
             filled._fill("rate", typed)
             mass = self.particles[kind].mean_mass

@@ -10,6 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from chutelab.engines import exact
+from chutelab.machine.nominal import discharge
 from chutelab.results import REASONS, Kind
 from chutelab.results.ledger import ledger
 from machines import bent, face, gated, of_sizes, scene_of, thrown
@@ -170,6 +171,40 @@ def test_a_belt_that_is_too_steep_lets_it_slide_back():
     time = slip_ends + (0.5 + sqrt(0.5**2 + 2.0 * back * way)) / back
     assert end["t"] == pytest.approx(time, rel=1e-12)
     assert end["velocity_after"][0] < 0.0
+
+
+@pytest.mark.parametrize(
+    ("degrees", "speed", "friction", "given", "shape"),
+    [
+        (12.0, 1.2, "adhesion", None, "disk"),
+        (35.0, 1.7, "adhesion", None, "disk"),
+        (-15.0, 0.6, "adhesion", None, "disk"),
+        (15.0, 1.2, 0.45, 0.2, "disk"),
+        (25.0, 1.0, 0.9, 2.5, "disk"),
+        (20.0, 0.5, 0.3, 3.5, "disk"),
+        (15.0, 1.0, 0.6, 3.5, "spinning disk"),
+        (-10.0, 0.8, 0.2, 0.8, "spinning sphere"),
+    ],
+)
+def test_the_nominal_particle_is_let_go_where_the_engine_lets_it_go(
+    degrees, speed, friction, given, shape
+):
+    beta = radians(degrees)
+    along, up = np.array([cos(beta), sin(beta)]), np.array([-sin(beta), cos(beta)])
+    stream = {"at": (RHO * up - 0.9 * along).tolist(), "velocity": None}
+    if given is not None:
+        stream["velocity"] = (given * along).tolist()
+    built = scene_of(
+        particle={"radius": RADIUS, "spin": "spin" in shape, "shape": shape.split()[-1]},
+        incoming={"speed": speed, "pulley_radius": WHEEL, "friction": friction,
+                  "incline_deg": degrees},
+        stream=stream,
+        run={"until": 4.0},
+    )  # fmt: skip
+    place, velocity = discharge(built.scene)
+    left = exact.run(built).select(Kind.SEPARATION)[0]
+    np.testing.assert_allclose(np.array(place), left["position"], atol=1e-12)
+    np.testing.assert_allclose(np.array(velocity), left["velocity_after"], atol=1e-12)
 
 
 # Kinds of particles

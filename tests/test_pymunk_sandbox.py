@@ -300,6 +300,23 @@ def test_rolling_friction_slows_a_rolling_ball(shape):
     assert residual(got) < 1e-12
 
 
+@pytest.mark.parametrize("arm", [0.02, 0.5])
+def test_rolling_friction_shares_a_blow_with_friction(arm):
+    # Thrown on a rough floor with ω: it sticks, v = -r ω', and either the couple is used up,
+    # J3 = arm J_n, and (I + m r²) ω' = I ω - m r v + J3, or nothing turns: ω' = v' = 0.
+    r, mass, spin = 0.01, 0.1, 0.5 * 0.1 * 0.01**2
+    m = lone((0.0, 0.1), (0.5, 0.0), until=0.14, particle={"spin": True}, surface=[
+        face("floor", (-1.0, 0.0), (9.0, 0.0), restitution=0.5, friction=9.0)
+    ])  # fmt: skip
+    got = run(replace(m, rolling=np.array([arm])))
+    hit = got.select(Kind.IMPACT)[0]
+    whole = spin + mass * r * r
+    couple = min(arm * r * hit["normal_impulse"], mass * r * 0.5)
+    assert hit["omega_after"] == pytest.approx((couple - mass * r * 0.5) / whole, abs=1e-9)
+    assert hit["velocity_after"][0] == pytest.approx(-r * hit["omega_after"], abs=1e-10)
+    assert residual(got) < 1e-13
+
+
 @pytest.mark.parametrize(("slope", "rolls"), [(1.0, False), (2.0, True)])
 def test_rolling_friction_holds_a_ball_on_a_slope_up_to_its_angle(slope, rolls):
     # Up to tan β = arm/r it stays; beyond, m a (1 + I/(m r²)) = m g (sin β - arm/r cos β).

@@ -10,15 +10,15 @@ from math import inf, nan
 
 import numpy as np
 
-from chutelab.machine.releases import on_belt, release_point, release_velocity
+from chutelab.machine.releases import on_belt, release_point, release_velocity, up_belt
 from chutelab.mechanics.ballistics import descent
 from chutelab.mechanics.contact import (
-    DISK_SHARE,
     Circle,
     Outcome,
     advance,
     grip_slip,
     normal_force,
+    rim_share,
 )
 from chutelab.scene import Scene
 from chutelab.util.arrays import Bools, Floats, Ints, Numbers
@@ -27,6 +27,12 @@ STEPS = 100_000
 """Knots of a ride after which it counts as one without an end; a quarter turn takes 65, the slowest
 fall off the very top 2,000."""
 
+
+PHASES = 3
+"""Sliding, gripping or not, and sliding back: what can follow each other on a belt."""
+
+ALONG = 1e-12
+"""Share of a speed across the belt that is rounding."""
 
 Pair = tuple[Numbers, Numbers]
 """A place (m) or a velocity (m/s) in the world frame."""
@@ -39,58 +45,77 @@ def discharge(scene: Scene) -> tuple[Pair, Pair]:
     that throws it off backwards).
     """
     position, velocity = release_point(scene), release_velocity(scene)
-    if scene.incoming is None or not on_belt(scene) or velocity[1] != 0.0:
+    if scene.incoming is None or not on_belt(scene):
+        return position, velocity
+    (x, y), (vx, vy), (cosine, sine) = position, velocity, up_belt(scene)
+    if np.any(np.abs(vy * cosine - vx * sine) > ALONG * np.hypot(vx, vy)):
         return position, velocity
     rho, speed = scene.incoming.pulley_radius + scene.particle.radius, scene.incoming.speed
     if not isinstance(scene.met(scene.kinds[0], "incoming")[1], str):
-        return _slip_round(scene, rho, velocity[0], -position[0])
-    # Adhesion lets go where cos φ1 = v²/(g ρ), at the top if that is 1 or more: Eq. (2).
+        return _slip_round(scene, rho, vx * cosine + vy * sine, 0.0 - (x * cosine + y * sine))
+    # Adhesion lets go where cos φ1 = v²/(g ρ), Eq. (2), or where the belt ends if that is more.
     ratio = np.divide(speed * speed, scene.gravity * rho)
-    grip = np.where(np.greater(speed, 0.0), np.minimum(ratio, 1.0), nan)
-    sine = np.sqrt((1.0 - grip) * (1.0 + grip))
-    return (rho * sine, rho * grip), (speed * grip, 0.0 - speed * sine)
+    grip = np.where(np.greater(speed, 0.0), np.minimum(ratio, cosine), nan)
+    side = np.where(grip < cosine, np.sqrt((1.0 - grip) * (1.0 + grip)), grip * 0.0 - sine)
+    return (rho * side, rho * grip), (speed * grip, 0.0 - speed * side)
 
 
 def _slip_round(scene: Scene, rho: Numbers, speed: Numbers, distance: Numbers) -> tuple[Pair, Pair]:
     """Go along belt and pulley with Coulomb friction."""
-    assert scene.incoming is not None
+    belt = scene.incoming
+    assert belt is not None
+    incline, (_, friction) = np.radians(belt.incline_deg), scene.met(scene.kinds[0], "incoming")
     given = (
-        rho, speed, distance, scene.gravity, scene.met(scene.kinds[0], "incoming")[1],
-        scene.incoming.speed,
+        rho, speed, distance, scene.gravity, friction, belt.speed, incline, belt.length,
     )  # fmt: skip
     shape = np.broadcast_shapes(*map(np.shape, given))
-    rho, speed, distance, gravity, friction, belt = (
+    rho, speed, distance, gravity, friction, pace, incline, length = (
         np.broadcast_to(values, shape).ravel() for values in given
     )
-    share = np.full(len(rho), DISK_SHARE if scene.particle.spin else 1.0)
-    w, z = _along_belt(speed, distance, friction * gravity, belt, share)
-    nothing = np.zeros(len(rho))
+    share = np.full(len(rho), rim_share(1.0, 1.0, scene.particle.moment))
+    start = 0.0 - incline
     circle = Circle(
-        phi=nothing, w=w, z=z, rho=rho, gravity=gravity, friction=friction, belt=belt,
-        slip=nothing, share=share, low=nothing - 1e-9, high=nothing + inf,
+        phi=start, w=speed, z=np.zeros(len(rho)), rho=rho, gravity=gravity, friction=friction,
+        belt=pace, slip=np.zeros(len(rho)), share=share, low=start - 1e-9, high=start + inf,
     )  # fmt: skip
-    slip = w + z - belt
+    w, z = _along_belt(circle, distance, length)
+    circle = replace(circle, w=w, z=z)
+    slip = w + z - pace
     circle = replace(circle, slip=np.where(slip == 0.0, grip_slip(circle), np.sign(slip)))
     phi, w = (values.reshape(shape) for values in _round_pulley(circle))
     rho, sine, cosine = rho.reshape(shape), np.sin(phi), np.cos(phi)
     return (rho * sine, rho * cosine), (w * cosine, -w * sine)
 
 
-def _along_belt(
-    w: Floats, distance: Floats, drag: Floats, belt: Floats, share: Floats
-) -> tuple[Floats, Floats]:
-    """Return speed and r ω at the top of the pulley after slipping along the belt, NaN if never."""
-    slip = w - belt
-    slips = (slip != 0.0) & (drag > 0.0)
-    pull = np.where(slip > 0.0, -drag, drag)
-    until_grip = np.where(slips, np.abs(slip) / np.where(slips, drag * (1.0 / share), 1.0), 0.0)
-    reach = descent(distance, -w, -pull)
-    reach = np.where(np.isfinite(reach), reach, inf)
-    t = np.minimum(until_grip, reach)
-    pace = np.where(slips, w + pull * t, w)
-    z = np.where(slips, (1.0 / share - 1.0) * pull * t, 0.0)
-    arrives = np.where(slips & (reach <= until_grip), True, pace > 0.0)
-    return np.where(arrives, pace, nan), z
+# A way that is never gone comes out as inf or NaN.
+@np.errstate(divide="ignore", invalid="ignore")
+def _along_belt(circle: Circle, distance: Floats, length: Floats) -> tuple[Floats, Floats]:
+    """Return speed and r ω where the belt meets the pulley, NaN if the particle never gets there.
+
+    It slides until it grips, is carried or rolls then, or slides the other way where the belt is
+    too steep for its friction.
+    """
+    w, z, lever = circle.w, circle.z, circle.lever
+    load, pull = circle.gravity * np.cos(circle.phi), circle.gravity * np.sin(circle.phi)
+    still = w + z == circle.belt
+    arrives, lost = np.zeros((2, len(w)), dtype=bool)
+    for _ in range(PHASES):
+        holds = still & (circle.share * np.abs(pull) <= circle.friction * load)
+        slides = np.where(still, np.sign(pull), np.sign(w + z - circle.belt))
+        force = np.where(holds, -circle.share * pull, -slides * circle.friction * load)
+        pace, twist = pull + force, lever * force
+        fades = ~still & (slides * (pace + twist) < 0.0)
+        rate = np.where(fades, np.abs(pace + twist), 1.0)
+        until_grip = np.where(fades, np.abs(w + z - circle.belt) / rate, inf)
+        reach, back = descent(distance, -w, -pace), descent(length - distance, w, pace)
+        reach, back = (np.where(when >= 0.0, when, inf) for when in (reach, back))
+        t = np.where(arrives | lost, 0.0, np.minimum(np.minimum(until_grip, reach), back))
+        lost |= ~arrives & ((back < np.minimum(reach, until_grip)) | np.isinf(t))
+        arrives |= ~lost & (reach <= until_grip)
+        t = np.where(np.isfinite(t), t, 0.0)
+        distance = distance - t * (w + 0.5 * pace * t)
+        w, z, still = w + pace * t, z + twist * t, still | fades
+    return np.where(arrives, w, nan), z
 
 
 def _round_pulley(circle: Circle) -> tuple[Floats, Floats]:

@@ -106,6 +106,24 @@ def load_on(s: State, index: Ints, obstacle: Ints, c: Contact) -> Floats:
     return load
 
 
+def pressed(s: State, index: Ints, obstacle: Ints, c: Contact) -> Bools:
+    """Tell which particles an obstacle bears: by a positive load, or one that is about to be.
+
+    Where a path round a circle gets steeper towards the weight, what hops along it lands in ever
+    shorter hops where the load is 0; by rounding that is never above 0.
+    """
+    load = load_on(s, index, obstacle, c)
+    bears = load > 0.0
+    if np.count_nonzero(bears) < len(index):
+        near = ~bears & (load >= -WEIGHTLESS * s.gravity[index])
+        near &= obstacle >= s.obstacles.segments
+        if np.count_nonzero(near):
+            rho = pick(s.obstacles.rho, index, np.maximum(obstacle - s.obstacles.segments, 0))
+            w = dot(s.v.take(index, axis=1), c.tangent)
+            bears |= near & (w * s.weight_along(index, c.normal) / rho < 0.0)
+    return bears
+
+
 def settle_law(s: State, index: Ints) -> None:
     """Choose between gripping and slipping, and end tracks that have settled.
 
@@ -274,13 +292,13 @@ def _after(
         on = index[held]
         under = s.contact(on)
         leaving = np.abs(dot(s.v.take(on, axis=1), under.normal)) > NEGLIGIBLE
-        held[held] = ~leaving & (load_on(s, on, s.on[on], under) > 0.0)
+        held[held] = ~leaving & pressed(s, on, s.on[on], under)
         slides = held & live
         _slide_past(s, index[slides], obstacle[slides], side[slides], rebound[slides])
         live &= ~held
     rests = live & (rebound <= REST)
     if np.count_nonzero(rests):
-        rests &= load_on(s, index, obstacle, c) > 0.0
+        rests &= pressed(s, index, obstacle, c)
         rest_on(s, index[rests], obstacle[rests], side[rests], rebound[rests])
         live &= ~rests
     if np.count_nonzero(live) < len(live):

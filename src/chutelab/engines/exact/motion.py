@@ -14,8 +14,8 @@ from chutelab.engines.exact.contacts import (
     end_roll,
     end_slip,
     face_force,
-    load_on,
     look_round,
+    pressed,
     rest_on,
     strike,
 )
@@ -36,7 +36,7 @@ def go_on(s: State, index: Ints, obstacle: Ints, side: Floats) -> None:
     o, left, face = s.obstacles, s.on[index], s.side[index]
     ends = obstacle == NONE
     obstacle, side = np.where(ends, left, obstacle), np.where(ends, face, side)
-    stays = ~ends & (load_on(s, index, obstacle, s.contact(index, obstacle, side)) > 0.0)
+    stays = ~ends & pressed(s, index, obstacle, s.contact(index, obstacle, side))
     off = ~stays
     s.part(index[off], o.surface[left[off]])
     # From a tangential joint it flies off what follows; from an end it leaves what ends.
@@ -128,7 +128,7 @@ def ride(s: State, index: Ints) -> None:
     if s.rolls:
         turn = s.surface_spin(index, circle)
         state = replace(state, rolling=s.rolling[index], roll=s.roll[index], turn=turn)
-    lifted = normal_force(state) <= 0.0
+    lifted = ~pressed(s, index, circle, c)
     stop = s.next_change(index)
     step = advance(state, stop - s.age[index])
     outcome = np.where(lifted, Outcome.LIFT, step.outcome)

@@ -221,13 +221,13 @@ class Lone:
         self.steps += 1
         return self.contacts
 
-    def _rolled(self, x: Vec2d, v: Vec2d, h: float) -> list[Contact]:
-        """Step in lasting contact, with the couple by which rolling friction opposes the spin.
+    def _rolled(self, x: Vec2d, v: Vec2d, h: float, g: Vec2d) -> list[Contact]:
+        """Step, with the couple by which rolling friction opposes the spin.
 
         Given before the step, friction bears it: as much as the pushes allow, or what stops the
         turning, which is found between none and that much.
         """
-        contacts = self._step(x, v, self.omega, h, self.pull)
+        contacts = self._step(x, v, self.omega, h, g)
         if not self.arm or not contacts:
             return contacts
         couple, spin, moment = 0.0, contacts[0].face.spin, self.body.moment
@@ -241,7 +241,7 @@ class Lone:
                 couple = -copysign(self.arm * sum(c.push for c in contacts), after)
             else:
                 break
-            contacts = self._step(x, v, self.omega + couple / moment, h, self.pull)
+            contacts = self._step(x, v, self.omega + couple / moment, h, g)
             ends.append((couple, self.body.angular_velocity - spin))
         pushes = sum(contact.push for contact in contacts)
         return [c._replace(couple=couple * c.push / pushes) for c in contacts]
@@ -316,10 +316,8 @@ class Lone:
         self.restitution = {struck: self._rebound(struck, normal)}
         if self.blows > TURNS:
             self.restitution = {face: self._rebound(face, n) for face, n in touching.items()}
-        pushed = self._step(self.x, self.v, self.omega, INSTANT, Vec2d(0, 0))
+        pushed = self._rolled(self.x, self.v, INSTANT, Vec2d(0, 0))
         self.v, self.omega = self.body.velocity, self.body.angular_velocity
-        if self.arm:
-            pushed = self._braked(pushed, before[1])
         for contact in pushed:
             self._book(contact, before)
             lands = contact.face.surface == self.machine.landing and not self.landed
@@ -337,17 +335,6 @@ class Lone:
                 f"{WINDOW} blows in no time: it is driven to and fro in a narrow place; move"
                 " the surfaces there apart, or lower their restitution",
             )  # fmt: skip
-
-    def _braked(self, pushed: list[Contact], omega: float) -> list[Contact]:
-        """Give blows their rolling friction, which stops the turning there was, at most."""
-        braked = []
-        for contact in pushed:
-            turning = self.body.moment * (omega - contact.face.spin)
-            couple = -copysign(min(self.arm * contact.push, abs(turning)), turning)
-            omega += couple / self.body.moment
-            self.omega += couple / self.body.moment
-            braked.append(contact._replace(couple=couple))
-        return braked
 
     def _rebound(self, face: Face, normal: Vec2d) -> float:
         """Return ε, or 0 where a rebound would be too slow or too low."""
@@ -434,11 +421,11 @@ class Lone:
             # In a hollow, what it moved into the surface by from the start is no bend of the way.
             bends = into > 0.0 or (into < before and face.hollow(middle) > 0.0)
             self.restitution[face] = 1.0 - max(before / into, 0.0) if bends else 0.0
-        contacts = self._rolled(middle - h * self.v, self.v, h)
+        contacts = self._rolled(middle - h * self.v, self.v, h, self.pull)
         if abs(self.v.dot(normal)) > SEAM * (1.0 + self.v.length):
             turn = (self.body.velocity.length / self.v.length) ** 2
             self.restitution = {face: turn * one for face, one in self.restitution.items()}
-            contacts = self._rolled(middle - h * self.v, self.v, h)
+            contacts = self._rolled(middle - h * self.v, self.v, h, self.pull)
         v, omega = self.body.velocity, self.body.angular_velocity
         x = middle + 0.5 * h * v
         for contact in contacts:

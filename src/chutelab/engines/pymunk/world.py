@@ -318,8 +318,8 @@ class World:
         circle.cache_bb()
         base = pymunk.Body(body_type=pymunk.Body.KINEMATIC)
         foot = pymunk.Circle(base, 0.0)
+        about["spin"] = -about["speed"] / radius
         if whole:
-            about["spin"] = -about["speed"] / radius
             self._add(Bend(circle, tangent=None, foot=foot, begin=0.0, extent=inf, **about))
             return
         more = sqrt(2.0 * JOINT * self.hair / radius)

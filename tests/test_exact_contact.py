@@ -1,0 +1,80 @@
+"""The event-driven engine and the contact engine tell the same of random machines of all parts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+import pytest
+
+from chutelab.engines import contact, exact
+from chutelab.results import Kind
+from chutelab.results.ledger import ledger
+from machines import bent, face, of_sizes, scene_of, thrown
+
+COUNT = 6
+
+
+def machine(seed):
+    """Disks and spheres of three kinds over arcs, pegs, ramps and gates, none of which meet."""
+    draw = np.random.default_rng(seed)
+
+    def values():
+        return {"speed": draw.choice([0.0, 1.0, -2.0]), "restitution": 0.0, "friction": 0.0}
+
+    arcs = []
+    for n in range(draw.integers(2, 5)):
+        extent = 2.0 * pi if n % 2 else draw.uniform(0.8, 5.5)
+        arcs.append({
+            "center": draw.uniform(-1.0, 1.0, 2) - [0.0, 1.0], "radius": draw.uniform(0.1, 0.6),
+            "begin": draw.uniform(-pi, pi), "extent": extent, **values(),
+        })  # fmt: skip
+    if seed % 3 == 0:
+        arcs[0]["appears" if seed % 2 else "vanishes"] = draw.uniform(0.4, 0.9)
+    ramps = [
+        face(f"ramp{n}", *draw.uniform(-1.5, 1.5, (2, 2)).tolist(), **values()) for n in range(2)
+    ]
+    built = bent(scene_of(surface=ramps, stream={"at": [0.0, 5.0]}, run={"until": 1.2}), *arcs)
+    built = replace(
+        thrown(built, draw.uniform([-1.0, 1.8], [1.0, 2.6], (COUNT, 2))), interact=False
+    )
+    pairs = [
+        {"restitution": draw.uniform(0.4, 0.9, (3, n)), "friction": draw.uniform(0.0, 0.6, (3, n))}
+        for n in (len(built.segments.length), len(arcs))
+    ]
+    built = of_sizes(
+        built, draw.uniform(0.01, 0.06, COUNT), draw.uniform(0.05, 0.2, COUNT),
+        draw.choice([0.0, 0.4, 0.5], COUNT), np.arange(COUNT) % 3,
+        rolling=draw.uniform(0.0, 0.2, 3) * (seed % 2),
+    )  # fmt: skip
+    # Tables of pairs of particles, which do not matter here, are as many as there are kinds.
+    table = np.zeros((3, 3))
+    built = replace(built, pair_restitution=table, pair_friction=table, outlines=(None,) * 3)
+    return replace(
+        built,
+        segments=replace(built.segments, **pairs[0]),
+        arcs=replace(built.arcs, **pairs[1]),
+    )
+
+
+def blows(run, particle):
+    """Return the impacts of a particle up to the first slow or grazing one."""
+    hits = run.select(Kind.IMPACT)
+    hits = hits[hits["particle"] == particle]
+    push = hits["normal_impulse"] / run.machine.particle.mass[particle]
+    slow = np.flatnonzero(push < 0.5)
+    return hits[: slow[0]] if len(slow) else hits
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_blow_by_blow(seed):
+    built = machine(seed)
+    one, other = exact.run(built), contact.run(built)
+    assert ledger(one).relative_residual < 1e-12
+    for n in range(COUNT):
+        a, b = blows(one, n), blows(other, n)
+        shared = min(len(a), len(b), 4)
+        for name in ("t", "position", "velocity_after", "omega_after"):
+            np.testing.assert_allclose(a[name][:shared], b[name][:shared], rtol=1e-9, atol=1e-9)
+        assert abs(len(a) - len(b)) <= 1 or shared == 4

@@ -64,9 +64,9 @@ def _slip_round(scene: Scene, rho: Numbers, speed: Numbers, distance: Numbers) -
     """Go along belt and pulley with Coulomb friction."""
     belt = scene.incoming
     assert belt is not None
-    incline, (_, friction) = np.radians(belt.incline_deg), scene.met(scene.kinds[0], "incoming")
     given = (
-        rho, speed, distance, scene.gravity, friction, belt.speed, incline, belt.length,
+        rho, speed, distance, scene.gravity, scene.met(scene.kinds[0], "incoming")[1], belt.speed,
+        np.radians(belt.incline_deg), belt.length,
     )  # fmt: skip
     shape = np.broadcast_shapes(*map(np.shape, given))
     rho, speed, distance, gravity, friction, pace, incline, length = (

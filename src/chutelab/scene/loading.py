@@ -131,7 +131,7 @@ _SIGNS: Final = {"minimum": ">=", "exclusiveMinimum": ">", "maximum": "<=", "exc
 def faults_of(error: ValidationError, document: Mapping[str, Any]) -> list[Fault]:
     """Say every error of a validation in words, one fault a key, in the order of the models' keys.
 
-    Conflicts between keys are left out: `chutelab.scene.conflicts` finds them, also in a scene whose
+    Conflicts between keys are left out: `scene.conflicts` finds them, also in a scene whose
     validation never came to them.
     """
     faults: dict[Location, Fault] = {}

@@ -700,6 +700,30 @@ def test_a_gate_is_seen_while_it_is_there() -> None:
     ]
 
 
+def test_the_scale_stands_where_no_name_is() -> None:
+    recording = falling()
+    layout = laid_out(recording)
+    shown = Window(-0.6, 0.6, -0.1, 0.6).fitted(layout.window.width / layout.window.height)
+    corner = (shown.left, shown.top)
+    for wall in [
+        Line("ceiling", corner, (shown.left + 0.3, shown.top)),
+        Line("wall", corner, (shown.left + 0.2, shown.top - 0.2)),
+    ]:
+        recording = falling(wall)
+        stage = stage_of(recording, moments_at([0.5]), layout=replace(layout, window=shown))
+        (bar,) = [one for one in stage.view.lines if one.get_gid() == "scale"]
+        (text,) = [one for one in stage.view.texts if one.get_text().endswith(" m")]
+        box = text.get_window_extent()
+        others = [one.get_window_extent() for one in stage.view.texts if one is not text]
+        assert not box.count_overlaps(others)
+        for line in (one for one in stage.view.lines if str(one.get_gid()).startswith("surface")):
+            path = line.get_path().transformed(line.get_transform())
+            assert not path.intersects_bbox(box, filled=False)
+        (x0, x1), middle = bar.get_xdata(), text.get_position()[0]  # type: ignore[misc]
+        assert float(text.get_text().removesuffix(" m")) == pytest.approx(x1 - x0, rel=1e-9)
+        assert middle == pytest.approx(0.5 * (x0 + x1))
+
+
 def test_streams_have_colours_and_names_of_their_own() -> None:
     spots = [(0.1 * i - 0.4, 0.3) for i in range(6)]
     names = ("coarse", "fine ones")

@@ -10,9 +10,11 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from chutelab.engines import exact
+from chutelab.engines.simulation import simulate
 from chutelab.machine.nominal import discharge
 from chutelab.results import REASONS, Kind
 from chutelab.results.ledger import ledger
+from chutelab.scene import SceneError, from_dict
 from machines import bent, face, gated, of_sizes, scene_of, thrown
 
 G, WHEEL, RADIUS = 9.81, 0.3, 0.02
@@ -215,6 +217,17 @@ def test_points_beside_disks_are_refused():
     mixed = of_sizes(replace(built, interact=False), np.array([0.0, 0.1]), 0.1)
     with pytest.raises(ValueError, match="points beside disks"):
         exact.run(mixed)
+
+
+def test_a_scene_with_points_beside_disks_is_refused_by_its_key():
+    kinds = [{"name": "a", "radius": 0.0}, {"name": "b", "radius": 0.01}]
+    streams = [
+        {"particle": "a", "at": [0.0, 1.0], "velocity": [0.0, 0.0]},
+        {"name": "two", "particle": "b", "at": [0.3, 1.0], "velocity": [0.0, 0.0]},
+    ]
+    tables = {"particle": kinds, "surface": [FAR], "stream": streams, "run": {"until": 1.0}}
+    with pytest.raises(SceneError, match=r"particle\.radius = 0\.0: .*points beside disks"):
+        simulate(from_dict(tables))
 
 
 def test_of_a_mixture_each_does_what_it_does_alone():

@@ -113,6 +113,10 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
         if machine.interact:
             allowed = "contact or pymunk, because stream.interact = true"
             raise _refused(scene, "run.engine", "exact", allowed)
+        points = np.equal(machine.particle.radius, 0.0)
+        if np.any(points) and not np.all(points):
+            allowed = "more than 0, or 0 of all kinds: no engine has points beside disks"
+            raise _refused(scene, "particle.radius", 0.0, allowed)
         from chutelab.engines.exact import CornerError, run
 
         try:

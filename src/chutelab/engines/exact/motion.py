@@ -240,21 +240,23 @@ def carry(s: State, index: Ints) -> None:
             return
     motion = _motion(s, index, AT_REST)
     motion.never = s.obstacles.under_belt
-    before, up_belt = motion.position, rows_of(s.up_belt, index)
-    v, stops = dot(motion.velocity, up_belt), s.stop[index] - s.age[index]
-    ends = -dot(before, up_belt) / v
+    before, v, way = motion.position, motion.velocity[0], motion.position[0]
+    stops = s.stop[index] - s.age[index]
+    if s.tilted:
+        up_belt = rows_of(s.up_belt, index)
+        v, way = dot(motion.velocity, up_belt), dot(before, up_belt)
+    ends = -way / v
     ends[~(v > 0.0)] = np.inf
     dt, hits, obstacle, side = _next(s, motion, np.minimum(ends, stops))
     _move(s, motion, dt)
-    tilted = np.count_nonzero(up_belt[1]) > 0
-    if tilted:
+    if s.tilted:
         lifted = s.mass[index] * s.gravity[index] * (s.p[1, index] - before[1])
         s.book(index, s.obstacles.surface[np.zeros(len(index), dtype=np.int64)], lifted)
     s.knots(index)
     free = ~hits
     _stop(s, index[free & (stops < ends)])
     onto = free & (ends <= stops)
-    start = np.arctan2(-up_belt[1], up_belt[0]) if tilted else np.zeros(len(index))
+    start = np.arctan2(-up_belt[1], up_belt[0]) if s.tilted else np.zeros(len(index))
     carry_round(s, index[onto], start[onto], v[onto])
     _strike(s, index, hits, obstacle, side)
 

@@ -278,10 +278,13 @@ def obstacles(machine: Machine, far: float = 0.0) -> Obstacles:
     touch = touch_of(size, far)
     near = JOINT * size
     spots = spots_of(corners[..., 0], near[0].item())
-    came = np.concatenate([seg.appears, machine.arcs.appears])
-    went = np.concatenate([seg.vanishes, machine.arcs.vanishes])
-    times = np.concatenate([came, went])
-    changes = np.unique(times[np.isfinite(times)]) if np.isfinite(times).any() else NEVER
+    came, went, changes = seg.appears, seg.vanishes, NEVER
+    if len(bends.order):
+        came = np.concatenate([came, machine.arcs.appears])
+        went = np.concatenate([went, machine.arcs.vanishes])
+    if np.count_nonzero(np.isinf(came)) + np.count_nonzero(np.isinf(went)) < 2 * len(came):
+        times = np.concatenate([came, went])
+        changes = np.unique(times[np.isfinite(times)])
     seen: dict[tuple[object, ...], int] = {}
     for s, pair in enumerate(spots[: len(length)]):
         # A gate that shuts again is there twice, at different times.
@@ -393,10 +396,12 @@ def obstacles(machine: Machine, far: float = 0.0) -> Obstacles:
 
 def joined(parts: Sequence[Floats], axis: int) -> Floats:
     """Join arrays along an axis; along the last one, one column stands for all."""
-    most = max([part.shape[-1] for part in parts])
-    if most > 1:
-        parts = [part if part.shape[-1] == most else part.repeat(most, axis=-1) for part in parts]
-    return np.concatenate(parts, axis)
+    try:
+        return np.concatenate(parts, axis)
+    except ValueError:
+        most = max(part.shape[-1] for part in parts)
+        alike = [part if part.shape[-1] == most else part.repeat(most, axis=-1) for part in parts]
+        return np.concatenate(alike, axis)
 
 
 def _of_kind(machine: Machine, values: Numbers) -> Floats:

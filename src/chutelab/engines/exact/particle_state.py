@@ -134,6 +134,8 @@ class State:
         self.staggered = np.count_nonzero(self.released) > 0
         self.stop = self.each(machine.end_time) - self.released  # age at which the run is over
         self.everyone = np.arange(count)
+        # Whether the incoming belt rises or falls.
+        self.tilted = machine.pulley is not None and np.count_nonzero(machine.pulley.incline) > 0
         # Ages at which gates open or shut, (T, k).
         self.changes = self.obstacles.changes[:, None] - self.released
 

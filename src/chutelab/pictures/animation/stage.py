@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
+from matplotlib.transforms import Bbox
 from PIL import Image, ImageDraw
 
 from chutelab.pictures.animation.actors import (
@@ -340,11 +341,24 @@ def pace_words(slow: float) -> str:
 
 
 def _draw_scale(ax: Axes) -> None:
-    """Draw a bar of round length in the upper left corner: the picture has no ticks."""
+    """Draw a bar of round length in a corner where no name is: the picture has no ticks."""
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
     length = round_step(right - left, 6)
-    x, y = left + 0.015 * (right - left), top - 0.08 * (top - bottom)
-    ax.plot([x, x + length], [y, y], color=style.MUTED, linewidth=2.0, solid_capstyle="butt")
-    middle = x + 0.5 * length, y + 0.012 * (top - bottom)
-    said = ax.text(*middle, f"{length:g} m", ha="center", va="bottom")
+    taken = [text.get_window_extent().padded(2.0) for text in ax.texts]
+    lines = [line.get_path().transformed(line.get_transform()) for line in ax.lines]
+    (bar,) = ax.plot([], [], color=style.MUTED, linewidth=2.0, solid_capstyle="butt", gid="scale")
+    said = ax.text(0.0, 0.0, f"{length:g} m", ha="center", va="bottom")
     said.set(fontsize=style.SMALL, color=style.MUTED)
+    edge = 0.015 * (right - left)
+    corners: list[tuple[int, int, float, float]] = []
+    for y in (top - 0.08 * (top - bottom), bottom + 0.03 * (top - bottom)):
+        for x in (left + edge, right - edge - length):
+            said.set_position((x + 0.5 * length, y + 0.012 * (top - bottom)))
+            ends = ax.transData.transform([(x, y), (x + length, y)])
+            box = Bbox.union([said.get_window_extent(), Bbox(ends)])
+            crossed = sum(line.intersects_bbox(box, filled=False) for line in lines)
+            hides = int(100 * box.count_overlaps(taken) + crossed)
+            corners.append((hides, len(corners), x, y))
+    _, _, x, y = min(corners)
+    bar.set_data([x, x + length], [y, y])
+    said.set_position((x + 0.5 * length, y + 0.012 * (top - bottom)))

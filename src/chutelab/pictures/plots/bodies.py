@@ -54,13 +54,15 @@ LONGEST = 20
 
 
 def stream_handles(machine: Machine) -> list[Line2D]:
-    """Return what a legend needs to name the streams."""
+    """Return what a legend needs to name the streams, unless it is particle 0 alone."""
     colours = stream_colours(len(machine.streams))
+    sizes = np.bincount(machine.releases.stream, minlength=len(colours))
     return [
         Line2D(
             [], [], ls="none", marker="o", ms=6.0, color=color, label=style.plain(name[:LONGEST])
         )
-        for name, color in zip(machine.streams, colours, strict=True)
+        for i, (name, color) in enumerate(zip(machine.streams, colours, strict=True))
+        if i or sizes[0] > 1
     ]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from functools import cache
 from math import acos, atan2, cos, degrees, hypot, isnan, nan, radians, sin, sqrt
@@ -411,3 +412,25 @@ def test_a_finding_without_number_keeps_no_promise():
     assert replace(row, error=row.tolerance).holds
     assert not replace(row, error=nan).holds
     assert replace(row, error=nan, tolerance=None).holds
+
+
+def test_a_quantity_may_be_of_one_stream():
+    drops = {"count": 3, "rate": 1.0, "velocity": [0.0, 0.0]}
+    floor = {"name": "floor", "from": [-9, 0], "to": [9, 0], "restitution": 0.0}
+    document = {
+        "stream": [{"at": [1.0, 1.0], **drops}, {"name": "far", "at": [4.0, 2.0], **drops}],
+        "surface": [floor],
+    }
+    recording = simulate(sc.from_dict(document))
+    assert measure(recording, "ended.x.mean") == pytest.approx(2.5, rel=1e-12, abs=0.0)
+    assert measure(recording, "by_stream.stream.ended.x.mean") == 1.0
+    assert measure(recording, "by_stream.far.ended.x.mean") == 4.0
+    assert measure(recording, "by_stream.far.impact.floor.count") == 3.0
+    # Fallen from rest: v = sqrt(2 g h).
+    fallen = sqrt(2.0 * 9.81 * (2.0 - 0.0063))
+    vy = measure(recording, "by_stream.far.impact.floor.vy.min")
+    assert vy == pytest.approx(-fallen, rel=1e-12, abs=0.0)
+    for name in ("by_stream.near.ended.x.mean", "by_stream.far.x2", "by_stream.far.ended.x"):
+        expect = {"quantity": name, "value": 1.0, "tolerance": 0.1, "source": "nobody"}
+        with pytest.raises(sc.SceneError, match=re.escape(f'expect[0].quantity = "{name}"')):
+            sc.from_dict({**document, "expect": [expect]})

@@ -300,7 +300,8 @@ def verify(scene: Scene, progress: Callable[[float], None] | None = None) -> Ver
     prediction = predict(scene)
     findings: list[Finding] = []
     for expect in scene.expect:
-        quantity, unit = expect.quantity, unit_of(expect.quantity, scene.surfaces)
+        quantity, names = expect.quantity, [str(stream.name) for stream in scene.streams]
+        unit = unit_of(quantity, scene.surfaces, names)
         assert unit is not None
         predicted = nan
         if quantity in SYMBOLS:

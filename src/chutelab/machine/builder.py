@@ -23,7 +23,7 @@ from chutelab.machine.nominal import plate_hit
 from chutelab.machine.parts import Arcs, Caution, Machine, Particle, Pulley, Segments, Thread
 from chutelab.machine.releases import Releases, draw, up_belt
 from chutelab.scene import Conveyor, Fault, Plate, Scene, SceneError, Surface
-from chutelab.scene.rules import ON_BELT
+from chutelab.scene.conflicts import ON_BELT
 from chutelab.scene.units import polygon_moment
 from chutelab.util.arrays import Bools, Floats, Ints, Numbers
 

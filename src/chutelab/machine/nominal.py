@@ -51,7 +51,7 @@ def discharge(scene: Scene) -> tuple[Pair, Pair]:
     if np.any(np.abs(vy * cosine - vx * sine) > ALONG * np.hypot(vx, vy)):
         return position, velocity
     rho, speed = scene.incoming.pulley_radius + scene.particle.radius, scene.incoming.speed
-    if not isinstance(scene.incoming.friction, str):
+    if not isinstance(scene.met(scene.kinds[0], "incoming")[1], str):
         return _slip_round(scene, rho, vx * cosine + vy * sine, 0.0 - (x * cosine + y * sine))
     # Adhesion lets go where cos φ1 = v²/(g ρ), Eq. (2), or where the belt ends if that is more.
     ratio = np.divide(speed * speed, scene.gravity * rho)
@@ -64,9 +64,9 @@ def _slip_round(scene: Scene, rho: Numbers, speed: Numbers, distance: Numbers) -
     """Go along belt and pulley with Coulomb friction."""
     belt = scene.incoming
     assert belt is not None
-    incline = np.radians(belt.incline_deg)
     given = (
-        rho, speed, distance, scene.gravity, belt.friction, belt.speed, incline, belt.length,
+        rho, speed, distance, scene.gravity, scene.met(scene.kinds[0], "incoming")[1], belt.speed,
+        np.radians(belt.incline_deg), belt.length,
     )  # fmt: skip
     shape = np.broadcast_shapes(*map(np.shape, given))
     rho, speed, distance, gravity, friction, pace, incline, length = (

@@ -9,7 +9,7 @@ from math import acos, degrees, floor, inf, prod, sqrt
 import numpy as np
 
 from chutelab.scene import Fault, Scene, SceneError, Stream
-from chutelab.scene.rules import beside
+from chutelab.scene.conflicts import beside
 from chutelab.util.arrays import Bools, Floats, Ints, Numbers
 from chutelab.util.tables import number
 

@@ -97,6 +97,10 @@ def each(recording: Recording, name: str) -> Floats:
     match name.split("."):
         case ["ended", "t"]:
             return end_times(recording)
+        case ["ended", "x" | "y" as axis]:
+            places = np.full(recording.count, nan)
+            places[recording.released] = recording.ends()[1]["position"][:, "xy".index(axis)]
+            return places
         case ["ledger", entry]:
             values = np.full(recording.count, nan)
             values[recording.released] = recording.ends()[1]["entries"][:, ENTRIES.index(entry)]
@@ -118,14 +122,19 @@ def measure(recording: Recording, name: str) -> float:
     """Return a quantity of a recording, in the unit its name has; NaN if it did not happen.
 
     Names are such as ``x2``, ``landing.x.mean`` or ``ledger.by_surface.plate.restitution_loss``.
-    One without statistic is particle 0's; ``spread`` is the standard deviation.
+    One without statistic is particle 0's; ``spread`` is the standard deviation. After
+    ``by_stream.NAME.`` it is that of the particles of one stream.
 
     Raises
     ------
     KeyError
         If there is no quantity of that name.
     """
-    match name.split("."):
+    parts, whose = name.split("."), np.ones(recording.count, dtype=bool)
+    if parts[0] == "by_stream":
+        stream = recording.machine.streams.index(parts[1])
+        parts, whose = parts[2:], recording.machine.releases.stream == stream
+    match parts:
         case ["contacts"]:
             return float(recording.contacts)
         case ["ended", reason] if reason in REASONS:
@@ -137,9 +146,9 @@ def measure(recording: Recording, name: str) -> float:
         case ["ledger", entry]:
             return float(getattr(ledger(recording), entry))
         case [*event, "count"]:
-            return float(np.isfinite(each(recording, ".".join([*event, "t"]))).sum())
+            return float(np.isfinite(each(recording, ".".join([*event, "t"]))[whose]).sum())
         case [*quantity, statistic] if statistic in _STATISTICS:
-            values = each(recording, ".".join(quantity))
+            values = each(recording, ".".join(quantity))[whose]
             values = values[np.isfinite(values)]
             return float(_STATISTICS[statistic](values)) if len(values) else nan
     return float(each(recording, name)[0])

@@ -2,7 +2,8 @@
 
 - `units`: sizes with their units, and what a key may hold: strict types and ranges.
 - `materials`: ``[[material]]``, and presets with their spread and sources.
-- `rules`: conflicts between keys and between tables; ``[[expect]]``.
+- `rules`: ``[[expect]]``, and the names of a run's quantities.
+- `conflicts`: what no single key can answer for.
 - `tables`: the tables of a scene as frozen Pydantic models, with the defaults.
 - `schema`: `Scene`, all tables together, and what follows from one for another.
 - `overrides`: keys by their full path: JSON Schema, limits, ``KEY=VALUE`` texts.

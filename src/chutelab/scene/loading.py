@@ -17,8 +17,8 @@ from typing import Any, Final
 import tomli_w
 from pydantic import ValidationError
 
+from chutelab.scene.conflicts import EITHER, ConflictError, Look, conflicts
 from chutelab.scene.overrides import Override, apply, at_path, joined, rule_at
-from chutelab.scene.rules import EITHER, ConflictError, Look, conflicts
 from chutelab.scene.schema import Scene, as_written
 from chutelab.util.errors import MISSING, Fault, InputError, cut, did_you_mean, printable
 from chutelab.util.files import first_bytes
@@ -131,7 +131,7 @@ _SIGNS: Final = {"minimum": ">=", "exclusiveMinimum": ">", "maximum": "<=", "exc
 def faults_of(error: ValidationError, document: Mapping[str, Any]) -> list[Fault]:
     """Say every error of a validation in words, one fault a key, in the order of the models' keys.
 
-    Conflicts between keys are left out: `chutelab.scene.rules` finds them, also in a scene whose
+    Conflicts between keys are left out: `scene.conflicts` finds them, also in a scene whose
     validation never came to them.
     """
     faults: dict[Location, Fault] = {}

@@ -19,7 +19,7 @@ from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
-from chutelab.scene.rules import EITHER
+from chutelab.scene.conflicts import EITHER
 from chutelab.scene.schema import Scene, as_written
 from chutelab.util.errors import MISSING, Fault, InputError, printable
 

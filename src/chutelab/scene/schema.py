@@ -8,8 +8,9 @@ from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
+from chutelab.scene.conflicts import EITHER, ConflictError, Look, conflicts, stream_name
 from chutelab.scene.materials import PRESETS, Material
-from chutelab.scene.rules import EITHER, ConflictError, Expect, Look, conflicts
+from chutelab.scene.rules import Expect
 from chutelab.scene.tables import (
     Conveyor,
     Incoming,
@@ -54,8 +55,8 @@ def _several(default: Any, **limits: Any) -> Any:
 class Scene(Table):
     """A validated scene, all defaults filled in that need no geometry.
 
-    Of tables of which there may be one or several, `particles`, `plates` and `streams` are all, and
-    `particle`, `plate` and `stream` the first ones; of plates that at a distance from the pulley.
+    Of tables of which there may be one or several, `particles`, `plates` and `streams` are all;
+    `stream` is the first, `particle` its kind, and `plate` the one at a distance from the pulley.
 
     Raises
     ------
@@ -108,8 +109,8 @@ class Scene(Table):
 
     @property
     def particle(self) -> Particle:
-        """The first kind of particles."""
-        return self.particles[0]
+        """The kind of particles of the first stream."""
+        return self.particles[self.kinds[0]]
 
     @property
     def plate(self) -> Plate | None:
@@ -327,7 +328,7 @@ class Scene(Table):
             return stream
         filled = stream.model_copy()
         if stream.name is None:
-            filled._fill("name", f"stream{number + 1}" if number else "stream")
+            filled._fill("name", stream_name(number))
         if isinstance(typed, str):
             filled._fill("rate", typed)
             mass = self.particles[kind].mean_mass

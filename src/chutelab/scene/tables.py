@@ -9,7 +9,7 @@ from typing import Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
-from chutelab.scene.rules import ConflictError, surface_conflicts
+from chutelab.scene.conflicts import ConflictError, surface_conflicts
 from chutelab.scene.units import (
     MOST_PARTICLES,
     Amount,

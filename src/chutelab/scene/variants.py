@@ -13,6 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from chutelab.scene.conflicts import EITHER, Look, conflicts
 from chutelab.scene.loading import SceneError, from_dict, plain, to_dict
 from chutelab.scene.overrides import (
     Override,
@@ -23,7 +24,6 @@ from chutelab.scene.overrides import (
     parts_of,
     rule_at,
 )
-from chutelab.scene.rules import EITHER, Look, conflicts
 from chutelab.scene.schema import Scene, plain_number
 from chutelab.scene.units import SIZE, read_size
 from chutelab.util.arrays import Bools, Floats

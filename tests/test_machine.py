@@ -274,3 +274,204 @@ def test_the_engine_takes_the_nominal_particle_the_same_way(name):
     assert left["position"] == pytest.approx(position, abs=1e-14)
     assert left["velocity_after"] == pytest.approx(velocity, abs=1e-14)
     assert hit["position"] == pytest.approx(nominal.plate_hit(loaded), abs=1e-14)
+
+
+def test_a_box_may_stand_on_a_floor_from_the_beginning():
+    def standing(height):
+        return machine.build(scene.from_dict({
+            "particle": {"shape": "box", "size": [0.02, 0.1], "mass": 0.1, "spin": True},
+            "surface": [{"name": "floor", "from": [-1.0, 0.0], "to": [1.0, 0.0]}],
+            "stream": {"at": [0.0, height], "velocity": [0.0, 0.0]},
+        }))  # fmt: skip
+
+    assert standing(0.05).releases.position.tolist() == [[0.0, 0.05]]
+    # I = m (w² + h²) / 12
+    inertia = 0.1 * (0.02**2 + 0.1**2) / 12.0
+    assert standing(0.05).particle.inertia == pytest.approx(inertia, rel=1e-14, abs=0.0)
+    with pytest.raises(scene.SceneError, match=r"at least 0\.05 m from floor"):
+        standing(0.049)
+
+
+def falling(**tables):
+    """Return a machine of particles that fall past a few surfaces."""
+    dropped = {"at": [0.0, 1.0], "velocity": [0.0, 0.0]}
+    return machine.build(scene.from_dict({"stream": dropped, **tables}))
+
+
+def test_a_gate_that_opens_and_closes_again_is_two_pieces():
+    line = {"from": [0.0, 0.0], "to": [1.0, 0.0]}
+    found = falling(surface=[
+        {"name": "always", **line},
+        {"name": "opens", **line, "opens_at": 1.0},
+        {"name": "closes", **line, "closes_at": 1.0},
+        {"name": "shut-between", **line, "closes_at": 1.0, "opens_at": 2.0},
+        {"name": "open-between", **line, "opens_at": 1.0, "closes_at": 2.0},
+    ])  # fmt: skip
+    there = {
+        name: [
+            (found.segments.appears[k], found.segments.vanishes[k])
+            for k in np.flatnonzero(found.segments.surface == n)
+        ]
+        for n, name in enumerate(found.surfaces)
+    }
+    assert there == {
+        "always": [(-inf, inf)],
+        "opens": [(-inf, 1.0)],
+        "closes": [(1.0, inf)],
+        "shut-between": [(1.0, 2.0)],
+        "open-between": [(-inf, 1.0), (2.0, inf)],
+    }
+
+
+def test_copies_are_rows_of_rows_of_one_surface():
+    pegs = {
+        "name": "pegs",
+        "center": [1.0, 2.0],
+        "radius": 0.1,
+        "repeat": [[3, 0.5, 0.0], [2, 0.25, -1.0]],
+    }
+    found = falling(surface=[pegs])
+    assert found.surfaces == ("pegs",)
+    assert found.arcs.center.tolist() == [
+        [1.0, 2.0], [1.5, 2.0], [2.0, 2.0], [1.25, 1.0], [1.75, 1.0], [2.25, 1.0]
+    ]  # fmt: skip
+    assert found.arcs.whole.all()
+
+
+@pytest.mark.parametrize(("first", "last", "clockwise"), [(0.0, 90.0, -1.0), (90.0, 0.0, 1.0)])
+def test_an_arc_runs_from_its_first_angle_to_its_last(first, last, clockwise):
+    arc = {"name": "arc", "center": [0.0, 0.0], "radius": 0.5, "from_deg": first, "to_deg": last}
+    arcs = falling(surface=[{**arc, "speed": 2.0}]).arcs
+    assert arcs.begin.tolist() == [0.0]
+    assert arcs.extent.tolist() == [radians(90.0)]
+    assert arcs.speed.tolist() == [2.0 * clockwise]
+    begin, end = arcs.ends
+    assert begin == pytest.approx(np.array([[0.5, 0.0]]), rel=0.0, abs=1e-16)
+    assert end == pytest.approx(np.array([[0.0, 0.5]]), rel=0.0, abs=1e-16)
+
+
+@pytest.mark.parametrize("to", [(3.0, 1.0), (-1.0, 0.5)])
+def test_a_conveyor_runs_forward_on_top_and_back_below(to):
+    belt = {"name": "belt", "from": [1.0, 0.0], "to": list(to), "pulley_radius": 0.2, "speed": 3.0}
+    found = falling(conveyor=[belt])
+    way = np.subtract(to, (1.0, 0.0)) / hypot(to[0] - 1.0, to[1])
+    start, end, tangent = found.segments.start, found.segments.end, found.segments.tangent
+    # The top is above the axes, by the radius, and runs from the one to the other.
+    top = np.array([-way[1], way[0]]) * (1.0 if way[0] > 0.0 else -1.0)
+    assert top[1] > 0.0
+    assert start[0] == pytest.approx(np.array([1.0, 0.0]) + 0.2 * top, rel=1e-14)
+    assert end[1] == pytest.approx(np.array([1.0, 0.0]) - 0.2 * top, rel=1e-14)
+    assert tangent[0] == pytest.approx(way, rel=1e-14)
+    assert tangent[1] == pytest.approx(-way, rel=1e-14)
+    assert found.segments.speed.tolist() == [3.0, 3.0]
+    assert found.arcs.center.tolist() == [[1.0, 0.0], list(to)]
+    assert found.arcs.speed.tolist() == [3.0 if way[0] > 0.0 else -3.0] * 2
+
+
+def test_an_inclined_belt_ends_where_the_pulley_is_tangential():
+    beta = radians(20.0)
+    found = machine.build(scene.load("perpendicular", ["incoming.incline_deg=20"]))
+    up, out = np.array([cos(beta), sin(beta)]), np.array([-sin(beta), cos(beta)])
+    assert found.segments.end[0] == pytest.approx(0.1 * out, rel=1e-14)
+    assert found.segments.start[0] == pytest.approx(0.1 * out - up, rel=1e-14)
+    assert found.releases.position[0] == pytest.approx((0.1 + 0.0063) * out - up, rel=1e-14)
+    assert found.releases.velocity[0] == pytest.approx(2.0 * up, rel=1e-14)
+
+
+MIXTURE = {
+    "particle": [
+        {"name": "small", "radius": [0.002, 0.004], "density": 2500.0},
+        {"name": "large", "shape": "sphere", "spin": True, "mass": 0.5, "radius": 0.02},
+    ],
+    "stream": [
+        {"particle": "small", "count": 500, "fill": [[0.0, 0.0], [0.3, 0.5]]},
+        {"particle": "large", "count": 3, "at": [0.0, 1.0], "to": [1.0, 1.0], "velocity": [0, 0]},
+    ],
+}
+
+
+def test_particles_of_several_kinds_are_arrays():
+    found = machine.build(scene.from_dict(MIXTURE))
+    radius, mass, kind = found.particle.radius, found.particle.mass, found.releases.kind
+    assert kind.tolist() == [0] * 500 + [1] * 3
+    assert radius[0] == 0.003  # the first has the mean
+    assert radius[:500].min() >= 0.002
+    assert radius[:500].max() <= 0.004
+    # Drawn evenly: mean 3 mm, standard deviation (b - a) / sqrt(12).
+    assert radius[:500].mean() == pytest.approx(0.003, rel=0.03)
+    assert radius[:500].std() == pytest.approx(0.002 / sqrt(12.0), rel=0.1)
+    assert mass[:500] == pytest.approx(2500.0 * 4.0 / 3.0 * np.pi * radius[:500] ** 3, rel=1e-13)
+    assert mass[500:].tolist() == [0.5] * 3
+    # 2/5 m r² of what turns
+    assert found.particle.inertia[500:] == pytest.approx(0.4 * 0.5 * 0.02**2, rel=1e-14)
+    assert not found.particle.inertia[:500].any()
+    # A line without a rate: all at once, evenly spaced.
+    assert found.releases.position[500:].tolist() == [[0.0, 1.0], [0.5, 1.0], [1.0, 1.0]]
+    assert not found.releases.t.any()
+
+
+def test_a_packed_box_holds_everybody_and_nobody_is_in_another_or_in_a_surface():
+    wall = {"name": "wall", "from": [0.1, 0.0], "to": [0.2, 0.5]}
+    peg = {"name": "peg", "center": [0.25, 0.1], "radius": 0.03}
+    found = machine.build(scene.from_dict({**MIXTURE, "surface": [wall, peg]}))
+    place, radius = found.releases.position[:500], found.particle.radius[:500]
+    assert (place - radius[:, None]).min() >= 0.0
+    assert (place + radius[:, None])[:, 0].max() <= 0.3
+    apart = np.hypot(*(place[:, None] - place).transpose(2, 0, 1))
+    np.fill_diagonal(apart, inf)
+    assert (apart >= radius[:, None] + radius).all()
+    along = np.array([0.1, 0.5])
+    share = np.clip((place - [0.1, 0.0]) @ along / (along @ along), 0.0, 1.0)
+    assert (np.hypot(*(place - [0.1, 0.0] - share[:, None] * along).T) >= radius).all()
+    assert (abs(np.hypot(*(place - [0.25, 0.1]).T) - 0.03) >= radius).all()
+    with pytest.raises(
+        scene.SceneError, match=r"stream\[0\]\.fill = \[\[0.0, 0.0\], \[0.3, 0.5\]\]"
+    ):
+        machine.build(scene.from_dict(MIXTURE, overrides=["stream[0].count=5000"]))
+
+
+def test_what_a_pair_meets_with_is_said_by_pair_then_surface_then_material():
+    coal = {"name": "lump", "material": "coal", "radius": 0.01}
+    document = {
+        "particle": [coal, {"name": "ball"}],
+        "surface": [
+            {"name": "plain", "from": [0.0, 0.0], "to": [1.0, 0.0]},
+            {"name": "told", "from": [0.0, -1.0], "to": [1.0, -1.0], "restitution": 0.9},
+            {"name": "lined", "from": [0.0, -2.0], "to": [1.0, -2.0], "material": "rubber"},
+        ],
+        "pair": [{"between": ["told", "lump"], "friction": 0.07}],
+        "stream": [
+            {"particle": "lump", "at": [0.0, 1.0], "velocity": [0.0, 0.0], "interact": True},
+            {"particle": "ball", "at": [0.5, 1.0], "velocity": [0.0, 0.0], "friction": 0.04},
+        ],
+    }
+    found = machine.build(scene.from_dict(document))
+    material = scene.materials.PRESETS["coal"].material
+    assert found.segments.restitution.tolist() == [
+        [material.restitution_steel, 0.9, material.restitution_rubber], [0.3, 0.9, 0.3]
+    ]  # fmt: skip
+    assert found.segments.friction.tolist() == [
+        [material.friction_steel, 0.07, material.friction_rubber], [0.4, 0.4, 0.4]
+    ]  # fmt: skip
+    # Among themselves: coal's own; what the stream says; and of the two the geometric mean.
+    mixed = sqrt(material.friction * 0.04)
+    assert found.pair_friction == pytest.approx(
+        np.array([[material.friction, mixed], [mixed, 0.04]]), rel=1e-15
+    )
+    assert found.particle.mass[0] == pytest.approx(
+        material.density * 4.0 / 3.0 * np.pi * 0.01**3, rel=1e-15
+    )
+
+
+def test_a_rate_may_be_a_mass_per_time():
+    rate = ["stream.rate='36 t/h'", "stream.count=3"]
+    found = scene.load("perpendicular", rate)
+    # 36 t/h are 10 kg/s, 1250 particles of 8 g a second.
+    assert found.stream.rate == pytest.approx(1250.0, rel=1e-15)
+    assert found.stream.mass_rate == pytest.approx(10.0, rel=1e-15)
+    lighter = found.with_values({"particle.mass": 0.004})
+    assert lighter.stream.rate == pytest.approx(2500.0, rel=1e-15)
+    # Of a range the mean of r³ counts: (b⁴ - a⁴) / (4 (b - a)).
+    mixed = found.with_values({"particle.radius": [0.003, 0.006], "particle.density": 2000.0})
+    mean = 2000.0 * 4.0 / 3.0 * np.pi * (0.006**4 - 0.003**4) / (4.0 * 0.003)
+    assert mixed.stream.rate == pytest.approx(10.0 / mean, rel=1e-14)

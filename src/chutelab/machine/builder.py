@@ -138,6 +138,13 @@ class _Room:
         points = nearest(places)
         away = places.T - points
         distance = np.hypot(*away)
+        for kind, particle in enumerate(scene.particles):
+            # A box reaches as far as its furthest corner that way.
+            boxes = (releases.kind == kind).nonzero()[0] if particle.outline else []
+            if len(boxes):
+                towards = np.array(particle.outline) @ (-away[:, boxes] / distance[boxes])
+                reach = np.array(np.broadcast_to(reach, distance.shape))
+                reach[boxes] += towards.max(axis=0) - particle.radius
         depth = np.where(who, reach - distance, -inf)
         rounding = ROUNDING * np.maximum(np.abs(points).max(axis=0), np.abs(places).max(axis=1))
         inside = np.flatnonzero(depth > np.maximum(ON_BELT, rounding))

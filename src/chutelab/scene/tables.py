@@ -94,7 +94,7 @@ class Particle(Table):
         if self.span is None:
             return self.mass
         low, high = self.span
-        return self.mass * 0.5 * (low + high) * (low * low + high * high) / self.radius**3
+        return self.mass * 0.25 * (low + high) * (low * low + high * high) / self.radius**3
 
     @property
     def moment(self) -> float:

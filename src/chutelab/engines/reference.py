@@ -147,8 +147,9 @@ def _plain(machine: Machine) -> Machine:
         return machine
     met = {key: getattr(parts, key)[kind] for key in ("restitution", "friction")}
     if wheel is not None:
-        grip = {key: float(getattr(wheel, key)[kind]) for key in met}
-        wheel = replace(wheel, **grip)
+        wheel = replace(
+            wheel, restitution=wheel.restitution[kind], friction=float(wheel.friction[kind])
+        )
     numbers = {key: float(np.broadcast_to(value, 1)[0]) for key, value in vars(p).items()}
     return replace(
         machine, segments=replace(parts, **met), pulley=wheel, particle=replace(p, **numbers)

@@ -31,7 +31,7 @@ from chutelab.studies.accuracy import (
 )
 from chutelab.util.errors import InputError
 
-LONE = [name for name in sc.shipped() if "stream" not in name]
+LONE = [name for name in sc.shipped() if sc.load(name).count == 1]
 
 
 def difference(one, other, unit="relative"):

@@ -246,6 +246,8 @@ def test_any_value_in_range_comes_back_unchanged(document):
 SHIPPED = (
     "belt-landing",
     "free-fall",
+    "heap",
+    "hopper",
     "inclined-20",
     "inclined-40",
     "inclined-60",

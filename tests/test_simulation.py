@@ -33,7 +33,9 @@ def same(one, other):
 @pytest.mark.parametrize("name", scene.shipped())
 def test_auto_takes_exact_unless_particles_interact(name):
     built = machine.build(loaded(name))
-    assert choose(built) == choose(built, "auto") == ("contact" if name == "stream" else "exact")
+    assert (
+        choose(built) == choose(built, "auto") == ("contact" if loaded(name).crowded else "exact")
+    )
     assert [choose(built, engine) for engine in ENGINES[1:]] == ["exact", "contact", "pymunk"]
 
 

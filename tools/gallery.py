@@ -1,10 +1,9 @@
-"""Make the gallery of all shipped scenes: docs/gallery.md and a picture of each in docs/gallery.
+"""Make the gallery of all shipped scenes: gallery.md, and a picture of each in gallery/.
 
     python tools/gallery.py [DIRECTORY]
 
-The directory is ``docs`` beside this folder by default. Titles and what to look at are those of
-the scene files. Of many particles the picture shows where they are at one time, of few their
-tracks.
+They go to the directory, by default ``docs`` beside this folder. Titles and what to look at are
+those of the scene files. With `--text` no pictures are made, which takes most of the time.
 """
 
 from __future__ import annotations
@@ -13,10 +12,52 @@ import sys
 from pathlib import Path
 
 from chutelab.engines.simulation import simulate
-from chutelab.pictures.plots import overlay
+from chutelab.pictures.plots.figure import draw_view
+from chutelab.pictures.plots.panels import analytic_of
+from chutelab.pictures.plots.scenery import bodily
+from chutelab.pictures.plots.style import Picture
 from chutelab.scene import load
 from chutelab.scene.loading import about
 
+SIZE = (6.4, 4.2)
+"""Width and height of a picture, inches."""
 
-def page() -> str:
-    """Return the text of gallery.md."""
+DPI = 80
+"""Dots to the inch: a picture has some 30 kB."""
+
+
+def text() -> str:
+    """Return gallery.md."""
+    parts = [
+        "# The shipped scenes",
+        "Made by `python tools/gallery.py` from `scenes/*.toml`; `chutelab run NAME --out DIR` runs"
+        " one, and `chutelab verify NAME` checks what it promises.",
+    ]
+    for one in about():
+        parts += [f"## `{one.name}`: {one.title}", f"![{one.title}](gallery/{one.name}.png)"]
+        parts.append("\n".join(one.look))
+    return "\n\n".join(parts) + "\n"
+
+
+def picture(name: str, path: Path) -> None:
+    """Run a scene, and draw it with its particles, or with the tracks of those that never meet."""
+    recording = simulate(load(name))
+    figure = Picture(SIZE, DPI)
+    ax = figure.add_axes((0.1, 0.11, 0.88, 0.77))
+    parts = analytic_of(recording, recording.prediction)[0]
+    draw_view(ax, recording, parts, bodies=not parts and bodily(recording))
+    figure.write(path)
+
+
+def main(arguments: list[str]) -> None:
+    """Write the page and, unless asked for the text alone, the pictures."""
+    folders = [Path(a) for a in arguments if a != "--text"]
+    docs = folders[0] if folders else Path(__file__).parents[1] / "docs"
+    (docs / "gallery").mkdir(parents=True, exist_ok=True)
+    (docs / "gallery.md").write_text(text(), encoding="utf-8", newline="\n")
+    for one in about() if "--text" not in arguments else ():
+        picture(one.name, docs / "gallery" / f"{one.name}.png")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -311,6 +311,25 @@ def test_a_conveyor_carries_up_and_round_its_pulley():
     assert residual(recording) < 1e-12
 
 
+@pytest.mark.parametrize("speed", [2.0, -2.0])
+def test_a_fast_conveyor_lets_go_where_its_pulley_begins(speed):
+    # v² > g ρ: what has come to the belt's speed by Coulomb friction leaves at the end of the top.
+    mu, drop, wheel = 0.2, 0.3 - R, 0.1
+    belt = {"name": "belt", "from": [-1.2, -wheel], "to": [1.2, -wheel], "speed": speed}
+    belt |= {"pulley_radius": wheel, "friction": mu}
+    machine = scene_of(particle={"spin": False}, conveyor=[belt], run={"until": 1.5})
+    recording = run(thrown(machine, (0.0, 0.3), (0.5 * speed, 0.0)))
+    fall, gain = sqrt(2.0 * drop / G), 0.5 * abs(speed)
+    # Friction turns the blow's impulse, and then the weight's, into speed: µ (g t + v_n) in all.
+    slips = max(gain - mu * G * fall, 0.0) / (mu * G)
+    after = min(gain, mu * G * fall)
+    way = 0.5 * abs(speed) * fall + (0.5 * abs(speed) + after) * slips + 0.5 * mu * G * slips**2
+    left = recording.select(Kind.SEPARATION)[-1]
+    assert left["t"] == pytest.approx(fall + slips + (1.2 - way) / abs(speed), abs=2e-6)
+    assert left["position"] == pytest.approx([np.sign(speed) * 1.2, R], abs=3e-6)
+    assert left["velocity_after"] == pytest.approx([speed, 0.0], abs=1e-9)
+
+
 # Gates
 
 

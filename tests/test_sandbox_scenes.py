@@ -65,7 +65,7 @@ def test_the_outflow_of_a_hopper_is_beverloos():
 def repose(rolling, count):
     """Return the flanks' mean slope, degrees: a line through the highest grain of each 12 mm."""
     scene = sc.load("heap", [f"particle.rolling_friction={rolling}", f"stream.count={count}"])
-    recording = simulate(scene.with_values({"run.until": count / 100.0 + 2.0}))
+    recording = simulate(scene.with_values({"run.until": count / 60.0 + 2.0}))
     x, y = last_places(recording).T
     x, top = np.abs(x[y > 0.0]), (y + recording.particle.radius)[y > 0.0]
     strip = (x // 0.012).astype(int)

@@ -192,6 +192,79 @@ def test_a_fast_disk_meets_the_far_side_of_a_ring_that_it_enters_in_the_same_ste
     assert met["position"][0][0] == pytest.approx(far, rel=1e-12)
 
 
+def first_within(place, velocity, center, reach):
+    """Return when a parabola comes within reach of a centre: the first root of a quartic."""
+    x, y = np.subtract(place, center)
+    fall = [-0.5 * G, velocity[1], y]
+    gap = np.polyadd(np.polymul([velocity[0], x], [velocity[0], x]), np.polymul(fall, fall))
+    roots = np.roots(np.polysub(gap, [reach**2]))
+    return roots.real[(np.abs(roots.imag) < 1e-12) & (roots.real > 0.0)].min()
+
+
+@pytest.mark.parametrize("crowded", [False, True])
+@pytest.mark.parametrize("aside", [0.002, 0.004, 0.007, 0.0099])
+def test_the_end_of_an_arc_is_struck_by_what_comes_in_at_the_opening(aside, crowded):
+    # The upper end of a half circle that opens to the left; the disk would go by inside, too near.
+    end, speed = (0.0, 0.31), 10.0
+    bowl = {"center": (0.0, 0.0), "radius": 0.31, "begin": -0.5 * pi, "extent": pi,
+            "restitution": 0.5}  # fmt: skip
+    place, velocity = (-0.2, end[1] - aside), (speed, 0.5 * G * 0.2 / speed)
+    machine = arc_machine(bowl, run={"until": 0.2})
+    recording = run(thrown(machine, [place, (9.0, 9.0)] if crowded else [place], velocity))
+    hit = recording.select(Kind.IMPACT)[0]
+    t = first_within(place, velocity, end, R)
+    x = np.array([place[0] + velocity[0] * t, place[1] + velocity[1] * t - 0.5 * G * t**2])
+    assert hit["t"] == pytest.approx(t, abs=1e-11)
+    np.testing.assert_allclose(hit["position"], x, atol=1e-11)
+    normal, v = (x - end) / R, np.array([velocity[0], velocity[1] - G * t])
+    np.testing.assert_allclose(hit["velocity_after"], v - 1.5 * (v @ normal) * normal, atol=1e-9)
+
+
+def test_who_flies_away_over_an_arc_is_not_struck_by_its_inside():
+    # Beside a bowl, below its rim, it falls on the ground: one blow.
+    bowl = {"center": (0.0, 1.0), "radius": 0.4, "begin": -pi, "extent": pi}
+    ground = face("ground", (-1.0, 0.61), (-0.28, 0.61), restitution=0.8, friction=0.0)
+    machine = arc_machine(bowl, surface=[ground], run={"until": 0.3})
+    recording = run(thrown(machine, [(-0.33, 0.67)], (0.0, -0.5)))
+    hit, v = recording.select(Kind.IMPACT)[0], sqrt(0.25 + 2.0 * G * (0.06 - R))
+    assert hit["t"] == pytest.approx((v - 0.5) / G, abs=1e-12)
+    assert hit["velocity_after"][1] == pytest.approx(0.8 * v, rel=1e-12)
+
+
+@pytest.mark.parametrize("late", np.linspace(0.0, 1e-3, 7).tolist())
+def test_a_disk_that_brushes_a_peg_from_below_is_struck(late):
+    # At the top it would be 0.4 µm in the peg, less than its way bends in a step, 1.2 µm.
+    peg, reach, speed = 0.003, R + 0.003, 1.0
+    rise = 0.01 + late
+    place = (-speed * rise, -reach + 4e-7 - 0.5 * G * rise**2)
+    machine = arc_machine({"center": (0.0, 0.0), "radius": peg, "begin": 0.0, "extent": 2.0 * pi,
+                           "restitution": 0.5}, run={"until": 0.05})  # fmt: skip
+    recording = run(thrown(machine, [place], (speed, G * rise)))
+    hit = recording.select(Kind.IMPACT)[0]
+    assert hit["t"] == pytest.approx(
+        first_within(place, (speed, G * rise), (0.0, 0.0), reach), abs=1e-9
+    )
+
+
+@pytest.mark.parametrize("outside", [False, True])
+def test_the_end_of_a_moving_arc_runs_as_its_nearer_face(outside):
+    # It falls on the end of a quarter, whose tangent there is upright, a little outside or inside:
+    # round the end the arc runs clockwise where it is nearer to the outside, else the other way.
+    quarter = {"center": (0.0, 0.0), "radius": 0.4, "begin": -0.5 * pi, "extent": 0.5 * pi,
+               "speed": 1.0, "friction": 0.1, "restitution": 0.5}  # fmt: skip
+    aside = 0.015 * R if outside else -0.015 * R
+    machine = arc_machine(quarter, run={"until": 0.3})
+    recording = run(thrown(machine, [(0.4 + aside, 0.2)]))
+    hit = recording.select(Kind.IMPACT)[0]
+    normal = np.array([aside, sqrt(R**2 - aside**2)]) / R
+    approach = -(hit["velocity_before"] @ normal)
+    along = np.array([normal[1], -normal[0]])
+    slip = hit["velocity_before"] @ along - (1.0 if outside else -1.0)
+    push = -np.sign(slip) * 0.1 * 1.5 * approach
+    expected = hit["velocity_before"] + 1.5 * approach * normal + push * along
+    np.testing.assert_allclose(hit["velocity_after"], expected, atol=1e-9)
+
+
 @pytest.mark.parametrize("inside", [False, True])
 @pytest.mark.parametrize("whole", [False, True])
 def test_a_moving_arc_turns_clockwise(inside, whole):
@@ -236,6 +309,25 @@ def test_a_conveyor_carries_up_and_round_its_pulley():
     paid = recording.by_surface[:, 0].sum()
     assert paid == pytest.approx(0.1 * G * (left["position"][1] - start[1]), rel=0.02)
     assert residual(recording) < 1e-12
+
+
+@pytest.mark.parametrize("speed", [2.0, -2.0])
+def test_a_fast_conveyor_lets_go_where_its_pulley_begins(speed):
+    # v² > g ρ: what has come to the belt's speed by Coulomb friction leaves at the end of the top.
+    mu, drop, wheel = 0.2, 0.3 - R, 0.1
+    belt = {"name": "belt", "from": [-1.2, -wheel], "to": [1.2, -wheel], "speed": speed}
+    belt |= {"pulley_radius": wheel, "friction": mu}
+    machine = scene_of(particle={"spin": False}, conveyor=[belt], run={"until": 1.5})
+    recording = run(thrown(machine, (0.0, 0.3), (0.5 * speed, 0.0)))
+    fall, gain = sqrt(2.0 * drop / G), 0.5 * abs(speed)
+    # Friction turns the blow's impulse, and then the weight's, into speed: µ (g t + v_n) in all.
+    slips = max(gain - mu * G * fall, 0.0) / (mu * G)
+    after = min(gain, mu * G * fall)
+    way = 0.5 * abs(speed) * fall + (0.5 * abs(speed) + after) * slips + 0.5 * mu * G * slips**2
+    left = recording.select(Kind.SEPARATION)[-1]
+    assert left["t"] == pytest.approx(fall + slips + (1.2 - way) / abs(speed), abs=2e-6)
+    assert left["position"] == pytest.approx([np.sign(speed) * 1.2, R], abs=3e-6)
+    assert left["velocity_after"] == pytest.approx([speed, 0.0], abs=1e-9)
 
 
 # Gates

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import pi
+from math import inf, pi
 
 import numpy as np
 import pytest
 
 from chutelab.engines import contact, exact
+from chutelab.engines.exact.contacts import CornerError
 from chutelab.results import Kind
 from chutelab.results.ledger import ledger
 from machines import bent, face, of_sizes, scene_of, thrown
@@ -59,22 +60,52 @@ def machine(seed):
 
 
 def blows(run, particle):
-    """Return the impacts of a particle up to the first slow or grazing one."""
+    """Return the impacts of a particle before a slow or grazing one or short bounce, and its time.
+
+    A bounce that ends within two steps is left out by the contact engine, which lets the particle
+    lie from the blow before it on.
+    """
     hits = run.select(Kind.IMPACT)
     hits = hits[hits["particle"] == particle]
     push = hits["normal_impulse"] / run.machine.particle.mass[particle]
-    slow = np.flatnonzero(push < 0.5)
-    return hits[: slow[0]] if len(slow) else hits
+    soon = np.append(np.diff(hits["t"]) < 2.0 * run.machine.dt, False)
+    again = np.append(np.diff(hits["surface"]) == 0, False)
+    slow = np.flatnonzero((push < 0.5) | (soon & again))
+    return (hits[: slow[0]], hits["t"][slow[0]]) if len(slow) else (hits, inf)
 
 
-@pytest.mark.parametrize("seed", range(12))
-def test_blow_by_blow(seed):
+def compare(seed):
+    """Hold the first blows of two runs against each other, and count them."""
     built = machine(seed)
     one, other = exact.run(built), contact.run(built)
     assert ledger(one).relative_residual < 1e-12
     for n in range(COUNT):
-        a, b = blows(one, n), blows(other, n)
+        (a, first), (b, then) = blows(one, n), blows(other, n)
+        a, b = (hits[hits["t"] < min(first, then) - 1e-6] for hits in (a, b))
         shared = min(len(a), len(b), 4)
         for name in ("t", "position", "velocity_after", "omega_after"):
             np.testing.assert_allclose(a[name][:shared], b[name][:shared], rtol=1e-9, atol=1e-9)
         assert abs(len(a) - len(b)) <= 1 or shared == 4
+
+
+# 49: the end of a moving arc; 14, 350: past an arc outside; 773, 929: in at its opening.
+@pytest.mark.parametrize("seed", [*range(12), 14, 49, 350, 773, 929])
+def test_blow_by_blow(seed):
+    compare(seed)
+
+
+CORNERED = pytest.mark.xfail(
+    strict=True, raises=CornerError, reason="the exact engine does not follow it, and says so"
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "seed",
+    [
+        pytest.param(seed, marks=CORNERED if seed in (50, 141, 256) else ())
+        for seed in range(12, 312)
+    ],
+)
+def test_three_hundred_machines_blow_by_blow(seed):
+    compare(seed)

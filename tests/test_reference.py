@@ -139,6 +139,34 @@ def test_what_it_cannot_follow_is_refused():
         run(thrown((0.0, 0.5), (0.0, 0.0), 3.0, vee))
 
 
+@pytest.mark.parametrize(
+    ("surface", "more", "what"),
+    [
+        ({"name": "peg", "center": [0.0, 0.0], "radius": 0.1}, {}, "straight surfaces"),
+        (floor(opens_at=1.0), {}, "always there"),
+        (floor(), {"particle": {"spin": True, "rolling_friction": 0.1}}, "rolling friction"),
+        (floor(), {"string": [{"from": [0.0, 2.0]}]}, "strings"),
+    ],
+)
+def test_what_it_has_no_equations_for_is_refused(surface, more, what):
+    with pytest.raises(reference.UnableError, match=what):
+        run({**thrown((0.0, 0.5), (0.0, 0.0), 3.0, surface), **more})
+
+
+def test_one_of_several_kinds_meets_surfaces_as_its_kind_does():
+    # The second of three kinds: ε = 0.7 by its material, on a floor that says nothing.
+    kinds = [
+        {"name": name, "radius": radius, "material": name}
+        for name, radius in (("glass", 0.02), ("rubber", 0.01), ("coal", 0.03))
+    ]
+    bare = {"name": "floor", "points": [[-9.0, 0.0], [9.0, 0.0]]}
+    tables = thrown((0.0, 0.5), (0.0, 0.0), 0.35, bare) | {"particle": kinds}
+    tables["stream"]["particle"] = "rubber"
+    (hit,) = run(tables).select(Kind.IMPACT)
+    assert hit["t"] == pytest.approx(sqrt(2.0 * 0.49 / G), rel=1e-12)
+    assert hit["velocity_after"][1] == pytest.approx(0.7 * sqrt(2.0 * G * 0.49), rel=1e-12)
+
+
 def test_without_scipy_it_says_what_to_install():
     code = (
         "import sys; sys.modules['scipy.integrate'] = None\n"

@@ -120,14 +120,40 @@ def run(machine: Machine) -> Recording:
     UnableError
         If it is not alone, SciPy is missing, or it gets where the equations here do not reach.
     """
-    if machine.count > 1:
-        raise UnableError("it integrates one particle")
+    machine = _plain(machine)
     try:
         from scipy.integrate import DOP853
         from scipy.optimize import brentq
     except ImportError:
         raise UnableError('SciPy is missing: pip install "chutelab[bench]"') from None
     return _Run(machine, DOP853, brentq).result()
+
+
+def _plain(machine: Machine) -> Machine:
+    """Return a machine of numbers for its only particle, or refuse what the equations lack."""
+    if machine.count > 1:
+        raise UnableError("it integrates one particle")
+    kind = int(machine.releases.kind[0])
+    parts, wheel, p = machine.segments, machine.pulley, machine.particle
+    for there, what in (
+        (machine.outlines[kind] is not None or machine.threads, "disks without strings"),
+        (len(machine.arcs.surface), "straight surfaces, and the drive pulley"),
+        (np.isfinite([parts.appears, parts.vanishes]).any(), "surfaces that are always there"),
+        (machine.rolling[kind] > 0.0, "disks without rolling friction"),
+    ):
+        if there:
+            raise UnableError(f"it integrates {what}, only")
+    if len(machine.rolling) == 1:
+        return machine
+    met = {key: getattr(parts, key)[kind] for key in ("restitution", "friction")}
+    if wheel is not None:
+        wheel = replace(
+            wheel, restitution=wheel.restitution[kind], friction=float(wheel.friction[kind])
+        )
+    numbers = {key: float(np.broadcast_to(value, 1)[0]) for key, value in vars(p).items()}
+    return replace(
+        machine, segments=replace(parts, **met), pulley=wheel, particle=replace(p, **numbers)
+    )
 
 
 class _Run:

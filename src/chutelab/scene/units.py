@@ -192,7 +192,7 @@ def _said(words: str) -> Any:
 Span = Annotated[
     tuple[Positive, Positive],
     AfterValidator(_ascending),
-    _said("a range [from, to]"),
+    _said("a range [from, to] with from < to"),
 ]
 """A range [from, to]."""
 

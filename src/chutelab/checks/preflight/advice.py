@@ -297,6 +297,8 @@ def preflight(scene: Scene) -> Preflight:
     tried = trial(machine, engine)
     if scene.run.engine != "auto":
         why = f'run.engine = "{engine}" asks for it'
+    elif engine == "pymunk":
+        why = "boxes, polygons and strings are for no other engine"
     elif machine.interact:
         why = "particles meet each other, which the exact engine does not follow"
     elif machine.count == 1:

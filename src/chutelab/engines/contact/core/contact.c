@@ -19,7 +19,7 @@ void describe(Contact *c, int i, int j) {
         pair = surface_pair(a, -1 - j);
         c->owner = s->owner;
         c->other[0] = 0;
-        c->other[1] = surface_speed(s, c->nx, c->ny, a->x, a->y);
+        c->other[1] = surface_speed(s, c->nx, c->ny, a->x, a->y, r);
         c->other[2] = s->shape != SEGMENT ? -s->speed / s->radius : 0;
     } else {
         const Disk *b = W.disks + j;

@@ -92,7 +92,7 @@ static inline void advance(Disk *d, double t) {
 /* geometry.c */
 double gap_to(const Surface *s, double x, double y, double r, double *nx, double *ny);
 const Surface *face_at(const Surface *s, double x, double y);
-double surface_speed(const Surface *s, double nx, double ny, double x, double y);
+double surface_speed(const Surface *s, double nx, double ny, double x, double y, double r);
 double bending(const Surface *s, double x, double y, double r);
 double meet_surface(const Surface *s, const Disk *d, double span, double *approach);
 double meet_disk(double x, double y, double u, double v, double reach, double span, double *approach);

@@ -2,6 +2,9 @@
 
 #include "core.h"
 
+/* Newton's steps to where a parabola is nearest: from that of its chord, which is close. */
+#define NEAREST 4
+
 /* Whether a point, seen from the centre, is in the angle of an arc, which may be wider than a half
    circle; all of a circle. */
 static int in_angle(const Surface *s, double dx, double dy) {
@@ -61,11 +64,12 @@ double gap_to(const Surface *s, double x, double y, double r, double *nx, double
 
    One rule for faces, ends and circles: the surface runs along its left side (a circle: its
    outside) as `speed` says, and against it on the other side. On both faces of a segment that is
-   its velocity; round an end it is that of an end roller, continuous with the face on that side. */
-double surface_speed(const Surface *s, double nx, double ny, double x, double y) {
+   its velocity; round an end it is that of an end roller, continuous with the face on that side:
+   the sides are those of the tangent where the disk touches. */
+double surface_speed(const Surface *s, double nx, double ny, double x, double y, double r) {
     double side;
     if (s->shape == SEGMENT) side = ny * s->tx - nx * s->ty;
-    else side = nx * (x - s->x) + ny * (y - s->y);
+    else side = nx * (x - s->x) + ny * (y - s->y) - r;
     return side >= 0 ? s->speed : -s->speed;
 }
 
@@ -83,11 +87,13 @@ double bending(const Surface *s, double x, double y, double r) {
 }
 
 /* When a point that moves on a parabola about a centre comes within `reach` of it, or from within
-   beyond it (side = -1); its speed of approach then. INFINITY if not within the span.
+   beyond it (side = -1); its speed of approach then. INFINITY if not within the span, and if it is
+   there and does not approach.
 
-   The chord of the parabola gives a bracket and a first guess, Newton's method the root. A way that
-   only grazes the circle between two outside ends of the chord, by less than the chord's sagitta
-   g h^2/8, is missed. */
+   The chord of the parabola gives a bracket and a first guess, Newton's method the root. Where both
+   ends of the chord are outside, the parabola bends from it by g h^2/8 at most: it is asked where it is
+   nearest. A hop that touches the inside of a circle from below between two places that do not is
+   missed: it is no faster than gravity makes it in half the span. */
 static double meet_round(double x, double y, double vx, double vy, double reach, double side,
                          double span, double *approach) {
     double c = side * (x * x + y * y - reach * reach);
@@ -95,7 +101,7 @@ static double meet_round(double x, double y, double vx, double vy, double reach,
     if (c <= 0) {
         double d = sqrt(x * x + y * y);
         *approach = d > 0 ? -side * (x * vx + y * vy) / d : 0;
-        return 0;
+        return *approach > 0 ? 0 : INFINITY;
     }
     double cx = vx + 0.5 * W.gx * span, cy = vy + 0.5 * W.gy * span;
     double ex = x + cx * span, ey = y + cy * span;
@@ -103,10 +109,20 @@ static double meet_round(double x, double y, double vx, double vy, double reach,
     double a = cx * cx + cy * cy, b = x * cx + y * cy, low = 0, high = span, h;
     double root = b * b - a * (x * x + y * y - reach * reach);
     if (last > 0) {
-        if (side < 0 || b >= 0 || root <= 0 || a * span <= -b) return INFINITY;
-        high = -b / a;
-        double px = x + (vx + 0.5 * W.gx * high) * high, py = y + (vy + 0.5 * W.gy * high) * high;
-        if (px * px + py * py >= reach * reach) return INFINITY;
+        double bend = reach + 0.125 * W.g * span * span, px, py;
+        if (side < 0 || b >= 0) return INFINITY;
+        high = MIN(-b / a, span);
+        if (square(x + cx * high) + square(y + cy * high) >= bend * bend) return INFINITY;
+        for (int n = 0;; n++) {
+            px = x + (vx + 0.5 * W.gx * high) * high;
+            py = y + (vy + 0.5 * W.gy * high) * high;
+            if (px * px + py * py < reach * reach) break;
+            double wx = vx + W.gx * high, wy = vy + W.gy * high;
+            double curve = wx * wx + wy * wy + px * W.gx + py * W.gy;
+            double next = MIN(MAX(high - (px * wx + py * wy) / curve, 0), span);
+            if (n == NEAREST || !(curve > 0) || next == high) return INFINITY;
+            high = next;
+        }
     }
     if (root < 0) root = 0;
     /* The form without cancellation of either root. */
@@ -167,7 +183,8 @@ static double meet_ends(const Surface *s, const Disk *d, double span, double *ap
 }
 
 /* When a disk meets a circle from inside. Where it goes inwards at first, from outside through the
-   opening of an arc or from a place that touches, that is after it was nearest to the centre. */
+   opening of an arc or from a place that touches, that is after it was nearest to the centre; if it is
+   not inside even there, never. */
 static double meet_inside(const Surface *s, const Disk *d, double span, double *approach) {
     double x = d->x - s->x, y = d->y - s->y, vx = d->vx, vy = d->vy, t = 0;
     double in = x * vx + y * vy;
@@ -178,6 +195,7 @@ static double meet_inside(const Surface *s, const Disk *d, double span, double *
         vx += W.gx * t;
         vy += W.gy * t;
     }
+    if (x * x + y * y >= s->radius * s->radius) return INFINITY;
     return t + meet_round(x, y, vx, vy, s->radius - d->radius, -1, span - t, approach);
 }
 
@@ -204,17 +222,26 @@ double meet_surface(const Surface *s, const Disk *d, double span, double *approa
     }
     double away = sqrt(dx * dx + dy * dy), side = away >= s->radius ? 1 : -1;
     if (side * (away - s->radius) > sweep + r) return INFINITY;
+    /* The first of its outside, its inside and its ends: whoever comes in at an opening may meet an end
+       before what he would come to without it. */
+    double first = INFINITY, speed;
     for (; side >= -1; side -= 2) {
         double h = INFINITY;
-        if (side > 0) h = meet_round(dx, dy, d->vx, d->vy, s->radius + r, 1, span, approach);
-        else if (s->radius > r) h = meet_inside(s, d, span, approach);
-        if (h < INFINITY) {
+        if (side > 0) h = meet_round(dx, dy, d->vx, d->vy, s->radius + r, 1, span, &speed);
+        else if (s->radius > r) h = meet_inside(s, d, span, &speed);
+        if (h < first) {
             double px = dx + (d->vx + 0.5 * W.gx * h) * h, py = dy + (d->vy + 0.5 * W.gy * h) * h;
-            if (in_angle(s, px, py)) return h;
+            if (in_angle(s, px, py)) {
+                first = h;
+                *approach = speed;
+            }
         }
-        if (s->shape == CIRCLE) return INFINITY;
+        if (s->shape == CIRCLE) return first;
     }
-    return meet_ends(s, d, span, approach);
+    double h = meet_ends(s, d, span, &speed);
+    if (h >= first) return first;
+    *approach = speed;
+    return h;
 }
 
 /* Time until two disks at a relative place (x, y) and velocity (u, v) are `reach` apart: as both

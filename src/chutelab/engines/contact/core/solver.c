@@ -49,7 +49,7 @@ static double gap_later(const Contact *c, double h) {
 }
 
 /* Time until the foot of a disk on a face passes its end, INFINITY where there is none or the face
-   goes on smoothly. */
+   goes on smoothly, and not so bent that the disk flies on. */
 static double time_on_face(const Contact *c) {
     const Disk *d = W.disks + c->i;
     const Surface *s = W.surfaces + (-1 - c->j);
@@ -66,7 +66,14 @@ static double time_on_face(const Contact *c) {
         run = (x * d->vy - y * d->vx) / square_away;
         length = 2 * half;
     }
-    if (along < 0 || along > length || run == 0 || s->mates[run > 0] >= 0) return INFINITY;
+    if (along < 0 || along > length || run == 0) return INFINITY;
+    if (s->mates[run > 0] >= 0) {
+        const Surface *next = W.surfaces + s->mates[run > 0];
+        double load = -(W.gx * c->nx + W.gy * c->ny), fast = d->vx * c->ny - d->vy * c->nx;
+        int round = next->shape != SEGMENT
+            && square(d->x - next->x) + square(d->y - next->y) >= square(next->radius);
+        if (!round || load > fast * fast / (next->radius + d->radius)) return INFINITY;
+    }
     return (run > 0 ? length - along : along) / fabs(run);
 }
 

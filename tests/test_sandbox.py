@@ -286,7 +286,7 @@ def unlike(reason):
 UNLIKE = {
     60: unlike("ends after lasting contacts by 7e-5 m, at a finer step too"),
     146: unlike("ends after lasting contacts by 7e-5 m, at a finer step too"),
-    156: unlike("which of the last slow blows on a ramp are told"),
+    156: unlike("how many blows of a chatter in a wedge are told"),
 }
 
 

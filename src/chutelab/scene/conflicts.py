@@ -32,6 +32,11 @@ class ConflictError(ValueError):
 EITHER: Final = {"particle": "particles", "plate": "plates", "stream": "streams"}
 """Tables of which a file has one, ``[stream]``, or several, ``[[stream]]``; all of them in code."""
 
+ALWAYS: Final = ("particle", "stream", "run")
+"""Tables that a scene has without writing them."""
+
+LIST: Final = (list, tuple)
+
 SURFACES: Final = ("plate", "conveyor", "surface")
 """Lists of tables that are surfaces with names of their own."""
 
@@ -39,21 +44,26 @@ SURFACES: Final = ("plate", "conveyor", "surface")
 class Look:
     """Read-only look at a scene's tables, as its file has them or as it dumps them, sound or not.
 
-    The defaults come from `model`, which is `Scene`; `faulty` holds the full paths that are already
+    `defaults` has those of the keys of each table; `faulty` holds the full paths that are already
     known to be at fault, `asked` the keys whose values were asked for: the rules can depend on no
     others. Of tables of which there may be several, a key is that of the first unless a row says
     otherwise, a number from 0.
     """
 
-    def __init__(self, document: Mapping[str, Any], model: Any, faulty: Collection[str] = ()):
+    def __init__(
+        self,
+        document: Mapping[str, Any],
+        defaults: Mapping[str, Mapping[str, Any]],
+        faulty: Collection[str] = (),
+    ) -> None:
         self._document = document
-        self._model = model
+        self._defaults = defaults
         self._faulty = faulty
         self.asked: set[str] = set()
 
     def sound(self, path: str) -> bool:
         """Whether neither the key, nor its table, nor anything inside it is at fault."""
-        return not any(
+        return not self._faulty or not any(
             f == path
             or f.startswith((path + ".", path + "["))
             or path.startswith((f + ".", f + "["))
@@ -67,17 +77,17 @@ class Look:
     def rows(self, table: str) -> int:
         """Return how many there are of a table of which there may be several."""
         found = self._document.get(table)
-        return len(found) if isinstance(found, list | tuple) else int(isinstance(found, Mapping))
+        return len(found) if isinstance(found, LIST) else int(isinstance(found, dict))
 
     def path(self, table: str, key: str = "", row: int = 0) -> str:
         """Return the full path of a key, or of a table."""
-        several = isinstance(self._document.get(table), list | tuple)
-        return f"{table}[{row}]" * several + table * (not several) + f".{key}" * bool(key)
+        several = isinstance(self._document.get(table), LIST)
+        head = f"{table}[{row}]" if several else table
+        return f"{head}.{key}" if key else head
 
     def given(self, table: str, key: str, row: int = 0) -> bool:
         """Whether the key is written out, sound or not."""
-        content = self._content(table, row)
-        return isinstance(content, Mapping) and content.get(key) is not None
+        return self._content(table, row).get(key) is not None
 
     def __call__(self, table: str, key: str, row: int = 0) -> Any:
         """Return the value of a key, or its default; NaN if it is at fault or its table absent."""
@@ -85,23 +95,26 @@ class Look:
         self.asked.add(path)
         if not self.sound(path):
             return math.nan
-        if self.given(table, key, row):
-            return self._content(table, row)[key]
-        absent = self._model.model_fields[EITHER.get(table, table)].default in (None, ())
-        if absent and not self.has(table):
+        value = self._content(table, row).get(key)
+        if value is not None:
+            return value
+        if table not in ALWAYS and not self.has(table):
             return math.nan
-        return self._model.tables()[table].model_fields[key].default
+        return self._defaults[table][key]
 
     def several(self, key: str) -> list[Any]:
         """Return a list of tables such as ``[[surface]]``, as far as it is one at all."""
         found = self._document.get(key)
-        return list(found) if isinstance(found, list | tuple) else []
+        return list(found) if isinstance(found, LIST) else []
 
-    def _content(self, table: str, row: int) -> Any:
+    def _content(self, table: str, row: int) -> dict[str, Any]:
+        """Return the keys of a table, none of what is no table."""
         found = self._document.get(table)
-        if isinstance(found, list | tuple):
-            return found[row] if row < len(found) else None
-        return found if row == 0 else None
+        if isinstance(found, LIST):
+            found = found[row] if row < len(found) else None
+        elif row:
+            found = None
+        return found if isinstance(found, dict) else {}
 
 
 def conflicts(look: Look) -> Iterator[Fault]:
@@ -159,7 +172,7 @@ def _names(look: Look) -> Iterator[Fault]:
         known = surfaces if table in SURFACES else {}
         for row in range(look.rows(table)):
             path, name = look.path(table, "name", row), look(table, "name", row)
-            if not look.given(table, "name", row) or not isinstance(name, str):
+            if not isinstance(name, str):
                 if table == "particle" and look.rows(table) > 1 and look.sound(path):
                     yield Fault(path, MISSING, "a name; needed where there are several kinds")
                 continue

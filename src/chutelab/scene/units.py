@@ -26,15 +26,18 @@ class Table(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    _typed: dict[str, object] = PrivateAttr(default_factory=dict)
-
     def _fill(self, key: str, value: object) -> None:
         # A default that depends on another key: not counted among the keys that were set, so that
         # a scene taken apart and changed gets it anew.
         object.__setattr__(self, key, value)
 
+
+class Resolved(Table):
+    """A table with keys whose values mean others, and which its file keeps as they were given."""
+
+    _typed: dict[str, object] = PrivateAttr(default_factory=dict)
+
     def _resolve(self, key: str, value: object) -> None:
-        # What a key means, in place of how it was given, which the scene's file keeps.
         self._typed = {**self._typed, key: getattr(self, key)}
         self._fill(key, value)
 

@@ -776,7 +776,7 @@ def test_check_goes_through_all_scenes_before_it_refuses():
 
 def test_every_shipped_scene_can_be_built():
     text = call("check", *sc.shipped()).stdout
-    assert text.count("  engine  ") == len(sc.shipped()) == 11
+    assert text.count("  engine  ") == len(sc.shipped())
 
 
 def test_the_tables_agree_as_printed_and_mark_what_differs():

@@ -278,9 +278,12 @@ def test_a_scene_that_expects_nothing_has_its_answers_compared():
 # The shipped scenes.
 
 
+LONG = ("stream", "slip", "rock-box", "cradle", "dominoes", "cascade", "spoon")
+
+
 def quick():
     """Those that take long are left to `chutelab verify`, which CI runs of all."""
-    return [name for name in sc.shipped() if name not in ("stream", "slip")]
+    return [name for name in sc.shipped() if name not in LONG]
 
 
 @pytest.mark.parametrize("name", sc.shipped())
@@ -298,7 +301,7 @@ def test_each_shipped_scene_shows_what_it_is_expected_to(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["stream", "slip"])
+@pytest.mark.parametrize("name", LONG)
 def test_what_takes_long_shows_what_it_is_expected_to_too(name):
     found = verify(sc.load(name))
     assert [row for row in (*found.findings, *found.agreements) if not row.holds] == []

@@ -18,7 +18,7 @@ from chutelab.results.quantities import QUANTITIES
 from chutelab.results.recorder import StalledError
 from machines import MOVING_CORNER, PERPENDICULAR
 
-LONE = [name for name in sc.shipped() if "stream" not in name]
+LONE = [name for name in sc.shipped() if sc.load(name).count == 1]
 
 
 def look(name, *overrides):

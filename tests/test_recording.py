@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from chutelab import machine, scene
 from chutelab.engines import exact
+from chutelab.engines.simulation import choose
 from chutelab.machine import Particle
 from chutelab.results import ENTRIES, REASONS, Kind
 from chutelab.results import recording as tracks
@@ -22,7 +23,11 @@ from chutelab.results.recorder import Recorder
 EPS = 2.0**-52
 G = 9.81
 M = 0.008
-EXACT = [name for name in scene.shipped() if name not in ("stream", "stream-independent")]
+EXACT = [
+    name
+    for name in scene.shipped()
+    if name != "stream-independent" and choose(machine.build(scene.load(name))) == "exact"
+]
 
 
 @cache

@@ -245,16 +245,23 @@ def test_any_value_in_range_comes_back_unchanged(document):
 
 SHIPPED = (
     "belt-landing",
+    "cascade",
+    "cradle",
+    "dominoes",
     "free-fall",
     "inclined-20",
     "inclined-40",
     "inclined-60",
+    "inclined-conveyor",
     "low-speed",
     "perpendicular",
     "perpendicular-fast",
+    "rock-box",
     "slip",
+    "spoon",
     "stream",
     "stream-independent",
+    "two-sizes",
 )
 
 

@@ -30,10 +30,13 @@ def same(one, other):
     return all(getattr(one, name) == getattr(other, name) for name in names)
 
 
+AUTO = {"stream": "contact", "rock-box": "contact", "cradle": "pymunk", "dominoes": "pymunk"}
+
+
 @pytest.mark.parametrize("name", scene.shipped())
 def test_auto_takes_exact_unless_particles_interact(name):
     built = machine.build(loaded(name))
-    assert choose(built) == choose(built, "auto") == ("contact" if name == "stream" else "exact")
+    assert choose(built) == choose(built, "auto") == AUTO.get(name, "exact")
     assert [choose(built, engine) for engine in ENGINES[1:]] == ["exact", "contact", "pymunk"]
 
 

@@ -113,8 +113,8 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
         if machine.interact:
             allowed = "contact or pymunk, because stream.interact = true"
             raise _refused(scene, "run.engine", "exact", allowed)
-        points = np.equal(machine.particle.radius, 0.0)
-        if np.any(points) and not np.all(points):
+        points = np.count_nonzero(np.equal(machine.particle.radius, 0.0))
+        if 0 < points < np.size(machine.particle.radius):
             allowed = "more than 0, or 0 of all kinds: no engine has points beside disks"
             raise _refused(scene, "particle.radius", 0.0, allowed)
         from chutelab.engines.exact import CornerError, run
@@ -125,7 +125,7 @@ def follow(machine: Machine, engine: str | None, progress: Progress | None) -> R
             if "exact" in (engine, scene.run.engine):
                 raise _refused(scene, "run.engine", "exact", str(error)) from error
             name = "contact"
-    if np.any(machine.particle.radius == 0.0):
+    if np.count_nonzero(np.equal(machine.particle.radius, 0.0)):
         raise _refused(scene, "particle.radius", 0.0, f'more than 0 with run.engine = "{name}"')
     if name == "contact":
         from chutelab.engines.contact import run as stepped

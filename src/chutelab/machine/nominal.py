@@ -48,7 +48,7 @@ def discharge(scene: Scene) -> tuple[Pair, Pair]:
     if scene.incoming is None or not on_belt(scene):
         return position, velocity
     (x, y), (vx, vy), (cosine, sine) = position, velocity, up_belt(scene)
-    if np.any(np.abs(vy * cosine - vx * sine) > ALONG * np.hypot(vx, vy)):
+    if np.count_nonzero(np.abs(vy * cosine - vx * sine) > ALONG * np.hypot(vx, vy)):
         return position, velocity
     rho, speed = scene.incoming.pulley_radius + scene.particle.radius, scene.incoming.speed
     if not isinstance(scene.met(scene.kinds[0], "incoming")[1], str):

@@ -335,7 +335,7 @@ class Machine:
         low, high = ends.min(axis=-2), ends.max(axis=-2)
         left, bottom = (np.minimum(low[..., axis], -wheel) for axis in (0, 1))
         right, top = (np.maximum(high[..., axis], wheel) for axis in (0, 1))
-        if np.all(np.greater(self.gravity, 0.0)):
+        if np.count_nonzero(self.gravity) == np.size(self.gravity):
             return -inf, inf, bottom - EXIT_MARGIN, inf
         return left - EXIT_MARGIN, right + EXIT_MARGIN, bottom - EXIT_MARGIN, top + EXIT_MARGIN
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from math import acos, degrees, floor, inf, prod, sqrt
 
 import numpy as np
@@ -51,9 +51,14 @@ class Releases:
             array.flags.writeable = False
 
 
+FIELDS = tuple(field.name for field in fields(Releases))
+
+
 def up_belt(scene: Scene) -> tuple[float, float]:
     """Return the direction in which the incoming belt runs, (cos β, sin β)."""
     assert scene.incoming is not None
+    if not np.count_nonzero(scene.incoming.incline_deg):
+        return 1.0, 0.0
     incline: float = np.radians(scene.incoming.incline_deg)
     cosine: float = np.cos(incline)
     sine: float = np.sin(incline)
@@ -85,7 +90,7 @@ def release_velocity(scene: Scene, stream: int = 0) -> tuple[float, float]:
     assert scene.incoming is not None
     speed, (cosine, sine) = scene.incoming.speed, up_belt(scene)
     # 0 is a number, also where the speeds of a family are an array.
-    return speed * cosine, speed * sine if np.any(sine) else 0.0
+    return speed * cosine, speed * sine if np.count_nonzero(sine) else 0.0
 
 
 def on_belt(scene: Scene, stream: int = 0) -> bool:
@@ -174,13 +179,21 @@ def squeeze(
 
 @dataclass(frozen=True, eq=False)
 class Draw:
-    """What was drawn of one stream: its releases, arrays of n, and radii (m) if they differ."""
+    """What was drawn of one stream: its releases, and radii (n,), m, if they differ."""
 
-    t: Floats
-    position: Floats
-    velocity: Floats
-    carried: bool
+    releases: Releases
     radius: Floats | None
+
+
+def _releases(
+    scene: Scene, n: int, t: Floats, position: Floats, velocity: Floats, carried: bool
+) -> Releases:
+    """Return the releases of stream n, of which all are carried or none."""
+    every = len(t)
+    rides = np.empty(every, dtype=bool)
+    stream, kind = np.empty((2, every), dtype=np.int64)
+    rides[:], stream[:], kind[:] = carried, n, np.arange(every) if scene.shape else scene.kinds[n]
+    return Releases(t, position, velocity, rides, stream, kind)
 
 
 Clear = Callable[[Floats, float], Bools]
@@ -218,23 +231,18 @@ def draw(scene: Scene, clear: Clear) -> tuple[Releases, Floats | None]:
             drawn.append(_draw(scene, n))
         else:
             drawn.append(_pour(scene, n, drawn, clear))
-    counts = [len(one.t) for one in drawn]
-    kinds = np.arange(counts[0]) if scene.shape else np.repeat(scene.kinds, counts)
-    first, *others = drawn
-    t, position, velocity = first.t, first.position, first.velocity
-    if others:
-        t, position, velocity = (
-            np.concatenate([getattr(one, name) for one in drawn])
-            for name in ("t", "position", "velocity")
-        )
-    carried = np.repeat([one.carried for one in drawn], counts)
-    stream_of = np.repeat(np.arange(len(drawn)), counts)
-    releases = Releases(t, position, velocity, carried, stream_of, kinds)
-    alike = len({particle.radius for particle in scene.particles}) == 1 if others else True
+    if len(drawn) == 1:
+        return drawn[0].releases, drawn[0].radius
+    releases = Releases(
+        *(np.concatenate([getattr(one.releases, name) for one in drawn]) for name in FIELDS)
+    )
+    alike = len({particle.radius for particle in scene.particles}) == 1
     if alike and all(one.radius is None for one in drawn):
         return releases, None
     radii = [
-        np.full(len(one.t), scene.particles[kind].radius) if one.radius is None else one.radius
+        np.full(len(one.releases.t), scene.particles[kind].radius)
+        if one.radius is None
+        else one.radius
         for one, kind in zip(drawn, scene.kinds, strict=True)
     ]
     return releases, np.concatenate(radii)
@@ -268,10 +276,10 @@ def _draw(scene: Scene, n: int) -> Draw:
     position, velocity = np.empty((2, every, 2))
     velocity[:, 0], velocity[:, 1] = release_velocity(scene, n)
     height, radii, faster = np.zeros(every), None, np.zeros(every)
-    crowded = scene.crowded and stream.count > 1
+    crowded = stream.count > 1 and scene.crowded
     # The first one has no spread. Making a generator takes as long as all other preparations.
-    drawn = stream.bed_height > 0.0 or stream.speed_spread > 0.0 or stream.to or particle.span
-    if stream.count > 1 and (drawn or crowded):
+    spread = stream.bed_height > 0.0 or stream.speed_spread > 0.0
+    if stream.count > 1 and (crowded or spread or stream.to or particle.span):
         rng = _dice(scene, n)
         height = stream.bed_height * rng.random(every)
         height[0] = 0.0
@@ -287,7 +295,8 @@ def _draw(scene: Scene, n: int) -> Draw:
         if not stream.at_once and every > 1:
             share[1:] = rng.random(every - 1)
         begin, end = np.array(stream.at), np.array(stream.to)
-        return Draw(t, begin + share[:, None] * (end - begin), velocity, False, radii)
+        position = begin + share[:, None] * (end - begin)
+        return Draw(_releases(scene, n, t, position, velocity, False), radii)
     rides = on_belt(scene, n)
     adheres = rides and scene.incoming is not None and isinstance(scene.incoming.friction, str)
     cosine, sine = up_belt(scene) if rides else (1.0, 0.0)
@@ -305,7 +314,7 @@ def _draw(scene: Scene, n: int) -> Draw:
         height += radii - particle.radius
     x, low = release_point(scene, n)
     position[:, 0], position[:, 1] = x - sine * height, low + cosine * height
-    return Draw(t, position, velocity, adheres, radii)
+    return Draw(_releases(scene, n, t, position, velocity, adheres), radii)
 
 
 PITCH = 2.04
@@ -335,7 +344,8 @@ def _pour(scene: Scene, n: int, before: Sequence[Draw], clear: Clear) -> Draw:
     free = clear(places, largest)
     for kind, one in zip(scene.kinds, before, strict=False):
         other = scene.particles[kind].radius if one.radius is None else one.radius
-        for place, r in zip(one.position, np.broadcast_to(other, len(one.t)), strict=True):
+        theirs = one.releases.position
+        for place, r in zip(theirs, np.broadcast_to(other, len(theirs)), strict=True):
             free &= np.hypot(*(places - place).T) >= largest + r
     places = places[free]
     if len(places) < stream.count:
@@ -349,7 +359,8 @@ def _pour(scene: Scene, n: int, before: Sequence[Draw], clear: Clear) -> Draw:
     velocity = np.empty((stream.count, 2))
     velocity[:] = release_velocity(scene, n)
     t = np.full(stream.count, stream.start)
-    return Draw(t, places[: stream.count].copy(), velocity, False, radii)
+    position = places[: stream.count].copy()
+    return Draw(_releases(scene, n, t, position, velocity, False), radii)
 
 
 def _spread_apart(

@@ -19,7 +19,7 @@ from pydantic import ValidationError
 
 from chutelab.scene.conflicts import EITHER, ConflictError, Look, conflicts
 from chutelab.scene.overrides import Override, apply, at_path, joined, rule_at
-from chutelab.scene.schema import Scene, as_written
+from chutelab.scene.schema import DEFAULTS, Scene, as_written
 from chutelab.util.errors import MISSING, Fault, InputError, cut, did_you_mean, printable
 from chutelab.util.files import first_bytes
 
@@ -216,13 +216,13 @@ def _unknown(parts: Location) -> str:
     """Say that a key is unknown, and which one was probably meant."""
     *above, last = parts
     key, known = str(last), _keys(above)
-    if near := _nearest(key, known):
-        return f"unknown key; did you mean {joined((*above, *near))}?"
     homes = [
         f"[[{name}]]" if name in LISTS else f"[{name}]"
         for name in Scene.tables()
         if key in _keys([name, 0] if name in LISTS else [name])
     ]
+    if not homes and (near := _nearest(key, known)):
+        return f"unknown key; did you mean {joined((*above, *near))}?"
     if homes:
         return f"unknown key here; it belongs in {_listed(homes)}"
     return f"unknown key; known here are {', '.join(known)}"
@@ -323,7 +323,7 @@ def from_dict(
         tables = [field.alias or name for name, field in Scene.model_fields.items()]
         for key in document.keys() - set(tables):
             faulty.update(_nearest(key, tables))
-        found += conflicts(Look(document, Scene, faulty))
+        found += conflicts(Look(document, DEFAULTS, faulty))
         faults += [_traced(fault, given) for fault in found]
     if scene is None or faults:
         raise SceneError(source, faults, f"The scene is empty. {_STARTER}" if empty else "")

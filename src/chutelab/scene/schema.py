@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import hypot, pi
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Final, Self
 
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
 
@@ -33,6 +33,27 @@ from chutelab.scene.units import (
     described,
     tonnes_per_hour,
 )
+
+TABLES: Final[dict[str, type[Table]]] = {
+    "particle": Particle,
+    "material": Material,
+    "pair": Pair,
+    "incoming": Incoming,
+    "plate": Plate,
+    "outgoing": Outgoing,
+    "conveyor": Conveyor,
+    "surface": Surface,
+    "string": String,
+    "stream": Stream,
+    "run": Run,
+    "expect": Expect,
+}
+
+DEFAULTS: Final = {
+    name: {key: field.default for key, field in table.model_fields.items()}
+    for name, table in TABLES.items()
+}
+"""Of the keys of each table, by their names in code."""
 
 
 def _one_or_several(given: object) -> object:
@@ -91,21 +112,7 @@ class Scene(Table):
     @classmethod
     def tables(cls) -> dict[str, type[Table]]:
         """Model of each table by its key."""
-        tables: tuple[type[Table], ...] = (
-            Particle,
-            Material,
-            Pair,
-            Incoming,
-            Plate,
-            Outgoing,
-            Conveyor,
-            Surface,
-            String,
-            Stream,
-            Run,
-            Expect,
-        )
-        return {table.__name__.lower(): table for table in tables}
+        return TABLES
 
     @property
     def particle(self) -> Particle:
@@ -125,6 +132,8 @@ class Scene(Table):
     @property
     def kinds(self) -> tuple[int, ...]:
         """Which of the particles each stream consists of."""
+        if len(self.particles) == 1:
+            return (0,) * len(self.streams)
         names = [kind.name for kind in self.particles]
         return tuple(
             0 if stream.particle is None else names.index(stream.particle)
@@ -148,40 +157,41 @@ class Scene(Table):
         kind) says, then the material, then the default. Of two kinds that nothing is said of it is
         the geometric mean of what each has with itself, a mixing rule that is as good as any.
         """
-        values = [self._own(kind, other, key) for key in ("restitution", "friction")]
-        return values[0], values[1]
-
-    def _own(self, kind: int, other: int | str, key: str) -> Any:
         particle = self.particles[kind]
-        with_it = self.particles[other].name if isinstance(other, int) else other
-        for pair in self.pair:
-            if set(pair.between) == {particle.name, with_it} and getattr(pair, key) is not None:
-                return getattr(pair, key)
-        if isinstance(other, int) and other != kind:
-            a, b = self._own(kind, kind, key), self._own(other, other, key)
-            return (a * b) ** 0.5
-        if isinstance(other, int):
-            homes: tuple[Table, ...] = tuple(
-                stream for stream, its in zip(self.streams, self.kinds, strict=True) if its == kind
-            )
-            column = ""
-        else:
-            table = self.surface_table(other)
-            homes = (table,)
+        with_it: str | None
+        if isinstance(other, str):
+            with_it, table = other, self.surface_table(other)
             steel = isinstance(table, Plate) or (
                 isinstance(table, Surface) and table.material == "steel"
             )
-            column = "_steel" if steel else "_rubber"
-        for home in homes:
-            if key in home.model_fields_set:
-                return getattr(home, key)
-        if isinstance(homes[0] if homes else None, Incoming) and key == "friction":
-            return getattr(homes[0], key)
-        material = self._material(particle)
-        value = None if material is None else getattr(material, key + column)
-        if value is not None:
-            return value
-        return getattr(homes[0], key) if homes else Stream.model_fields[key].default
+            values = self._own(particle, (table,), "_steel" if steel else "_rubber")
+        elif other == kind:
+            with_it, rows = particle.name, zip(self.streams, self.kinds, strict=True)
+            own = [stream for stream, its in rows if its == kind]
+            values = self._own(particle, own or [Stream()])
+        else:
+            with_it = self.particles[other].name
+            pairs = zip(self.met(kind, kind), self.met(other, other), strict=True)
+            values = tuple((a * b) ** 0.5 for a, b in pairs)
+        restitution, friction = values
+        for pair in reversed(self.pair):
+            if set(pair.between) == {particle.name, with_it}:
+                restitution = restitution if pair.restitution is None else pair.restitution
+                friction = friction if pair.friction is None else pair.friction
+        return restitution, friction
+
+    def _own(self, particle: Particle, homes: Sequence[Table], column: str = "") -> Any:
+        """Return what tables say, else the material, else the default of the first."""
+        material, values = self._material(particle), []
+        for key in ("restitution", "friction"):
+            said = [home for home in homes if key in home.model_fields_set]
+            value = None
+            # Whether the incoming belt grips is its own matter.
+            grips = key == "friction" and isinstance(homes[0], Incoming)
+            if material is not None and not said and not grips:
+                value = getattr(material, key + column)
+            values.append(getattr((said or homes)[0], key) if value is None else value)
+        return values
 
     def _material(self, particle: Particle) -> Any:
         if particle.material is None:
@@ -191,10 +201,9 @@ class Scene(Table):
 
     def surface_table(self, name: str) -> Incoming | Plate | Outgoing | Conveyor | Surface:
         """Return the table that a surface is from, by its name."""
-        for key in ("incoming", "plate", "outgoing"):
-            table: Incoming | Plate | Outgoing | None = getattr(self, key)
-            if name == key and table is not None:
-                return table
+        if name in ("incoming", "plate", "outgoing"):
+            table: Incoming | Plate | Outgoing = getattr(self, name)
+            return table
         return next(free for free in self.free if free.name == name)
 
     @property
@@ -269,7 +278,7 @@ class Scene(Table):
 
     @model_validator(mode="after")
     def _judge_and_fill(self) -> Self:
-        faults = list(conflicts(Look(as_written(self), Scene)))
+        faults = list(conflicts(Look(as_written(self), DEFAULTS)))
         if faults:
             raise ConflictError(faults)
         self._fill_defaults()

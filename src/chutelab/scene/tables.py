@@ -25,6 +25,7 @@ from chutelab.scene.units import (
     Radius,
     Rate,
     Repeats,
+    Resolved,
     Share,
     Size,
     Switch,
@@ -40,7 +41,7 @@ from chutelab.scene.units import (
 )
 
 
-class Particle(Table):
+class Particle(Resolved):
     """One kind of particles: disks, or mass points with radius 0; boxes and polygons."""
 
     name: Name | None = described(None, "Name of this kind; needed where there are several")
@@ -278,7 +279,7 @@ class String(Table):
     )
 
 
-class Stream(Table):
+class Stream(Resolved):
     """A stream of particles: how many, of what kind, when, where and how fast they are released."""
 
     name: Name | None = described(

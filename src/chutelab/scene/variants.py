@@ -24,7 +24,7 @@ from chutelab.scene.overrides import (
     parts_of,
     rule_at,
 )
-from chutelab.scene.schema import Scene, plain_number
+from chutelab.scene.schema import DEFAULTS, Scene, plain_number
 from chutelab.scene.units import SIZE, read_size
 from chutelab.util.arrays import Bools, Floats
 from chutelab.util.errors import MISSING, InputError
@@ -254,7 +254,7 @@ def judged_by(scene: Scene, values: Mapping[str, object]) -> set[str]:
     """
     document = plain(to_dict(scene))
     apply(document, [Override(key, plain_number(value)) for key, value in values.items()])
-    look = Look(document, Scene)
+    look = Look(document, DEFAULTS)
     list(conflicts(look))
     return look.asked
 

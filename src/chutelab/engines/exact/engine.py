@@ -139,7 +139,7 @@ def run(
     if machine.interact:
         raise ValueError("the exact engine has no contacts between particles")
     points = np.equal(machine.particle.radius, 0.0)
-    if points.any() and not points.all() and machine.segments.start.ndim == 2:
+    if 0 < np.count_nonzero(points) < points.size and machine.segments.start.ndim == 2:
         raise ValueError("the exact engine has no points beside disks")
     begin = perf_counter()
     recorder = Recorder(machine, apart=apart)

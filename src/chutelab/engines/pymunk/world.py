@@ -112,13 +112,15 @@ class Face:
         """Return 1 over the radius (1/m) on which a disk's centre follows a hollow side, or 0."""
         return 0.0
 
-    def free(self, path: Flight | Carriage, x: Vec2d, v: Vec2d, gap: float, normal: Vec2d) -> float:
+    def free(
+        self, path: Flight | Carriage, x: Vec2d, v: Vec2d, gap: float, rate: float, pull: float
+    ) -> float:
         """Return a time (s) in which a disk at a place on a path surely meets no surface.
 
         A convex one lies behind the plane through its nearest point: the gap stays above
-        gap + rate τ + a τ²/2, a the least acceleration along the normal there.
+        gap + rate τ + pull τ²/2, with the rate and the least acceleration along the normal there.
         """
-        return falls(gap, v.dot(normal), path.pull(normal))
+        return falls(gap, rate, pull)
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,7 +180,9 @@ class Bend(Face):
         room = self.shape.radius - self.radius
         return 1.0 / room if room > 0.0 and (x - self.center).length < self.shape.radius else 0.0
 
-    def free(self, path: Flight | Carriage, x: Vec2d, v: Vec2d, gap: float, normal: Vec2d) -> float:
+    def free(
+        self, path: Flight | Carriage, x: Vec2d, v: Vec2d, gap: float, rate: float, pull: float
+    ) -> float:
         """Return a time (s) in which it is not met; see `Face.free` for the outside.
 
         Beside an arc that is the time to a line through the centre and an end. Inside, with c from
@@ -194,7 +198,7 @@ class Bend(Face):
             # Past the line, or it might take itself to be on either side of it.
             return ahead + CREEP * self.radius / max(v.length, sqrt(path.most * self.radius))
         if not (hollow := self.hollow(x)):
-            return falls(gap, v.dot(normal), path.pull(normal))
+            return falls(gap, rate, pull)
         rho, c = 1.0 / hollow, away.length
         horizon = rho / (v.length + sqrt(path.most * rho))
         bend = 2.0 * ((v.length + path.most * horizon) ** 2 + rho * path.most)
@@ -387,7 +391,7 @@ class World:
                 if rate < -slow and (rate < -graze or not self.curved(face, x)):
                     return t
                 leaving = True
-            tau = face.free(path, x, v, gap, normal)
+            tau = face.free(path, x, v, gap, rate, path.pull(normal))
             if leaving and (speed := v.length + g * self.machine.dt) > 0.0:
                 tau = max(tau, min(0.5 * t + FIRST * self.machine.dt, r / speed))
             if t + tau == t:

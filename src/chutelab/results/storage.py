@@ -151,7 +151,8 @@ def _about(recording: Recording) -> dict[str, Any]:
     """Return the header of the file."""
     return {
         "format": FORMAT,
-        "scene": recording.scene.model_dump_json(by_alias=True),
+        # Only what was given: whether a key is there may mean something.
+        "scene": recording.scene.model_dump_json(by_alias=True, exclude_unset=True),
         "title": recording.title,
         "engine": recording.engine,
         "particle": plain(asdict(recording.particle)),

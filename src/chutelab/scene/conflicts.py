@@ -130,7 +130,12 @@ def conflicts(look: Look) -> Iterator[Fault]:
         yield from _plate(look, row)
     for row, surface in enumerate(look.several("surface")):
         if isinstance(surface, Mapping):
-            yield from surface_conflicts(f"surface[{row}]", surface)
+            path = f"surface[{row}]"
+            known = {
+                key: value if look.sound(f"{path}.{key}") else math.nan
+                for key, value in surface.items()
+            }
+            yield from surface_conflicts(path, known)
     for row, conveyor in enumerate(look.several("conveyor")):
         if isinstance(conveyor, Mapping) and conveyor.get("from") == conveyor.get("to") is not None:
             yield Fault(
@@ -187,7 +192,7 @@ def _names(look: Look) -> Iterator[Fault]:
     own = [m.get("name") for m in look.several("material") if isinstance(m, Mapping)]
     for row in range(look.rows("particle")):
         name = look("particle", "material", row)
-        if isinstance(name, str) and name not in (*own, *PRESETS):
+        if isinstance(name, str) and look.sound("material") and name not in (*own, *PRESETS):
             there = [n for n in own if isinstance(n, str)] + list(PRESETS)
             allowed = did_you_mean(name, there, "`chutelab materials` lists them")
             yield Fault(
@@ -195,6 +200,9 @@ def _names(look: Look) -> Iterator[Fault]:
             )
     tables = [table for table in ("incoming", "plate", "outgoing") if look.has(table)]
     anything = [n for n in (*kinds, *surfaces, *tables) if isinstance(n, str)]
+    # Of names that are themselves at fault nobody can tell which one was meant.
+    if not all(map(look.sound, ("particle", *SURFACES))):
+        return
     for row, pair in enumerate(look.several("pair")):
         between = pair.get("between") if isinstance(pair, Mapping) else None
         if not (isinstance(between, list | tuple) and look.sound(f"pair[{row}]")):
@@ -202,10 +210,12 @@ def _names(look: Look) -> Iterator[Fault]:
         if not any(name in kinds for name in between):
             text = f"one of them must be the name of a [[particle]]; {_there_are(kinds)}"
             yield Fault(f"pair[{row}].between", list(between), text)
-        for name in between:
+        for place, name in enumerate(between):
             if name not in anything:
                 allowed = did_you_mean(str(name), anything, _there_are(anything))
-                yield Fault(f"pair[{row}].between", name, f"no such kind or surface; {allowed}")
+                yield Fault(
+                    f"pair[{row}].between[{place}]", name, f"no such kind or surface; {allowed}"
+                )
 
 
 def _there_are(names: Iterable[object]) -> str:
@@ -230,7 +240,7 @@ def _kind(look: Look, row: int) -> Iterator[Fault]:
             yield Fault(path("spin"), True, text)
         if look.given("particle", "density", row):
             yield Fault(path("density"), density, f"{path('radius')} is 0: give a mass")
-    if look("particle", "rolling_friction", row) > 0.0 and spin is not True and not shaped:
+    if look("particle", "rolling_friction", row) > 0.0 and spin is False and not shaped:
         text = f"needs {path('spin')} = true: what never turns never rolls"
         yield Fault(path("rolling_friction"), look("particle", "rolling_friction", row), text)
     for key, needed in (("size", "box"), ("points", "polygon")):
@@ -251,6 +261,7 @@ def _engine(look: Look) -> Iterator[Fault]:
     engine = look("run", "engine")
     streams, kinds = max(1, look.rows("stream")), max(1, look.rows("particle"))
     counts = [look("stream", "count", row) for row in range(streams)]
+    sizes = [look("particle", "radius", row) for row in range(kinds)]
     for row in range(kinds):
         path = look.path("particle", "radius", row)
         shape = look("particle", "shape", row)
@@ -258,7 +269,10 @@ def _engine(look: Look) -> Iterator[Fault]:
             if engine in ("exact", "contact"):
                 text = f'{look.path("particle", "shape", row)} = "{shape}" needs pymunk'
                 yield Fault("run.engine", engine, text)
-        elif look("particle", "radius", row) == 0.0:
+        elif sizes[row] == 0.0:
+            if any(size != 0.0 for size in sizes if size is not math.nan):
+                text = "more than 0, or 0 of all kinds: no engine has points beside disks"
+                yield Fault(path, 0.0, text)
             if engine in ("contact", "pymunk"):
                 text = f"{path} is 0, and {engine} needs disks (> 0)"
                 yield Fault("run.engine", engine, text)
@@ -273,8 +287,8 @@ def _engine(look: Look) -> Iterator[Fault]:
             text = f"{path} with {many} needs contact or pymunk"
             yield Fault("run.engine", engine, text)
     if sum(counts) > MOST_PARTICLES:
-        text = f"at most {MOST_PARTICLES} particles in all streams together"
-        yield Fault(look.path("stream", "count"), sum(counts), text)
+        text = f"at most {MOST_PARTICLES} particles in all streams together, not {sum(counts)}"
+        yield Fault(look.path("stream", "count", counts.index(max(counts))), max(counts), text)
     if look.several("string") and engine in ("exact", "contact"):
         yield Fault("run.engine", engine, "string[0] needs pymunk")
 
@@ -293,7 +307,7 @@ def _release(look: Look, row: int) -> Iterator[Fault]:
         if fills and given(key):
             text = f"{path('fill')} releases all at once in its box"
             yield Fault(path(key), look("stream", key, row), text)
-    if given("to") and not given("at"):
+    if given("to") and not (given("at") or fills):
         yield Fault(path("at"), MISSING, f"a point [x, y], m, to go with {path('to')}")
     if given("to") and given("bed_height"):
         text = f"is a height above a point; {path('to')} makes a line of it"
@@ -411,7 +425,7 @@ def surface_conflicts(path: str, surface: Mapping[str, Any]) -> Iterator[Fault]:
         begin, end = 0.0 if begin is None else begin, surface.get("to_deg")
         end = 360.0 if end is None else end
         angles = isinstance(begin, int | float) and isinstance(end, int | float)
-        if angles and not 0.0 < abs(end - begin) <= 360.0:
+        if angles and (begin == end or abs(end - begin) > 360.0):
             text = f"must be another angle than {path}.from_deg, at most 360 from it"
             yield Fault(f"{path}.to_deg", end, text)
         return

@@ -216,13 +216,13 @@ def _unknown(parts: Location) -> str:
     """Say that a key is unknown, and which one was probably meant."""
     *above, last = parts
     key, known = str(last), _keys(above)
-    if near := _nearest(key, known):
-        return f"unknown key; did you mean {joined((*above, *near))}?"
     homes = [
         f"[[{name}]]" if name in LISTS else f"[{name}]"
         for name in Scene.tables()
         if key in _keys([name, 0] if name in LISTS else [name])
     ]
+    if not homes and (near := _nearest(key, known)):
+        return f"unknown key; did you mean {joined((*above, *near))}?"
     if homes:
         return f"unknown key here; it belongs in {_listed(homes)}"
     return f"unknown key; known here are {', '.join(known)}"

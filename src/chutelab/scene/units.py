@@ -12,11 +12,13 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
+    GetJsonSchemaHandler,
     PrivateAttr,
     SerializerFunctionWrapHandler,
     WithJsonSchema,
     model_serializer,
 )
+from pydantic_core import CoreSchema
 
 
 class Table(BaseModel):
@@ -184,15 +186,22 @@ def _ascending(span: tuple[float, float]) -> tuple[float, float]:
     return span
 
 
-def _said(words: str) -> Any:
-    """Say what a list is in words, for messages."""
-    return Field(json_schema_extra={"x-words": words})
+class _Said:
+    """Says what a list is in words, for messages; `Field` would be overruled by that of a key."""
+
+    def __init__(self, words: str) -> None:
+        self.words = words
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {**handler(schema), "x-words": self.words}
 
 
 Span = Annotated[
     tuple[Positive, Positive],
     AfterValidator(_ascending),
-    _said("a range [from, to] with from < to"),
+    _Said("a range [from, to] with from < to"),
 ]
 """A range [from, to]."""
 
@@ -205,10 +214,10 @@ def _box(corners: tuple[Point, Point]) -> tuple[Point, Point]:
 
 
 Box = Annotated[
-    tuple[Point, Point], AfterValidator(_box), _said("a box [[left, bottom], [right, top]]")
+    tuple[Point, Point], AfterValidator(_box), _Said("a box [[left, bottom], [right, top]]")
 ]
-Size = Annotated[tuple[Positive, Positive], _said("[width, height] of two numbers > 0")]
-Two = Annotated[tuple[Text, Text], _said('two names ["a", "b"]')]
+Size = Annotated[tuple[Positive, Positive], _Said("[width, height] of two numbers > 0")]
+Two = Annotated[tuple[Text, Text], _Said('two names ["a", "b"]')]
 
 
 def _convex(points: tuple[Point, ...]) -> tuple[Point, ...]:
@@ -250,9 +259,9 @@ Corners = Annotated[tuple[Point, ...], Field(min_length=3, max_length=32), After
 
 Copies = Annotated[
     tuple[Annotated[Whole, Field(ge=1, le=1_000)], Coordinate, Coordinate],
-    _said("[n, dx, dy]: a whole number from 1 to 1000, and a shift"),
+    _Said("[n, dx, dy]: a whole number from 1 to 1000, and a shift"),
 ]
-Repeats = Annotated[tuple[Copies, ...], _said("one or two copies [[n, dx, dy], ...]")]
+Repeats = Annotated[tuple[Copies, ...], _Said("one or two copies [[n, dx, dy], ...]")]
 
 
 def tonnes_per_hour(text: str) -> float:
@@ -279,7 +288,7 @@ else:
     Radius = Amount | Span
     Rate = Annotated[
         Annotated[Number, Field(ge=1e-6, le=1e9)]
-        | Annotated[Text, Field(max_length=40), _said('a text such as "120 t/h"')],
+        | Annotated[Text, Field(max_length=40), _Said('a text such as "120 t/h"')],
         AfterValidator(_rate),
     ]
 

@@ -144,7 +144,7 @@ void was_moved(int i);
 
 /* solver.c */
 int find_contacts(double h, int *woke);
-void sweep_contacts(Contact *list, int count, int sweeps, int plain, double accurate, double enough);
+void sweep_contacts(Contact *list, int count, int rounds, int plain, double accurate, double enough);
 void solve_contacts(void);
 void close_step(double h);
 void take_back(int i);

@@ -25,6 +25,10 @@
 #define PARALLEL 1e-7
 /* Steps that a contact in a crowd lasts at least if its end is told as a separation. */
 #define LASTS 10
+/* Contacts; an island of fewer is swept so many times as often where its gaps need it: disks that
+   moving surfaces draw into a wedge take up to thousands of sweeps, or sink into each other. */
+#define SMALL 500
+#define MOST_ROUNDS 50
 /* Sweeps before they are hastened: most solves need no more. */
 #define PLAIN 6
 /* Of momentum. */
@@ -96,8 +100,9 @@ static int add(int i, int j, double least, double bound, double h) {
     later = gap_later(c, h);
     if (far && later > 0) return 1;
     relative(c, 0, u);
-    /* What has sunk in counts even if it parts: else what parts others would press it. */
-    if (-u[0] > bound || (u[0] > W.soft && c->gap > -SUNK * least)) return 1;
+    /* What has sunk in counts however it moves: else what parts others would press it, or what knocks
+       on it in each step. */
+    if (c->gap > -SUNK * least && (-u[0] > bound || u[0] > W.soft)) return 1;
     double aim = MIN(c->gap, 0);
     if (c->gap < -SLOP * least) {
         double part = MIN(MAX(PART, -c->gap / (DEEP * least)), 1);
@@ -350,13 +355,17 @@ static double sweep(Contact *list, int count, int sweeps, int plain, double accu
     return worst;
 }
 
-/* Solve contacts by sweeps until changes are `accurate`; less will do if they are `enough`. Where
-   belts drive disks into a wedge that locks itself, rigid bodies with all of the friction have no
-   solution: there the friction is lowered until they have one. */
-void sweep_contacts(Contact *list, int count, int sweeps, int plain, double accurate, double enough) {
-    for (int left = TRIES;; left--) {
-        double worst = sweep(list, count, sweeps, plain, accurate);
-        if (worst <= accurate || left == 0) break;
+/* Solve contacts by sweeps until changes are `accurate`; if gaps are closed but for `enough`, m/s, less
+   will do. A crowd is swept again, up to so many rounds, of which the last is good enough, and more
+   finely where small changes leave gaps open: these sweeps crawl. By itself (0 rounds), and where
+   sweeps diverge, rigid bodies with all of the friction may have no solution, driven into a wedge that
+   locks itself: there it is lowered until they have one. */
+void sweep_contacts(Contact *list, int count, int rounds, int plain, double accurate, double enough) {
+    for (int left = TRIES;;) {
+        double worst = sweep(list, count, W.sweeps, plain, accurate);
+        if ((worst <= accurate && rounds < 2) || left == 0) break;
+        int ends = worst < INFINITY;
+        if (worst <= accurate) accurate *= 0.1;
         if (worst < INFINITY) {
             worst = 0;
             for (int n = 0; n < count; n++) {
@@ -367,7 +376,11 @@ void sweep_contacts(Contact *list, int count, int sweeps, int plain, double accu
                 worst = MAX(worst, c->need - v[0] + u[0]);
             }
         }
-        if (worst <= enough) break;
+        if (worst <= enough || (ends && rounds == 1)) break;
+        if (ends && rounds > 1) {
+            rounds--;
+            continue;
+        }
         worst = 0;
         for (int n = 0; n < count; n++) worst = MAX(worst, list[n].change);
         for (int n = 0; n < count; n++) {
@@ -384,6 +397,7 @@ void sweep_contacts(Contact *list, int count, int sweeps, int plain, double accu
             }
             c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
         }
+        left--;
     }
 }
 
@@ -439,9 +453,15 @@ void solve_contacts(void) {
     for (int n = 0; n < W.contact_count; n++) push(W.contacts + n, W.contacts[n].impulse);
     for (int from = 0, to = 0; from < W.contact_count; from = to) {
         Contact *list = W.contacts + from;
-        while (to < W.contact_count && (!W.interact || W.contacts[to].island == list->island)) to++;
-        sweep_contacts(list, to - from, W.sweeps, W.interact ? PLAIN : W.sweeps, W.accurate,
-                       W.interact ? 1e300 : MAX(W.accurate, 1e-9));
+        double least = INFINITY;
+        for (; to < W.contact_count && (!W.interact || W.contacts[to].island == list->island); to++) {
+            const Contact *c = W.contacts + to;
+            least = MIN(least, MIN(W.disks[c->i].radius, W.disks[c->j >= 0 ? c->j : c->i].radius));
+        }
+        if (W.interact)
+            sweep_contacts(list, to - from, MIN(MAX(SMALL / (to - from), 1), MOST_ROUNDS), PLAIN,
+                           W.accurate, W.skip * least);
+        else sweep_contacts(list, to - from, 0, W.sweeps, W.accurate, MAX(W.accurate, 1e-9));
     }
     for (int n = 0; n < W.contact_count; n++) {
         /* Rounding presses nobody; with endless friction even that would pull. */

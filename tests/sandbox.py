@@ -1,0 +1,285 @@
+"""Machines and mixtures drawn at random from all that a scene file can say of round particles."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from chutelab.machine import build
+from chutelab.scene import Scene, SceneError, from_dict
+
+MATERIALS = ("steel", "gravel", "coal", "glass", "rubber", "wheat", "mine")
+
+
+def draw(seed: int) -> Scene:
+    """Return the scene of a seed; in every other one particles meet."""
+    return from_dict(tables(seed), f"sandbox-{seed}")
+
+
+def tables(seed: int) -> dict[str, Any]:
+    """Return a scene that can be built, as its file has it; the same seed gives the same scene.
+
+    Up to three streams of up to three kinds, into a box, a drum or onto a floor, with whatever
+    stands in the way. Radii are 4 to 30 mm, lengths 0.05 to 2.4 m and speeds up to 3 m/s; up to 10
+    particles that do not meet, 10 to 60 that do; 1 to 1.6 s are run.
+    """
+    rng = np.random.default_rng(seed)
+    while True:
+        drawn = Drawing(rng, meet=seed % 2 == 1).tables
+        try:
+            build(from_dict(drawn))
+        except SceneError:
+            # A release inside a surface, a box too small, or a plate that is missed.
+            continue
+        return drawn
+
+
+class Drawing:
+    """One attempt at a scene."""
+
+    def __init__(self, rng: np.random.Generator, *, meet: bool) -> None:
+        self.rng, self.meet = rng, meet
+        self.end = self.number(1.0, 1.6)
+        self.transfer = self.chance(0.4)
+        self.adheres = self.transfer and self.chance(0.5)
+        self.tables: dict[str, Any] = {
+            # Without any, what lies on a belt grazes the pulley or not as rounding says.
+            "gravity": self.one_of(
+                *[9.81] * 5, 0.05 if self.transfer else 0.0, 0.05, self.number(1.0, 20.0)
+            ),
+            "run": {"until": self.end},
+        }
+        self._kinds()
+        self._belts()
+        self._surfaces()
+        self._streams()
+        self._pairs()
+        if self.transfer and self.chance(0.3):
+            ending = "landed" if "outgoing" in self.tables else "settled"
+            self.tables["run"] = {"until": ending, "max_time": self.end}
+
+    def number(self, low: float, high: float) -> float:
+        return float(self.rng.uniform(low, high))
+
+    def whole(self, low: int, high: int) -> int:
+        return int(self.rng.integers(low, high + 1))
+
+    def chance(self, share: float) -> bool:
+        return bool(self.rng.random() < share)
+
+    def one_of(self, *values: Any) -> Any:
+        return values[int(self.rng.integers(len(values)))]
+
+    def vector(self, reach: float) -> list[float]:
+        return self.rng.uniform(-reach, reach, 2).tolist()
+
+    def place(self, reach: float = 0.7) -> list[float]:
+        """Draw a place; beyond the pulley where nothing that rides can give way to what it meets.
+
+        Adhesion moves riders as if they had no end of mass: between one of them and a wall on the
+        belt nothing has room.
+        """
+        x, y = self.vector(reach)
+        return [x + (1.5 if self.adheres and self.meet else 0.0), y]
+
+    def some(self, **drawn: Any) -> dict[str, Any]:
+        """Leave out half of the values, so that defaults are drawn as well."""
+        return {key: value for key, value in drawn.items() if self.chance(0.5)}
+
+    def values(self) -> dict[str, float]:
+        return self.some(
+            restitution=self.one_of(0.0, self.number(0.0, 0.9), self.number(0.2, 0.7)),
+            friction=self.one_of(0.0, self.number(0.0, 1.0), self.number(0.0, 1.0)),
+        )
+
+    def _kinds(self) -> None:
+        count = self.whole(1, 3)
+        self.kinds = [f"kind-{n}" for n in range(count)]
+        rows = []
+        for name in self.kinds:
+            size = float(10.0 ** self.number(-2.4, -1.6 if self.meet else -1.5))
+            ranged = self.chance(0.3)
+            row: dict[str, Any] = {
+                "radius": [size, size * self.number(1.05, 1.8)] if ranged else size,
+                **self.some(shape=self.one_of("disk", "sphere"), spin=self.chance(0.7)),
+            }
+            if count > 1 or self.chance(0.5):
+                row["name"] = name
+            row |= self.one_of(
+                {},
+                {"mass": self.number(0.005, 0.5)},
+                {"density": self.number(500.0, 8000.0)},
+                {"material": self.one_of(*MATERIALS)},
+                {"material": self.one_of(*MATERIALS), "mass": self.number(0.005, 0.5)},
+            )
+            if row.get("spin") and self.chance(0.4):
+                row["rolling_friction"] = self.number(0.01, 0.4)
+            rows.append(row)
+        self.tables["particle"] = rows if count > 1 or self.chance(0.2) else rows[0]
+        if any(row.get("material") == "mine" for row in rows):
+            own = {"name": "mine", "density": 1234.0, "restitution": 0.35, "friction": 0.25}
+            faces = self.some(restitution_steel=0.3, friction_steel=0.2, friction_rubber=0.7)
+            self.tables["material"] = [own | faces]
+        self.named = [row["name"] for row in rows if "name" in row]
+
+    def _belts(self) -> None:
+        if not self.transfer:
+            return
+        speed, wheel = self.number(0.3, 3.0), self.number(0.05, 0.3)
+        belt: dict[str, Any] = {"speed": speed, "pulley_radius": wheel}
+        belt |= self.some(length=self.number(0.3, 0.8), restitution=self.number(0.0, 0.6))
+        belt |= {"incline_deg": self.number(-25.0, 35.0)} if self.chance(0.6) else {}
+        if not self.adheres:
+            belt["friction"] = self.number(0.0, 1.0)
+        self.tables["incoming"] = belt
+        if self.chance(0.5):
+            self.tables["outgoing"] = {
+                "drop": 2.0 * wheel + self.number(0.3, 0.8),
+                "drop_from": "top",
+                **self.some(speed=self.number(-2.0, 3.0), start=-1.0, length=3.0),
+                **self.values(),
+            }
+        plates = []
+        if self.chance(0.5):
+            plates.append({
+                "distance": self.number(0.2, 0.8),
+                **self.some(angle_deg=self.number(-40.0, 40.0), above=self.number(0.1, 0.4)),
+                **self.values(),
+            })  # fmt: skip
+        if self.chance(0.3):
+            plates.append(self._hanging())
+        if plates:
+            self.tables["plate"] = plates if len(plates) > 1 else plates[0]
+
+    def _hanging(self) -> dict[str, Any]:
+        x, y = self.place()
+        return {
+            "name": "flap", "pivot": [x, y], "above": self.number(0.0, 0.2),
+            **self.some(angle_deg=self.number(-60.0, 60.0), below=self.number(0.1, 0.4)),
+            **self.values(),
+        }  # fmt: skip
+
+    def _surfaces(self) -> None:
+        rows = [] if self.transfer else [self._container()]
+        for n in range(self.whole(0, 4)):
+            row = {"name": f"s{n}", **self._course(), **self.values()}
+            row |= self.some(speed=self.one_of(0.0, self.number(-1.5, 1.5)))
+            row |= self.some(material=self.one_of("steel", "rubber"))
+            if self.chance(0.3):
+                row |= self.some(opens_at=self.number(0.1, 0.9), closes_at=self.number(0.1, 0.9))
+            rows.append(row)
+        if self.chance(0.3):
+            dx, dy = self.number(0.15, 0.3), self.number(0.15, 0.3)
+            rows.append({
+                "name": "pegs", "center": [-2.0 * dx, -0.5], "radius": self.number(0.01, 0.04),
+                "repeat": [[self.whole(2, 5), dx, 0.0], [self.whole(1, 3), 0.5 * dx, dy]],
+                **self.values(),
+            })  # fmt: skip
+        if rows:
+            self.tables["surface"] = rows
+        if not self.transfer and self.chance(0.2):
+            self.tables["plate"] = self._hanging()
+        if self.chance(0.3):
+            start = np.array(self.place())
+            way = np.array([self.number(0.3, 0.8) * self.one_of(-1.0, 1.0), self.number(-0.3, 0.3)])
+            self.tables["conveyor"] = [{
+                "name": "carrier", "from": start.tolist(), "to": (start + way).tolist(),
+                "speed": self.number(-2.0, 2.0), **self.some(pulley_radius=self.number(0.04, 0.12)),
+                **self.values(),
+            }]  # fmt: skip
+
+    def _container(self) -> dict[str, Any]:
+        kind = self.whole(0, 2)
+        if kind == 0:
+            corners = [[-1.2, 1.2], [-1.2, -1.2], [1.2, -1.2], [1.2, 1.2]]
+            return {"name": "box", "points": corners, **self.values()}
+        if kind == 1:
+            turning = self.some(speed=self.number(-1.0, 1.0))
+            return {"name": "drum", "center": [0.0, 0.0], "radius": 1.2, **turning, **self.values()}
+        return {"name": "floor", "from": [-3.0, -1.0], "to": [3.0, -1.0], **self.values()}
+
+    def _course(self) -> dict[str, Any]:
+        start = np.array(self.place())
+        if self.chance(0.4):
+            begin, extent = self.number(-180.0, 180.0), self.one_of(-1.0, 1.0)
+            whole = self.chance(0.2)
+            return {
+                "center": start.tolist(), "radius": self.number(0.08, 0.5),
+                **({} if whole else {
+                    "from_deg": begin, "to_deg": begin + extent * self.number(30.0, 300.0),
+                }),
+            }  # fmt: skip
+        points = [start]
+        for _ in range(self.one_of(1, 1, 2, 3)):
+            angle = self.number(-np.pi, np.pi)
+            onward = self.number(0.15, 0.6) * np.array([np.cos(angle), np.sin(angle)])
+            points.append(points[-1] + onward)
+        ends = [point.tolist() for point in points]
+        return {"from": ends[0], "to": ends[1]} if len(ends) == 2 else {"points": ends}
+
+    def _streams(self) -> None:
+        count = self.whole(1, 3)
+        most = 60 if self.meet else 10
+        counts = self.rng.multinomial(self.whole(max(count, most // 6), most) - count,
+                                      [1.0 / count] * count) + 1  # fmt: skip
+        rows = []
+        for n, every in enumerate(counts.tolist()):
+            row: dict[str, Any] = {"count": every, **self.some(seed=self.whole(0, 99))}
+            row |= {"start": self.number(0.0, 0.3)} if self.chance(0.3) else {}
+            row |= {"name": f"stream-{n}"} if self.chance(0.3) else {}
+            if self.named and self.chance(0.7):
+                row["particle"] = self.one_of(*self.named)
+            if self.meet and (n == 0 or self.chance(0.5)):
+                row["interact"] = True
+            if self.meet:
+                row |= self.values()
+            way = self.whole(0, 3)
+            if self.transfer and n == 0:
+                self._on_belt(row)
+            elif way == 0:
+                self._at_a_point(row)
+            elif way == 3:
+                side = self.number(0.15, 0.5)
+                x, y = self.place(0.5)
+                row["fill"] = [[x, y], [x + side, y + self.number(0.15, 0.6)]]
+                row |= self.some(velocity=self.vector(1.0))
+            else:
+                self._along_a_line(row)
+            rows.append(row)
+        self.tables["stream"] = rows if count > 1 else rows[0]
+
+    def _on_belt(self, row: dict[str, Any]) -> None:
+        # Layers of an adhesive bed ride into each other round the pulley, of which `check` warns.
+        row["rate"] = self._rate()
+        if not self.adheres:
+            row |= self.some(speed_spread=self.number(0.0, 0.2))
+        if not (self.adheres and self.meet):
+            row |= self.some(bed_height=self.number(0.0, 0.1))
+
+    def _at_a_point(self, row: dict[str, Any]) -> None:
+        row |= {"at": self.place(), "velocity": self.vector(2.0), "rate": self._rate()}
+        row |= self.some(bed_height=self.number(0.0, 0.2), speed_spread=self.number(0.0, 0.5))
+
+    def _along_a_line(self, row: dict[str, Any]) -> None:
+        start = self.place()
+        row |= {"at": start, "to": [start[0] + self.number(0.2, 0.6), start[1]]}
+        row["velocity"] = self.vector(1.5)
+        if self.chance(0.5):
+            row["rate"] = self._rate()
+        elif self.meet:
+            # All at once, beside each other: in a row that is long enough for all.
+            row["to"] = [start[0] + 0.11 * row["count"], start[1] + self.number(-0.1, 0.1)]
+
+    def _rate(self) -> Any:
+        return self.one_of(self.number(20.0, 200.0), f"{self.number(1.0, 8.0):.3g} t/h")
+
+    def _pairs(self) -> None:
+        if not self.named or self.chance(0.7):
+            return
+        surfaces = [
+            row["name"] for key in ("surface", "conveyor") for row in self.tables.get(key, [])
+        ]
+        surfaces += [table for table in ("incoming", "outgoing") if table in self.tables]
+        between = [self.one_of(*self.named), self.one_of(*self.named, *surfaces)]
+        self.tables["pair"] = [{"between": between, **self.values()}]

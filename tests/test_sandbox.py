@@ -1,0 +1,317 @@
+"""Random machines of all parts and mixtures of all kinds: laws that every run of them must keep."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import inf, pi
+
+import numpy as np
+import pytest
+import tomli_w
+from click.testing import CliRunner
+
+from chutelab.cli import main
+from chutelab.engines import contact, exact
+from chutelab.engines.simulation import simulate
+from chutelab.machine import build
+from chutelab.results import Kind, Recording
+from chutelab.results.ledger import ledger
+from sandbox import draw, tables
+
+INSIDE = 0.03
+"""Radii that no particle may be in a surface or in another."""
+
+NEAR = 2e-5
+"""m that ends may differ by after lasting contacts, without a look at a finer step."""
+
+SLOW, DT = 8.0, 1e-3
+"""Blows of less than so many times the weight during a step (s) may count as rest."""
+
+PLACES = 6
+"""Places between two knots at which a track is looked at."""
+
+
+class Geometry:
+    """Distances to the surfaces of a machine, written once more: the engines have their own."""
+
+    def __init__(self, machine):
+        self.segments, self.arcs, self.pulley = machine.segments, machine.arcs, machine.pulley
+        wheel = [-inf] * (machine.pulley is not None)
+        self.appears = np.concatenate([self.segments.appears, self.arcs.appears, wheel])
+        self.vanishes = np.concatenate(
+            [self.segments.vanishes, self.arcs.vanishes, np.negative(wheel)]
+        )
+        owner = np.concatenate(
+            [self.segments.surface, self.arcs.surface, np.zeros(len(wheel), int)]
+        )
+        self.names = [machine.surfaces[n] for n in owner]
+
+    def look(self, place):
+        """Return, of points (M, 2), distance, side and whether the foot is inside: each (P, M)."""
+        rows = []
+        seg, arcs = self.segments, self.arcs
+        for a, b in zip(seg.start, seg.end, strict=True):
+            along, away = b - a, place - a
+            share = away @ along / (along @ along)
+            far = away - np.clip(share, 0.0, 1.0)[:, None] * along
+            side = along[0] * away[:, 1] - along[1] * away[:, 0]
+            rows.append((np.hypot(*far.T), side, (share >= 0.0) & (share <= 1.0)))
+        ends = arcs.ends
+        for n, (center, radius) in enumerate(zip(arcs.center, arcs.radius, strict=True)):
+            x, y = (place - center).T
+            turn = np.mod(np.arctan2(y, x) - arcs.begin[n], 2.0 * pi)
+            on, aside = turn <= arcs.extent[n], np.hypot(x, y) - radius
+            corner = np.minimum(*(np.hypot(*(place - end[n]).T) for end in ends))
+            rows.append((np.where(on, np.abs(aside), corner), aside, on))
+        if self.pulley is not None:
+            aside = np.hypot(*place.T) - self.pulley.radius
+            # A wheel is full: its inside is no place to be.
+            rows.append((aside, aside, np.ones(len(place), dtype=bool)))
+        return tuple(np.array(column) for column in zip(*rows, strict=True))
+
+    def there(self, t):
+        """Which pieces are there at times (M,), (P, M)."""
+        return (self.appears[:, None] <= t) & (t < self.vanishes[:, None])
+
+
+def of_each(value, count):
+    return np.broadcast_to(value, count)
+
+
+def track_places(recording, particle, times):
+    """Times and places on the track of a particle: its knots, some between, and some times."""
+    track = recording.track(particle)
+    if not len(track):
+        return np.zeros(0), np.zeros((0, 2))
+    t = track["t"]
+    share = np.arange(1, PLACES) / PLACES
+    between = (t[:-1, None] + np.diff(t)[:, None] * share).ravel()
+    own = np.concatenate([between, times[(times >= t[0]) & (times <= t[-1])]])
+    # `at` finds the place of one particle among all: pick the cubic's knots here instead.
+    left = (
+        np.clip(np.searchsorted(t, own, side="right") - 1, 0, len(t) - 2) if len(t) > 1 else own * 0
+    )
+    if len(t) > 1:
+        a, b, h = track[left], track[left + 1], t[left + 1] - t[left]
+        s = np.divide(own - t[left], h, out=np.zeros_like(h), where=h > 0.0)[:, None]
+        h = h[:, None]
+        # The cubic with these ends and these velocities at them.
+        place = (
+            (1.0 - s) ** 2 * ((1.0 + 2.0 * s) * a["position"] + s * h * a["velocity"])
+            + s * s * ((3.0 - 2.0 * s) * b["position"] - (1.0 - s) * h * b["velocity"])
+        )  # fmt: skip
+    else:
+        own, place = np.zeros(0), np.zeros((0, 2))
+    every = np.concatenate([t, own])
+    order = np.argsort(every, kind="stable")
+    return every[order], np.concatenate([track["position"], place])[order]
+
+
+def in_surfaces(recording):
+    """Yield what is in a surface by more than it may, or passes one."""
+    machine = recording.machine
+    geometry = Geometry(machine)
+    radius = of_each(machine.particle.radius, machine.count)
+    ends = recording.knots["t"] if len(recording.knots) else np.zeros(1)
+    times = np.linspace(ends.min(), ends.max(), 200)
+    for who in range(machine.count):
+        t, place = track_places(recording, who, times)
+        if not len(t) or not len(geometry.names):
+            continue
+        distance, side, over = geometry.look(place)
+        there = geometry.there(t)
+        deep = np.where(there, 1.0 - distance / radius[who], -inf)
+        for piece in np.flatnonzero(np.isfinite(geometry.appears)):
+            # A gate shuts on nobody: who is in it then is not touched until it is clear of it.
+            if not t[0] < geometry.appears[piece] <= t[-1]:
+                continue
+            since = np.flatnonzero(t >= geometry.appears[piece])
+            if deep[piece, since[0]] > 0.0 or deep[piece, since[0] - 1] > -INSIDE:
+                clear = np.flatnonzero(deep[piece, since] <= 0.0)
+                until = since[clear[0]] if len(clear) else len(t)
+                there[piece, since[0] : until] = False
+                deep[piece, since[0] : until] = -inf
+        if deep.max() > INSIDE:
+            piece, at = np.unravel_index(deep.argmax(), deep.shape)
+            yield f"{who} in {geometry.names[piece]} by {deep.max():.2g} r at {t[at]:.6g} s"
+        passes = (side[:, 1:] * side[:, :-1] < 0.0) & over[:, 1:] & over[:, :-1]
+        passes &= there[:, 1:] & there[:, :-1]
+        for piece, at in np.argwhere(passes):
+            yield f"{who} through {geometry.names[piece]} at {t[at]:.6g} s"
+
+
+def in_others(recording):
+    """Yield which particles are in each other by more than they may."""
+    machine = recording.machine
+    radius = of_each(machine.particle.radius, machine.count)
+    t = np.unique(recording.knots["t"])
+    some = t[:: max(1, len(t) // 300)]
+    for now in np.concatenate([some, np.linspace(t[0], t[-1], 200)]):
+        place = recording.at([now])[0][0]
+        here = np.flatnonzero(np.isfinite(place[:, 0]))
+        gap = np.hypot(*np.moveaxis(place[here][:, None] - place[here], -1, 0))
+        deep = (np.add.outer(radius[here], radius[here]) - gap) / np.minimum.outer(
+            radius[here], radius[here]
+        )
+        np.fill_diagonal(deep, -inf)
+        if len(here) and deep.max() > INSIDE:
+            i, j = here[list(np.unravel_index(deep.argmax(), deep.shape))]
+            yield f"{i} in {j} by {deep.max():.2g} r at {now:.6g} s"
+
+
+def in_the_ledger(recording):
+    """Yield what the books leave unexplained."""
+    books = ledger(recording)
+    if not abs(books.residual) <= 1e-10 * books.turned_over:
+        yield f"ledger: {books.relative_residual:.1e}"
+    if books.by_stream:
+        others = sum(one["from_others"] for one in books.by_stream.values())
+        if not abs(others - books.residual) <= 1e-12 * books.turned_over:
+            yield f"streams: {others:.3g} J from others, residual {books.residual:.3g} J"
+        if not recording.machine.interact and any(
+            abs(one["from_others"]) > 1e-10 * books.turned_over for one in books.by_stream.values()
+        ):
+            yield "streams: energy from others where none meet"
+
+
+def faults(recording: Recording) -> list[str]:
+    """Return what a run did that none may do."""
+    found = [*in_surfaces(recording), *in_the_ledger(recording)]
+    return found + list(in_others(recording)) if recording.machine.interact else found
+
+
+def forced_from(recording, particle):
+    """When something first holds a particle, s: from then on it does not fly; inf if never.
+
+    The ride of an adhesive belt does not count. In free flight knots differ by the weight alone.
+    """
+    knots = recording.track(particle)
+    events = recording.events[recording.events["particle"] == particle]
+    if recording.machine.releases.carried[particle]:
+        left = events["t"][events["kind"] == Kind.SEPARATION]
+        knots = knots[knots["t"] >= left[0]] if len(left) else knots[:0]
+    time, velocity = np.diff(knots["t"]), np.diff(knots["velocity"], axis=0)
+    velocity[:, 1] += recording.gravity * time
+    scale = 1e-9 * (np.abs(knots["velocity"]).max(initial=0.0) + recording.gravity)
+    turning = np.abs(np.diff(knots["omega"])) > 1e-9 * (1.0 + np.abs(knots["omega"]).max(initial=0))
+    held = ((np.abs(velocity).max(axis=1, initial=0.0) > scale) | turning) & (time > 0.0)
+    return float(knots["t"][:-1][held].min(initial=inf))
+
+
+def blows(recording, particle, until):
+    """Events of a particle before it is held, or strikes too slowly for a step to tell."""
+    events = recording.events[recording.events["particle"] == particle]
+    mass = of_each(recording.machine.particle.mass, recording.count)[particle]
+    struck = np.isin(events["kind"], (Kind.IMPACT, Kind.LANDING))
+    slow = struck & (events["normal_impulse"] < SLOW * recording.gravity * DT * mass)
+    until = min([until, *events["t"][slow]]) - 1e-9
+    return events[events["t"] < until], until
+
+
+def differences(exact, contact):
+    """Yield in what two answers differ, where none meet, by more than they promise of blows."""
+    for who in range(exact.count):
+        held = min(forced_from(exact, who), forced_from(contact, who))
+        (a, before), (b, until) = (blows(run, who, held) for run in (exact, contact))
+        a, b = a[a["t"] < until], b[b["t"] < before]
+        if a["kind"].tolist() != b["kind"].tolist() or (a["surface"] != b["surface"]).any():
+            yield f"{who}: other events"
+            continue
+        for name in ("t", "position", "velocity_after", "omega_after"):
+            apart = np.abs(a[name] - b[name]).max(initial=0.0)
+            if not apart <= 1e-9 * np.abs(a[name]).max(initial=1.0):
+                yield f"{who}: {name} of an event by {apart:.1e}"
+        if exact.ended[who] != contact.ended[who]:
+            yield f"{who}: ended {exact.ended[who]} and {contact.ended[who]}"
+        if before == until == inf and not ends_apart(exact, contact)[who] <= 1e-9:
+            yield f"{who}: ends elsewhere"
+
+
+def ends_apart(one, other):
+    """How far apart the ends of tracks are, (N,), m; 0 of who was never released."""
+    apart = np.zeros(one.count)
+    a, b = (run.ends()[1]["position"] for run in (one, other))
+    apart[one.released] = np.abs(a - b).max(axis=1)
+    return apart
+
+
+def same(one, other):
+    """Whether two recordings are the same to the last bit."""
+    arrays = ("knots", "events", "offsets", "ended", "by_surface")
+    return all(getattr(one, k).tobytes() == getattr(other, k).tobytes() for k in arrays)
+
+
+def check(seed, folder):
+    drawn = draw(seed)
+    if seed % 10 == 0:
+        # As a user has it: the command, from a file to a file.
+        file = folder / "scene.toml"
+        file.write_text(tomli_w.dumps(tables(seed)), encoding="utf-8")
+        words = ["run", str(file), "--out", str(folder / "out"), "--only", "npz", "-q"]
+        outcome = CliRunner().invoke(main, words)
+        assert outcome.exit_code == 0, outcome.output
+        assert same(Recording.load(folder / "out" / "recording.npz"), simulate(drawn))
+    machine = build(drawn)
+    run = contact.run(machine)
+    assert faults(run) == []
+    assert same(contact.run(build(draw(seed))), run)
+    assert same(Recording.load(run.save(folder / "recording.npz")), run)
+    if machine.interact:
+        return
+    try:
+        followed = exact.run(machine)
+    except exact.CornerError:
+        # A disk that turns, held between two surfaces of which one moves: auto takes contact.
+        assert simulate(drawn).engine == "contact"
+        return
+    assert faults(followed) == []
+    assert list(differences(followed, run)) == []
+    assert same(exact.run(build(draw(seed))), followed)
+    # What is held somewhere is off by the square of a step.
+    apart = ends_apart(followed, run)
+    if (apart > NEAR).any():
+        finer = ends_apart(followed, contact.run(replace(machine, dt=0.25 * machine.dt)))
+        assert (finer <= np.maximum(NEAR, 0.25 * apart)).all(), (apart, finer)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_laws_hold_on_any_machine(seed, tmp_path):
+    check(seed, tmp_path)
+
+
+def unlike(reason):
+    return pytest.mark.xfail(strict=True, reason=f"exact and contact differ: {reason}")
+
+
+UNLIKE = {
+    60: unlike("ends after lasting contacts by 7e-5 m, at a finer step too"),
+    146: unlike("ends after lasting contacts by 7e-5 m, at a finer step too"),
+    156: unlike("how many blows of a chatter in a wedge are told"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "seed", [pytest.param(seed, marks=UNLIKE.get(seed, ())) for seed in range(12, 300)]
+)
+def test_laws_hold_on_three_hundred_machines(seed, tmp_path):
+    check(seed, tmp_path)
+
+
+def test_what_is_wrong_is_seen():
+    """A track is moved, or an entry of the ledger changed: the same laws see it."""
+    run = contact.run(build(draw(7)))
+    assert faults(run) == []
+    deep = run.knots.copy()
+    struck = run.events[run.events["kind"] == Kind.IMPACT][0]
+    # As if the first surface that is met were 5 % of a radius further away.
+    radius = np.broadcast_to(run.machine.particle.radius, run.count)[struck["particle"]]
+    away = struck["velocity_after"] - struck["velocity_before"]
+    deep["position"] -= 0.05 * radius * away / np.hypot(*away)
+    assert any(" in " in fault for fault in in_surfaces(replace(run, knots=deep)))
+    near = run.knots.copy()
+    near["position"] *= 0.9
+    assert any(in_others(replace(run, knots=near)))
+    booked = run.knots.copy()
+    booked["entries"][:, 1] *= 1.0 + 1e-6
+    assert any(fault.startswith("ledger") for fault in faults(replace(run, knots=booked)))

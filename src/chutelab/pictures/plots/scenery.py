@@ -265,6 +265,10 @@ def window_of(recording: Recording) -> Window:
     path, tail = (crowd, crowd[:0]) if many else _path(recording)
     together = bodily(recording) or len(machine.streams) > 1
     points = [np.concatenate([path, crowd]) if together else path]
+    if bodily(recording):
+        # All that come to lie somewhere: of a heap its feet, which few strike.
+        stays = recording.ended[recording.released] != REASONS.index("exit")
+        points.append(recording.ends()[1]["position"][stays])
     for thread in machine.threads:
         points += [np.array([thread.anchor]), recording.track(thread.particle)["position"]]
     if machine.pulley is not None:

@@ -307,3 +307,18 @@ def test_what_is_ignored_or_somebody_elses_is_left_alone():
         signal.signal(signal.SIGTERM, mine)
         signal.signal(signal.SIGHUP, before)
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.parametrize(
+    ("name", "key"),
+    [
+        ("two-sizes", "particle"),
+        ("cascade", "conveyor"),
+        ("spoon", "surface[0].center"),
+        ("cradle", "string"),
+        ("inclined-conveyor", "incoming.incline_deg"),
+        ("hopper", "particle.radius"),
+    ],
+)
+def test_what_the_laws_are_not_about_is_refused_by_its_key(name, key):
+    assert f"{key} = " in call(name, code=2).stderr or f"{key}: " in call(name, code=2).stderr

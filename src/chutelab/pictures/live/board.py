@@ -14,8 +14,8 @@ import ipywidgets
 
 from chutelab.engines.exact import CornerError, run
 from chutelab.machine import build
-from chutelab.pictures.live.picture import View, draw, numbers, refuse, table, tracks, view_of
-from chutelab.scene import Scene, SceneError
+from chutelab.pictures.live.picture import UNSHOWN, View, draw, numbers, table, tracks, view_of
+from chutelab.scene import Scene, SceneError, need_plain
 from chutelab.util.arrays import Floats
 
 
@@ -120,7 +120,7 @@ class Board:
     """
 
     def __init__(self, scene: Scene) -> None:
-        refuse(scene)
+        need_plain(scene, UNSHOWN)
         self.scene = scene.with_values(_simpler(scene))
         self.controls = controls(self.scene)
         self.view = self._view()

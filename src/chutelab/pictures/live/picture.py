@@ -15,7 +15,6 @@ from chutelab.machine import Machine
 from chutelab.pictures import BLUE, GREY, VERMILION
 from chutelab.results import Kind, Recording
 from chutelab.results.quantities import observed
-from chutelab.scene import Fault, Scene, SceneError
 from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet
 
@@ -49,26 +48,8 @@ ROWS = (
 """What the table says of particle 0: key, words, unit."""
 
 
-def refuse(scene: Scene) -> None:
-    """Raise a `SceneError` if a scene has what neither a page nor the sliders can show."""
-    kind, belt = scene.particle, scene.incoming
-    has: list[tuple[str, object, bool]] = [
-        ("particle", f"{len(scene.particles)} kinds", len(scene.particles) > 1),
-        ("particle.shape", kind.shape, kind.shape != "disk"),
-        ("particle.radius", list(kind.span or ()), kind.span is not None),
-        ("stream", f"{len(scene.streams)} streams", len(scene.streams) > 1),
-        ("conveyor", None, bool(scene.conveyor)),
-        ("string", None, bool(scene.string)),
-    ]
-    if belt is not None:
-        has.append(("incoming.incline_deg", belt.incline_deg, belt.incline_deg != 0.0))
-    for i, surface in enumerate(scene.surface):
-        for name in ("center", "opens_at", "closes_at"):
-            value = getattr(surface, name)
-            has.append((f"surface[{i}].{name}", value, value is not None))
-    text = "a live picture cannot show this; `chutelab run --out` draws it"
-    if faults := [Fault(key, value, text) for key, value, there in has if there]:
-        raise SceneError(scene.source, faults)
+UNSHOWN = "a live picture cannot show this; `chutelab run --out` draws it"
+"""What is said of a scene that is not plain."""
 
 
 @dataclass(frozen=True)

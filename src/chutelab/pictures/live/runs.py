@@ -18,13 +18,13 @@ import numpy as np
 
 from chutelab.engines.simulation import simulate
 from chutelab.pictures.animation.moments import sentence
-from chutelab.pictures.live.picture import refuse
+from chutelab.pictures.live.picture import UNSHOWN
 from chutelab.pictures.plots import analytic_of, style, window_of
 from chutelab.pictures.plots.scenery import STRUCK, action, strobe_step
 from chutelab.results import ENTRIES, REASONS, Kind, Recording
 from chutelab.results.quantities import measure
 from chutelab.results.recorder import StalledError
-from chutelab.scene import Scene, SceneError
+from chutelab.scene import Scene, SceneError, need_plain
 from chutelab.scene.overrides import value_at
 from chutelab.scene.rules import unit_of
 from chutelab.scene.units import symbol
@@ -153,7 +153,7 @@ def study(
 def _check(scenes: Sequence[Scene]) -> None:
     """Refuse, before anything runs, what a page cannot show, or is too much for who waits."""
     for scene in scenes:
-        refuse(scene)
+        need_plain(scene, UNSHOWN)
     most = max((scene.count for scene in scenes), default=0)
     if most > MOST_PARTICLES:
         raise InputError(

@@ -24,7 +24,7 @@ from chutelab.machine import build
 from chutelab.results import REASONS, Kind, balance
 from chutelab.results.ledger import ledger
 from chutelab.results.recorder import StalledError
-from chutelab.scene import load, parse
+from chutelab.scene import from_dict, load, parse
 
 G, R, M = 9.81, 0.0063, 0.008
 
@@ -723,3 +723,19 @@ def test_ctrl_c_stops_a_long_run_at_once(engine):
     assert running.returncode == 130
     assert out == ""
     assert said.strip().endswith("Interrupted.")
+
+
+@pytest.mark.parametrize("engine", ["contact", "pymunk"])
+def test_a_crowd_on_a_gate_that_is_still_to_open_has_not_settled(engine):
+    gate = {"name": "gate", "from": [-0.2, 0.0], "to": [0.2, 0.0], "restitution": 0.0}
+    row = {"count": 5, "at": [-0.06, 0.01], "to": [0.06, 0.01], "velocity": [0.0, 0.0]}
+    found = chutelab.simulate(from_dict({
+        "particle": {"radius": 0.01},
+        "stream": {**row, "interact": True, "restitution": 0.0},
+        "surface": [{**gate, "opens_at": 0.5}],
+        "run": {"engine": engine, "until": "settled"},
+    }))  # fmt: skip
+    assert (found.ended == REASONS.index("exit")).all()
+    # From rest at y = r down to 1 m below the gate.
+    fall = sqrt(2.0 * (1.0 + 0.01) / 9.81)
+    assert found.ends()[1]["t"] == pytest.approx(0.5 + fall, rel=0.0, abs=2e-3)

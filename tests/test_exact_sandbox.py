@@ -226,7 +226,7 @@ def test_a_scene_with_points_beside_disks_is_refused_by_its_key():
         {"name": "two", "particle": "b", "at": [0.3, 1.0], "velocity": [0.0, 0.0]},
     ]
     tables = {"particle": kinds, "surface": [FAR], "stream": streams, "run": {"until": 1.0}}
-    with pytest.raises(SceneError, match=r"particle\.radius = 0\.0: .*points beside disks"):
+    with pytest.raises(SceneError, match=r"particle\[0\]\.radius = 0\.0: .*points beside disks"):
         simulate(from_dict(tables))
 
 

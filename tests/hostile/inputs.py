@@ -100,8 +100,9 @@ def scenes(rng: random.Random) -> list[str]:
     else:
         tables = tomllib.loads(text.decode())
         # Work that takes long is no hang.
-        if tables.get("stream", {}).get("count", 1) > 200:
-            tables["stream"]["count"] = 200
+        streams = tables.get("stream", [])
+        for stream in streams if isinstance(streams, list) else [streams]:
+            stream["count"] = min(stream.get("count", 1), 200)
         for _ in range(rng.choice((1, 1, 1, 2, 3))):
             tables = changed(rng, tables)
         try:

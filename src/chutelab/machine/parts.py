@@ -308,6 +308,13 @@ class Machine:
         return len(self.releases.t)
 
     @property
+    def last_gate(self) -> float:
+        """When a surface comes or goes for the last time, s; -inf if none does."""
+        pieces = self.segments, self.arcs
+        times = np.concatenate([[p.appears, p.vanishes] for p in pieces], axis=1)
+        return float(times[np.isfinite(times)].max(initial=-inf))
+
+    @property
     def corners(self) -> Floats:
         """Points round which the box of all segments and arcs goes, (..., C, 2), m."""
         parts = [self.segments.start, self.segments.end]

@@ -520,7 +520,10 @@ class Shared:
             for i in np.flatnonzero(self.landed & self.free).tolist():
                 self._end(i, "landed")
         calm = self.inside & (self.calm >= CALM)
-        together = self.machine.interact and (self.waiting or (self.inside & ~calm).any())
+        # Nothing has settled that a gate is still to change, or has just changed.
+        gated = self.t < self.machine.last_gate + CALM
+        under_way = gated or bool(self.waiting) or bool((self.inside & ~calm).any())
+        together = self.machine.interact and under_way
         if until == "settled" and not together:
             for i in np.flatnonzero(calm).tolist():
                 self._tell_calm(i)

@@ -238,8 +238,9 @@ static void stop_all(int reason) {
     }
 }
 
-/* Whether everything of a crowd has been calm for long enough. */
+/* Whether everything of a crowd has been calm for long enough, and no gate is still to come or go. */
 static int has_settled(void) {
+    if (W.gate_count && next_gate(W.t) < INFINITY) return 0;
     for (int i = W.low; i < W.high; i++) {
         const Disk *d = W.disks + i;
         if (d->mode == WAITING || d->mode == RIDING || (d->mode == FREE && d->calm < SETTLED)) return 0;

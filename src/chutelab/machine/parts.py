@@ -125,29 +125,22 @@ class Particle:
         return np.asarray(0.5 * self.mass * (vx**2 + vy**2) + 0.5 * self.inertia * omega**2)
 
 
-@dataclass(frozen=True, eq=False)
-class Segments:
-    """Straight two-sided surfaces, world frame, SI units.
-
-    Arrays have shape (S,) or (S, 2); in a family (N, S) and (N, S, 2).
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Pieces:
+    """What S pieces of surfaces have, straight or bent: read-only arrays.
 
     Attributes
     ----------
-    start, tangent : ndarray, (..., S, 2)
-        First end, and unit vector towards the second.
-    length, speed : ndarray, (..., S)
-        Length (m), and speed of the surface along the tangent (m/s).
+    speed : ndarray, (..., S)
+        Speed of the surface, along the tangent of a segment, clockwise round an arc, m/s.
     restitution, friction : ndarray, (..., S)
         Of the pair with a particle; (K, S) where there are several kinds of particles.
     surface : ndarray, (S,)
-        Index of the surface a segment belongs to, into `Machine.surfaces`.
+        Index of the surface a piece belongs to, into `Machine.surfaces`.
     appears, vanishes : ndarray, (S,)
         From when to when it is there, s; -inf and inf if always.
     """
 
-    start: Floats
-    tangent: Floats
-    length: Floats
     speed: Floats
     restitution: Floats
     friction: Floats
@@ -159,14 +152,33 @@ class Segments:
         for array in vars(self).values():
             array.flags.writeable = False
 
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Segments(Pieces):
+    """Straight two-sided surfaces, world frame, SI units.
+
+    Arrays have shape (S,) or (S, 2); in a family (N, S) and (N, S, 2).
+
+    Attributes
+    ----------
+    start, tangent : ndarray, (..., S, 2)
+        First end, and unit vector towards the second.
+    length : ndarray, (..., S)
+        m.
+    """
+
+    start: Floats
+    tangent: Floats
+    length: Floats
+
     @property
     def end(self) -> Floats:
         """Second end, (..., S, 2), m."""
         return self.start + self.length[..., None] * self.tangent
 
 
-@dataclass(frozen=True, eq=False)
-class Arcs:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Arcs(Pieces):
     """Two-sided surfaces bent round a centre, and whole circles, world frame, SI units.
 
     Arrays have shape (A,) or (A, 2); in a family (N, A) and (N, A, 2).
@@ -180,30 +192,12 @@ class Arcs:
     begin, extent : ndarray, (..., A)
         Angle of the first end from the x axis, counterclockwise, and how far the arc reaches
         from there, counterclockwise, rad; 2π for a whole circle, which has no ends.
-    speed : ndarray, (..., A)
-        Speed of the surface, clockwise, m/s.
-    restitution, friction : ndarray, (..., A)
-        Of the pair with a particle; (K, A) where there are several kinds of particles.
-    surface : ndarray, (A,)
-        Index of the surface an arc belongs to, into `Machine.surfaces`.
-    appears, vanishes : ndarray, (A,)
-        From when to when it is there, s; -inf and inf if always.
     """
 
     center: Floats
     radius: Floats
     begin: Floats
     extent: Floats
-    speed: Floats
-    restitution: Floats
-    friction: Floats
-    surface: Ints
-    appears: Floats
-    vanishes: Floats
-
-    def __post_init__(self) -> None:
-        for array in vars(self).values():
-            array.flags.writeable = False
 
     @property
     def whole(self) -> Bools:

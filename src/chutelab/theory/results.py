@@ -62,7 +62,18 @@ class Reason(StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Transfer:
+class Arrays:
+    """An answer of read-only arrays, copies of what it is made of."""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            array = np.array(getattr(self, field.name))
+            array.flags.writeable = False
+            object.__setattr__(self, field.name, array)
+
+
+@dataclass(frozen=True, eq=False)
+class Transfer(Arrays):
     """One transfer from belt to belt, or many: read-only arrays of one shape, SI units, radians.
 
     NaN where there is no answer; `reason` then says why, see `chutelab.theory.Reason`. Stages
@@ -124,12 +135,6 @@ class Transfer:
     omega1: Floats
     omega2: Floats
     reason: NDArray[np.str_]
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            array = np.array(getattr(self, field.name))
-            array.flags.writeable = False
-            object.__setattr__(self, field.name, array)
 
 
 STAGES = {

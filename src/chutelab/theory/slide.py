@@ -7,12 +7,12 @@ Friction makes that a linear equation for u over the angle.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from chutelab.theory.results import Reason
+from chutelab.theory.results import Arrays, Reason
 from chutelab.util.arrays import Bools, Floats
 
 HALVINGS = 64
@@ -37,7 +37,7 @@ takes 1/√u where u is 0 at an end; the last nodes are 1e-37 from there."""
 
 
 @dataclass(frozen=True, eq=False)
-class Slide:
+class Slide(Arrays):
     """Where and how motions along a round chute end: read-only arrays of one shape.
 
     Attributes
@@ -62,12 +62,6 @@ class Slide:
     time: Floats
     load: Floats
     reason: NDArray[np.str_]
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            array = np.array(getattr(self, field.name))
-            array.flags.writeable = False
-            object.__setattr__(self, field.name, array)
 
 
 def slide(

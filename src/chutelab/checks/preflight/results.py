@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from chutelab.machine import Arcs, Machine, Segments
+from chutelab.machine import Machine
+from chutelab.machine.parts import Pieces
 from chutelab.results.quantities import QUANTITIES, air_drag
 from chutelab.results.recording import Recording
 from chutelab.scene import Scene
@@ -198,7 +199,7 @@ def built(machine: Machine) -> Iterator[Part]:
     yield from _releases(machine)
 
 
-def _moves(parts: Segments | Arcs, k: int) -> str:
+def _moves(parts: Pieces, k: int) -> str:
     """Say how fast a piece of a surface moves, and when it is there."""
     said = f", moving at {parts.speed[k]:.6g} m/s" if parts.speed[k] else ""
     if np.isfinite(parts.appears[k]):

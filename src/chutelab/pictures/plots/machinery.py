@@ -244,7 +244,7 @@ class _Names:
             label = self.ax.annotate(
                 style.plain(self._said(surface, parts[0][0])), (0.0, 0.0),
                 xytext=(0.0, 0.0), textcoords="offset points", fontsize=style.SMALL,
-                color=colour_of(self.machine, parts[0][0]), path_effects=HALO, zorder=4.0,
+                color=colour_of(self.machine, parts[0][0]), path_effects=HALO, zorder=5.0,
             )  # fmt: skip
             best: tuple[int, Spot, Bbox] | None = None
             for spot in self._spots(parts):

@@ -223,8 +223,8 @@ def test_a_nip_that_no_impulses_hold_open_lets_the_belt_slip(count, alpha, arm, 
                 "restitution": 0.0, "friction": friction},
         run={"until": 0.5},
     )  # fmt: skip
-    row = r * (1.0 + 2.01 * np.arange(count))[:, None] * [cos(0.1), sin(0.1)]
-    recording = run(thrown(machine, row + [1e-4, 0.15]))
+    row = np.multiply.outer(r * (1.0 + 2.01 * np.arange(count)), [cos(0.1), sin(0.1)])
+    recording = run(thrown(machine, row + np.array([1e-4, 0.15])))
     radius = np.full(count, r)
     for t in np.linspace(1e-3, 0.499, 200):
         x = recording.at([t])[0][0]

@@ -131,6 +131,7 @@ class Job:
         # An arc may become two.
         room = self.materials + len(machine.arcs.surface)
         comes = np.isfinite(self.pieces["opens"]) | np.isfinite(self.pieces["closes"])
+        gates = 2 * int(np.count_nonzero(comes))
         self.owners = len(machine.surfaces)
         buckets = 1 << (4 * n + 16).bit_length() if machine.interact else 1
         cells = 12 * n + 64 if machine.interact else 1
@@ -142,7 +143,7 @@ class Job:
             ("heads", INTEGER, buckets), ("heap", INTEGER, n), ("queue", INTEGER, n + 1),
             ("moved", INTEGER, n), ("found", INTEGER, 2 * n),
             ("nearby", INTEGER, number("MAX_NEARBY") * n), ("everything", INTEGER, room),
-            ("spared", INTEGER, 2 * n * np.count_nonzero(comes)),
+            ("spared", INTEGER, gates * n),
         )  # fmt: skip
         self.make_room("knot", (100 if machine.releases.carried.any() else 30) * n + 200)
         self.make_room("event", 40 * n + 1200)

@@ -1,125 +1,109 @@
-"""One HTML file from a scene: data, style and script joined."""
+"""One HTML file from a scene: data, style, modules, the engine's thread and its WebAssembly."""
 
 from __future__ import annotations
 
 import json
+import re
 from base64 import b64encode
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from functools import cache
 from hashlib import sha256
 from html import escape
 from importlib.resources import files
 from pathlib import Path
 from string import Template
-from typing import Final
 
-from chutelab.pictures.live.runs import Study, pack, study
+from chutelab.pictures.live.describe import describe
 from chutelab.pictures.plots import style
 from chutelab.scene import Scene
-from chutelab.scene.variants import Vary
 from chutelab.util.files import whole
 from chutelab.util.versions import own_version
 
-SCRIPTS: Final = (
-    "tracks.js", "books.js", "view.js", "picture.js", "film.js", "panels.js", "input.js", "main.js",
-)  # fmt: skip
-"""In the order in which they build on each other."""
+LANGUAGES = ("en", "de")
 
 
-@dataclass(frozen=True)
-class Written:
-    """A page that was written.
-
-    Attributes
-    ----------
-    path : Path
-        Where.
-    size : int
-        Bytes.
-    variants : int
-        All of them.
-    faults : dict of tuple of float to str
-        Values of those that could not be run, and why.
-    """
-
-    path: Path
-    size: int
-    variants: int
-    faults: dict[tuple[float, ...], str]
-
-
-def write(
-    scene: Scene,
-    varies: Sequence[Vary | str] = (),
-    path: str | Path = "page.html",
-    *,
-    home: tuple[str, str] | None = None,
-    progress: Callable[[float], None] | None = None,
-) -> Written:
-    """Run all variants of a scene and write a page of them, whole or not at all.
+def html(scene: Scene, *, language: str = "en", home: tuple[str, str] | None = None) -> str:
+    """Return the live page of a scene; the same scene and version give the same bytes.
 
     Parameters
     ----------
     scene : Scene
-        From `chutelab.load`.
-    varies : sequence of Vary or str
-        Up to two keys with their values, such as ``"plate.angle_deg=-20:70:46"``; each becomes a
-        slider.
-    path : path-like
-        The file; one that is there is replaced, its folder must be there.
+        Of disks or spheres, without strings.
+    language : {"en", "de"}
+        Of all that the page says; what the scene says stands as it is.
     home : tuple of str, optional
         Text and address of a link back, for a page that is one of several.
-    progress : callable, optional
-        Called with the share of the variants that are done, 0 to 1.
-
-    Returns
-    -------
-    Written
-        What was written, and which variants could not be run: the page says so on their positions.
 
     Raises
     ------
-    InputError
-        If what is to be varied cannot be, there is too much for a page, or no variant runs.
-
-    Notes
-    -----
-    The same scene, varies and versions give the same bytes.
+    SceneError
+        If there is something in the scene that the contact engine has not, by its key.
     """
-    done = study(scene, varies, progress)
-    data = _html(done, home).encode("utf-8")
-    path = Path(path)
-    with whole(path) as unfinished:
-        unfinished.write_bytes(data)
-    faults = {o.values: o.fault for o in done.outcomes if o.fault}
-    return Written(path, len(data), len(done.outcomes), faults)
-
-
-def html(
-    scene: Scene, varies: Sequence[Vary | str] = (), *, home: tuple[str, str] | None = None
-) -> str:
-    """Return the page that `write` would write."""
-    return _html(study(scene, varies), home)
-
-
-def _html(done: Study, home: tuple[str, str] | None) -> str:
     css = f":root {{\n{_palette()}}}\n{_asset('page.css')}"
-    script = "\n".join(["(() => {", '"use strict";', *map(_asset, SCRIPTS), "})();"])
+    core = files("chutelab.engines.contact") / "core"
+    data = {
+        **describe(scene),
+        "version": own_version(),
+        "language": language,
+        "strings": json.loads(_asset(f"strings/{language}.json")),
+        "layout": json.loads((core / "layout.json").read_text(encoding="utf-8")),
+        "wasm": b64encode((core / "core.wasm").read_bytes()).decode("ascii"),
+    }
     # Within a script element nothing but an end tag must look like one.
-    data = json.dumps(pack(done), allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
-    link = f'<a class="home" href="{escape(home[1])}">{escape(home[0])}</a>' if home else ""
+    packed = json.dumps(data, allow_nan=False, separators=(",", ":"), ensure_ascii=False)
+    script = joined("app.js")
     return Template(_asset("page.html")).substitute(
-        title=escape(done.scene.title),
+        language=language,
+        title=escape(scene.title),
         version=escape(own_version()),
-        home=link,
+        home=f'<a class="home" href="{escape(home[1])}">{escape(home[0])}</a>' if home else "",
         css=css,
         css_hash=_hash(css),
         script=script,
         script_hash=_hash(script),
-        data=data,
+        worker=joined("worker.js"),
+        data=packed.replace("<", "\\u003c"),
     )
 
 
+def write(
+    scene: Scene,
+    path: str | Path,
+    *,
+    language: str = "en",
+    home: tuple[str, str] | None = None,
+) -> int:
+    """Write the live page of a scene, whole or not at all, and return its size in bytes.
+
+    See `html`; a file that is there is replaced, its folder must be there.
+    """
+    data = html(scene, language=language, home=home).encode("utf-8")
+    with whole(Path(path)) as unfinished:
+        unfinished.write_bytes(data)
+    return len(data)
+
+
+@cache
+def joined(name: str) -> str:
+    """Return a module and all it builds on as one, in an order in which each comes after those."""
+    order: list[str] = []
+
+    def visit(module: str) -> None:
+        if module not in order:
+            for other in re.findall(r'^import .+? from "\./([\w-]+\.js)";$', _asset(module), IMPORT):
+                visit(other)
+            order.append(module)
+
+    visit(name)
+    parts = (re.sub(r"^(import|export) [^;]+;\n", "", _asset(module), flags=IMPORT)
+             for module in order)  # fmt: skip
+    # A worker's text stands in a script element too.
+    return "".join(parts).replace("</", "<\\/")
+
+
+IMPORT = re.MULTILINE | re.DOTALL
+
+
+@cache
 def _asset(name: str) -> str:
     return (files("chutelab.pictures.live") / "assets" / name).read_text(encoding="utf-8")
 

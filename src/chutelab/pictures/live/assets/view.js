@@ -1,76 +1,95 @@
-// From metres to pixels, and numbers as texts.
+// Between the world, m with y up, and the picture, pixels with y down.
 
-const PREFIXES = { "-15": "f", "-12": "p", "-9": "n", "-6": "µ", "-3": "m", 0: "", 3: "k", 6: "M" };
-const minus = (text) => text.replace(/-/g, "−");
+/**
+ * @typedef {{left: number, bottom: number, right: number, top: number}} Box
+ * @typedef {import("./machine.js").Machine} Machine
+ */
 
-/** A factor and a prefixed unit that bring the size to between 1 and 1000. */
-function scaled(size, unit) {
-  if (!(size > 0)) return [1, unit];
-  const power = Math.min(Math.max(3 * Math.floor(Math.log10(size) / 3), -15), 6);
-  return [10 ** -power, PREFIXES[power] + unit];
+class View {
+  width = 1;
+
+  height = 1;
+
+  /** Pixels per metre. */
+  scale = 100;
+
+  /** The world's point in the middle. */
+  x = 0;
+
+  y = 0;
+
+  /** @param {number} width @param {number} height */
+  resize(width, height) {
+    this.width = width;
+    this.height = height;
+  }
+
+  /** Show all of a box, with some room round it. @param {Box} box @param {number} [margin] px */
+  fit({ left, bottom, right, top }, margin = 34) {
+    const across = Math.max(1, this.width - 2 * margin), up = Math.max(1, this.height - 2 * margin);
+    this.scale = Math.min(across / Math.max(right - left, 1e-6), up / Math.max(top - bottom, 1e-6));
+    this.x = 0.5 * (left + right);
+    this.y = 0.5 * (bottom + top);
+  }
+
+  /** @param {number} factor @param {number} px @param {number} py the point that stays, pixels */
+  zoom(factor, px, py) {
+    const [x, y] = [this.worldX(px), this.worldY(py)];
+    this.scale *= factor;
+    this.x += x - this.worldX(px);
+    this.y += y - this.worldY(py);
+  }
+
+  /** @param {number} x */
+  px(x) {
+    return 0.5 * this.width + (x - this.x) * this.scale;
+  }
+
+  /** @param {number} y */
+  py(y) {
+    return 0.5 * this.height - (y - this.y) * this.scale;
+  }
+
+  /** @param {number} px */
+  worldX(px) {
+    return this.x + (px - 0.5 * this.width) / this.scale;
+  }
+
+  /** @param {number} py */
+  worldY(py) {
+    return this.y - (py - 0.5 * this.height) / this.scale;
+  }
+
+  /** To what a place that is dragged is rounded: no finer than a pixel, m. */
+  get snap() {
+    return 10 ** Math.floor(Math.log10(1.5 / this.scale));
+  }
 }
 
-/** At most so many significant digits, no trailing zeros. */
-function brief(value, digits = 4) {
-  if (value === 0) return "0";
-  const text = value.toPrecision(digits);
-  return minus(/e/.test(text) ? Number(text).toExponential() : String(Number(text)));
-}
-
-const scientific = (value) => (value === 0 ? "0" : minus(value.toExponential(0).replace("e+", "e")));
-
-const withUnit = (text, unit) => (unit === "°" ? `${text}°` : unit ? `${text} ${unit}` : text);
-
-const ROUND = [1, 2, 5, 10];
-
-function roundStep(least) {
-  const power = 10 ** Math.floor(Math.log10(least));
-  return power * ROUND.find((factor) => factor * power >= least * (1 - 1e-9));
-}
-
-const FOOT = 28; // px under the window for the figures of the x axis
-
-/** The usual window, or a larger one for a run that does not fit in it. */
-function windowOf({ window: own, offsets, fault }) {
-  const usual = data.window;
-  if (!offsets || fault) return usual;
-  const slack = 0.015 * Math.max(usual[1] - usual[0], usual[3] - usual[2]);
-  return own.map((side, i) => {
-    const beyond = i % 2 ? side - usual[i] : usual[i] - side;
-    return beyond > slack ? side : usual[i];
-  });
-}
-
-/** The window of the world at equal scales in a box of pixels. */
-function viewOf([left, right, bottom, top], width, height) {
-  const room = height - FOOT;
-  const scale = Math.min(width / (right - left), room / (top - bottom));
-  const x0 = (left + right) / 2 - width / scale / 2;
-  const y1 = (bottom + top) / 2 + room / scale / 2;
-  return {
-    scale, width, height,
-    left: x0, right: x0 + width / scale, top: y1, bottom: y1 - height / scale,
-    x: (x) => (x - x0) * scale,
-    y: (y) => (y1 - y) * scale,
+/** What is shown of a machine at first: all that its particles can meet, and their tracks.
+ * @param {Machine} machine @param {{x: number, y: number}[]} points @returns {Box} */
+function boxOf(machine, points) {
+  const box = { left: Infinity, bottom: Infinity, right: -Infinity, top: -Infinity };
+  const widen = (/** @type {number} */ x, /** @type {number} */ y, r = 0) => {
+    box.left = Math.min(box.left, x - r);
+    box.right = Math.max(box.right, x + r);
+    box.bottom = Math.min(box.bottom, y - r);
+    box.top = Math.max(box.top, y + r);
   };
-}
-
-/** The part of a line inside the view; null if none is. */
-function clipped(view, { x0, y0, x1, y1 }) {
-  let [low, high] = [0, 1];
-  for (const [from, along, least, most] of [
-    [x0, x1 - x0, view.left, view.right],
-    [y0, y1 - y0, view.bottom, view.top],
-  ]) {
-    if (along === 0) {
-      if (from < least || from > most) return null;
-    } else {
-      const shares = [(least - from) / along, (most - from) / along].sort((a, b) => a - b);
-      low = Math.max(low, shares[0]);
-      high = Math.min(high, shares[1]);
+  for (const { x, y, tx, ty, length } of machine.segments) {
+    widen(x, y);
+    widen(x + tx * length, y + ty * length);
+  }
+  for (const arc of machine.arcs) {
+    for (let n = 0; n <= 32; n += 1) {
+      const angle = arc.begin + (arc.extent * n) / 32;
+      widen(arc.x + arc.radius * Math.cos(angle), arc.y + arc.radius * Math.sin(angle));
     }
   }
-  if (low >= high) return null;
-  const at = (share) => ({ x: view.x(x0 + share * (x1 - x0)), y: view.y(y0 + share * (y1 - y0)) });
-  return { begin: at(low), end: at(high), low, high };
+  if (machine.pulley) widen(0, 0, machine.pulley.radius);
+  machine.releases.forEach(({ x, y }, i) => widen(x, y, machine.radius[i]));
+  points.forEach(({ x, y }) => widen(x, y));
+  return box;
 }
+
+export { View, boxOf };

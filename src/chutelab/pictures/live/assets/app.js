@@ -1,0 +1,34 @@
+// The page: reads its data, starts the engine's thread, and joins the parts.
+
+import { Engine } from "./engine.js";
+import { Lab } from "./lab.js";
+import { Stage } from "./stage.js";
+import { Transport } from "./transport.js";
+import { Words } from "./words.js";
+
+/** @param {string} id @returns {any} */
+const byId = (id) => document.getElementById(id);
+
+/** @param {string} text base64 */
+function bytesOf(text) {
+  const binary = atob(text), bytes = new Uint8Array(binary.length);
+  for (let i = 0; i < binary.length; i += 1) bytes[i] = binary.charCodeAt(i);
+  return bytes;
+}
+
+function start() {
+  const data = JSON.parse(byId("lab").textContent);
+  const words = new Words(data.language, data.strings);
+  const source = new Blob([byId("worker").textContent], { type: "text/javascript" });
+  const worker = new Worker(URL.createObjectURL(source), { type: "module" });
+  const engine = new Engine(worker, bytesOf(data.wasm).buffer, data.layout);
+  for (const element of document.querySelectorAll("[data-say]")) {
+    element.textContent = words.say(/** @type {HTMLElement} */ (element).dataset.say ?? "");
+  }
+  const lab = new Lab(data, engine);
+  const stage = new Stage(byId("stage"), lab, words);
+  new Transport(lab, stage, words);
+  Object.assign(globalThis, { chutelab: { lab, stage } });
+}
+
+start();

@@ -1,0 +1,200 @@
+// The scene under somebody's hands: its values, its run, its clock. Nothing here draws.
+
+import { build } from "./machine.js";
+import { Recording } from "./recording.js";
+import { Fault, resolve, withValues } from "./scene.js";
+
+/**
+ * @typedef {import("./machine.js").Machine} Machine
+ * @typedef {import("./scene.js").Scene} Scene
+ * @typedef {import("./scene.js").Given} Given
+ * @typedef {import("./engine.js").Engine} Engine
+ * @typedef {"scene" | "run" | "time" | "play"} News
+ */
+
+/** s of a crowd that is computed before it is shown. */
+const AHEAD = 0.5;
+
+/** Undo reaches back so many changes. */
+const MOST_UNDO = 200;
+
+/** Slow motion and fast, in times of real time. */
+const RATES = [0.02, 0.05, 0.1, 0.25, 0.5, 1, 2, 4];
+
+class Lab {
+  /** @param {any} data of the page @param {Engine} engine */
+  constructor(data, engine) {
+    this.data = data;
+    this.engine = engine;
+    /** @type {Map<News, Set<() => void>>} */
+    this.listeners = new Map();
+    /** @type {Given[]} */
+    this.past = [];
+    /** @type {Given[]} */
+    this.future = [];
+    this.first = /** @type {Given} */ (data.scene);
+    this.t = 0;
+    this.playing = false;
+    this.rate = 1;
+    /** @type {Fault | null} */
+    this.fault = null;
+    this.use(this.first);
+  }
+
+  /** @param {News} news @param {() => void} listener */
+  on(news, listener) {
+    if (!this.listeners.has(news)) this.listeners.set(news, new Set());
+    this.listeners.get(news)?.add(listener);
+  }
+
+  /** @param {News} news */
+  tell(news) {
+    this.listeners.get(news)?.forEach((listener) => listener());
+  }
+
+  /** Take over a scene that can be built, and run it; one that cannot says why, and changes nothing.
+   * @param {Given} given @returns {boolean} */
+  use(given) {
+    try {
+      const scene = resolve(given, this.data);
+      const machine = build(scene);
+      const goesOn = this.machine?.interact && machine.interact && this.t > 0;
+      this.given = given;
+      this.scene = scene;
+      this.machine = machine;
+      this.fault = null;
+      this.run(goesOn ? this.t : 0);
+    } catch (error) {
+      if (!(error instanceof Fault)) throw error;
+      this.fault = error;
+    }
+    this.tell("scene");
+    return !this.fault;
+  }
+
+  /** Run from a time on, with what is there then: a crowd goes on under somebody's hands, all
+   * others begin anew, since they take no time.
+   * @param {number} from s */
+  run(from) {
+    const machine = /** @type {Machine} */ (this.machine);
+    let job = machine;
+    if (from > 0 && this.recording) {
+      const { renamed, releases } = this.recording.goOn(from, machine);
+      const some = (/** @type {number[]} */ values) => renamed.map(({ index }) => values[index]);
+      const gates = (/** @type {any[]} */ pieces) => pieces.map((piece) => ({
+        ...piece, appears: piece.appears - from, vanishes: piece.vanishes - from,
+      }));
+      job = {
+        ...machine, releases, radius: some(machine.radius), mass: some(machine.mass),
+        inertia: some(machine.inertia), segments: gates(machine.segments),
+        arcs: gates(machine.arcs), endTime: Math.max(0, machine.endTime - from),
+      };
+    } else this.recording = new Recording(machine);
+    const { recording } = this;
+    this.engine.run(job, AHEAD + (from > 0 ? 0 : this.t), (chunk) => {
+      recording.add(chunk);
+      this.tell("run");
+    });
+  }
+
+  /** Change values of the scene, by key. While something is dragged they are no step of undo yet.
+   * @param {Record<string, unknown>} values @param {{done?: boolean}} [how] */
+  change(values, { done = true } = {}) {
+    this.replace(withValues(/** @type {Given} */ (this.given), values), { done });
+  }
+
+  /** @param {Given} given @param {{done?: boolean}} [how] */
+  replace(given, { done = true } = {}) {
+    const before = this.before ?? this.given;
+    if (this.use(given)) this.before = before;
+    if (done) this.settle();
+  }
+
+  /** What was dragged is let go: make one step of undo of it. */
+  settle() {
+    if (this.before && this.before !== this.given) {
+      this.past = [...this.past, this.before].slice(-MOST_UNDO);
+      this.future = [];
+    }
+    this.before = undefined;
+    if (this.fault) {
+      this.fault = null;
+    }
+    this.tell("scene");
+  }
+
+  undo() {
+    this.travel(this.past, this.future);
+  }
+
+  redo() {
+    this.travel(this.future, this.past);
+  }
+
+  /** @param {Given[]} from @param {Given[]} to */
+  travel(from, to) {
+    const given = from.pop();
+    if (!given) return;
+    to.push(/** @type {Given} */ (this.given));
+    this.use(given);
+  }
+
+  /** Back to the scene as it was written, which can be undone. */
+  reset() {
+    if (this.given !== this.first) this.replace(this.first);
+    this.restart();
+  }
+
+  /** All again from the beginning, with the machine as it is now. */
+  restart() {
+    this.t = this.start;
+    if (this.recording?.renamed) this.run(0);
+    this.tell("time");
+  }
+
+  /** When there is something to see, s. */
+  get start() {
+    return Math.min(0, this.recording?.begin ?? 0);
+  }
+
+  /** s up to which time may go: the end of the run, or as far as it has come. */
+  get end() {
+    const { recording } = this;
+    if (!recording) return 0;
+    return recording.state === "running" && recording.machine.interact
+      ? recording.now : Math.max(recording.end, 0);
+  }
+
+  get isOver() {
+    return this.recording?.state !== "running" && this.t >= this.end;
+  }
+
+  play() {
+    if (this.isOver) this.restart();
+    this.playing = true;
+    this.tell("play");
+  }
+
+  pause() {
+    this.playing = false;
+    this.tell("play");
+  }
+
+  /** @param {number} t s */
+  seek(t) {
+    this.t = Math.max(this.start, Math.min(t, this.end));
+    this.engine.allow(this.t + AHEAD);
+    this.tell("time");
+  }
+
+  /** Go on by a frame of so many seconds of real time. @param {number} seconds */
+  tick(seconds) {
+    if (!this.playing) return;
+    this.engine.allow(this.t - (this.recording?.shift ?? 0) + seconds * this.rate + AHEAD * this.rate);
+    this.t = Math.min(this.t + seconds * this.rate, this.end);
+    this.tell("time");
+    if (this.isOver) this.pause();
+  }
+}
+
+export { Lab, RATES };

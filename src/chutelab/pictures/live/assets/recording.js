@@ -1,0 +1,304 @@
+// What a run leaves: where each particle is at any time, and its energy ledger.
+// Between the engine's knots a track is the cubic Hermite curve, as in Python's recordings.
+
+import { KNOT_ROW } from "./core.js";
+
+/**
+ * @typedef {{x: number, y: number, vx: number, vy: number, spin: number, ended: boolean}} State
+ * @typedef {{start: number, kinetic: number, potential: number, belt_work: number,
+ *   restitution_loss: number, friction_loss: number, residual: number}} Ledger
+ * @typedef {import("./machine.js").Machine} Machine
+ * @typedef {import("./core.js").Event} Event
+ */
+
+const T = 0, X = 1, Y = 2, VX = 3, VY = 4, SPIN = 5, BELT = 6, RESTITUTION = 7, FRICTION = 8;
+
+/** Knots of one particle, `KNOT_ROW` doubles each. */
+class Track {
+  rows = new Float64Array(8 * KNOT_ROW);
+
+  count = 0;
+
+  /** Where it was looked for last. */
+  near = 0;
+
+  /** @param {Float64Array} row @param {number} shift s @param {number[] | null} entries */
+  add(row, shift, entries) {
+    if ((this.count + 1) * KNOT_ROW > this.rows.length) {
+      const rows = new Float64Array(2 * this.rows.length);
+      rows.set(this.rows);
+      this.rows = rows;
+    }
+    const begin = this.count * KNOT_ROW;
+    this.rows.set(row, begin);
+    this.rows[begin] += shift;
+    if (entries) entries.forEach((value, n) => { this.rows[begin + BELT + n] += value; });
+    this.count += 1;
+  }
+
+  /** @param {number} knot @param {number} column */
+  at(knot, column) {
+    return this.rows[knot * KNOT_ROW + column];
+  }
+
+  get begin() {
+    return this.count ? this.rows[0] : Infinity;
+  }
+
+  get end() {
+    return this.count ? this.at(this.count - 1, T) : -Infinity;
+  }
+
+  /** The last knot that is not after t. @param {number} t */
+  knotBefore(t) {
+    let low = 0;
+    let high = this.count - 1;
+    const { near } = this;
+    if (near < high && this.at(near, T) <= t) {
+      if (this.at(near + 1, T) > t) return near;
+      low = near;
+    }
+    while (high - low > 1) {
+      const middle = (low + high) >> 1;
+      if (this.at(middle, T) <= t) low = middle;
+      else high = middle;
+    }
+    this.near = low;
+    return low;
+  }
+
+  /** Forget what is after t, but for the state then. @param {number} t */
+  cut(t) {
+    if (!this.count || this.end <= t) return;
+    if (this.begin > t) {
+      this.count = 0;
+      return;
+    }
+    const { x, y, vx, vy, spin } = /** @type {State} */ (this.state(t));
+    const entries = this.entries(t);
+    this.count = this.knotBefore(t) + 1;
+    this.turns.length = Math.min(this.turns.length, this.count);
+    this.near = 0;
+    this.add(new Float64Array([t, x, y, vx, vy, spin, ...entries, 0]), 0, null);
+  }
+
+  /** Position, velocity and spin; null before the release, and where the track ended after it.
+   * @param {number} t @returns {State | null} */
+  state(t) {
+    if (!this.count || t < this.rows[0]) return null;
+    const last = this.count - 1;
+    if (t >= this.end) return this.stateOf(last, t > this.end);
+    const i = this.knotBefore(t);
+    const h = this.at(i + 1, T) - this.at(i, T);
+    const s = (t - this.at(i, T)) / h;
+    const [x, vx] = this.curve(i, X, VX, h, s);
+    const [y, vy] = this.curve(i, Y, VY, h, s);
+    const spin = this.at(i, SPIN) * (1 - s) + this.at(i + 1, SPIN) * s;
+    return { x, y, vx, vy, spin, ended: false };
+  }
+
+  /** @param {number} i @param {boolean} ended @returns {State} */
+  stateOf(i, ended) {
+    return {
+      x: this.at(i, X), y: this.at(i, Y), vx: this.at(i, VX), vy: this.at(i, VY),
+      spin: this.at(i, SPIN), ended,
+    };
+  }
+
+  /** A coordinate and its velocity at the share s of the time h between two knots.
+   * @param {number} i @param {number} place @param {number} pace @param {number} h
+   * @param {number} s */
+  curve(i, place, pace, h, s) {
+    const a = this.at(i, place), va = this.at(i, pace), vb = this.at(i + 1, pace);
+    const dx = this.at(i + 1, place) - a;
+    const where = a + s * (h * va + s * (3 * dx - h * (2 * va + vb) + s * (h * (va + vb) - 2 * dx)));
+    const slope = dx / h;
+    return [where, va + s * (2 * (3 * slope - 2 * va - vb) + 3 * s * (va + vb - 2 * slope))];
+  }
+
+  /** By how much it has turned since its release, counterclockwise, rad. @param {number} t */
+  angle(t) {
+    if (!this.count || t <= this.begin) return 0;
+    const i = t >= this.end ? this.count - 1 : this.knotBefore(t);
+    for (let n = this.turns.length; n < this.count; n += 1) {
+      const h = n ? this.at(n, T) - this.at(n - 1, T) : 0;
+      this.turns.push(n ? this.turns[n - 1] + 0.5 * h * (this.at(n, SPIN) + this.at(n - 1, SPIN)) : 0);
+    }
+    const h = Math.min(t, this.end) - this.at(i, T);
+    const spin = /** @type {State} */ (this.state(Math.min(t, this.end))).spin;
+    return this.turns[i] + 0.5 * h * (this.at(i, SPIN) + spin);
+  }
+
+  /** Angle at each knot, as far as somebody has asked. @type {number[]} */
+  turns = [];
+
+  /** Belt work, restitution loss and friction loss so far, J, straight between knots.
+   * @param {number} t */
+  entries(t) {
+    const i = t >= this.end ? this.count - 1 : this.knotBefore(t);
+    const h = i + 1 < this.count ? this.at(i + 1, T) - this.at(i, T) : 0;
+    const s = h > 0 ? Math.min(1, (t - this.at(i, T)) / h) : 0;
+    return [BELT, RESTITUTION, FRICTION].map((column) => {
+      const from = this.at(i, column);
+      return h > 0 ? from + s * (this.at(i + 1, column) - from) : from;
+    });
+  }
+}
+
+/** The tracks and events of a run, which may still go on. */
+class Recording {
+  /** @param {Machine} machine */
+  constructor(machine) {
+    this.machine = machine;
+    this.tracks = machine.releases.map(() => new Track());
+    /** @type {Event[]} */
+    this.events = [];
+    this.state = "running";
+    /** s up to which all is there. */
+    this.now = 0;
+    /** What a run that goes on after a change calls the particles, and what it adds to entries.
+     * @type {{index: number, entries: number[]}[] | null} */
+    this.renamed = null;
+    this.shift = 0;
+    this.cuts = 0;
+  }
+
+  /** @param {{knots: Float64Array, events: Event[], now: number, state: string}} chunk */
+  add({ knots, events, now, state }) {
+    for (let begin = 0; begin < knots.length; begin += KNOT_ROW) {
+      const row = knots.subarray(begin, begin + KNOT_ROW);
+      const its = this.renamed ? this.renamed[row[9]] : { index: row[9], entries: null };
+      this.tracks[its.index].add(row, this.shift, its.entries);
+    }
+    for (const event of events) {
+      const index = (/** @type {number} */ disk) =>
+        this.renamed && disk >= 0 ? this.renamed[disk].index : disk;
+      this.events.push({
+        ...event, t: event.t + this.shift, disk: index(event.disk), other: index(event.other),
+      });
+    }
+    this.state = state;
+    const done = state !== "running";
+    this.now = done ? Math.max(this.end, now + this.shift) : now + this.shift;
+  }
+
+  get end() {
+    return this.tracks.reduce((latest, track) => Math.max(latest, track.end), -Infinity);
+  }
+
+  get begin() {
+    return this.tracks.reduce((first, track) => Math.min(first, track.begin), Infinity);
+  }
+
+  /** Forget what is after t, and return the releases with which a run goes on from there: of those
+   * under way, and of those still to come.
+   * @param {number} t @param {Machine} machine */
+  goOn(t, machine) {
+    /** @type {{index: number, entries: number[]}[]} */
+    const renamed = [];
+    const releases = [];
+    machine.releases.forEach((release, index) => {
+      const track = this.tracks[index] ?? (this.tracks[index] = new Track());
+      const ended = track.count && track.end < t && this.hasEnded(index, t);
+      track.cut(t);
+      const state = track.state(t);
+      if (ended) return;
+      renamed.push({ index, entries: state ? track.entries(t) : [0, 0, 0] });
+      if (!state) {
+        releases.push({ ...release, t: Math.max(0, release.t - t) });
+        return;
+      }
+      // Whoever still rides the belt goes on riding.
+      const carried = release.carried && state.x < 0 && !this.hasLeft(index, t);
+      releases.push({ ...release, ...state, t: 0, carried });
+      track.count -= 1;
+    });
+    this.events = this.events.filter((event) => event.t <= t);
+    this.machine = machine;
+    this.renamed = renamed;
+    this.shift = t;
+    this.now = t;
+    this.state = "running";
+    return { renamed, releases };
+  }
+
+  /** @param {number} index @param {number} t */
+  hasEnded(index, t) {
+    return this.state === "done" || this.now > this.tracks[index].end + 1e-9
+      ? this.tracks[index].end < Math.min(t, this.now) : false;
+  }
+
+  /** @param {number} index @param {number} t */
+  hasLeft(index, t) {
+    return this.events.some(({ disk, kind, t: when }) => disk === index && kind === 1 && when <= t);
+  }
+
+  /** The energy ledger of one particle; while it slips the balance gives the slip heat, while it is
+   * carried the belt's work, in flight what it leaves over is the residual.
+   * @param {number} index @param {number} t @returns {Ledger | null} */
+  ledgerOf(index, t) {
+    const track = this.tracks[index];
+    const state = track.state(t);
+    if (!state) return null;
+    const { machine } = this;
+    const mass = machine.mass[index], inertia = machine.inertia[index];
+    const kinetic = (/** @type {State} */ { vx, vy, spin }) =>
+      0.5 * mass * (vx * vx + vy * vy) + 0.5 * inertia * spin * spin;
+    const potential = (/** @type {State} */ { y }) => mass * machine.gravity * y;
+    const energy = (/** @type {State} */ one) => kinetic(one) + potential(one);
+    const first = track.stateOf(0, false);
+    const start = energy(first);
+    const gain = energy(state) - start;
+    const i = t >= track.end ? track.count - 1 : track.knotBefore(t);
+    const j = Math.min(i + 1, track.count - 1);
+    const slips = track.at(i, FRICTION) !== track.at(j, FRICTION);
+    const driven = track.at(i, BELT) !== track.at(j, BELT);
+    let [belt, restitution, friction] = track.entries(t);
+    restitution = track.at(i, RESTITUTION);
+    const residualAt = (/** @type {number} */ k) => energy(track.stateOf(k, false)) - start
+      - (track.at(k, BELT) - track.at(k, RESTITUTION) - track.at(k, FRICTION));
+    let residual = residualAt(i);
+    if (driven && !slips) belt = gain + restitution + friction - residual;
+    else if (slips) friction = belt - restitution + residual - gain;
+    else residual = gain - (belt - restitution - friction);
+    return {
+      start, kinetic: kinetic(state), potential: potential(state), belt_work: belt,
+      restitution_loss: restitution, friction_loss: friction, residual,
+    };
+  }
+
+  /** The ledger of all particles that have been released.
+   * @param {number} t @returns {Ledger} */
+  ledger(t) {
+    /** @type {Ledger} */
+    const total = {
+      start: 0, kinetic: 0, potential: 0, belt_work: 0, restitution_loss: 0, friction_loss: 0,
+      residual: 0,
+    };
+    const names = /** @type {(keyof Ledger)[]} */ (Object.keys(total));
+    for (let index = 0; index < this.tracks.length; index += 1) {
+      const its = this.ledgerOf(index, t);
+      if (its) for (const name of names) total[name] += its[name];
+    }
+    return total;
+  }
+
+  /** Points of a track from its begin to t, knots among them, for a line through them.
+   * @param {number} index @param {number} from @param {number} to @param {number} step s */
+  points(index, from, to, step) {
+    const track = this.tracks[index];
+    const points = [];
+    const begin = Math.max(from, track.begin);
+    const end = Math.min(to, track.end);
+    if (!(begin <= end)) return points;
+    for (let t = begin, i = track.knotBefore(begin); ;) {
+      points.push(/** @type {State} */ (track.state(t)));
+      if (t >= end) return points;
+      while (i + 1 < track.count && track.at(i + 1, T) <= t) i += 1;
+      const knot = i + 1 < track.count ? track.at(i + 1, T) : end;
+      t = Math.min(t + step, knot > t ? knot : end, end);
+    }
+  }
+}
+
+export { Recording, Track };

@@ -1,0 +1,416 @@
+// The picture: surfaces, tracks and handles as SVG, particles on a canvas between them.
+
+import { ARROW, Handles, roundTo, valuesOf } from "./handles.js";
+import { View, boxOf } from "./view.js";
+
+/**
+ * @typedef {import("./lab.js").Lab} Lab
+ * @typedef {import("./handles.js").Handle} Handle
+ * @typedef {import("./words.js").Words} Words
+ */
+
+const SVG = "http://www.w3.org/2000/svg";
+
+/** Tracks that are drawn at most; more are a blot. */
+const MOST_TRACKS = 40;
+
+/** Pixels between the dashes that show a belt run. */
+const DASH = 26;
+
+/** Pieces of a track are no longer than this, s. */
+const FINE = 0.004;
+
+/** @param {string} name @param {Record<string, unknown>} [attributes] @returns {any} */
+function svg(name, attributes = {}) {
+  const element = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, String(value));
+  return element;
+}
+
+class Stage {
+  /** @param {HTMLElement} home @param {Lab} lab @param {Words} words */
+  constructor(home, lab, words) {
+    this.home = home;
+    this.lab = lab;
+    this.words = words;
+    this.view = new View();
+    this.show = { strobe: true, trails: true, velocity: false, forces: false, handles: true };
+    this.back = svg("svg", { "aria-hidden": "true" });
+    this.canvas = document.createElement("canvas");
+    this.front = svg("svg", { role: "group" });
+    this.front.setAttribute("aria-label", words.say("stage"));
+    this.canvas.setAttribute("aria-hidden", "true");
+    home.append(this.back, this.canvas, this.front);
+    this.surfaces = svg("g", { class: "surfaces" });
+    this.paths = svg("g", { class: "paths" });
+    this.back.append(this.surfaces, this.paths);
+    this.grips = svg("g", { class: "grips" });
+    /** Further layers, of tools, lie below the handles. */
+    this.over = svg("g", { class: "over" });
+    this.front.append(this.over, this.grips);
+    /** @type {Handle[]} */
+    this.handles = [];
+    /** @type {Map<string, any>} */
+    this.gripOf = new Map();
+    /** @type {Handle | null} */
+    this.held = null;
+    this.fitted = false;
+    new ResizeObserver(() => this.resize()).observe(home);
+    lab.on("scene", () => this.rebuild());
+    lab.on("run", () => this.traced());
+    lab.on("time", () => this.paint());
+    this.listen();
+    this.resize();
+  }
+
+  /** A page in a frame that is hidden has no size yet: all is drawn once it has one. */
+  resize() {
+    const { clientWidth: width, clientHeight: height } = this.home;
+    if (!width || !height) return;
+    this.view.resize(width, height);
+    const dense = globalThis.devicePixelRatio || 1;
+    this.canvas.width = Math.round(width * dense);
+    this.canvas.height = Math.round(height * dense);
+    for (const layer of [this.back, this.front]) layer.setAttribute("viewBox", `0 0 ${width} ${height}`);
+    if (!this.fitted || !this.moved) this.fit();
+    else this.rebuild();
+  }
+
+  /** Whether somebody has chosen what is shown. */
+  moved = false;
+
+  fit() {
+    const { machine, recording } = this.lab;
+    if (!machine) return;
+    const points = recording ? this.trackPoints(recording).flat() : [];
+    this.view.fit(boxOf(machine, points));
+    this.fitted = points.length > 0;
+    this.moved = false;
+    this.rebuild();
+  }
+
+  /** @param {import("./recording.js").Recording} recording */
+  trackPoints(recording) {
+    const shown = recording.machine.interact ? [] : recording.tracks.slice(0, MOST_TRACKS);
+    return shown.map((_, i) => recording.points(i, -Infinity, Infinity, FINE));
+  }
+
+  /** The run has come on: its tracks, and the first view once there is one. */
+  traced() {
+    const { recording } = this.lab;
+    if (recording && !this.fitted && recording.state !== "running") this.fit();
+    this.drawTracks();
+    this.paint();
+  }
+
+  rebuild() {
+    if (this.view.width < 2) return;
+    this.drawSurfaces();
+    this.drawTracks();
+    this.placeHandles();
+    this.paint();
+  }
+
+  drawSurfaces() {
+    const { machine } = this.lab;
+    if (!machine) return;
+    const { view } = this;
+    this.surfaces.replaceChildren();
+    /** @type {{element: any, speed: number}[]} */
+    this.running = [];
+    const line = (/** @type {any} */ piece, /** @type {string} */ path) => {
+      const gate = isFinite(piece.appears) || isFinite(piece.vanishes);
+      const name = machine.surfaces[piece.surface];
+      const kind = piece.speed ? "belt" : name === "plate" ? "plate" : "wall";
+      const element = svg("path", { d: path, class: `${kind}${gate ? " gate" : ""}` });
+      element.append(Object.assign(svg("title"), { textContent: name }));
+      this.surfaces.append(element);
+      if (gate) this.gates.push({ element, appears: piece.appears, vanishes: piece.vanishes });
+      if (piece.speed) this.run(path, piece.speed);
+    };
+    this.gates = [];
+    if (machine.pulley) {
+      const { radius, speed } = machine.pulley;
+      this.surfaces.append(this.wheel(0, 0, radius, speed));
+    }
+    for (const piece of machine.segments) {
+      const end = [piece.x + piece.tx * piece.length, piece.y + piece.ty * piece.length];
+      line(piece, `M${view.px(piece.x)} ${view.py(piece.y)}L${view.px(end[0])} ${view.py(end[1])}`);
+    }
+    for (const arc of machine.arcs) {
+      if (arc.extent >= 2 * Math.PI && arc.speed) {
+        this.surfaces.append(this.wheel(arc.x, arc.y, arc.radius, arc.speed));
+      } else line(arc, this.arcPath(arc));
+    }
+  }
+
+  /** @type {{element: any, appears: number, vanishes: number}[]} */
+  gates = [];
+
+  /** @type {{element: any, speed: number, x?: number, y?: number, radius?: number}[]} */
+  running = [];
+
+  /** @param {{x: number, y: number, radius: number, begin: number, extent: number}} arc */
+  arcPath({ x, y, radius, begin, extent }) {
+    const { view } = this, r = radius * view.scale;
+    const at = (/** @type {number} */ angle) =>
+      `${view.px(x + radius * Math.cos(angle))} ${view.py(y + radius * Math.sin(angle))}`;
+    const parts = extent >= 2 * Math.PI ? 2 : 1;
+    let path = `M${at(begin)}`;
+    for (let n = 1; n <= parts; n += 1) {
+      const wide = extent / parts > Math.PI ? 1 : 0;
+      path += `A${r} ${r} 0 ${wide} 0 ${at(begin + (extent * n) / parts)}`;
+    }
+    return path;
+  }
+
+  /** Dashes along a belt that move with it. @param {string} path @param {number} speed m/s */
+  run(path, speed) {
+    const element = svg("path", { d: path, class: "dashes", "stroke-dasharray": `3 ${DASH - 3}` });
+    this.surfaces.append(element);
+    this.running.push({ element, speed });
+  }
+
+  /** A pulley with spokes. @param {number} x @param {number} y @param {number} radius
+   * @param {number} speed m/s, clockwise */
+  wheel(x, y, radius, speed) {
+    const { view } = this, r = radius * view.scale, group = svg("g", { class: "wheel" });
+    const spokes = svg("g");
+    group.append(svg("circle", { cx: view.px(x), cy: view.py(y), r }), spokes);
+    for (let n = 0; n < 3; n += 1) {
+      const [c, s] = [Math.cos((n * Math.PI) / 3) * r * 0.8, Math.sin((n * Math.PI) / 3) * r * 0.8];
+      spokes.append(svg("path", {
+        d: `M${view.px(x) - c} ${view.py(y) - s}L${view.px(x) + c} ${view.py(y) + s}`,
+      }));
+    }
+    this.running.push({ element: spokes, speed, x: view.px(x), y: view.py(y), radius });
+    return group;
+  }
+
+  drawTracks() {
+    const { recording } = this.lab, { view } = this;
+    this.paths.replaceChildren();
+    if (!recording || !this.show.trails) return;
+    for (const points of this.trackPoints(recording)) {
+      if (points.length < 2) continue;
+      const line = points.map(({ x, y }) => `${view.px(x).toFixed(1)},${view.py(y).toFixed(1)}`);
+      this.paths.append(svg("polyline", { points: line.join(" "), class: "track" }));
+    }
+  }
+
+  /** Particles, and what moves. */
+  paint() {
+    const { lab, view, canvas } = this;
+    const { recording, machine, t } = lab;
+    const context = canvas.getContext("2d");
+    if (!context || !recording || !machine) return;
+    const dense = globalThis.devicePixelRatio || 1;
+    context.setTransform(dense, 0, 0, dense, 0, 0);
+    context.clearRect(0, 0, view.width, view.height);
+    for (const { element, speed, x, y, radius } of this.running) {
+      if (radius) element.setAttribute("transform", `rotate(${((speed * t) / radius) * (180 / Math.PI)} ${x} ${y})`);
+      else element.setAttribute("stroke-dashoffset", String(-((speed * t * view.scale) % DASH)));
+    }
+    for (const { element, appears, vanishes } of this.gates) {
+      element.classList.toggle("absent", t < appears || t >= vanishes);
+    }
+    const style = getComputedStyle(this.home);
+    const ink = style.getPropertyValue("--particle"), rim = style.getPropertyValue("--ink");
+    if (this.show.strobe && !machine.interact) this.strobe(context, style);
+    const spins = machine.inertia.some((value) => value > 0);
+    context.lineWidth = 1;
+    const kinds = machine.radius.length > 1 && new Set(machine.releases.map(({ stream }) => stream)).size > 1;
+    for (let i = 0; i < recording.tracks.length; i += 1) {
+      const state = recording.tracks[i].state(t);
+      if (!state || (state.ended && recording.tracks.length > 1)) continue;
+      const x = view.px(state.x), y = view.py(state.y);
+      const r = Math.max(1.2, (machine.radius[i] ?? 0) * view.scale);
+      if (x < -r || x > view.width + r || y < -r || y > view.height + r) continue;
+      context.beginPath();
+      context.arc(x, y, r, 0, 2 * Math.PI);
+      context.fillStyle = kinds ? style.getPropertyValue(`--kind-${machine.releases[i]?.stream % 5}`) : ink;
+      context.fill();
+      if (r > 3) {
+        context.strokeStyle = rim;
+        context.stroke();
+      }
+      if (spins && r > 3) this.mark(context, recording.tracks[i], t, x, y, r, rim);
+    }
+    for (const draw of this.painters) draw(context, style);
+  }
+
+  /** Further things that are painted over the particles.
+   * @type {((context: CanvasRenderingContext2D, style: CSSStyleDeclaration) => void)[]} */
+  painters = [];
+
+  /** A radius that shows how a particle turns.
+   * @param {CanvasRenderingContext2D} context @param {import("./recording.js").Track} track
+   * @param {number} t @param {number} x @param {number} y @param {number} r @param {string} ink */
+  mark(context, track, t, x, y, r, ink) {
+    const angle = track.angle(t);
+    context.strokeStyle = ink;
+    context.beginPath();
+    context.moveTo(x, y);
+    context.lineTo(x + r * Math.cos(angle), y - r * Math.sin(angle));
+    context.stroke();
+  }
+
+  /** Dots at round times on the first tracks.
+   * @param {CanvasRenderingContext2D} context @param {CSSStyleDeclaration} style */
+  strobe(context, style) {
+    const { recording } = this.lab;
+    if (!recording) return;
+    const step = this.strobeStep;
+    context.fillStyle = style.getPropertyValue("--track");
+    for (const track of recording.tracks.slice(0, 1)) {
+      for (let n = Math.ceil(track.begin / step - 1e-9); n * step <= track.end; n += 1) {
+        const state = track.state(n * step);
+        if (!state) continue;
+        context.beginPath();
+        context.arc(this.view.px(state.x), this.view.py(state.y), 2.6, 0, 2 * Math.PI);
+        context.fill();
+      }
+    }
+  }
+
+  /** A round time, s, that gives some twenty dots. */
+  get strobeStep() {
+    const { recording } = this.lab;
+    const span = recording ? recording.end - recording.begin : 1;
+    const rough = Math.max(span, 1e-6) / 20, ten = 10 ** Math.floor(Math.log10(rough));
+    return [1, 2, 5, 10].map((n) => n * ten).find((step) => step >= rough) ?? 10 * ten;
+  }
+
+  placeHandles() {
+    const { machine, scene } = this.lab;
+    if (!machine || !scene) return;
+    this.handles = this.show.handles ? new Handles(scene, machine, this.lab.data).list : [];
+    const wanted = new Set(this.handles.map(({ id }) => id));
+    for (const [id, grip] of this.gripOf) {
+      if (wanted.has(id)) continue;
+      grip.remove();
+      this.gripOf.delete(id);
+    }
+    for (const handle of this.handles) {
+      const grip = this.gripOf.get(handle.id) ?? this.newGrip(handle.id);
+      this.describe(grip, handle);
+      this.grips.append(grip);
+    }
+  }
+
+  /** @param {string} id */
+  newGrip(id) {
+    const grip = svg("g", { class: "grip", role: "slider", tabindex: 0, "data-id": id });
+    grip.append(svg("path", { class: "stem" }), svg("circle", { class: "room", r: 20 }),
+      svg("path", { class: "knob" }));
+    this.gripOf.set(id, grip);
+    return grip;
+  }
+
+  /** @param {any} grip @param {Handle} handle */
+  describe(grip, handle) {
+    const { view, words } = this, x = view.px(handle.x), y = view.py(handle.y);
+    grip.setAttribute("transform", `translate(${x} ${y})`);
+    const [stem, , knob] = grip.children;
+    knob.setAttribute("d", KNOBS[handle.shape]);
+    if (handle.from) {
+      const [u, v] = [view.px(handle.from[0]) - x, view.py(handle.from[1]) - y];
+      stem.setAttribute("d", `M${u} ${v}L0 0`);
+      const angle = (Math.atan2(-v, -u) * 180) / Math.PI;
+      knob.setAttribute("transform", u || v ? `rotate(${angle})` : "");
+    }
+    const [first] = handle.axes;
+    const name = `${words.name(handle.surface)}: ${words.say(`handle-${handle.what}`)}`;
+    const values = handle.axes.filter(({ step }) => step).map((axis) => words.value(axis));
+    grip.setAttribute("aria-label", name);
+    grip.setAttribute("aria-valuenow", String(first.value));
+    grip.setAttribute("aria-valuetext", values.join(", "));
+    if (isFinite(first.low)) grip.setAttribute("aria-valuemin", String(first.low));
+    if (isFinite(first.high)) grip.setAttribute("aria-valuemax", String(first.high));
+    handle.axes.forEach(({ value }, n) => { if (!isFinite(value)) handle.axes[n].value = 0; });
+  }
+
+  listen() {
+    this.front.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
+      const grip = /** @type {Element} */ (event.target).closest(".grip");
+      const handle = this.handles.find(({ id }) => id === grip?.getAttribute("data-id"));
+      if (!handle || !grip) return;
+      event.preventDefault();
+      /** @type {any} */ (grip).focus();
+      this.front.setPointerCapture(event.pointerId);
+      this.held = handle;
+      grip.classList.add("held");
+    });
+    this.front.addEventListener("pointermove", (/** @type {PointerEvent} */ event) => {
+      if (!this.held) return;
+      const [px, py] = this.placeOf(event);
+      this.latest = { x: this.view.worldX(px), y: this.view.worldY(py) };
+      // More events than frames come: the latest counts.
+      if (!this.waiting) this.waiting = requestAnimationFrame(() => this.dragOn());
+    });
+    for (const end of ["pointerup", "pointercancel"]) {
+      this.front.addEventListener(end, () => {
+        if (!this.held) return;
+        this.dragOn();
+        this.gripOf.get(this.held.id)?.classList.remove("held");
+        this.held = null;
+        this.lab.settle();
+      });
+    }
+    this.front.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
+      const grip = /** @type {Element} */ (event.target).closest(".grip");
+      const handle = this.handles.find(({ id }) => id === grip?.getAttribute("data-id"));
+      if (handle && this.nudge(handle, event)) event.preventDefault();
+    });
+  }
+
+  /** @type {{x: number, y: number} | undefined} */
+  latest;
+
+  waiting = 0;
+
+  /** @param {PointerEvent} event @returns {[number, number]} */
+  placeOf(event) {
+    const box = this.front.getBoundingClientRect();
+    return [event.clientX - box.left, event.clientY - box.top];
+  }
+
+  dragOn() {
+    cancelAnimationFrame(this.waiting);
+    this.waiting = 0;
+    if (!this.held || !this.latest) return;
+    const { snap } = this.view, handle = this.held;
+    const numbers = handle.drag(this.latest.x, this.latest.y).map((value, n) =>
+      roundTo(value, handle.axes[n].unit === "degrees" ? 0.5
+        : handle.axes[n].unit === "m/s" ? Math.max(0.01, 10 ** Math.ceil(Math.log10(snap / ARROW)) / 2)
+          : snap));
+    this.latest = undefined;
+    this.lab.change(valuesOf(handle, numbers), { done: false });
+  }
+
+  /** @param {Handle} handle @param {KeyboardEvent} event @returns {boolean} */
+  nudge(handle, { key, shiftKey }) {
+    const ways = /** @type {Record<string, [number, number]>} */ ({
+      ArrowRight: [0, 1], ArrowLeft: [0, -1], ArrowUp: [1, 1], ArrowDown: [1, -1],
+      PageUp: [0, 10], PageDown: [0, -10],
+    });
+    if (!(key in ways)) return false;
+    const [which, sign] = ways[key];
+    const free = handle.axes.map(({ step }, n) => (step ? n : -1)).filter((n) => n >= 0);
+    const n = free[Math.min(which, free.length - 1)];
+    const numbers = handle.axes.map(({ value }) => value);
+    const step = handle.axes[n].step * (shiftKey ? 0.1 : 1);
+    numbers[n] = roundTo(numbers[n] + sign * step, step);
+    const axes = handle.axes.filter((axis, i) => i === n || axis.part !== undefined || !axis.step);
+    this.lab.change(valuesOf({ ...handle, axes }, axes.map((axis) => numbers[handle.axes.indexOf(axis)])));
+    return true;
+  }
+}
+
+const KNOBS = {
+  point: "M-7 0A7 7 0 1 0 7 0A7 7 0 1 0 -7 0Z",
+  turn: "M0 -8L8 0L0 8L-8 0Z",
+  arrow: "M-6 -7L8 0L-6 7Z",
+};
+
+export { Stage, svg };

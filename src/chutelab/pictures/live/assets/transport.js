@@ -1,0 +1,92 @@
+// Play, pause, step, scrub, and how fast; undo and redo.
+
+import { RATES } from "./lab.js";
+
+/**
+ * @typedef {import("./lab.js").Lab} Lab
+ * @typedef {import("./stage.js").Stage} Stage
+ * @typedef {import("./words.js").Words} Words
+ */
+
+/** Positions of the slider of time. */
+const PLACES = 1000;
+
+/** No frame counts for more than this, s: a page that was hidden goes on where it was. */
+const LONGEST = 0.1;
+
+class Transport {
+  /** @param {Lab} lab @param {Stage} stage @param {Words} words */
+  constructor(lab, stage, words) {
+    this.lab = lab;
+    this.words = words;
+    const element = (/** @type {string} */ id) => /** @type {any} */ (document.getElementById(id));
+    this.playButton = element("play");
+    this.time = element("time");
+    this.clock = element("clock");
+    this.rate = element("rate");
+    const buttons = /** @type {Record<string, () => void>} */ ({
+      restart: () => lab.restart(),
+      back: () => this.step(-1),
+      play: () => (lab.playing ? lab.pause() : lab.play()),
+      forward: () => this.step(1),
+      undo: () => lab.undo(),
+      redo: () => lab.redo(),
+      reset: () => lab.reset(),
+      fit: () => stage.fit(),
+    });
+    for (const [id, act] of Object.entries(buttons)) {
+      const button = element(id);
+      if (button.classList.contains("text")) button.textContent = words.say(id);
+      else button.title = words.say(id);
+      button.setAttribute("aria-label", words.say(id));
+      button.addEventListener("click", act);
+    }
+    for (const rate of RATES) {
+      this.rate.append(new Option(`${words.local(String(rate))}×`, String(rate), rate === 1, rate === 1));
+    }
+    this.rate.addEventListener("change", () => { lab.rate = Number(this.rate.value); });
+    this.time.addEventListener("input", () => {
+      lab.pause();
+      lab.seek(lab.start + (lab.end - lab.start) * (Number(this.time.value) / PLACES));
+    });
+    this.undoButton = element("undo");
+    this.redoButton = element("redo");
+    this.fault = element("fault");
+    for (const news of /** @type {const} */ (["scene", "run", "time", "play"])) {
+      lab.on(news, () => this.refresh());
+    }
+    this.refresh();
+    this.then = performance.now();
+    requestAnimationFrame((now) => this.frame(now));
+  }
+
+  /** @param {number} now ms */
+  frame(now) {
+    this.lab.tick(Math.min((now - this.then) / 1000, LONGEST));
+    this.then = now;
+    requestAnimationFrame((next) => this.frame(next));
+  }
+
+  /** A sixtieth of a second of what is shown, in the pace it is shown. @param {number} sign */
+  step(sign) {
+    this.lab.pause();
+    this.lab.seek(this.lab.t + (sign * this.lab.rate) / 60);
+  }
+
+  refresh() {
+    const { lab, words } = this;
+    const span = lab.end - lab.start;
+    this.time.value = String(span > 0 ? Math.round(((lab.t - lab.start) / span) * PLACES) : 0);
+    const clock = `${words.fixed(lab.t, 3)} s`;
+    this.clock.textContent = clock;
+    this.time.setAttribute("aria-valuetext", clock);
+    this.playButton.classList.toggle("playing", lab.playing);
+    this.playButton.setAttribute("aria-label", words.say(lab.playing ? "pause" : "play"));
+    this.undoButton.disabled = !lab.past.length;
+    this.redoButton.disabled = !lab.future.length;
+    this.fault.hidden = !lab.fault;
+    if (lab.fault) this.fault.textContent = lab.fault.text;
+  }
+}
+
+export { Transport };

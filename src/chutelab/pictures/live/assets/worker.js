@@ -1,0 +1,95 @@
+// The engine's own thread: runs machines, so that the picture never waits for them.
+//
+// In:  {type: "load", wasm, layout}; {type: "run", id, machine, until} begins a run and ends the one
+//      before; {type: "until", id, until} lets it go on to a later time (s).
+// Out: {type: "ready"}; {type: "chunk", id, knots, events, now, state, books, reasons}, where state
+//      is "running", "done", "stalled" or "failed"; books and reasons come with the end.
+
+import { startCore } from "./core.js";
+
+/** ms between two looks at the messages. */
+const TURN = 6;
+
+/** Most steps of the core between two looks at the clock. */
+const MOST_STEPS = 256;
+
+/** @type {import("./core.js").Core} */
+let core;
+
+/** @type {{id: number, until: number, steps: number} | null} */
+let job = null;
+
+let scheduled = false;
+const channel = new MessageChannel();
+channel.port1.onmessage = () => {
+  scheduled = false;
+  work();
+};
+
+function schedule() {
+  if (scheduled || !job) return;
+  scheduled = true;
+  channel.port2.postMessage(null);
+}
+
+/** Whether the run has reached the time it may go to. Without contacts between them disks run one
+ * after the other, each to its end.
+ * @param {{until: number}} task */
+const isAhead = (task) => core.machine?.interact && core.get("t") >= task.until;
+
+function work() {
+  if (!job || isAhead(job)) return;
+  const began = performance.now();
+  const knots = [];
+  const events = [];
+  /** @type {"running" | "done" | "stalled" | "failed"} */
+  let state = "running";
+  try {
+    while (state === "running" && !isAhead(job)) {
+      const before = performance.now();
+      state = core.proceed(job.steps);
+      const taken = core.take();
+      knots.push(taken.knots);
+      events.push(...taken.events);
+      const now = performance.now();
+      job.steps = now - before < 1 ? Math.min(2 * job.steps, MOST_STEPS) : Math.max(1, job.steps >> 1);
+      if (now - began > TURN) break;
+    }
+  } catch {
+    state = "failed";
+  }
+  const over = state !== "running";
+  const all = joined(knots);
+  postMessage({
+    type: "chunk", id: job.id, knots: all, events, now: core.get("t"), state,
+    books: over ? core.books() : null, reasons: over ? core.reasons() : null,
+  }, { transfer: [all.buffer] });
+  if (over) job = null;
+  else schedule();
+}
+
+/** @param {Float64Array[]} parts */
+function joined(parts) {
+  if (parts.length === 1) return parts[0];
+  const all = new Float64Array(parts.reduce((size, part) => size + part.length, 0));
+  let at = 0;
+  for (const part of parts) {
+    all.set(part, at);
+    at += part.length;
+  }
+  return all;
+}
+
+addEventListener("message", async ({ data }) => {
+  if (data.type === "load") {
+    core = await startCore(await WebAssembly.compile(data.wasm), data.layout);
+    postMessage({ type: "ready" });
+  } else if (data.type === "run") {
+    core.begin(data.machine);
+    job = { id: data.id, until: data.until, steps: 64 };
+    work();
+  } else if (data.type === "until" && job && data.id === job.id) {
+    job.until = data.until;
+    schedule();
+  }
+});

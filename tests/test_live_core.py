@@ -1,0 +1,53 @@
+"""The page's host of the core does what Python's does, to the last bit."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from live.machines import as_page_has_it, dumps
+
+from chutelab.engines.contact import engine, module
+from chutelab.machine import build
+from chutelab.scene import load
+
+HERE = Path(__file__).parent
+NODE = shutil.which("node")
+pytestmark = pytest.mark.skipif(NODE is None, reason="needs node")
+
+SCENES = [
+    "perpendicular", "inclined-40", "stream", "slip", "spoon", "cascade", "two-sizes",
+    ("hopper", "stream.count=150"), ("stream", "stream.interact=true", "stream.count=60"),
+    "inclined-conveyor",
+]  # fmt: skip
+
+
+def test_the_pages_host_runs_every_kind_of_scene_as_python_does():
+    machines = []
+    for row in SCENES:
+        name, *overrides = (row,) if isinstance(row, str) else row
+        machines.append(build(load(name, overrides)))
+    done = subprocess.run(
+        [str(NODE), HERE / "live" / "core.mjs"],
+        input=dumps([as_page_has_it(machine) for machine in machines]),
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    answers = json.loads(done.stdout)
+    for row, machine, answer in zip(SCENES, machines, answers, strict=True):
+        job = engine.Job(module.Module(), machine)
+        assert job.run(None) is None
+        assert answer["state"] == "done"
+        knots = np.concatenate(job.knots)
+        ours = knots.view("<f8").reshape(-1, 10)[:, :9]
+        its = np.array(answer["knots"]).reshape(-1, 10)
+        assert np.array_equal(its[:, :9], ours), row
+        assert np.array_equal(its[:, 9], knots["disk"]), row
+        events = np.concatenate(job.events)
+        assert [event["t"] for event in answer["events"]] == events["t"].tolist(), row
+        assert [event["kind"] for event in answer["events"]] == events["kind"].tolist(), row
+        books = job.module.array("books", engine.REAL, 3 * (job.owners + 1)).reshape(-1, 3)
+        assert np.array_equal(np.array(answer["books"]), books), row

@@ -169,7 +169,7 @@ class Handles {
       }
       return;
     }
-    const keys = row.points.length === 2 && row.from ? ["from", "to"] : null;
+    const keys = row.given.from ? ["from", "to"] : null;
     row.points.forEach((point, i) => {
       const key = keys ? `${table}.${keys[i]}` : `${table}.points[${i}]`;
       const what = i === 0 ? "begin" : i === row.points.length - 1 ? "end" : "corner";

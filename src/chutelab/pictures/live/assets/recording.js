@@ -41,6 +41,13 @@ class Track {
     return this.rows[knot * KNOT_ROW + column];
   }
 
+  /** Lowest knot, m. */
+  get lowest() {
+    let low = Infinity;
+    for (let i = 0; i < this.count; i += 1) low = Math.min(low, this.at(i, Y));
+    return low;
+  }
+
   get begin() {
     return this.count ? this.rows[0] : Infinity;
   }
@@ -180,6 +187,13 @@ class Recording {
     this.state = state;
     const done = state !== "running";
     this.now = done ? Math.max(this.end, now + this.shift) : now + this.shift;
+  }
+
+  /** Potential energy of all at the lowest point that each has been at, J. */
+  get lowest() {
+    const { mass, gravity } = this.machine;
+    return this.tracks.reduce((sum, track, i) =>
+      (track.count ? sum + mass[i] * gravity * track.lowest : sum), 0);
   }
 
   get end() {

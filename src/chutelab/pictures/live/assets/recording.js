@@ -210,6 +210,7 @@ class Recording {
   goOn(t, machine) {
     /** @type {{index: number, entries: number[]}[]} */
     const renamed = [];
+    /** @type {Machine["releases"]} */
     const releases = [];
     machine.releases.forEach((release, index) => {
       const track = this.tracks[index] ?? (this.tracks[index] = new Track());
@@ -301,6 +302,7 @@ class Recording {
    * @param {number} index @param {number} from @param {number} to @param {number} step s */
   points(index, from, to, step) {
     const track = this.tracks[index];
+    /** @type {State[]} */
     const points = [];
     const begin = Math.max(from, track.begin);
     const end = Math.min(to, track.end);

@@ -101,7 +101,10 @@ def joined(name: str) -> str:
 
 IMPORTED = re.compile(r'^import [^;]+ from "\./([\w-]+\.js)";$', re.MULTILINE)
 TAKEN_OFF = re.compile(
-    r"^import [^;]+;\n|^export \{[^}]+\};\n|^export (?=async|class|const|function)", re.MULTILINE
+    r"^import [^;]+;\n|^export \{[^}]+\};\n|^export (?=async|class|const|function)"
+    # What only a reader or a type checker needs.
+    r"|/\*\*(?:[^*]|\*(?!/))*\*/ ?|^ *//.*\n|^ +",
+    re.MULTILINE,
 )
 
 

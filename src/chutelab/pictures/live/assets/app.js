@@ -1,8 +1,13 @@
 // The page: reads its data, starts the engine's thread, and joins the parts.
 
+import { Bench } from "./bench.js";
 import { Engine } from "./engine.js";
+import { Inspector } from "./inspector.js";
+import { Keep } from "./keep.js";
+import { listenToKeys } from "./keyboard.js";
 import { Lab } from "./lab.js";
 import { EnergyPanel, NumbersPanel } from "./panels.js";
+import { Prediction } from "./predict.js";
 import { Stage } from "./stage.js";
 import { Transport } from "./transport.js";
 import { Words } from "./words.js";
@@ -26,11 +31,22 @@ function start() {
   for (const element of document.querySelectorAll("[data-say]")) {
     element.textContent = words.say(/** @type {HTMLElement} */ (element).dataset.say ?? "");
   }
+  for (const element of document.querySelectorAll("[data-label]")) {
+    element.setAttribute("aria-label", words.say(element.getAttribute("data-label") ?? ""));
+  }
   const lab = new Lab(data, engine);
   const stage = new Stage(byId("stage"), lab, words);
   new EnergyPanel(byId("panels"), lab, words);
   new NumbersPanel(byId("panels"), lab, words);
+  const inspector = new Inspector(byId("panels"), lab, words);
+  const bench = new Bench(byId("tools"), stage, inspector, lab, words);
   new Transport(lab, stage, words);
+  new Keep(byId("panels"), stage, lab, words);
+  if (data.live?.predict) new Prediction(stage, lab, words);
+  listenToKeys(bench, lab, words);
+  for (const panel of document.querySelectorAll("#panels > .card")) {
+    if (data.live?.panels && !data.live.panels.includes(panel.id)) panel.remove();
+  }
   Object.assign(globalThis, { chutelab: { lab, stage } });
 }
 

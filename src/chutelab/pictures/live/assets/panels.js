@@ -151,4 +151,4 @@ class NumbersPanel {
   }
 }
 
-export { EnergyPanel, NumbersPanel, card, html, numbersOf, stacks };
+export { EnergyPanel, NumbersPanel, RELEASE_KINDS, card, html, numbersOf, stacks };

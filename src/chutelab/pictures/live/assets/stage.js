@@ -1,5 +1,6 @@
 // The picture: surfaces, tracks and handles as SVG, particles on a canvas between them.
 
+import { openHandles } from "./controls.js";
 import { ARROW, Handles, roundTo, valuesOf } from "./handles.js";
 import { View, boxOf } from "./view.js";
 
@@ -284,7 +285,9 @@ class Stage {
   placeHandles() {
     const { machine, scene } = this.lab;
     if (!machine || !scene) return;
-    this.handles = this.show.handles ? new Handles(scene, machine, this.lab.data).list : [];
+    const { data } = this.lab;
+    this.handles = this.show.handles
+      ? openHandles(new Handles(scene, machine, data).list, data) : [];
     const wanted = new Set(this.handles.map(({ id }) => id));
     for (const [id, grip] of this.gripOf) {
       if (wanted.has(id)) continue;

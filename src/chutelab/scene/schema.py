@@ -183,7 +183,7 @@ class Scene(Table):
                 friction = friction if pair.friction is None else pair.friction
         return restitution, friction
 
-    def _own(self, particle: Particle, homes: Sequence[Table], column: str = "") -> Any:
+    def _own(self, particle: Particle, homes: Sequence[Any], column: str = "") -> Any:
         """Return what tables say, else the material, else the default of the first."""
         if particle.material is None and len(homes) == 1:
             return homes[0].restitution, homes[0].friction

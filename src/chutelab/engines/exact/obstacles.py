@@ -131,6 +131,25 @@ class Obstacles:
         turn = np.mod(np.arctan2(away[1], away[0]) - begin + FOOT, 2.0 * np.pi)
         return np.asarray(turn <= extent + 2.0 * FOOT)
 
+    def reached(self, rows: Ints, circle: Ints, away: Floats, epoch: Ints) -> Bools:
+        """Tell which circles (k,) are met from directions (2, k), as far as gates are concerned.
+
+        Not those that are not there after so many changes as `epoch` tells. A gate that appears in
+        a disk does not act on it until the disk is clear of it; so neither does its end, where the
+        disk comes to it along the gate, which goes on into the disk there.
+        """
+        met = self.present[epoch, circle + self.segments]
+        ends = self.joints.meeting[:, circle]
+        ahead = self.joints.tips[1]
+        ahead = ahead.reshape(2, -1, ahead.shape[-1])
+        clear = (ends == NONE).all(axis=0)
+        for number in ends:
+            piece = number // 2
+            face = np.where(piece < self.segments, piece, piece - self.segments + self.first_arc)
+            beyond = dot(pick(ahead, rows, number), away) >= -rows_of(self.touch, rows)
+            clear |= (number != NONE) & beyond & self.present[epoch, face]
+        return np.asarray(met & clear)
+
     def of(self, first: int, last: int) -> Obstacles:
         """Return the obstacles of the particles from `first` up to `last`."""
         if self.length.shape[-1] == self.rho.shape[-1] == self.material.shape[-1] == 1:
@@ -342,8 +361,8 @@ def obstacles(machine: Machine, far: float = 0.0) -> Obstacles:
     if wheel is not None:
         pulley, surface[-1] = first + 2 * arcs, wheel.surface
         for row, value in enumerate((wheel.speed, wheel.restitution, wheel.friction)):
-            own_value = isinstance(value, np.ndarray)
-            material[row, -1] = _of_kind(machine, value) if own_value else value
+            several = isinstance(value, np.ndarray)
+            material[row, -1] = _of_kind(machine, value) if several else value
     start, stop = corners[:, :flat], corners[:, len(spots) : len(spots) + flat]
     faces = np.empty((2, 4, flat, 1, length.shape[1]))
     faces[0, 0], faces[1, 0] = -tangent[1][:, None], tangent[0][:, None]

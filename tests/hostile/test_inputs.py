@@ -1,4 +1,4 @@
-"""Scenes, machines, arguments, tracks, recordings, unfinished sweeps and notebooks with mistakes in them."""
+"""Scenes, machines, arguments, tracks and other files with mistakes in them, see `hostile.inputs`."""
 
 from __future__ import annotations
 

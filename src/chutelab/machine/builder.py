@@ -91,9 +91,9 @@ class _Room:
 
     def surfaces(self, low: Floats, high: Floats) -> Iterator[tuple[int, float, float, Any]]:
         """Yield what may reach into a box (m): whose, from when to when, and its nearest points."""
-        x0, y0, x1, y1 = self.ends
-        near = (np.maximum(x0, x1) > low[0]) & (np.minimum(x0, x1) < high[0])
-        near &= (np.maximum(y0, y1) > low[1]) & (np.minimum(y0, y1) < high[1])
+        a, b = self.ends[:2], self.ends[2:]
+        beside = (np.maximum(a, b) > low[:, None]) & (np.minimum(a, b) < high[:, None])
+        near = beside[0] & beside[1]
         for n in near.any(axis=(*range(1, near.ndim),)).nonzero()[0].tolist():
             yield (*_when(self.segments, n), partial(_on_segment, ends=self.ends[:, n]))
         for n in range(len(self.arcs.surface)):
@@ -117,19 +117,23 @@ class _Room:
         places = releases.position.T.copy()
         low, high = places - radius, places + radius
         if not self.scene.shape:
-            low, high = low.min(axis=1), high.max(axis=1)
+            low, high = np.minimum.reduce(low, axis=1), np.maximum.reduce(high, axis=1)
+        belt, walks = self.scene.incoming, ~releases.carried
+        others = np.count_nonzero(walks) > 0
         for surface, appears, vanishes, nearest in self.surfaces(low, high):
+            onto = surface == 0 and belt is not None
+            if onto and not others:
+                continue
             there = (appears <= releases.t) & (releases.t < vanishes)
-            if surface == 0 and self.scene.incoming is not None:
-                there &= ~releases.carried
+            if onto:
+                there &= walks
             if np.count_nonzero(there):
                 releases = self.out(releases, nearest, radius, there, self.names[surface])
-        belt = self.scene.incoming
-        if belt is not None and not releases.carried.all():
+        if belt is not None and others:
             # A point may start anywhere.
             reach = np.where(np.greater(radius, 0.0), belt.pulley_radius + radius, 0.0)
             axis = np.zeros((2, 1))
-            releases = self.out(releases, lambda _: axis, reach, ~releases.carried, "incoming")
+            releases = self.out(releases, lambda _: axis, reach, walks, "incoming")
         return releases
 
     def out(
@@ -301,6 +305,9 @@ def _pieces(scene: Scene, pieces: Sequence[Piece], count: int) -> tuple[Floats, 
     kinds = 1 if scene.shape else len(scene.particles)
     columns = np.empty((count + 2 * kinds, len(pieces), *scene.shape))
     for n, (_, _, numbers) in enumerate(pieces):
+        if not scene.shape:
+            columns[:, n] = numbers
+            continue
         for column, value in zip(columns, numbers, strict=True):
             column[n] = value
     appears, vanishes = np.array([gate for _, gate, _ in pieces]).reshape(-1, 2).T.copy()

@@ -353,8 +353,7 @@ def origin(machine: Machine) -> tuple[float, float]:
     It is (0, 0) unless the machine is many times its own size away from there; and so round a
     number that taking it off a coordinate loses no digit.
     """
-    corners = machine.corners
-    if machine.pulley is not None or not corners.size:
+    if machine.pulley is not None or not (corners := machine.corners).size:
         return 0.0, 0.0
     axes = tuple(range(corners.ndim - 1))
     low, high = corners.min(axis=axes), corners.max(axis=axes)

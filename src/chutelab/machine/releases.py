@@ -267,14 +267,14 @@ def _draw(scene: Scene, n: int) -> Draw:
     stream, particle = scene.streams[n], scene.particles[scene.kinds[n]]
     every = stream.count * prod(scene.shape)
     # Those of each scene of a family follow another.
-    t = np.tile(np.arange(stream.count), prod(scene.shape)) / stream.rate
+    t = np.arange(every) % stream.count / stream.rate
     if stream.at_once:
         t = np.zeros(every)
     if stream.start:
         t += stream.start
     position, velocity = np.empty((2, every, 2))
     velocity[:, 0], velocity[:, 1] = release_velocity(scene, n)
-    height, radii, faster = np.zeros(every), None, np.zeros(every)
+    height, radii = np.zeros(every), None
     crowded = stream.count > 1 and scene.crowded
     # The first one has no spread. Making a generator takes as long as all other preparations.
     spread = stream.bed_height > 0.0 or stream.speed_spread > 0.0

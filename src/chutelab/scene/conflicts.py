@@ -94,7 +94,7 @@ class Look:
         """Return the value of a key, or its default; NaN if it is at fault or its table absent."""
         path = self.path(table, key, row)
         self.asked.add(path)
-        if not self.sound(path):
+        if self._faulty and not self.sound(path):
             return math.nan
         value = self._content(table, row).get(key)
         if value is not None:
@@ -111,10 +111,9 @@ class Look:
     def _content(self, table: str, row: int) -> dict[str, Any]:
         """Return the keys of a table, none of what is no table."""
         found = self._document.get(table)
-        if isinstance(found, LIST):
-            found = found[row] if row < len(found) else None
-        elif row:
-            found = None
+        if isinstance(found, dict):
+            return {} if row else found
+        found = found[row] if isinstance(found, LIST) and row < len(found) else None
         return found if isinstance(found, dict) else {}
 
 
@@ -172,7 +171,10 @@ def _names(look: Look) -> Iterator[Fault]:
     for table in (*SURFACES, "particle", "stream", "material"):
         known = surfaces if table in SURFACES else {}
         for row in range(look.rows(table)):
-            path, name = look.path(table, "name", row), look(table, "name", row)
+            name = look(table, "name", row)
+            if name is None and table != "particle":
+                continue
+            path = look.path(table, "name", row)
             if not isinstance(name, str):
                 if table == "particle" and look.rows(table) > 1 and look.sound(path):
                     yield Fault(path, MISSING, "a name; needed where there are several kinds")

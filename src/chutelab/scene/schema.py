@@ -122,7 +122,10 @@ class Scene(Table):
     @property
     def plate(self) -> Plate | None:
         """The damping plate."""
-        return next((plate for plate in self.plates if plate.pivot is None), None)
+        for plate in self.plates:
+            if plate.pivot is None:
+                return plate
+        return None
 
     @property
     def stream(self) -> Stream:
@@ -182,8 +185,10 @@ class Scene(Table):
                 friction = friction if pair.friction is None else pair.friction
         return restitution, friction
 
-    def _own(self, particle: Particle, homes: Sequence[Table], column: str = "") -> Any:
+    def _own(self, particle: Particle, homes: Sequence[Any], column: str = "") -> Any:
         """Return what tables say, else the material, else the default of the first."""
+        if particle.material is None and len(homes) == 1:
+            return homes[0].restitution, homes[0].friction
         material, values = self._material(particle), []
         for key in ("restitution", "friction"):
             said = [home for home in homes if key in home.model_fields_set]

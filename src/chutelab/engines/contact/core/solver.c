@@ -35,6 +35,9 @@
 #define NOISE 1e-11
 /* Times the first change: sweeps whose changes grow so far never end. */
 #define DIVERGES 1e3
+/* Times the change at the end of the first round: sweeps that have not crawled to less in the last one
+   press harder by as much in each, without end. */
+#define CRAWLS 0.5
 /* m/s; below it the contacts of a crowd count as calm: `settled` in the contract. */
 #define CALM 1e-3
 /* m/s; of a disk by itself: what is left of a speed that has come to nothing. */
@@ -356,17 +359,17 @@ static double sweep(Contact *list, int count, int sweeps, int plain, double accu
 }
 
 /* Solve contacts by sweeps until changes are `accurate`; if gaps are closed but for `enough`, m/s, less
-   will do. A crowd is swept again, up to so many rounds, of which the last is good enough, and more
-   finely where small changes leave gaps open: these sweeps crawl. By itself (0 rounds), and where
-   sweeps diverge, rigid bodies with all of the friction may have no solution, driven into a wedge that
-   locks itself: there it is lowered until they have one. */
+   will do. A crowd is swept again, up to so many rounds, of which the last is good enough if it crawls,
+   and more finely where small changes leave gaps open. By itself (0 rounds), and where sweeps diverge,
+   rigid bodies with all of the friction may have no solution, driven into a wedge that locks itself:
+   there it is lowered until they have one. */
 void sweep_contacts(Contact *list, int count, int rounds, int plain, double accurate, double enough) {
-    for (int left = TRIES;;) {
-        double worst = sweep(list, count, W.sweeps, plain, accurate);
-        if ((worst <= accurate && rounds < 2) || left == 0) break;
-        int ends = worst < INFINITY;
-        if (worst <= accurate) accurate *= 0.1;
-        if (worst < INFINITY) {
+    double first = INFINITY;
+    for (int left = TRIES, more = rounds;;) {
+        double change = sweep(list, count, W.sweeps, plain, accurate), worst = change;
+        if ((change <= accurate && more < 2) || left == 0) break;
+        if (change <= accurate) accurate *= 0.1;
+        if (change < INFINITY) {
             worst = 0;
             for (int n = 0; n < count; n++) {
                 const Contact *c = list + n;
@@ -376,11 +379,13 @@ void sweep_contacts(Contact *list, int count, int rounds, int plain, double accu
                 worst = MAX(worst, c->need - v[0] + u[0]);
             }
         }
-        if (worst <= enough || (ends && rounds == 1)) break;
-        if (ends && rounds > 1) {
-            rounds--;
+        if (worst <= enough) break;
+        if (change < INFINITY && more > 1) {
+            if (more-- == rounds) first = change;
             continue;
         }
+        if (more == 1 && change < CRAWLS * first) break;
+        more = rounds;
         worst = 0;
         for (int n = 0; n < count; n++) worst = MAX(worst, list[n].change);
         for (int n = 0; n < count; n++) {

@@ -1,4 +1,4 @@
-"""Scenes, machines, arguments, tracks and other files with mistakes in them, see `hostile.inputs`."""
+"""Scenes, machines, arguments, tracks and other files with mistakes, see `hostile.inputs`."""
 
 from __future__ import annotations
 

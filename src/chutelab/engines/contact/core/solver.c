@@ -565,7 +565,7 @@ static void tell_separation(int i) {
     const Disk *d = W.disks + i;
     const Track *track = W.tracks + i;
     if (track->lasted < 3) {
-        event_here(SEPARATION, i, d->on);
+        event_here(SEPARATION, i, track->ground);
         return;
     }
     double t = time_unloaded(track->load + 1, track->load_t + 1);
@@ -579,7 +579,7 @@ static void tell_separation(int i) {
     /* It has flown since. */
     Disk then = *d;
     advance(&then, t);
-    write_event(SEPARATION, i, -1, d->on, t, &then.x, &then.vx, &then.vx, 0, 0);
+    write_event(SEPARATION, i, -1, track->ground, t, &then.x, &then.vx, &then.vx, 0, 0);
 }
 
 /* After the solve: entries, supports, timers, tracks. */
@@ -590,8 +590,10 @@ void close_step(double h) {
     for (int i = W.low; i < W.high; i++) {
         Disk *d = W.disks + i;
         d->links = d->before = -1;
+        /* A disk by itself that leaves what it lay on may come back to it in this step, off by what a
+           step is: that is no blow, and of endless friction it would be one however soft. */
+        if (d->mode == FREE && (W.interact || !d->supports)) d->held_count = 0;
         d->supports = 0;
-        if (d->mode == FREE) d->held_count = 0;
         if (W.length_before > 0.01 * W.dt) d->impacts = 0;
         for (int n = 0; n < 3; n++) d->gain[n] = d->ahead[n] = 0;
         if (d->mode == FREE) {
@@ -612,6 +614,7 @@ void close_step(double h) {
             b->links = 2 * n + 1;
         }
         if (c->impulse[0] == 0) continue;
+        if (!W.interact && !a->supports) a->held_count = 0;
         if (!b && a->held_count < MAX_HELD) a->held[a->held_count++] = -1 - c->j;
         relative(c, 1, u);
         relative(c, 0, v);
@@ -652,7 +655,7 @@ void close_step(double h) {
         if (d->mode != FREE) continue;
         if (!d->supports) {
             d->calm = d->rest = 0;
-            if (d->on >= 0 && track->stays >= (W.interact ? LASTS : 3)) tell_separation(i);
+            if (track->stays >= (W.interact ? LASTS : 3)) tell_separation(i);
             if (track->lasted || track->stays) d->on = -1;
             track->stays = 0;
             flush_track(i);
@@ -685,11 +688,12 @@ void close_step(double h) {
                 const Contact *c = W.contacts + link / 2;
                 if (c->impulse[0] > 0 && c->j < 0) ground = c->owner;
             }
-            if (ground < 0 && d->on >= 0 && track->stays >= LASTS) event_here(SEPARATION, i, d->on);
-            if (d->on != ground) track->stays = 0;
+            if (ground < 0 && track->stays >= LASTS) event_here(SEPARATION, i, track->ground);
+            if (track->ground != ground) track->stays = 0;
             d->slips = 1;
             d->on = ground;
         }
+        track->ground = d->on;
         if (d->on >= 0) track->stays++;
         d->changes++;
         if (d->mode == GONE) continue;

@@ -22,6 +22,7 @@ from chutelab.mechanics.contact import (
 )
 from chutelab.scene import Scene
 from chutelab.util.arrays import Bools, Floats, Ints, Numbers
+from chutelab.util.trig import RADIANS, sin_cos
 
 STEPS = 100_000
 """Knots of a ride after which it counts as one without an end; a quarter turn takes 65, the slowest
@@ -159,8 +160,8 @@ def plate_hit(scene: Scene) -> Pair:
     """
     if scene.plate is None or scene.incoming is None:
         return nan, nan
-    alpha = np.radians(scene.plate.angle_deg)
-    nx, ny = -np.cos(alpha), -np.sin(alpha)
+    sine, cosine = sin_cos(scene.plate.angle_deg * RADIANS)
+    nx, ny = -cosine, -sine
     pivot_x = scene.incoming.pulley_radius + scene.plate.distance
     pivot_y = scene.plate.pivot_height
     (x, y), (vx, vy) = discharge(scene)

@@ -16,6 +16,7 @@ from chutelab.scene.materials import PRESETS
 from chutelab.scene.rules import SYMBOLS, THEORY, UNPROMISED, suggestion, unit_of
 from chutelab.scene.units import MOST_PARTICLES, read_size, write_size
 from chutelab.util.errors import MISSING, Fault, did_you_mean
+from chutelab.util.trig import RADIANS, sin_cos
 
 ON_BELT: Final = 1e-9
 """How near to the belt's height R + r a release counts as lying on the belt, m."""
@@ -335,8 +336,8 @@ def _release(look: Look, row: int) -> Iterator[Fault]:
         yield Fault(path("speed_spread"), look("stream", "speed_spread", row), text)
     if given("velocity") and look.sound(path("velocity")):
         velocity, speed = look("stream", "velocity", row), look("incoming", "speed")
-        angle = math.radians(look("incoming", "incline_deg"))
-        wanted = speed * math.cos(angle), speed * math.sin(angle)
+        sine, cosine = sin_cos(look("incoming", "incline_deg") * RADIANS)
+        wanted = speed * cosine, speed * sine
         if any(abs(v - w) > 1e-12 * abs(speed) for v, w in zip(velocity, wanted, strict=True)):
             text = f"{advice}; give a Coulomb coefficient, or leave the velocity out"
             yield Fault(path("velocity"), velocity, text)
@@ -355,9 +356,9 @@ def beside(x: float, y: float, height: float, length: float, incline_deg: float)
     The height is the pulley's radius and the particle's, m; the belt rises by the angle to where it
     is tangential to the pulley.
     """
-    angle = math.radians(incline_deg)
-    along = x * math.cos(angle) + y * math.sin(angle)
-    above = y * math.cos(angle) - x * math.sin(angle)
+    sine, cosine = sin_cos(incline_deg * RADIANS)
+    along = x * cosine + y * sine
+    above = y * cosine - x * sine
     return -length <= along <= 0.0 and abs(above - height) <= ON_BELT
 
 

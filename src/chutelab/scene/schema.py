@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import hypot, pi
+from math import hypot, pi, sqrt
 from typing import Annotated, Any, Final, Self
 
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
@@ -175,7 +175,9 @@ class Scene(Table):
         else:
             with_it = self.particles[other].name
             pairs = zip(self.met(kind, kind), self.met(other, other), strict=True)
-            values = tuple((a * b) ** 0.5 for a, b in pairs)
+            products: list[Any] = [a * b for a, b in pairs]
+            # A power of a half is no square root to the last bit.
+            values = tuple(sqrt(p) if isinstance(p, float) else p**0.5 for p in products)
         restitution, friction = values
         for pair in reversed(self.pair):
             if set(pair.between) == {particle.name, with_it}:
@@ -332,7 +334,8 @@ class Scene(Table):
         if shaped:
             filled._fill("radius", max(hypot(x, y) for x, y in filled.outline))
         if density is not None:
-            filled._fill("mass", density * (4.0 / 3.0 * pi) * filled.radius**3)
+            size = filled.radius
+            filled._fill("mass", density * (4.0 / 3.0 * pi) * (size * size * size))
         return filled
 
     def _with_rate(self, stream: Stream, number: int, kind: int) -> Stream:

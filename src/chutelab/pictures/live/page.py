@@ -89,18 +89,20 @@ def joined(name: str) -> str:
 
     def visit(module: str) -> None:
         if module not in order:
-            for other in re.findall(r'^import .+? from "\./([\w-]+\.js)";$', _asset(module), IMPORT):
+            for other in re.findall(IMPORTED, _asset(module)):
                 visit(other)
             order.append(module)
 
     visit(name)
-    parts = (re.sub(r"^(import|export) [^;]+;\n", "", _asset(module), flags=IMPORT)
-             for module in order)  # fmt: skip
+    parts = (re.sub(TAKEN_OFF, "", _asset(module)) for module in order)
     # A worker's text stands in a script element too.
     return "".join(parts).replace("</", "<\\/")
 
 
-IMPORT = re.MULTILINE | re.DOTALL
+IMPORTED = re.compile(r'^import [^;]+ from "\./([\w-]+\.js)";$', re.MULTILINE)
+TAKEN_OFF = re.compile(
+    r"^import [^;]+;\n|^export \{[^}]+\};\n|^export (?=async|class|const|function)", re.MULTILINE
+)
 
 
 @cache

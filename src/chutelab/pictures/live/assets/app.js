@@ -2,6 +2,7 @@
 
 import { Engine } from "./engine.js";
 import { Lab } from "./lab.js";
+import { EnergyPanel, NumbersPanel } from "./panels.js";
 import { Stage } from "./stage.js";
 import { Transport } from "./transport.js";
 import { Words } from "./words.js";
@@ -20,13 +21,15 @@ function start() {
   const data = JSON.parse(byId("lab").textContent);
   const words = new Words(data.language, data.strings);
   const source = new Blob([byId("worker").textContent], { type: "text/javascript" });
-  const worker = new Worker(URL.createObjectURL(source), { type: "module" });
+  const worker = new Worker(URL.createObjectURL(source));
   const engine = new Engine(worker, bytesOf(data.wasm).buffer, data.layout);
   for (const element of document.querySelectorAll("[data-say]")) {
     element.textContent = words.say(/** @type {HTMLElement} */ (element).dataset.say ?? "");
   }
   const lab = new Lab(data, engine);
   const stage = new Stage(byId("stage"), lab, words);
+  new EnergyPanel(byId("panels"), lab, words);
+  new NumbersPanel(byId("panels"), lab, words);
   new Transport(lab, stage, words);
   Object.assign(globalThis, { chutelab: { lab, stage } });
 }

@@ -6,6 +6,9 @@
  * @typedef {{structs: Record<string, Struct>, enums: Record<string, Record<string, number>>,
  *   constants: Record<string, number>}} Layout
  * @typedef {import("./machine.js").Machine} Machine
+ * @typedef {{t: number, x: number, y: number, before: number[], after: number[],
+ *   normal: number, tangent: number, disk: number, other: number, kind: number,
+ *   surface: number}} Event
  */
 
 const PAGE = 65536;
@@ -44,6 +47,9 @@ class Core {
     this.end = this.base;
     /** @type {Machine | null} */
     this.machine = null;
+    this.bytes = new Uint8Array();
+    this.doubles = new Float64Array();
+    this.ints = new Int32Array();
     this.look();
   }
 
@@ -228,11 +234,7 @@ class Core {
   /** @type {{what: string, room: number} | null} */
   grow = null;
 
-  /**
-   * @typedef {{t: number, x: number, y: number, before: number[], after: number[],
-   *   normal: number, tangent: number, disk: number, other: number, kind: number,
-   *   surface: number}} Event
-   * @returns {Event[]} */
+  /** @returns {Event[]} */
   events() {
     const { size, fields } = this.layout.structs.Event;
     return Array.from({ length: this.get("event_count") }, (_, row) => {

@@ -18,7 +18,13 @@ class Engine {
     worker.onmessage = ({ data }) => {
       if (data.type === "chunk" && data.id === this.id) this.onChunk(data);
     };
+    worker.onerror = ({ message }) => this.onFailure(message);
     worker.postMessage({ type: "load", wasm, layout });
+  }
+
+  /** The thread did not start, or broke. @param {string} message */
+  onFailure(message) {
+    throw new Error(`the engine's thread: ${message}`);
   }
 
   /** Begin a run, and end the one before.

@@ -105,7 +105,7 @@ class Handles {
     const { plates, incoming } = this.scene;
     plates.forEach((plate, n) => {
       const table = plates.length > 1 ? `plate[${n}]` : "plate";
-      const name = plate.pivot ? plate.name : "plate";
+      const name = (plate.pivot && plate.name) || "plate";
       const front = incoming ? incoming.pulley_radius : 0;
       const [x, y] = plate.pivot ?? [front + plate.distance, plate.pivot_height];
       const angle = plate.angle_deg * DEGREE;
@@ -159,8 +159,9 @@ class Handles {
         this.place(`${table}.center`, row.center), (px, py) => [px, py]);
       this.add(`${table}.radius`, row.name, "radius", "point", at(0.5 * (row.from_deg + row.to_deg)),
         [this.axis(`${table}.radius`, radius, "m")], (px, py) => [Math.hypot(px - x, py - y)]);
-      for (const [key, what] of whole ? [] : [["from_deg", "begin"], ["to_deg", "end"]]) {
-        const degrees = /** @type {number} */ (row[key]);
+      for (const [key, what, degrees] of whole ? [] : /** @type {[string, string, number][]} */ ([
+        ["from_deg", "begin", row.from_deg], ["to_deg", "end", row.to_deg],
+      ])) {
         this.add(`${table}.${key}`, row.name, what, "turn", at(degrees),
           [this.axis(`${table}.${key}`, degrees, "degrees")], (px, py) => {
             const angle = Math.atan2(py - y, px - x) / DEGREE;
@@ -169,14 +170,15 @@ class Handles {
       }
       return;
     }
-    const keys = row.points.length === 2 && row.from ? ["from", "to"] : null;
-    row.points.forEach((point, i) => {
+    const keys = row.given.from ? ["from", "to"] : null;
+    const { points = [] } = row;
+    points.forEach((point, i) => {
       const key = keys ? `${table}.${keys[i]}` : `${table}.points[${i}]`;
-      const what = i === 0 ? "begin" : i === row.points.length - 1 ? "end" : "corner";
+      const what = i === 0 ? "begin" : i === points.length - 1 ? "end" : "corner";
       this.add(key, row.name, what, "point", point, this.place(key, point), (x, y) => [x, y]);
     });
     if (row.speed) {
-      const [[x0, y0], [x1, y1]] = row.points;
+      const [[x0, y0], [x1, y1]] = points;
       const way = Math.hypot(x1 - x0, y1 - y0);
       this.arrow(`${table}.speed`, row.name, [0.5 * (x0 + x1), 0.5 * (y0 + y1)],
         [(x1 - x0) / way, (y1 - y0) / way], row.speed);
@@ -190,11 +192,12 @@ class Handles {
     const table = streams.length > 1 ? `stream[${n}]` : "stream";
     this.add(`${table}.at`, stream.name, "release", "point", stream.at,
       this.place(`${table}.at`, stream.at), (x, y) => [x, y]);
-    if (!stream.velocity) return;
-    const [x, y] = stream.at, [vx, vy] = stream.velocity;
+    const { velocity } = stream;
+    if (!velocity) return;
+    const [x, y] = stream.at, [vx, vy] = velocity;
     this.add(`${table}.velocity`, stream.name, "velocity", "arrow",
       [x + ARROW * vx, y + ARROW * vy], [0, 1].map((part) =>
-        this.axis(`${table}.velocity`, stream.velocity[part], "m/s", part)),
+        this.axis(`${table}.velocity`, velocity[part], "m/s", part)),
       (px, py) => [(px - x) / ARROW, (py - y) / ARROW], stream.at);
   }
 }

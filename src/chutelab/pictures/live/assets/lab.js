@@ -38,6 +38,8 @@ class Lab {
     this.rate = 1;
     /** @type {Fault | null} */
     this.fault = null;
+    /** What undo goes back to once what is dragged is let go. @type {Given | undefined} */
+    this.before = undefined;
     this.use(this.first);
   }
 
@@ -117,9 +119,6 @@ class Lab {
       this.future = [];
     }
     this.before = undefined;
-    if (this.fault) {
-      this.fault = null;
-    }
     this.tell("scene");
   }
 

@@ -41,6 +41,13 @@ class Track {
     return this.rows[knot * KNOT_ROW + column];
   }
 
+  /** Lowest knot, m. */
+  get lowest() {
+    let low = Infinity;
+    for (let i = 0; i < this.count; i += 1) low = Math.min(low, this.at(i, Y));
+    return low;
+  }
+
   get begin() {
     return this.count ? this.rows[0] : Infinity;
   }
@@ -182,6 +189,13 @@ class Recording {
     this.now = done ? Math.max(this.end, now + this.shift) : now + this.shift;
   }
 
+  /** Potential energy of all at the lowest point that each has been at, J. */
+  get lowest() {
+    const { mass, gravity } = this.machine;
+    return this.tracks.reduce((sum, track, i) =>
+      (track.count ? sum + mass[i] * gravity * track.lowest : sum), 0);
+  }
+
   get end() {
     return this.tracks.reduce((latest, track) => Math.max(latest, track.end), -Infinity);
   }
@@ -196,6 +210,7 @@ class Recording {
   goOn(t, machine) {
     /** @type {{index: number, entries: number[]}[]} */
     const renamed = [];
+    /** @type {Machine["releases"]} */
     const releases = [];
     machine.releases.forEach((release, index) => {
       const track = this.tracks[index] ?? (this.tracks[index] = new Track());
@@ -287,6 +302,7 @@ class Recording {
    * @param {number} index @param {number} from @param {number} to @param {number} step s */
   points(index, from, to, step) {
     const track = this.tracks[index];
+    /** @type {State[]} */
     const points = [];
     const begin = Math.max(from, track.begin);
     const end = Math.min(to, track.end);

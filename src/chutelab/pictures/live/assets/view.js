@@ -66,7 +66,11 @@ class View {
   }
 }
 
-/** What is shown of a machine at first: all that its particles can meet, and their tracks.
+/** m of belts that are shown beyond all that matters. */
+const BEYOND = 0.35;
+
+/** What is shown of a machine at first: its tracks and all that they can meet, but only so much of
+ * belts, which may be long.
  * @param {Machine} machine @param {{x: number, y: number}[]} points @returns {Box} */
 function boxOf(machine, points) {
   const box = { left: Infinity, bottom: Infinity, right: -Infinity, top: -Infinity };
@@ -76,10 +80,6 @@ function boxOf(machine, points) {
     box.bottom = Math.min(box.bottom, y - r);
     box.top = Math.max(box.top, y + r);
   };
-  for (const { x, y, tx, ty, length } of machine.segments) {
-    widen(x, y);
-    widen(x + tx * length, y + ty * length);
-  }
   for (const arc of machine.arcs) {
     for (let n = 0; n <= 32; n += 1) {
       const angle = arc.begin + (arc.extent * n) / 32;
@@ -87,8 +87,16 @@ function boxOf(machine, points) {
     }
   }
   if (machine.pulley) widen(0, 0, machine.pulley.radius);
-  machine.releases.forEach(({ x, y }, i) => widen(x, y, machine.radius[i]));
   points.forEach(({ x, y }) => widen(x, y));
+  if (!points.length) machine.releases.forEach(({ x, y }, i) => widen(x, y, machine.radius[i]));
+  const ends = (/** @type {import("./machine.js").Segment} */ { x, y, tx, ty, length }) =>
+    [[x, y], [x + tx * length, y + ty * length]];
+  const still = machine.segments.filter(({ speed }) => !speed);
+  for (const [x, y] of still.flatMap(ends)) widen(x, y);
+  const [left, right] = [box.left - BEYOND, box.right + BEYOND];
+  for (const [x, y] of machine.segments.filter(({ speed }) => speed).flatMap(ends)) {
+    widen(isFinite(left) ? Math.min(Math.max(x, left), right) : x, y);
+  }
   return box;
 }
 

@@ -39,6 +39,13 @@ class Words {
     return this.local((Math.abs(value) < 0.5 * 10 ** -places ? 0 : value).toFixed(places));
   }
 
+  /** An energy in mJ or J. @param {number} value J */
+  energy(value) {
+    const size = Math.abs(value);
+    if (size < 5e-13) return "0 mJ";
+    return size < 1 ? `${this.number(1e3 * value)} mJ` : `${this.number(value)} J`;
+  }
+
   /** @param {string} text */
   local(text) {
     const signed = text.replace("-", "−");

@@ -2,7 +2,7 @@
 //
 // In:  {type: "load", wasm, layout}; {type: "run", id, machine, until} begins a run and ends the one
 //      before; {type: "until", id, until} lets it go on to a later time (s).
-// Out: {type: "ready"}; {type: "chunk", id, knots, events, now, state, books, reasons}, where state
+// Out: {type: "chunk", id, knots, events, now, state, books, reasons}, where state
 //      is "running", "done", "stalled" or "failed"; books and reasons come with the end.
 
 import { startCore } from "./core.js";
@@ -80,11 +80,21 @@ function joined(parts) {
   return all;
 }
 
+/** @type {Promise<void>} */
+let ready;
+
+/** @param {{wasm: ArrayBuffer, layout: import("./core.js").Layout}} parts */
+async function load({ wasm, layout }) {
+  core = await startCore(await WebAssembly.compile(wasm), layout);
+}
+
 addEventListener("message", async ({ data }) => {
   if (data.type === "load") {
-    core = await startCore(await WebAssembly.compile(data.wasm), data.layout);
-    postMessage({ type: "ready" });
-  } else if (data.type === "run") {
+    ready = load(data);
+    return;
+  }
+  await ready;
+  if (data.type === "run") {
     core.begin(data.machine);
     job = { id: data.id, until: data.until, steps: 64 };
     work();

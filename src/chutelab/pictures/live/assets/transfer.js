@@ -1,0 +1,1 @@
+export const predict = () => ({ reason: "no-theory" });

@@ -1,0 +1,22 @@
+import js from "@eslint/js";
+import globals from "globals";
+
+export default [
+  js.configs.recommended,
+  {
+    languageOptions: { globals: { ...globals.browser, ...globals.node } },
+    rules: {
+      eqeqeq: "error",
+      "max-len": ["error", { code: 100, ignoreStrings: true }],
+      "no-var": "error",
+      "prefer-const": ["error", { destructuring: "all" }],
+      "no-restricted-syntax": [
+        "error",
+        {
+          selector: "AssignmentExpression[left.property.name=/^(innerHTML|outerHTML)$/]",
+          message: "Texts of a scene must never become markup.",
+        },
+      ],
+    },
+  },
+];

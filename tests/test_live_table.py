@@ -59,13 +59,24 @@ def test_keys_may_be_written_with_dots_or_as_tables_and_survive_being_written():
 
 
 def test_a_page_gets_every_key_by_index():
-    assert live_of(sc.parse(MACHINE + LIVE)) == {
+    scene = sc.parse(MACHINE + LIVE)
+    assert live_of(scene, sc.to_dict(scene)) == {
         "predict": True,
         "controls": ["plate.angle_deg", "surface[0].from", "stream.count"],
         "panels": ["energy", "landing"],
         "ranges": {"plate.angle_deg": [-20.0, 70.0], "stream.count": [1.0, 5.0]},
         "presets": [{"name": "Moon", "set": {"gravity": 1.62, "surface[0].to": [2, 3]}}],
     }
+
+
+def test_drops_are_measured_from_where_the_page_measures_them():
+    live = 'ranges = { outgoing.drop = [0.4, 1] }\npresets = [{ name = "a", set = { outgoing.drop = 0.6 } }]'
+    scene = sc.parse(f"{MACHINE}[live]\n{live}")
+    page = sc.to_dict(scene)
+    page["outgoing"] |= {"drop": 0.75, "drop_from": "top"}  # 0.25 more than from the impact
+    found = live_of(scene, page)
+    assert found["ranges"] == {"outgoing.drop": [0.65, 1.25]}
+    assert found["presets"] == [{"name": "a", "set": {"outgoing.drop": 0.85}}]
 
 
 def test_overrides_reach_it():

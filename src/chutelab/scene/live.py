@@ -64,21 +64,33 @@ def live_faults(document: Mapping[str, Any], live: Live) -> Iterator[Fault]:
                 yield Fault(f"{path}.set", None, str(fault))
 
 
-def live_of(scene: Scene) -> dict[str, Any]:
-    """Return ``[live]`` for a page: defaults filled in, and every key by index, not by name."""
-    document = as_written(scene)
+def live_of(scene: Scene, document: Mapping[str, Any]) -> dict[str, Any]:
+    """Return ``[live]`` for a page: defaults filled in, and every key by index, not by name.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    document
+        Its tables as the page has them. If they measure the drop to the outgoing belt from
+        elsewhere than the scene, so do the drops that are returned: the belt is where it was meant.
+    """
+    live, out = scene.live, scene.outgoing
+    lower = 0.0 if out is None else document["outgoing"]["drop"] - out.drop
 
     def path(key: str) -> str:
         return joined(resolved(document, key))
 
-    live = scene.live
+    def moved(key: str, value: Any) -> Any:
+        return value + lower if lower and path(key) == "outgoing.drop" else value
+
     return {
         "predict": live.predict,
         "controls": None if live.controls is None else [path(key) for key in live.controls],
         "panels": None if live.panels is None else list(live.panels),
-        "ranges": {path(key): list(ends) for key, ends in live.ranges.items()},
+        "ranges": {path(k): [moved(k, end) for end in ends] for k, ends in live.ranges.items()},
         "presets": [
-            {"name": one.name, "set": {path(key): value for key, value in one.set.items()}}
+            {"name": one.name, "set": {path(k): moved(k, value) for k, value in one.set.items()}}
             for one in live.presets
         ],
     }

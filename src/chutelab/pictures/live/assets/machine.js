@@ -1,8 +1,8 @@
 // `build`: what the keys of a scene mean as surfaces and releases, the same numbers as those of
 // Python's `chutelab.machine`, to the last bit: the same operations in the same order.
+import { draw, upBelt } from "./releases.js";
 import { clearOf, movedOut } from "./room.js";
 import { Fault, met } from "./scene.js";
-import { draw } from "./releases.js";
 import { RADIANS, lengthOf, modulo, sinCos } from "./trig.js";
 
 /** @typedef {import("./scene.js").Scene} Scene */
@@ -112,7 +112,9 @@ export function build(scene) {
   const every = scene.particles.map((_, kind) => kind);
   const values = names.map((name) => {
     const pairs = every.map((kind) => met(scene, kind, name));
-    return { restitution: pairs.map(([bounce]) => bounce), friction: pairs.map(([, grip]) => grip) };
+    return {
+      restitution: pairs.map(([bounce]) => bounce), friction: pairs.map(([, grip]) => grip),
+    };
   });
   /** @type {Segment[]} */
   const segments = [];
@@ -234,17 +236,6 @@ function beltsOf(scene) {
       out.speed));
   }
   return parts;
-}
-
-/**
- * Returns the direction in which the incoming belt runs, cosine and sine.
- * @param {Scene} scene
- * @returns {[number, number]}
- */
-export function upBelt(scene) {
-  if (!scene.incoming?.incline_deg) return [1.0, 0.0];
-  const [sine, cosine] = sinCos(scene.incoming.incline_deg * RADIANS);
-  return [cosine, sine];
 }
 
 /**

@@ -39,7 +39,7 @@ TRACK = "mass_A\nt\tx\ty\n" + "".join(
     f"{0.01 * n:.2f}\t{0.02 * n:.3f}\t{0.1 - 0.0005 * n * n:.4f}\n" for n in range(30)
 )
 COMMANDS = (
-    "run", "check", "show", "sweep", "solve", "compare", "page", "figure", "scenes",
+    "run", "check", "show", "sweep", "solve", "compare", "live", "figure", "scenes",
     "materials", "new", "schema", "tables",
     "lesson list", "lesson show", "lesson new",
 )  # fmt: skip

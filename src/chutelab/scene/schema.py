@@ -14,6 +14,7 @@ from chutelab.scene.rules import Expect
 from chutelab.scene.tables import (
     Conveyor,
     Incoming,
+    Live,
     Outgoing,
     Pair,
     Particle,
@@ -47,6 +48,7 @@ TABLES: Final[dict[str, type[Table]]] = {
     "stream": Stream,
     "run": Run,
     "expect": Expect,
+    "live": Live,
 }
 
 DEFAULTS: Final = {
@@ -105,6 +107,7 @@ class Scene(Table):
     )
     run: Run = Field(default_factory=Run)
     expect: tuple[Expect, ...] = Field((), max_length=MOST_EXPECTATIONS)
+    live: Live = Field(default_factory=Live)
 
     _source: str = PrivateAttr("<scene>")
     _shape: tuple[int, ...] = PrivateAttr(())
@@ -266,13 +269,14 @@ class Scene(Table):
         return from_dict(to_dict(self), self.source, overrides)
 
     def alone(self) -> Scene:
-        """Return the scene with its first particle only; nothing is expected of that."""
+        """Return the scene with its first particle only; nothing is expected of that, nor shown."""
         tables = as_written(self)
         streams = tables.get("stream", {})
         first = streams[0] if isinstance(streams, tuple) else streams
         changes: dict[str, object] = {
             "stream": {**first, "count": 1, "interact": False},
             "expect": None,
+            "live": None,
         }
         if self.string:
             held = [row for row in tables["string"] if row.get("particle", 0) == 0]

@@ -15,6 +15,7 @@ from string import Template
 from chutelab.pictures.live.describe import describe
 from chutelab.pictures.plots import style
 from chutelab.scene import Scene
+from chutelab.scene.live import live_of
 from chutelab.util.files import whole
 from chutelab.util.versions import own_version
 
@@ -40,8 +41,10 @@ def html(scene: Scene, *, language: str = "en", home: tuple[str, str] | None = N
     """
     css = f":root {{\n{_palette()}}}\n{_asset('page.css')}"
     core = files("chutelab.engines.contact") / "core"
+    facts = describe(scene)
     data = {
-        **describe(scene),
+        **facts,
+        "live": live_of(scene, facts["scene"]),
         "version": own_version(),
         "language": language,
         "strings": json.loads(_asset(f"strings/{language}.json")),

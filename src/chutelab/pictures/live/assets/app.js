@@ -5,6 +5,7 @@ import { Engine } from "./engine.js";
 import { Inspector } from "./inspector.js";
 import { Keep } from "./keep.js";
 import { listenToKeys } from "./keyboard.js";
+import { toToml } from "./keys.js";
 import { Lab } from "./lab.js";
 import { EnergyPanel, NumbersPanel } from "./panels.js";
 import { Prediction } from "./predict.js";
@@ -47,7 +48,9 @@ function start() {
   for (const panel of document.querySelectorAll("#panels > .card")) {
     if (data.live?.panels && !data.live.panels.includes(panel.id)) panel.remove();
   }
-  Object.assign(globalThis, { chutelab: { lab, stage } });
+  Object.assign(globalThis, {
+    chutelab: { lab, stage, toml: () => toToml(/** @type {any} */ (lab.given)) },
+  });
 }
 
 start();

@@ -101,7 +101,8 @@ const MAIN = /** @type {Record<string, string[]>} */ ({
 /** Keys that say nothing as the others are. @param {string} table @param {any} row */
 function idle(table, row) {
   if (table === "surface") {
-    return row.points ? ["center", "radius", "from_deg", "to_deg"] : [];
+    return [...(row.points ? ["center", "radius", "from_deg", "to_deg"] : []),
+      ...(row.given.from ? ["points"] : [])];
   }
   if (table === "stream") {
     return [...(row.count === 1 ? ["rate", "bed_height", "speed_spread", "seed"] : []),

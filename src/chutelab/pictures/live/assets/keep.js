@@ -4,7 +4,7 @@ import { toToml } from "./keys.js";
 import { card, html, numbersOf } from "./panels.js";
 import { Fault } from "./scene.js";
 import { download, fileStem, fromHash, knotRows, toCsv, toHash } from "./share.js";
-import { predict } from "./transfer.js";
+import { predict } from "./prediction.js";
 
 /**
  * @typedef {import("./lab.js").Lab} Lab

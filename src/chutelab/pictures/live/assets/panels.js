@@ -147,7 +147,7 @@ class NumbersPanel {
       .map(({ id, symbol, unit, simulated, analytic }) => html("tr", { "data-id": id },
         html("th", { scope: "row" }, html("b", {}, symbol), ` ${words.say(`number-${id}`)}, ${unit}`),
         html("td", {}, words.number(simulated)), html("td", {}, words.number(analytic)))));
-    this.reason.textContent = found.reason ? words.say(found.reason) : "";
+    this.reason.textContent = found.reason ? words.say(`reason-${found.reason.claim}`) : "";
   }
 }
 

@@ -230,7 +230,7 @@ def test_an_override_can_mend_a_fault():
 
 # Laws.
 
-GOOD = tomllib.loads(IN + PLATE + OUT + HOOD + "[stream]\ncount = 2\n[particle]\n[run]\n")
+GOOD = tomllib.loads(IN + PLATE + OUT + HOOD + "[stream]\ncount = 2\n[particle]\n[run]\n[live]\n")
 KEYS = st.text(st.characters(codec="utf-8"), min_size=1, max_size=20)
 VALUES = st.recursive(
     st.none()
@@ -244,7 +244,7 @@ VALUES = st.recursive(
     max_leaves=6,
 )
 KNOWN = {
-    "": {"title", "gravity", *GOOD, "surface", "expect"},
+    "": {"title", "gravity", *GOOD, "surface", "expect", "live"},
     "particle": {"radius", "mass", "spin"},
     "incoming": {"speed", "pulley_radius", "length", "friction", "restitution"},
     "plate": {
@@ -258,6 +258,7 @@ KNOWN = {
         *("restitution", "friction"),
     },
     "run": {"engine", "until", "max_time", "dt", "align"},
+    "live": {"predict", "controls", "panels", "ranges", "presets"},
 }
 
 

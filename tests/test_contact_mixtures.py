@@ -201,35 +201,3 @@ def test_mixtures_obey_the_laws_of_contact(seed):
 @pytest.mark.parametrize("seed", [*range(3, 16), *range(17, 63), 182, 371])
 def test_sixty_mixtures_obey_the_laws_of_contact(seed):
     check(seed)
-
-
-@pytest.mark.parametrize(
-    ("count", "alpha", "arm", "friction"), [(3, 0.2, 0.3, 1.0), (4, 0.25, 0.3, 1.0)]
-)
-def test_a_nip_that_no_impulses_hold_open_lets_the_belt_slip(count, alpha, arm, friction):
-    """A belt drives disks that may not turn into a wedge: none sinks into what does not give way.
-
-    The belt's friction is endless, and α less than the angles of friction: rigid bodies have no
-    solution with all of it. The lowest disk touches both faces where its centre is r / tan(α/2)
-    above their edge.
-    """
-    r, edge = 0.01, -0.3
-    faces = {"friction": 1e6, "restitution": 0.0}
-    wall = face("wall", (0.0, edge), (0.6 * sin(alpha), edge + 0.6 * cos(alpha)), **faces)
-    machine = scene_of(
-        particle={"radius": r, "spin": True, "rolling_friction": arm},
-        surface=[face("belt", (0.0, edge), (0.0, 0.3), speed=-1.0, **faces), wall],
-        stream={"count": 2, "interact": True, "rate": 1.0, "bed_height": 1.0, "at": [0.0, 3.0],
-                "restitution": 0.0, "friction": friction},
-        run={"until": 0.5},
-    )  # fmt: skip
-    row = np.multiply.outer(r * (1.0 + 2.01 * np.arange(count)), [cos(0.1), sin(0.1)])
-    recording = run(thrown(machine, row + np.array([1e-4, 0.15])))
-    radius = np.full(count, r)
-    for t in np.linspace(1e-3, 0.499, 200):
-        x = recording.at([t])[0][0]
-        assert depths(machine, x, radius, t).max() < 0.01
-        between = np.hypot(*np.moveaxis(x[:, None] - x, -1, 0))[~np.eye(count, dtype=bool)]
-        assert 2.0 - between.min() / r < 0.01
-    lowest = x[:, 1].min()
-    assert lowest == pytest.approx(edge + r / np.tan(0.5 * alpha), abs=0.02 * r / alpha)

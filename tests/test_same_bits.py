@@ -16,7 +16,7 @@ HERE = Path(__file__).parent
 
 QUICK = [
     "run perpendicular --out run --only png,csv,npz,json -q",
-    "page perpendicular --vary plate.angle_deg=0,20",
+    "live perpendicular -o live.html",
 ]
 
 # The words of one command a line; each may use what those above it have written.

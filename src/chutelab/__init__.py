@@ -19,7 +19,7 @@ The rooms of the house; each imports only those below it:
 - `scene`: scene files; `util`: small things for all.
 
 What most people need is here: `load`, `Scene`, `SceneError`, `simulate`, `Recording`, `theory`,
-`compare`, `overlay`, `animate`, and `exercises`, `measured`, `design`, `figures`. Each is imported
+`compare`, `overlay`, `animate`, `live`, and `exercises`, `measured`, `design`, `figures`. Each is imported
 when it is first asked for, so that text output never waits for matplotlib, nor the exact engine for
 pymunk or wasmtime.
 """
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from chutelab.classroom import exercises
     from chutelab.engines.simulation import simulate
     from chutelab.pictures.animation import animate
+    from chutelab.pictures.live import live
     from chutelab.pictures.plots import overlay
     from chutelab.results import Recording
     from chutelab.results.comparison import compare
@@ -56,6 +57,7 @@ __all__ = [
     "design",
     "exercises",
     "figures",
+    "live",
     "load",
     "measured",
     "overlay",
@@ -77,6 +79,7 @@ _HOME = {
     "SceneError": "chutelab.scene",
     "animate": "chutelab.pictures.animation",
     "compare": "chutelab.results.comparison",
+    "live": "chutelab.pictures.live",
     "load": "chutelab.scene",
     "overlay": "chutelab.pictures.plots",
     "simulate": "chutelab.engines.simulation",

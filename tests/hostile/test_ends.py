@@ -30,7 +30,7 @@ COMMANDS = {
     "solve": ["solve", "perpendicular", "--vary", "plate.restitution=0.1:0.9", "--target",
     "landing.vx=-1",
               "--out", "out"],
-    "page": ["page", "inclined-20", "-o", "page.html"],
+    "live": ["live", "inclined-20", "-o", "page.html"],
     "figure": ["figure", "8", "--out", "out"],
 }  # fmt: skip
 """A command of each kind that writes."""
@@ -175,7 +175,7 @@ FULL = 2000
 
 @pytest.mark.parametrize("name", ["run", "sweep", pytest.param("solve", marks=pytest.mark.slow),
                                   *(pytest.param(n, marks=pytest.mark.slow) for n in ("show",
-                                  "jobs", "page", "figure"))])  # fmt: skip
+                                  "jobs", "live", "figure"))])  # fmt: skip
 def test_a_full_disk(name, tmp_path):
     prepared(tmp_path)
 

@@ -2,7 +2,7 @@
 
 ===============  ==================================================================================
 `program`        the command ``chutelab`` itself, and what becomes of errors
-`running`        ``run``, ``show``, ``page``
+`running`        ``run``, ``show``, ``live``
 `checking`       ``check``, ``verify``, ``stress``
 `scenes`         ``scenes``, ``materials``, ``schema``, ``new``, ``tables``, ``figure``
 `comparing`      ``compare``
@@ -25,13 +25,13 @@ from chutelab.cli.checking import check, stress, verify
 from chutelab.cli.comparing import compare
 from chutelab.cli.lessons import lesson
 from chutelab.cli.program import main
-from chutelab.cli.running import page, run, show
+from chutelab.cli.running import live, run, show
 from chutelab.cli.scenes import figure, materials, new, scenes, schema, tables
 from chutelab.cli.solving import solve
 from chutelab.cli.sweeping import sweep
 
 for _command in (
-    run, check, show, sweep, solve, compare, lesson, page,
+    run, live, check, show, sweep, solve, compare, lesson,
     figure, tables, scenes, materials, new, schema, verify, stress, bench,
 ):  # fmt: skip
     main.add_command(_command)

@@ -136,7 +136,7 @@ def retitled(scene: Scene, changes: Sequence[str]) -> Scene:
     """
     if any(change.partition("=")[0].strip() == "title" for change in changes):
         return scene
-    told = [change.strip() for change in changes if not change.strip().startswith("run.")]
+    told = [change.strip() for change in changes if not change.strip().startswith(("run.", "live."))]
     if not told:
         return scene
     title = f"{scene.title}; with {', '.join(told)}"

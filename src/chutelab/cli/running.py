@@ -1,4 +1,4 @@
-"""``run``, ``show`` and ``page``: one scene simulated, a saved recording, one HTML file."""
+"""``run``, ``show`` and ``live``: one scene simulated, a saved recording, a live page."""
 
 from __future__ import annotations
 
@@ -146,49 +146,57 @@ def show(recording: Path, output: Output) -> None:
     output.tell(loaded)
 
 
-@click.command(short_help="Write a page with sliders that any browser opens.")
+@click.command(short_help="Open a scene as a page that answers when you drag it.")
 @scene_argument
-@click.option(
-    "--vary",
-    "varies",
-    metavar="KEY=FROM:TO:COUNT",
-    multiple=True,
-    help="A slider: a key of the scene and its values, such as plate.angle_deg=-20:70:46 or"
-    " incoming.speed=1,2,4. May be given twice.",
-)
 @set_option
 @file_option(
     "-o", "--out", "--output", "output",
-    text="The file to write; default: the scene's name with .html, here.",
+    text="The file to write, such as lab.html; default: one in a temporary folder, which is then"
+    " opened in the browser.",
 )  # fmt: skip
-@click.option("--quiet", "-q", is_flag=True, help="Print nothing, and no progress bar.")
-def page(
+@click.option(
+    "--language",
+    type=click.Choice(["en", "de"]),
+    default="en",
+    show_default=True,
+    help="Of all that the page says; texts of the scene stay as they are.",
+)
+@click.option("--quiet", "-q", is_flag=True, help="Print nothing.")
+def live(
     scene: str,
-    varies: tuple[str, ...],
     overrides: tuple[str, ...],
     output: Path | None,
+    language: str,
     quiet: bool,
 ) -> None:
-    """Write one HTML file that plays SCENE, with a slider for each quantity that is varied.
+    """Show SCENE as a live page: drag the plate, and path, numbers and ledger follow.
 
-    It holds everything: no network, no server. Every variant is simulated now; those that cannot
-    be run say so on their positions. A file that is there is replaced.
-    """
+    It is one HTML file with the contact engine in it, the same as in `chutelab run --engine
+    contact`: any browser opens it, from a memory stick or on a phone, without installation or
+    network. A file that is there is replaced.
+
+    What the page offers is the [live] table of the scene: predict = true hides path and numbers
+    until the learner has set a mark; controls, panels, ranges and presets say what can be changed
+    and what is shown.
+
+    \b
+    chutelab live inclined-40
+    chutelab live inclined-40 --language de -o lab.html
+    chutelab live perpendicular --set live.predict=true -o predict.html
+    """  # noqa: D301 - click wants the backspace
+    import webbrowser
+    from tempfile import mkdtemp
+
     from chutelab.pictures.live.page import write
-    from chutelab.scene import load
-    from chutelab.scene.variants import parse
 
-    sliders = [parse(text) for text in varies]
-    loaded = load(scene, overrides)
-    path = output or Path(f"{Path(scene).name.removesuffix('.toml')}.html")
-    check_file("-o" if output else "", path)
-    with writing(str(path)), progress(f"simulating {scene}", quiet=quiet) as update:
-        written = write(loaded, sliders, path, progress=update)
+    check_file("-o", output)
+    loaded = loaded_as_told(scene, overrides)
+    name = f"{Path(scene).name.removesuffix('.toml')}.html"
+    path = Path(mkdtemp(prefix="chutelab-")) / name if output is None else output
+    with writing(str(path)):
+        size = write(loaded, path, language=language)
+    if output is None and not webbrowser.open(path.absolute().as_uri()):
+        raise click.ClickException(f"no browser could be opened; the page is {path}")
     if not quiet:
-        variants = "1 variant" if written.variants == 1 else f"{written.variants} variants"
-        say(f"wrote {written.path}, {written.size / 1000:.0f} kB: {variants}")
-        for values, fault in list(written.faults.items())[:1]:
-            say(
-                f"{len(written.faults)} of them cannot be run, and the page says why; the first,"
-                f" at {', '.join(f'{value:g}' for value in values)}: {fault}"
-            )
+        done = "opened" if output is None else "wrote"
+        say(f"{done} {path}, {size / 1000:.0f} kB")

@@ -156,7 +156,10 @@ def _below(rule: Mapping[str, Any], part: str | int) -> Mapping[str, Any] | None
     """Return what a rule says of a key, or of an entry of a list."""
     below: Mapping[str, Any] | None
     if isinstance(part, str):
-        below = rule.get("properties", {}).get(part)
+        others = rule.get("additionalProperties")
+        below = rule.get("properties", {}).get(
+            part, others if isinstance(others, Mapping) else None
+        )
     elif part < len(rule.get("prefixItems", [])):
         below = rule["prefixItems"][part]
     else:
@@ -164,12 +167,14 @@ def _below(rule: Mapping[str, Any], part: str | int) -> Mapping[str, Any] | None
     return below
 
 
-def limits_of(rule: Mapping[str, Any]) -> tuple[float, float] | None:
+def limits_of(
+    rule: Mapping[str, Any], types: Sequence[str] = ("number",)
+) -> tuple[float, float] | None:
     """Return the least and the largest float that a rule allows; None if it allows none.
 
-    An excluded bound is moved by one float.
+    An excluded bound is moved by one float. `types` are those of JSON Schema that count.
     """
-    kinds = [kind for kind in rule.get("anyOf", [rule]) if kind.get("type") == "number"]
+    kinds = [kind for kind in rule.get("anyOf", [rule]) if kind.get("type") in types]
     if not kinds:
         return None
     limits = kinds[0]
@@ -220,7 +225,7 @@ def apply(
     for given_one in overrides:
         one = read(given_one) if isinstance(given_one, str) else given_one
         try:
-            path = _resolved(document, one.key)
+            path = resolved(document, one.key)
             _put(document, path, one.value)
         except InputError as error:
             faults.append(Fault(one.typed or one.key, None, str(error)))
@@ -243,8 +248,14 @@ def value_of(text: str) -> object:
     return read["value"] if set(read) == {"value"} else text.strip()
 
 
-def _resolved(document: dict[str, Any], key: str) -> list[str | int]:
-    """Return the parts of a key, with the index of a table of which there are several."""
+def resolved(document: Mapping[str, Any], key: str) -> list[str | int]:
+    """Return the parts of a key, with the index of a table of which there are several.
+
+    Raises
+    ------
+    InputError
+        If it is no path, or if it is not clear which of several tables is meant.
+    """
     names = names_of(document)
     path = parts_of(key, names)
     table = str(path[0])

@@ -5,24 +5,27 @@ Attributes mirror the TOML keys. Angles are degrees here (``_deg``) and nowhere 
 
 from __future__ import annotations
 
-from typing import Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import ConfigDict, Field, model_validator
 
 from chutelab.scene.conflicts import ConflictError, surface_conflicts
 from chutelab.scene.units import (
     MOST_PARTICLES,
+    MOST_PRESETS,
     Amount,
     Angle,
     Box,
     Coordinate,
     Corners,
+    Keys,
     Name,
     Number,
     Point,
     Polyline,
     Positive,
     Radius,
+    Ranges,
     Rate,
     Repeats,
     Resolved,
@@ -32,7 +35,9 @@ from chutelab.scene.units import (
     Table,
     Text,
     Two,
+    Values,
     Whole,
+    Worded,
     about_centroid,
     described,
     pair_friction,
@@ -95,7 +100,8 @@ class Particle(Resolved):
         if self.span is None:
             return self.mass
         low, high = self.span
-        return self.mass * 0.25 * (low + high) * (low * low + high * high) / self.radius**3
+        cube = self.radius * self.radius * self.radius
+        return self.mass * 0.25 * (low + high) * (low * low + high * high) / cube
 
     @property
     def moment(self) -> float:
@@ -362,3 +368,43 @@ class Run(Table):
     align: bool = described(
         True, "Whether the pymunk engine's steps of a lone particle end at contacts, or all last dt"
     )
+
+
+class Preset(Table):
+    """Values that go together, under one name: the Moon, a rough belt."""
+
+    name: Text = described(..., "What it is called", min_length=1, max_length=40)
+    set: Values = described(..., "Keys of the scene, and what they become")
+
+    def __hash__(self) -> int:
+        # As equal ones have it, though values may be lists.
+        return hash((self.name, *self.set))
+
+
+Panels = Annotated[
+    tuple[Literal["energy", "numbers", "landing", "curves", "tools", "edit", "share"], ...],
+    Worded('a list of "energy", "numbers", "landing", "curves", "tools", "edit", "share"'),
+]
+Presets = Annotated[
+    tuple[Preset, ...],
+    Field(max_length=MOST_PRESETS),
+    Worded('a list of tables such as { name = "Moon", set = { gravity = 1.62 } }'),
+]
+
+
+class Live(Table):
+    """What the live page of the scene offers. No engine looks at it."""
+
+    predict: Switch = described(
+        False,
+        "Whether path, landing and numbers are hidden until a mark is set and play pressed",
+    )
+    controls: Keys | None = described(
+        None, "Keys of the scene that can be changed there; default: all that have a handle"
+    )
+    panels: Panels | None = described(None, "What is shown beside the picture; default: all")
+    ranges: Ranges = described({}, "Of keys: [from, to] of what they can be changed to")
+    presets: Presets = described((), "Buttons, each of which changes some values")
+
+    def __hash__(self) -> int:
+        return hash((self.predict, self.controls, self.panels, *self.ranges, *self.presets))

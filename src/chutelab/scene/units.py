@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from itertools import pairwise
 from math import isfinite, nan
 from typing import TYPE_CHECKING, Annotated, Any, Final
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 from pydantic import (
     AfterValidator,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     GetJsonSchemaHandler,
@@ -143,6 +145,9 @@ MOST_PARTICLES: Final = 10_000_000
 MOST_SURFACES: Final = 1_000
 MOST_KINDS: Final = 100
 """Of particles, and of streams."""
+MOST_KEYS: Final = 200
+"""That a page lists: more than anybody looks through."""
+MOST_PRESETS: Final = 20
 MOST_POINTS: Final = 10_000
 MOST_EXPECTATIONS: Final = 1_000
 
@@ -186,7 +191,7 @@ def _ascending(span: tuple[float, float]) -> tuple[float, float]:
     return span
 
 
-class _Said:
+class Worded:
     """Says what a list is in words, for messages; `Field` would be overruled by that of a key."""
 
     def __init__(self, words: str) -> None:
@@ -198,10 +203,56 @@ class _Said:
         return {**handler(schema), "x-words": self.words}
 
 
+def _from_below_to(ends: tuple[float, float]) -> tuple[float, float]:
+    if not ends[0] < ends[1]:
+        raise ValueError("must be [from, to] with from < to")
+    return ends
+
+
+def _flat(given: object) -> object:
+    """Join the keys of tables inside each other: ``plate.angle_deg = 20`` is one key."""
+    if not isinstance(given, Mapping):
+        return given
+    flat: dict[str, object] = {}
+    for key, value in given.items():
+        inner = _flat(value)
+        flat |= (
+            {f"{key}.{k}": v for k, v in inner.items()} if isinstance(inner, dict) else {key: value}
+        )
+    return flat
+
+
+Keys = Annotated[
+    tuple[Text, ...],
+    Field(max_length=MOST_KEYS),
+    Worded('a list of keys such as ["plate.angle_deg", "incoming.speed"]'),
+]
+"""Full paths of keys of the scene."""
+
+Ranges = Annotated[
+    dict[
+        Text,
+        Annotated[
+            tuple[Number, Number],
+            AfterValidator(_from_below_to),
+            Worded("[from, to] with from < to"),
+        ],
+    ],
+    BeforeValidator(_flat),
+    Field(max_length=MOST_KEYS),
+    Worded("a table of keys, each with its [from, to]"),
+]
+Values = Annotated[
+    dict[Text, Any],
+    BeforeValidator(_flat),
+    Field(min_length=1, max_length=MOST_KEYS),
+    Worded("a table of keys of the scene and their values, such as { gravity = 1.62 }"),
+]
+
 Span = Annotated[
     tuple[Positive, Positive],
     AfterValidator(_ascending),
-    _Said("a range [from, to] with from < to"),
+    Worded("a range [from, to] with from < to"),
 ]
 """A range [from, to]."""
 
@@ -214,10 +265,10 @@ def _box(corners: tuple[Point, Point]) -> tuple[Point, Point]:
 
 
 Box = Annotated[
-    tuple[Point, Point], AfterValidator(_box), _Said("a box [[left, bottom], [right, top]]")
+    tuple[Point, Point], AfterValidator(_box), Worded("a box [[left, bottom], [right, top]]")
 ]
-Size = Annotated[tuple[Positive, Positive], _Said("[width, height] of two numbers > 0")]
-Two = Annotated[tuple[Text, Text], _Said('two names ["a", "b"]')]
+Size = Annotated[tuple[Positive, Positive], Worded("[width, height] of two numbers > 0")]
+Two = Annotated[tuple[Text, Text], Worded('two names ["a", "b"]')]
 
 
 def _convex(points: tuple[Point, ...]) -> tuple[Point, ...]:
@@ -259,9 +310,9 @@ Corners = Annotated[tuple[Point, ...], Field(min_length=3, max_length=32), After
 
 Copies = Annotated[
     tuple[Annotated[Whole, Field(ge=1, le=1_000)], Coordinate, Coordinate],
-    _Said("[n, dx, dy]: a whole number from 1 to 1000, and a shift"),
+    Worded("[n, dx, dy]: a whole number from 1 to 1000, and a shift"),
 ]
-Repeats = Annotated[tuple[Copies, ...], _Said("one or two copies [[n, dx, dy], ...]")]
+Repeats = Annotated[tuple[Copies, ...], Worded("one or two copies [[n, dx, dy], ...]")]
 
 
 def tonnes_per_hour(text: str) -> float:
@@ -288,7 +339,7 @@ else:
     Radius = Amount | Span
     Rate = Annotated[
         Annotated[Number, Field(ge=1e-6, le=1e9)]
-        | Annotated[Text, Field(max_length=40), _Said('a text such as "120 t/h"')],
+        | Annotated[Text, Field(max_length=40), Worded('a text such as "120 t/h"')],
         AfterValidator(_rate),
     ]
 

@@ -192,7 +192,7 @@ def quantity(scene: Scene, vary: Vary) -> Quantity:
             text = next((one.allowed for one in said if path.startswith(one.key)), text)
         raise InputError(text, vary.typed)
     kinds = {kind.get("type") for kind in about.get("anyOf", [about])}
-    if not (indexed or kinds & {"number", "integer"}) or parts[0] == "expect":
+    if not (indexed or kinds & {"number", "integer"}) or parts[0] in ("expect", "live"):
         raise InputError(f"{path} is no number, and only numbers can be varied", vary.typed)
     unit = str(about.get("x-unit") or "")
     if vary.unit not in ("", unit) and (vary.unit, unit) != ("%", ""):

@@ -107,7 +107,8 @@ def stamp_of(lesson: Lesson) -> str:
     all that simulates and draws.
     """
     scene = to_dict(scene_of(lesson, lesson.picture.scene, lesson.picture.set))
-    scene.pop("expect", None)  # what a scene promises does not show in its picture
+    for table in ("expect", "live"):  # neither shows in its picture
+        scene.pop(table, None)
     # Without defaults: they belong to the version.
     settings = lesson.picture.model_dump(exclude_unset=True, exclude={"scene", "set"})
     inputs = {"scene": scene, "picture": settings, "question": lesson.question}
@@ -259,7 +260,7 @@ def bundle(
     Raises
     ------
     InputError
-        If a lesson's scene cannot be run or varied.
+        If a lesson's scene cannot be run, or shown as a live page.
     OSError
         If it cannot be written.
     """
@@ -274,13 +275,11 @@ def bundle(
         cards = ""
         for i, lesson in enumerate(lessons):
 
-            def part(share: float, done: int = i) -> None:
-                if progress is not None:
-                    progress((done + share) / len(lessons))
-
             before = _link(lessons[i - 1], "prev", "← {}") if i > 0 else ""
             after = _link(lessons[i + 1], "next", "{} →") if i + 1 < len(lessons) else ""
-            cards += _lesson(lesson, made / lesson.folder.name, before, after, part)
+            cards += _lesson(lesson, made / lesson.folder.name, before, after)
+            if progress is not None:
+                progress((i + 1) / len(lessons))
         many = "One lesson" if len(lessons) == 1 else f"{len(lessons)} lessons"
         (made / INDEX).write_text(_page("index.html", cards=cards, count=many), encoding="utf-8")
         for name in _SHARED:
@@ -312,9 +311,7 @@ def _address(*names: str) -> str:
     return "/".join(quote(os.fsencode(name)) for name in names)
 
 
-def _lesson(
-    lesson: Lesson, folder: Path, before: str, after: str, progress: Callable[[float], None]
-) -> str:
+def _lesson(lesson: Lesson, folder: Path, before: str, after: str) -> str:
     """Make the folder of one lesson, with links to its neighbours; return its card."""
     folder.mkdir()
     for file in files_of(lesson):
@@ -331,9 +328,8 @@ def _lesson(
     if lesson.page is not None:
         from chutelab.pictures.live.page import write
 
-        scene = scene_of(lesson, lesson.page.scene, lesson.page.set)
-        home = (f"Back to the lesson: {lesson.title}", INDEX)
-        write(scene, lesson.page.vary, folder / LIVE, home=home, progress=progress)
+        scene = scene_of(lesson, lesson.page.scene, lesson.page.settings)
+        write(scene, folder / LIVE, home=(f"Back to the lesson: {lesson.title}", INDEX))
         doors.append(f'<li><a class="main" href="{LIVE}">Try it: change the machine</a></li>')
     if (folder / "exercise.ipynb").is_file():
         doors.append('<li><a href="exercise.ipynb" download>Exercise (Jupyter notebook)</a></li>')

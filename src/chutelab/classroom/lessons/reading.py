@@ -16,20 +16,16 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import Field, PrivateAttr, ValidationError
 
 from chutelab.scene import MISSING, Fault, Scene, SceneError, load, shipped
-from chutelab.scene.overrides import at_path, joined
+from chutelab.scene.overrides import Override, at_path, joined
 from chutelab.scene.rules import suggestion, unit_of
 from chutelab.scene.units import Number, Table, Text, Whole
-from chutelab.scene.variants import parse, quantity
-from chutelab.util.errors import InputError, did_you_mean
+from chutelab.util.errors import did_you_mean
 
 MOST: Final = 20
 """Entries of a list at most: a lesson that needs more is two lessons."""
 
 LONGEST: Final = 200
 """Characters of a text at most: it has to go on one slide."""
-
-VARIED: Final = 2
-"""Sliders of a page at most."""
 
 Said = Annotated[Text, Field(min_length=1, max_length=LONGEST)]
 Names = Annotated[tuple[Said, ...], Field(max_length=MOST)]
@@ -69,13 +65,19 @@ class Picture(Chosen):
 
 
 class Page(Chosen):
-    """What the page of the lesson lets one vary; without this table it has none."""
+    """What the live page of the lesson offers; without this table it has none."""
 
-    vary: Annotated[tuple[Said, ...], Field(min_length=1, max_length=VARIED)] = key(
-        ...,
-        "A slider each",
-        f'a list of 1 to {VARIED} texts such as "plate.angle_deg=-20:70:46" (from, to, how many)',
+    live: dict[str, Any] = key(
+        {},
+        "What is laid over [live] of the scene; predict is true unless it says false",
+        "a table such as [live] of a scene: predict, controls, panels, ranges, presets",
     )
+
+    @property
+    def settings(self) -> list[str | Override]:
+        """What is laid over the scene."""
+        live = {"predict": True, **self.live}
+        return [*self.set, *(Override(f"live.{name}", value) for name, value in live.items())]
 
 
 class Lesson(Table):
@@ -101,7 +103,7 @@ class Lesson(Table):
         " in quotes",
     )
     picture: Picture = key(Picture(), "How lesson.gif is made", "a table of keys and values")
-    page: Page | None = key(None, "What its page varies", "a table of keys and values")
+    page: Page | None = key(None, "What its page offers", "a table of keys and values")
 
     _folder: Path = PrivateAttr()
 
@@ -233,7 +235,9 @@ def _strays(folder: Path) -> list[Fault]:
     ]  # fmt: skip
 
 
-def scene_of(lesson: Lesson, name: str | None = None, settings: Sequence[str] = ()) -> Scene:
+def scene_of(
+    lesson: Lesson, name: str | None = None, settings: Sequence[str | Override] = ()
+) -> Scene:
     """Load one of a lesson's scenes, by default the first, with settings laid over it.
 
     Raises
@@ -282,16 +286,13 @@ def _misfits(lesson: Lesson) -> Iterator[Fault]:
         if name not in scenes:
             continue
         try:
-            scene = scene_of(lesson, name, part.set)
+            scene_of(lesson, name, part.settings if isinstance(part, Page) else part.set)
         except SceneError as error:
             for fault in error.faults:
-                yield Fault(f"{table}.set", list(part.set), str(fault))
-            continue
-        for i, text in enumerate(part.vary if isinstance(part, Page) else ()):
-            try:
-                quantity(scene, parse(text))
-            except InputError as error:
-                yield Fault(f"{table}.vary[{i}]", text, error.allowed)
+                if fault.key.startswith("live"):
+                    yield Fault(f"{table}.{fault.key}", fault.value, fault.allowed)
+                else:
+                    yield Fault(f"{table}.set", list(part.set), str(fault))
 
 
 def unit_in(lesson: Lesson, quantity: str) -> str:

@@ -9,3 +9,67 @@
   ``engine.js``, ``recording.js``, ``lab.js``, ``handles.js``, ``view.js``, ``words.js``. With one:
   ``stage.js``, ``transport.js`` and ``app.js``, which joins all.
 """
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from chutelab.scene import Scene, load
+from chutelab.util.errors import MissingLibraryError
+
+if TYPE_CHECKING:
+    from chutelab.pictures.live.widget import LivePage
+
+
+def live(
+    scene: Scene | str | Path,
+    overrides: Sequence[str] = (),
+    *,
+    height: int = 640,
+    language: str = "en",
+) -> LivePage:
+    """Show a scene in a notebook as a page that answers: drag the plate, and all else follows.
+
+    Parameters
+    ----------
+    scene : Scene, str or Path
+        A scene, a file, or the name of a shipped scene.
+    overrides : sequence of str
+        ``KEY=VALUE`` each, laid over a file or shipped scene.
+    height : int
+        Of the page, in pixels.
+    language : {"en", "de"}
+        Of what the page says.
+
+    Returns
+    -------
+    LivePage
+        Put it last in a cell to see it. Its `scene` is what the page has made of the scene, TOML
+        text for `chutelab.scene.parse`.
+
+    Raises
+    ------
+    SceneError
+        If the scene cannot be used, or has what the contact engine has not.
+    MissingLibraryError
+        An ImportError, without anywidget.
+
+    Examples
+    --------
+    >>> import chutelab
+    >>> chutelab.live("perpendicular", ["plate.angle_deg=20"])  # doctest: +SKIP
+    """
+    try:
+        from chutelab.pictures.live.widget import shown
+    except ModuleNotFoundError as error:
+        if error.name not in ("anywidget", "traitlets"):
+            raise
+        text = 'live pages in a notebook need anywidget: python -m pip install "chutelab[notebook]"'
+        raise MissingLibraryError(text) from error
+    loaded = scene if isinstance(scene, Scene) else load(scene, overrides)
+    return shown(loaded, height=height, language=language)
+
+
+__all__ = ["live"]

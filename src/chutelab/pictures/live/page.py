@@ -15,6 +15,7 @@ from string import Template
 from chutelab.pictures.live.describe import describe
 from chutelab.pictures.plots import style
 from chutelab.scene import Scene
+from chutelab.scene.live import live_of
 from chutelab.util.files import whole
 from chutelab.util.versions import own_version
 
@@ -40,8 +41,10 @@ def html(scene: Scene, *, language: str = "en", home: tuple[str, str] | None = N
     """
     css = f":root {{\n{_palette()}}}\n{_asset('page.css')}"
     core = files("chutelab.engines.contact") / "core"
+    facts = describe(scene)
     data = {
-        **describe(scene),
+        **facts,
+        "live": live_of(scene, facts["scene"]),
         "version": own_version(),
         "language": language,
         "strings": json.loads(_asset(f"strings/{language}.json")),
@@ -94,15 +97,16 @@ def joined(name: str) -> str:
             order.append(module)
 
     visit(name)
-    parts = (re.sub(TAKEN_OFF, "", _asset(module)) for module in order)
-    # A worker's text stands in a script element too.
-    return "".join(parts).replace("</", "<\\/")
+    text = "".join(re.sub(TAKEN_OFF, "", _asset(module)) for module in order)
+    # Half of the modules is what they say to developers. A worker's text is in a script element.
+    return re.sub(COMMENT, "", text).replace("</", "<\\/")
 
 
 IMPORTED = re.compile(r'^import [^;]+ from "\./([\w-]+\.js)";$', re.MULTILINE)
 TAKEN_OFF = re.compile(
     r"^import [^;]+;\n|^export \{[^}]+\};\n|^export (?=async|class|const|function)", re.MULTILINE
 )
+COMMENT = re.compile(r"/\*\*(?:[^*]|\*(?!/))*\*/\s*|^ *//.*\n|^ +|^\n", re.MULTILINE)
 
 
 @cache

@@ -99,7 +99,7 @@ typedef struct {
     int stays;            /* steps on one surface, blows or not */
     int held_back;        /* `knot` is one after a blow and not written yet */
     int again;            /* the latest blow may be told together with the one before */
-    int pad;
+    int ground;           /* surface that `stays` are on: who leaves it may have struck another last */
 } Track;
 
 typedef struct {

@@ -4,6 +4,7 @@ import { Engine } from "./engine.js";
 import { Arrows } from "./arrows.js";
 import { CurvesPanel } from "./curves.js";
 import { EnergyPanel } from "./energy.js";
+import { toToml } from "./keys.js";
 import { Lab } from "./lab.js";
 import { LandingPanel } from "./landing.js";
 import { NumbersPanel } from "./numbers.js";
@@ -37,9 +38,11 @@ function start() {
   const panels = [EnergyPanel, NumbersPanel, LandingPanel, CurvesPanel]
     .map((Panel) => new Panel(byId("panels"), lab, words));
   new Arrows(stage, words);
-  new Tools(/** @type {Element} */ (document.querySelector(".stage-card")), lab, stage, words, new Symbols(stage));
+  new Tools(byId("stage").parentElement, lab, stage, words, new Symbols(stage));
   new Transport(lab, stage, words);
-  Object.assign(globalThis, { chutelab: { lab, stage, panels } });
+  Object.assign(globalThis, {
+    chutelab: { lab, stage, panels, toml: () => toToml(/** @type {any} */ (lab.given)) },
+  });
 }
 
 start();

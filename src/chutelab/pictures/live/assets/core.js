@@ -5,7 +5,8 @@
  * @typedef {{size: number, fields: Record<string, [number, string, number]>}} Struct
  * @typedef {{structs: Record<string, Struct>, enums: Record<string, Record<string, number>>,
  *   constants: Record<string, number>}} Layout
- * @typedef {import("./machine.js").Machine} Machine
+ * @typedef {import("./machine.js").Machine & {spins?: number[]}} Machine with the spin, rad/s, with
+ *   which each is released, if not 0
  * @typedef {{t: number, x: number, y: number, before: number[], after: number[],
  *   normal: number, tangent: number, disk: number, other: number, kind: number,
  *   surface: number}} Event
@@ -169,7 +170,7 @@ class Core {
     }
     releases.forEach((one, i) => {
       this.fill("disks", "Disk", i, {
-        x: one.x, y: one.y, vx: one.vx, vy: one.vy, spin: one.spin ?? 0, release: one.t,
+        x: one.x, y: one.y, vx: one.vx, vy: one.vy, spin: machine.spins?.[i] ?? 0, release: one.t,
         radius: machine.radius[i], mass: machine.mass[i], inertia: machine.inertia[i],
         kind: one.kind, rides: Number(one.carried),
       });

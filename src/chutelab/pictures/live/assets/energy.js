@@ -16,7 +16,7 @@ const SIGNS = /** @type {Entry[]} */ ([
 ]);
 
 /** A residual below this part of the whole is rounding, and not shown. */
-const ROUNDING = 1e-12;
+const TINY_RESIDUAL = 1e-12;
 
 /** What was put in, and where it is: an entry of the other sign changes sides. A residual that is
  * only rounding is in neither.
@@ -26,7 +26,7 @@ function stacks(ledger) {
   const side = (/** @type {number} */ sign) =>
     entries.map(([name, value]) => /** @type {Entry} */ ([name, Math.max(sign * value, 0)]));
   const size = side(1).reduce((sum, [, value]) => sum + value, 0);
-  const shown = (/** @type {Entry} */ [name, value]) => name !== "residual" || value > ROUNDING * size;
+  const shown = (/** @type {Entry} */ [name, value]) => name !== "residual" || value > TINY_RESIDUAL * size;
   return { putIn: side(1).filter(shown), isNow: side(-1).filter(shown), size };
 }
 
@@ -79,7 +79,7 @@ class EnergyPanel {
     });
     SIGNS.forEach(([name], n) => {
       this.cells.get(name).textContent = this.words.energy(ledger[name]);
-      this.rows[n].hidden = name === "residual" && Math.abs(ledger[name]) <= ROUNDING * size;
+      this.rows[n].hidden = name === "residual" && Math.abs(ledger[name]) <= TINY_RESIDUAL * size;
     });
   }
 }

@@ -1,8 +1,9 @@
 // The scene under somebody's hands: its values, its run, its clock. Nothing here draws.
 
+import { withValues } from "./keys.js";
 import { build } from "./machine.js";
 import { Recording } from "./recording.js";
-import { Fault, resolve, withValues } from "./scene.js";
+import { Fault, resolve } from "./scene.js";
 
 /**
  * @typedef {import("./machine.js").Machine} Machine
@@ -80,18 +81,8 @@ class Lab {
   run(from) {
     const machine = /** @type {Machine} */ (this.machine);
     let job = machine;
-    if (from > 0 && this.recording) {
-      const { renamed, releases } = this.recording.goOn(from, machine);
-      const some = (/** @type {number[]} */ values) => renamed.map(({ index }) => values[index]);
-      const gates = (/** @type {any[]} */ pieces) => pieces.map((piece) => ({
-        ...piece, appears: piece.appears - from, vanishes: piece.vanishes - from,
-      }));
-      job = {
-        ...machine, releases, radius: some(machine.radius), mass: some(machine.mass),
-        inertia: some(machine.inertia), segments: gates(machine.segments),
-        arcs: gates(machine.arcs), endTime: Math.max(0, machine.endTime - from),
-      };
-    } else this.recording = new Recording(machine);
+    if (from > 0 && this.recording) job = this.recording.goOn(from, machine);
+    else this.recording = new Recording(machine);
     const { recording } = this;
     this.engine.run(job, AHEAD + (from > 0 ? 0 : this.t), (chunk) => {
       recording.add(chunk);

@@ -2,7 +2,7 @@
 
 import { card, follow, html } from "./panels.js";
 import { historyOf } from "./stages.js";
-import { predict } from "./transfer.js";
+import { predict } from "./prediction.js";
 
 /**
  * @typedef {import("./lab.js").Lab} Lab
@@ -35,7 +35,7 @@ function mean(values) {
 
 /** Each number as the mean over all particles that have it, and as predicted; NaN where there is
  * none.
- * @param {Stages[]} stages @param {any} found of `predict`
+ * @param {Stages[]} stages @param {Record<string, number>} found those of `predict`
  * @param {number} pulley its radius, m @param {number[]} radius of each particle, m
  * @returns {Row[]} */
 function numbersOf(stages, found, pulley, radius) {
@@ -87,8 +87,8 @@ class NumbersPanel {
     const { words, lab } = this;
     const recording = /** @type {Recording} */ (lab.recording), scene = /** @type {Scene} */ (lab.scene);
     const { machine } = recording, many = machine.releases.length;
-    const found = predict(scene);
-    const rows = numbersOf(historyOf(lab)?.stages ?? [], found,
+    const { numbers, reason } = predict(scene);
+    const rows = numbersOf(historyOf(lab)?.stages ?? [], numbers,
       machine.pulley?.radius ?? NaN, machine.radius).filter(({ simulated, analytic }) => isFinite(simulated) || isFinite(analytic));
     this.body.replaceChildren(...rows.map(({ id, symbol, unit, simulated, analytic }) =>
       html("tr", { "data-id": id },
@@ -97,8 +97,10 @@ class NumbersPanel {
           html("td", {}, words.number(Math.abs(value) < ROUNDED ? 0 : value))))));
     this.simulated.textContent = many > 1 ? words.say("simulated-mean", { n: many })
       : words.say("simulated");
-    const reason = found.reason ? words.say(found.reason) : "";
-    this.reason.textContent = rows.length ? reason : words.say("numbers-none");
+    const why = reason ? words.say(`reason-${reason.text}`, Object.fromEntries(Object
+      .entries(reason.words).map(([key, value]) => [key, typeof value === "number"
+        ? words.number(value) : words.name(value)]))) : "";
+    this.reason.textContent = rows.length ? why : words.say("numbers-none");
   }
 }
 

@@ -7,7 +7,7 @@ import { KNOT_ROW } from "./core.js";
  * @typedef {{x: number, y: number, vx: number, vy: number, spin: number, ended: boolean}} State
  * @typedef {{start: number, kinetic: number, potential: number, belt_work: number,
  *   restitution_loss: number, friction_loss: number, residual: number}} Ledger
- * @typedef {import("./machine.js").Machine} Machine
+ * @typedef {import("./core.js").Machine} Machine
  * @typedef {import("./core.js").Event} Event
  */
 
@@ -203,29 +203,31 @@ class Recording {
     return this.tracks.reduce((first, track) => Math.min(first, track.begin), Infinity);
   }
 
-  /** Forget what is after t, and return the releases with which a run goes on from there: of those
-   * under way, and of those still to come.
-   * @param {number} t @param {Machine} machine */
+  /** Forget what is after t, and return the machine by which a run goes on from there, in a time
+   * that begins then: with those under way, and with those still to come.
+   * @param {number} t @param {Machine} machine @returns {Machine} */
   goOn(t, machine) {
     /** @type {{index: number, entries: number[]}[]} */
     const renamed = [];
     /** @type {Machine["releases"]} */
     const releases = [];
+    /** @type {number[]} */
+    const spins = [];
     machine.releases.forEach((release, index) => {
       const track = this.tracks[index] ?? (this.tracks[index] = new Track());
-      const ended = track.count && track.end < t && this.hasEnded(index, t);
+      const ended = this.hasEnded(index, t);
       track.cut(t);
       const state = track.state(t);
       if (ended) return;
       renamed.push({ index, entries: state ? track.entries(t) : [0, 0, 0] });
-      if (!state) {
-        releases.push({ ...release, t: Math.max(0, release.t - t) });
-        return;
-      }
-      // Whoever still rides the belt goes on riding.
-      const carried = release.carried && state.x < 0 && !this.hasLeft(index, t);
-      releases.push({ ...release, ...state, t: 0, carried });
-      track.count -= 1;
+      spins.push(state ? state.spin : 0);
+      if (state) {
+        const { x, y, vx, vy } = state;
+        // Whoever still rides the belt goes on riding.
+        const carried = release.carried && x < 0 && !this.hasLeft(index, t);
+        releases.push({ ...release, x, y, vx, vy, t: 0, carried });
+        track.count -= 1;
+      } else releases.push({ ...release, t: Math.max(0, release.t - t) });
     });
     this.events = this.events.filter((event) => event.t <= t);
     this.machine = machine;
@@ -233,7 +235,15 @@ class Recording {
     this.shift = t;
     this.now = t;
     this.state = "running";
-    return { renamed, releases };
+    const some = (/** @type {number[]} */ values) => renamed.map(({ index }) => values[index]);
+    const gate = (/** @type {any} */ piece) => ({
+      ...piece, appears: piece.appears - t, vanishes: piece.vanishes - t,
+    });
+    return {
+      ...machine, releases, spins, radius: some(machine.radius), mass: some(machine.mass),
+      inertia: some(machine.inertia), segments: machine.segments.map(gate),
+      arcs: machine.arcs.map(gate), endTime: Math.max(0, machine.endTime - t),
+    };
   }
 
   /** @param {number} index @param {number} t */

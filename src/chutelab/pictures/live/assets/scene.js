@@ -240,7 +240,7 @@ export function resolve(given, lab) {
   const scene = {
     title: given.title ?? lab.tables.scene.title.default,
     gravity: given.gravity ?? lab.tables.scene.gravity.default,
-    particles, materials, pair: listOf(given.pair), incoming, plates, outgoing,
+    particles, materials, pair: given.pair ?? [], incoming, plates, outgoing,
     conveyor: rows("conveyor"), surface, streams, run, kinds,
     crowded: count > 1 && streams.some((stream) => stream.interact),
   };

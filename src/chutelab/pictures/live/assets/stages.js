@@ -14,7 +14,7 @@ const STAGE = { separation: 1, impact: 3, landing: 4, collision: 5 };
 /** The name of the plate that the paper's numbers are about. @param {Scene} scene */
 const plateName = ({ plates }) => (plates[0]?.pivot && plates[0].name) || "plate";
 
-class History {
+class RunHistory {
   /** @param {Recording} recording @param {string} plate its name */
   constructor(recording, plate) {
     this.recording = recording;
@@ -52,7 +52,7 @@ class History {
   /** @param {Event} event */
   add(event) {
     const { kind, disk, before, after, t, x, y } = event, its = this.stages[disk];
-    if (kind === STAGE.impact || kind === STAGE.collision) {
+    if ([STAGE.impact, STAGE.landing, STAGE.collision].includes(kind)) {
       const mass = this.recording.machine.mass[disk];
       const px = mass * (after[0] - before[0]), py = mass * (after[1] - before[1]);
       this.blows.push({ t, x, y, px, py });
@@ -81,7 +81,7 @@ class History {
   }
 }
 
-/** @type {History | undefined} */
+/** @type {RunHistory | undefined} */
 let latest;
 
 /** The history of a lab's run as it is now; all that show it share it.
@@ -89,8 +89,8 @@ let latest;
 function historyOf({ recording, scene }) {
   if (!recording || !scene) return null;
   if (latest?.isOf(recording)) latest.update();
-  else latest = new History(recording, plateName(scene));
+  else latest = new RunHistory(recording, plateName(scene));
   return latest;
 }
 
-export { History, historyOf };
+export { RunHistory, historyOf };

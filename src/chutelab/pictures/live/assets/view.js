@@ -66,11 +66,11 @@ class View {
   }
 }
 
-/** m of belts that are shown beyond all that matters. */
+/** m of belts and walls that are shown beyond all that matters. */
 const BEYOND = 0.35;
 
 /** What is shown of a machine at first: its tracks and all that they can meet, but only so much of
- * belts, which may be long.
+ * belts and walls, which may be long.
  * @param {Machine} machine @param {{x: number, y: number}[]} points @returns {Box} */
 function boxOf(machine, points) {
   const box = { left: Infinity, bottom: Infinity, right: -Infinity, top: -Infinity };
@@ -91,8 +91,10 @@ function boxOf(machine, points) {
   if (!points.length) machine.releases.forEach(({ x, y }, i) => widen(x, y, machine.radius[i]));
   const ends = (/** @type {import("./machine.js").Segment} */ { x, y, tx, ty, length }) =>
     [[x, y], [x + tx * length, y + ty * length]];
+  // Walls may reach far above all that ever was up there.
+  const highest = [...points, ...machine.releases].reduce((top, { y }) => Math.max(top, y), -Infinity);
   const still = machine.segments.filter(({ speed }) => !speed);
-  for (const [x, y] of still.flatMap(ends)) widen(x, y);
+  for (const [x, y] of still.flatMap(ends)) widen(x, Math.min(y, highest + BEYOND));
   const [left, right] = [box.left - BEYOND, box.right + BEYOND];
   for (const [x, y] of machine.segments.filter(({ speed }) => speed).flatMap(ends)) {
     widen(isFinite(left) ? Math.min(Math.max(x, left), right) : x, y);

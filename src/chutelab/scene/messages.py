@@ -1,0 +1,145 @@
+"""What is wrong with a scene, in words: Pydantic's errors as faults.
+
+A fault has the key's full path, and what is allowed.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Final
+
+from pydantic import ValidationError
+
+from chutelab.scene.conflicts import EITHER, ConflictError
+from chutelab.scene.overrides import at_path, joined, rule_at
+from chutelab.scene.schema import Scene
+from chutelab.util.errors import MISSING, Fault
+
+Location = tuple[str | int, ...]
+"""Path of keys and indices, as Pydantic gives it."""
+
+_NEAR: Final = 0.55
+"""Likeness of a misspelt key and the one that was meant: pivot is taken for pivot_height."""
+
+LISTS: Final = ("material", "pair", "conveyor", "surface", "string", "expect")
+"""Tables that are always lists; of those in `EITHER` there may be one or several."""
+
+_WORDS: Final = {
+    "number": "a number",
+    "integer": "a whole number",
+    "boolean": "true or false",
+    "string": "a string",
+}
+_SIGNS: Final = {"minimum": ">=", "exclusiveMinimum": ">", "maximum": "<=", "exclusiveMaximum": "<"}
+
+
+def faults_of(error: ValidationError, document: Mapping[str, Any]) -> list[Fault]:
+    """Say every error of a validation in words, one fault a key, in the order of the models' keys.
+
+    Conflicts between keys are left out: `scene.conflicts` finds them, also in a scene whose
+    validation never came to them.
+    """
+    faults: dict[Location, Fault] = {}
+    for detail in error.errors(include_url=False):
+        cause = detail.get("ctx", {}).get("error")
+        if isinstance(cause, ConflictError):
+            continue
+        parts, missing = detail["loc"], detail["type"] == "missing"
+        if parts[0] in EITHER and isinstance(document.get(str(parts[0])), Mapping):
+            parts = (parts[0], *parts[2:])
+        if detail["type"] == "extra_forbidden":
+            text = unknown(parts)
+        else:
+            if missing and isinstance(parts[-1], int):
+                # A point with one coordinate: show what is there, not what is not.
+                parts, missing = parts[:-1], False
+            # The location of a union's error ends with the name of the member that refused.
+            while (rule := rule_at(parts)) is None:
+                parts = parts[:-1]
+            last_key = max(depth for depth, part in enumerate(parts) if isinstance(part, str))
+            unit = (rule_at(parts[: last_key + 1]) or {}).get("x-unit")
+            allowed = _listed(_phrases(rule)) + (f", in {unit}" if unit else "")
+            text = str(cause) if cause else allowed if missing else f"must be {allowed}"
+        value = MISSING if missing else at_path(document, parts)
+        if value is MISSING and not missing:
+            # Of keys that were given as tables inside each other.
+            value = detail["input"]
+        faults.setdefault(parts, Fault(joined(parts), value, text))
+    # A list whose entries are refused is refused as too short, too.
+    broken_lists = {
+        parts[:depth]
+        for parts in faults
+        for depth in range(1, len(parts))
+        if all(isinstance(part, int) for part in parts[depth:])
+    }
+    broken_lists |= {parts[:1] for parts in faults if len(parts) > 1 and parts[0] in EITHER}
+    return [fault for parts, fault in faults.items() if parts not in broken_lists]
+
+
+def _phrases(rule: Mapping[str, Any]) -> list[str]:
+    """Say a rule of the JSON Schema in words: a phrase for each alternative."""
+    if "anyOf" in rule:
+        return [phrase for choice in rule["anyOf"] for phrase in _phrases(choice)]
+    if "x-words" in rule:
+        return [str(rule["x-words"])]
+    if "$ref" in rule:
+        return ["a table of keys and values"]
+    if "enum" in rule or "const" in rule:
+        return [f'"{choice}"' for choice in rule.get("enum", [rule.get("const")])]
+    if rule["type"] == "object":
+        return ["a table of keys and values"]
+    if rule["type"] != "array":
+        return [_WORDS[rule["type"]] + _range(rule)]
+    if "prefixItems" in rule:
+        return ["a point [x, y] of two numbers"]
+    if "$ref" in rule["items"]:
+        table = rule["items"]["$ref"].rpartition("/")[2].lower()
+        return [f"at most {rule['maxItems']} tables, each headed by [[{table}]]"]
+    return [f"a list of {rule['minItems']} to {rule['maxItems']} points [[x, y], ...]"]
+
+
+def _range(rule: Mapping[str, Any]) -> str:
+    if "maxLength" in rule:
+        return f" of at most {rule['maxLength']} characters"
+    if "minimum" in rule and "maximum" in rule:
+        return f" from {_bound(rule['minimum'])} to {_bound(rule['maximum'])}"
+    limits = [f"{sign} {_bound(rule[key])}" for key, sign in _SIGNS.items() if key in rule]
+    return f" {' and '.join(limits)}" if limits else ""
+
+
+def _bound(value: float) -> str:
+    return f"{value:g}" if isinstance(value, float) and abs(value) < 1e6 else str(int(value))
+
+
+def _listed(choices: Iterable[str]) -> str:
+    *first, last = choices
+    return f"{', '.join(first)} or {last}" if first else last
+
+
+def nearest(key: str, known: Iterable[str]) -> list[str]:
+    """Return the known key that is most like one, in a list; none if none is like it."""
+    return difflib.get_close_matches(key, list(known), n=1, cutoff=_NEAR)
+
+
+def unknown(parts: Sequence[str | int]) -> str:
+    """Say that a key is unknown, and which one was probably meant."""
+    *above, last = parts
+    key, known = str(last), _keys(above)
+    homes = [
+        f"[[{name}]]" if name in LISTS else f"[{name}]"
+        for name in Scene.tables()
+        if key in _keys([name, 0] if name in LISTS else [name])
+    ]
+    if not homes and (near := nearest(key, known)):
+        return f"unknown key; did you mean {joined((*above, *near))}?"
+    if homes:
+        return f"unknown key here; it belongs in {_listed(homes)}"
+    return f"unknown key; known here are {', '.join(known)}"
+
+
+def _keys(table: Sequence[str | int]) -> list[str]:
+    rule = rule_at(table)
+    rule = rule["anyOf"][0] if rule and "anyOf" in rule else rule
+    rule = rule_at([*table, 0]) if rule and "$ref" in rule else rule
+    return list(rule["properties"]) if rule else []

@@ -1,0 +1,369 @@
+"""What turns keys into machines, in Python and in JavaScript: every number to the last bit."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import chutelab.pictures.live
+import sandbox
+from chutelab.machine import build
+from chutelab.pictures.live.describe import describe
+from chutelab.scene import SceneError, from_dict, load, parse, shipped
+from chutelab.theory import Reason, predict, transfer
+from chutelab.theory.results import STAGES
+
+NODE = shutil.which("node")
+ASSETS = Path(chutelab.pictures.live.__file__).parent / "assets"
+
+pytestmark = pytest.mark.skipif(NODE is None, reason="node is not installed")
+
+SCENES = 500
+
+
+def in_node(documents=(), transfers=()):
+    """Return what JavaScript says of scenes, given as their files have them, or of transfers."""
+    lab = describe(load("perpendicular"))
+    told = json.dumps({"lab": lab, "scenes": [*documents], "transfers": [*transfers]})
+    script = Path(__file__).parent / "live" / "bits.mjs"
+    done = subprocess.run(
+        [NODE, str(script), str(ASSETS)], input=told, capture_output=True, text=True, check=False,
+        timeout=120,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    return found["scenes"] if documents else found["transfers"]
+
+
+def plain(value):
+    """Return numbers as they are written in what node says."""
+    if isinstance(value, float) and not np.isfinite(value):
+        return {"inf": "Infinity", "-inf": "-Infinity", "nan": "NaN"}[str(value)]
+    if isinstance(value, list | tuple):
+        return [plain(entry) for entry in value]
+    return {key: plain(entry) for key, entry in value.items()} if isinstance(value, dict) else value
+
+
+def rows(**columns):
+    """Return arrays (N, ...) as N tables."""
+    lists = {name: column.tolist() for name, column in columns.items()}
+    return [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)]
+
+
+def by_kind(values, kinds):
+    """Return values (S,) or (K, S) as (S, K)."""
+    count = np.size(values) // kinds
+    return np.array(values).reshape(kinds, count).T
+
+
+def numbers(machine):
+    """Return a machine as JavaScript has it."""
+    count, kinds = machine.count, len(machine.rolling)
+    starts, bends, releases = machine.segments, machine.arcs, machine.releases
+    pairs = [
+        {
+            "restitution": by_kind(part.restitution, kinds),
+            "friction": by_kind(part.friction, kinds),
+            "surface": part.surface, "appears": part.appears, "vanishes": part.vanishes,
+            "speed": part.speed,
+        }
+        for part in (starts, bends)
+    ]  # fmt: skip
+    pulley = None
+    if machine.pulley is not None:
+        pulley = {
+            name: getattr(machine.pulley, name)
+            for name in ("radius", "speed", "incline", "surface")
+        }
+        for name in ("restitution", "friction"):
+            value = np.array(getattr(machine.pulley, name), dtype=float)
+            pulley[name] = value.reshape(kinds).tolist()
+    return plain({
+        "surfaces": list(machine.surfaces),
+        "gravity": machine.gravity,
+        "landing": machine.landing,
+        "until": machine.until,
+        "endTime": float(machine.end_time),
+        "dt": machine.dt,
+        "interact": machine.interact,
+        "exitBox": [float(side) for side in machine.exit_box],
+        "segments": rows(
+            x=starts.start[:, 0], y=starts.start[:, 1], tx=starts.tangent[:, 0],
+            ty=starts.tangent[:, 1], length=starts.length, **pairs[0],
+        ),
+        "arcs": rows(
+            x=bends.center[:, 0], y=bends.center[:, 1], radius=bends.radius, begin=bends.begin,
+            extent=bends.extent, **pairs[1],
+        ),
+        "pulley": pulley,
+        "releases": rows(
+            t=releases.t, x=releases.position[:, 0], y=releases.position[:, 1],
+            vx=releases.velocity[:, 0], vy=releases.velocity[:, 1], carried=releases.carried,
+            stream=releases.stream, kind=releases.kind,
+        ),
+        **{
+            name: np.broadcast_to(getattr(machine.particle, name), count).tolist()
+            for name in ("radius", "mass", "inertia")
+        },
+        "pairRestitution": machine.pair_restitution.tolist(),
+        "pairFriction": machine.pair_friction.tolist(),
+        "rolling": machine.rolling.tolist(),
+    })  # fmt: skip
+
+
+def differences(mine, other, path=""):
+    """Yield where two trees differ."""
+    if isinstance(mine, dict) and isinstance(other, dict):
+        for key in mine:
+            yield from differences(mine[key], other.get(key), f"{path}.{key}")
+    elif isinstance(mine, list) and isinstance(other, list) and len(mine) == len(other):
+        for n, pair in enumerate(zip(mine, other, strict=True)):
+            yield from differences(*pair, f"{path}[{n}]")
+    elif mine != other:
+        yield f"{path}: {mine} in Python, {other} in JavaScript"
+
+
+def compare(documents, names):
+    for document, name, found in zip(documents, names, in_node(documents), strict=True):
+        scene = from_dict(document)
+        assert "machine" in found, (name, found)
+        wrong = list(differences(numbers(build(scene)), found["machine"]))
+        assert not wrong, (name, len(wrong), wrong[:5])
+        assert parse(found["toml"]) == scene, name
+
+
+def test_machines_drawn_at_random_are_the_same_to_the_last_bit():
+    compare([sandbox.tables(seed) for seed in range(SCENES)], range(SCENES))
+
+
+def test_shipped_scenes_are_the_same_to_the_last_bit():
+    documents, names = [], []
+    for name in shipped():
+        try:
+            documents.append(describe(load(name))["scene"])
+        except SceneError:
+            continue
+        names.append(name)
+    assert len(names) > 10
+    compare(documents, names)
+
+
+WALL = {"name": "wall", "from": [0.0, 0.0], "to": [1.0, 0.0]}
+THROWN = {"stream": {"at": [0.0, 1.0], "velocity": [0.0, 0.0]}, "surface": [WALL]}
+BELTS = {"incoming": {"speed": 1.0, "pulley_radius": 0.1}, "plate": {"distance": 0.3},
+         "outgoing": {"drop": 0.6, "drop_from": "top"}}  # fmt: skip
+REFUSED = {
+    "inside a surface": {**THROWN, "stream": {"at": [0.5, 0.002], "velocity": [0.0, 0.0]}},
+    "inside the pulley": {**BELTS, "stream": {"at": [0.0, 0.05], "velocity": [0.0, 0.0]}},
+    "inside at its second stream": {
+        **THROWN, "stream": [THROWN["stream"], {"at": [0.5, 0.0], "velocity": [0.0, 0.0]}],
+    },
+    "a box that is too small": {"stream": {"fill": [[0.0, 0.0], [0.1, 0.1]], "count": 900}},
+    "a plate of no length": {**BELTS, "plate": {"distance": 0.3, "above": 0.0, "below": 0.0}},
+    "a plate that ends above its pivot": {
+        **BELTS, "plate": {"distance": 0.3, "above": 0.0, "pivot_height": -0.6},
+    },
+    "two ends that are one": {**THROWN, "surface": [{**WALL, "to": [0.0, 0.0]}]},
+    "two points that are one": {
+        **THROWN, "surface": [{"name": "a", "points": [[0, 0], [1, 0], [1, 0]]}],
+    },
+    "an arc of no length": {
+        **THROWN,
+        "surface": [{"name": "a", "center": [5, 5], "radius": 1, "from_deg": 9, "to_deg": 9}],
+    },
+    "an arc beyond one turn": {
+        **THROWN, "surface": [{"name": "a", "center": [5, 5], "radius": 1, "to_deg": 361}],
+    },
+    "a gate that opens as it closes": {
+        **THROWN, "surface": [{**WALL, "opens_at": 1.0, "closes_at": 1.0}],
+    },
+    "a name that is there twice": {**THROWN, "surface": [WALL, WALL]},
+    "a conveyor of no length": {
+        **THROWN,
+        "conveyor": [{"name": "c", "from": [0.0, 0.0], "to": [0.0, 0.0], "speed": 1.0}],
+    },
+    "a plate without a belt": {**THROWN, "plate": {"distance": 0.3}},
+    "a landing without a belt": {**THROWN, "run": {"until": "landed"}},
+    "no place to start from": {"surface": [WALL]},
+    "a speed that adhesion does not allow": {
+        **BELTS, "stream": {"count": 3, "speed_spread": 0.1},
+    },
+    "a velocity that adhesion does not allow": {**BELTS, "stream": {"velocity": [2.0, 0.0]}},
+    "a negative radius": {**BELTS, "incoming": {"speed": 1.0, "pulley_radius": -0.1}},
+    "too steep a plate": {**BELTS, "plate": {"distance": 0.3, "angle_deg": 90.0}},
+    "no speed": {**BELTS, "incoming": {"pulley_radius": 0.1}},
+    "a kind that is not there": {
+        **BELTS, "particle": [{"name": "a"}, {"name": "b"}], "stream": {"particle": "c"},
+    },
+}  # fmt: skip
+
+
+def keys_refused(document):
+    """Return the keys for which Python refuses a scene."""
+    try:
+        build(from_dict(document))
+    except SceneError as error:
+        return [fault.key for fault in error.faults]
+    return []
+
+
+def test_what_cannot_be_built_is_refused_by_the_same_key():
+    drawn = {}
+    for seed in range(150):
+        tables = sandbox.Drawing(np.random.default_rng(seed), meet=seed % 2 == 1).tables
+        if keys_refused(tables):
+            drawn[seed] = tables
+    assert len(drawn) > 20
+    scenes = REFUSED | drawn
+    for name, document, found in zip(scenes, scenes.values(), in_node([*scenes.values()]),
+                                     strict=True):  # fmt: skip
+        keys = keys_refused(document)
+        assert keys, name
+        assert found.get("fault", {}).get("key") in keys, (name, keys, found.get("fault"))
+
+
+def test_random_numbers_are_those_of_numpy_for_all_seeds():
+    """Seeds of one word and of two, of the first stream and of others."""
+    seeds = [0, 1, 2**32 - 1, 2**32, 2**53 - 1, 2**63 - 1]
+    stream = {"at": [0.0, 0.0], "velocity": [0.0, 0.0], "bed_height": 1.0, "count": 4}
+    documents = [{"stream": [{**stream, "seed": str(seed)}] * 2} for seed in seeds]
+    for seed, found in zip(seeds, in_node(documents), strict=True):
+        heights = [release["y"] for release in found["machine"]["releases"]]
+        for n, dice in enumerate((np.random.default_rng(seed), np.random.default_rng([seed, 1]))):
+            wanted = dice.random(4)
+            assert heights[4 * n : 4 * n + 4] == [0.0, *wanted[1:].tolist()]
+
+
+def test_a_page_refuses_what_is_no_disk_by_its_key():
+    box = {"shape": "box", "size": [0.1, 0.1]}
+    for table, key in ((box, "particle.shape"), ({"radius": 0.0}, "particle.radius")):
+        with pytest.raises(SceneError) as caught:
+            describe(from_dict({**THROWN, "particle": table}))
+        assert [fault.key for fault in caught.value.faults] == [key]
+    with pytest.raises(SceneError, match="string"):
+        describe(from_dict({**THROWN, "string": [{"from": [0.0, 2.0]}]}))
+
+
+def test_a_belt_below_the_impact_is_told_from_the_top():
+    scene = load("perpendicular")
+    told = from_dict(describe(scene)["scene"])
+    assert told.outgoing.drop_from == "top"
+    mine, other = (build(one).segments.start[2, 1] for one in (scene, told))
+    assert other == pytest.approx(mine, abs=1e-15)
+
+
+CLAIMS = {
+    "outside": Reason.OUTSIDE, "early": Reason.EARLY, "no-impact": Reason.NO_IMPACT,
+    "second": Reason.SECOND, "misses": Reason.MISSES, None: None,
+}  # fmt: skip
+SYMBOLS = [name for names in STAGES.values() for name in names]
+
+
+def unlike(mine, found):
+    """Return what differs between a transfer in Python and in JavaScript."""
+    values = {name: float(getattr(mine, name)) for name in SYMBOLS}
+    claim = CLAIMS[(found["reason"] or {"claim": None})["claim"]]
+    wrong = list(differences(plain(values), found["numbers"]))
+    if claim != Reason.of(mine.reason):
+        wrong.append(f"{mine.reason} in Python, {found['reason']} in JavaScript")
+    return wrong
+
+
+def camel(name):
+    head, *rest = name.split("_")
+    return head + "".join(map(str.capitalize, rest))
+
+
+def test_transfers_are_the_same_to_the_last_bit():
+    rng = np.random.default_rng(2016)
+    drawn = []
+    for n in range(SCENES):
+        values = {
+            "speed": rng.uniform(0.2, 4.0), "pulley_radius": rng.uniform(0.05, 0.5),
+            "distance": rng.uniform(-0.2, 1.0), "angle": rng.uniform(-1.4, 1.4),
+            "pivot_height": rng.uniform(-0.5, 0.5), "restitution": rng.uniform(0.0, 1.0),
+            "drop": rng.uniform(0.0, 2.0), "belt_speed": rng.uniform(-2.0, 3.0),
+            "particle_radius": rng.uniform(0.001, 0.05), "mass": rng.uniform(0.001, 1.0),
+            "gravity": rng.uniform(0.1, 20.0), "spin": bool(rng.random() < 0.5),
+            "inertia": rng.uniform(0.1, 1.0), "incline": rng.uniform(-0.9, 0.9),
+            "plate_friction": rng.uniform(0.0, 1.0), "interval": rng.uniform(0.001, 1.0),
+            "unbounded_plate": bool(rng.random() < 0.5),
+        }  # fmt: skip
+        # Some at their defaults, and what is special: a level belt, an upright plate, no gravity.
+        if n % 3 == 0:
+            values |= {"incline": 0.0, "angle": 0.0 if n % 2 else values["angle"]}
+        elif n % 25 == 1:
+            values |= {"gravity": 0.0}
+        elif n % 25 == 2:
+            values |= {"restitution": 1.5, "speed": -1.0 if n % 2 else 1.0}
+        kept = {"speed", "pulley_radius", "distance"}
+        drawn.append({
+            name: value for name, value in values.items() if name in kept or rng.random() < 0.9
+        })  # fmt: skip
+    told = [{camel(name): value for name, value in values.items()} for values in drawn]
+    answered = 0
+    for values, found in zip(drawn, in_node(transfers=told), strict=True):
+        mine = transfer(**values)
+        answered += not np.isnan(mine.x3)
+        assert not unlike(mine, found), (values, unlike(mine, found))
+    assert 0.2 * SCENES < answered < 0.8 * SCENES
+
+
+def transfer_scene(seed):
+    """Draw a belt, a plate and a belt, and now and then something that is in the way."""
+    rng = np.random.default_rng(seed)
+    draw = sandbox.Drawing(rng, meet=False)
+    wheel = draw.number(0.05, 0.3)
+    tables = {
+        "gravity": draw.one_of(9.81, 9.81, draw.number(1.0, 20.0), 0.0),
+        "particle": {"radius": draw.number(0.002, 0.03), **draw.some(
+            mass=draw.number(0.01, 1.0), spin=True, shape="sphere",
+        )},
+        "incoming": {"speed": draw.number(0.3, 4.0), "pulley_radius": wheel, **draw.some(
+            length=draw.number(0.3, 1.0), incline_deg=draw.number(-25.0, 35.0),
+        )},
+        "plate": {"distance": draw.number(0.05, 0.8), **draw.some(
+            angle_deg=draw.number(-50.0, 70.0), above=draw.number(0.05, 0.5),
+            below=draw.number(0.05, 0.8), pivot_height=draw.number(-0.2, 0.4),
+        ), **draw.values()},
+        "stream": draw.some(rate=draw.number(1.0, 300.0)),
+    }  # fmt: skip
+    if tables["gravity"] == 0.0:
+        # Straight back from an upright plate it would graze the belt all along.
+        tables["plate"]["angle_deg"] = draw.number(1.0, 40.0) * draw.one_of(-1.0, 1.0)
+    if draw.chance(0.9):
+        tables["outgoing"] = {
+            "drop": draw.number(0.3, 1.5) + 2.0 * wheel, "drop_from": "top",
+            **draw.some(speed=draw.number(-2.0, 3.0), start=draw.number(-2.0, 0.3), length=3.0),
+        }  # fmt: skip
+    if draw.chance(0.4):
+        draw.transfer = True
+        tables["surface"] = [
+            {"name": f"s{n}", **draw._course(), **draw.some(opens_at=draw.number(0.1, 2.0))}
+            for n in range(draw.whole(1, 2))
+        ]
+    if draw.chance(0.1):
+        tables["plate"] = [tables["plate"], draw._hanging()]
+    return tables
+
+
+def test_predictions_are_the_same_to_the_last_bit_and_have_the_same_reasons():
+    documents = []
+    for seed in range(SCENES + 200):
+        tables = transfer_scene(seed)
+        if not keys_refused(tables):
+            documents.append(tables)
+    assert len(documents) > 400
+    reasons = []
+    for document, found in zip(documents, in_node(documents), strict=True):
+        mine = predict(from_dict(document))
+        reasons.append(Reason.of(mine.reason))
+        wrong = unlike(mine, found["prediction"])
+        assert not wrong, (document, str(mine.reason), found["prediction"]["reason"], wrong[:3])
+    for reason in (None, *Reason):
+        assert reasons.count(reason) > 10, (reason, reasons.count(reason))

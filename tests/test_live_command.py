@@ -1,0 +1,114 @@
+"""``chutelab live``: the file it writes, the browser it opens, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+from click.testing import CliRunner
+
+from chutelab.cli import main
+
+pytest.importorskip("chutelab.pictures.live.describe")
+
+
+def call(*arguments, code=0):
+    result = CliRunner().invoke(main, ["live", *map(str, arguments)])
+    assert result.exit_code == code, result.output
+    return result
+
+
+def data_of(path):
+    """What the page knows, as it reads it."""
+    page = path.read_text(encoding="utf-8")
+    return json.loads(
+        re.search(r'<script type="application/json" id="lab">(.*?)</script>', page, re.DOTALL)[1]
+    )
+
+
+def test_it_writes_one_file_with_the_scene_in_it(tmp_path):
+    path = tmp_path / "lab.html"
+    said = call("inclined-40", "--set", "plate.distance=0.07", "-o", path).stdout
+    assert said == f"wrote {path}, {path.stat().st_size / 1000:.0f} kB\n"
+    assert path.stat().st_size <= 400_000
+    found = data_of(path)
+    assert found["scene"]["plate"]["distance"] == 0.07
+    assert found["scene"]["title"].endswith("; with plate.distance=0.07")
+    assert found["language"] == "en"
+    assert found["live"] == {
+        "predict": False, "controls": None, "panels": None, "ranges": {}, "presets": []
+    }  # fmt: skip
+
+
+def test_what_the_page_offers_can_be_set_and_is_no_change_of_the_machine(tmp_path):
+    path = tmp_path / "lab.html"
+    settings = ("live.predict=true", 'live.controls=["plate.angle_deg"]')
+    call("perpendicular", *(word for one in settings for word in ("--set", one)), "-o", path)
+    found = data_of(path)
+    assert found["live"]["predict"] is True
+    assert found["live"]["controls"] == ["plate.angle_deg"]
+    assert "; with" not in found["scene"]["title"]
+
+
+def test_quiet_says_nothing_and_a_file_that_is_there_is_replaced(tmp_path):
+    path = tmp_path / "lab.html"
+    path.write_text("mine")
+    assert call("perpendicular", "-q", "-o", path).output == ""
+    assert path.read_text(encoding="utf-8").startswith("<!doctype html>")
+
+
+def shown(tmp_path, **environment):
+    """Run it without -o in a process of its own, whose files are in a folder of the test."""
+    command = [sys.executable, "-m", "chutelab", "live", "perpendicular"]
+    return subprocess.run(
+        command, capture_output=True, text=True, timeout=60, check=False,
+        env={**os.environ, "TMPDIR": str(tmp_path), **environment},
+    )  # fmt: skip
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have browsers of their own")
+def test_without_a_file_it_opens_the_page_in_the_browser_and_says_where_it_is(tmp_path):
+    browser = tmp_path / "browser.py"
+    browser.write_text("import pathlib, sys\npathlib.Path(sys.argv[2]).write_text(sys.argv[1])\n")
+    told = tmp_path / "told"
+    result = shown(tmp_path, BROWSER=f"{sys.executable} {browser} %s {told}")
+    assert result.returncode == 0, result.stderr
+    (page,) = tmp_path.glob("*/perpendicular.html")
+    assert told.read_text() == page.as_uri()
+    assert result.stdout.startswith(f"opened {page}, ")
+    assert data_of(page)["scene"]["title"] == "Perpendicular damping plate, 2 m/s"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have browsers of their own")
+def test_without_a_browser_it_says_so_and_where_the_page_is(tmp_path):
+    result = shown(tmp_path, PATH=str(tmp_path), BROWSER="", DISPLAY="", WAYLAND_DISPLAY="")
+    assert result.returncode == 1
+    (page,) = tmp_path.glob("*/perpendicular.html")
+    assert f"no browser could be opened; the page is {page}" in result.stderr
+
+
+def test_german_pages_say_it_in_german(tmp_path):
+    from chutelab.pictures.live import page
+
+    if not (page.files("chutelab.pictures.live") / "assets" / "strings" / "de.json").is_file():
+        pytest.skip("the German catalogue is not there yet")
+    call("perpendicular", "--language", "de", "-o", tmp_path / "lab.html")
+    text = (tmp_path / "lab.html").read_text(encoding="utf-8")
+    assert '<html lang="de">' in text
+    assert data_of(tmp_path / "lab.html")["language"] == "de"
+
+
+def test_what_the_contact_engine_has_not_is_refused_by_its_key(tmp_path):
+    result = call("perpendicular", "--set", "particle.radius=0", "-o", tmp_path / "a.html", code=2)
+    assert "particle.radius" in result.stderr
+    assert not (tmp_path / "a.html").exists()
+
+
+def test_the_old_command_is_gone():
+    result = CliRunner().invoke(main, ["page", "perpendicular"])
+    assert result.exit_code == 2
+    assert "No such command" in result.stderr

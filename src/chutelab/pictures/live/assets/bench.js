@@ -22,7 +22,7 @@ const POINTS = { move: 0, line: 2, arc: 3, drop: 1 };
 const STRAY = 6;
 
 /** How far from a line it can be clicked, pixels. */
-const REACH = 14;
+const CLICK_REACH = 14;
 
 const ZOOM = 1.25;
 
@@ -231,7 +231,7 @@ class Bench {
   pick([px, py]) {
     const { view } = this.stage, { machine } = this.lab;
     if (!machine) return;
-    const name = surfaceAt(machine, view.worldX(px), view.worldY(py), REACH / view.scale);
+    const name = surfaceAt(machine, view.worldX(px), view.worldY(py), CLICK_REACH / view.scale);
     this.inspector.choose(name || "scene");
   }
 

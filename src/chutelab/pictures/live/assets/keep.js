@@ -1,10 +1,12 @@
 // What one takes along: a link, the scene, the picture, tables; and the address that follows.
 
 import { toToml } from "./keys.js";
-import { card, html, numbersOf } from "./panels.js";
+import { numbersOf } from "./numbers.js";
+import { card, html } from "./panels.js";
+import { predict } from "./prediction.js";
 import { Fault } from "./scene.js";
 import { download, fileStem, fromHash, knotRows, toCsv, toHash } from "./share.js";
-import { predict } from "./prediction.js";
+import { historyOf } from "./stages.js";
 
 /**
  * @typedef {import("./lab.js").Lab} Lab
@@ -56,8 +58,10 @@ class Keep {
 
   /** @returns {(string | number)[][]} */
   get numbers() {
-    const found = numbersOf(this.recording, predict(/** @type {any} */ (this.lab.scene)));
-    const { words } = this;
+    const { lab, words } = this, machine = /** @type {any} */ (lab.machine);
+    const { numbers } = predict(/** @type {any} */ (lab.scene));
+    const found = numbersOf(historyOf(lab)?.stages ?? [], numbers,
+      machine.pulley?.radius ?? NaN, machine.radius);
     return [["", words.say("simulated"), words.say("analytic"), ""],
       ...found.map(({ symbol, simulated, analytic, unit }) => [symbol, simulated, analytic, unit])];
   }

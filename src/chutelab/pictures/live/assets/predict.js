@@ -1,13 +1,12 @@
 // First say where it will land, then see: path, landing and numbers are hidden until then.
 
-import { RELEASE_KINDS } from "./panels.js";
+import { historyOf } from "./stages.js";
 import { svg } from "./stage.js";
 
 /**
  * @typedef {import("./lab.js").Lab} Lab
  * @typedef {import("./stage.js").Stage} Stage
  * @typedef {import("./words.js").Words} Words
- * @typedef {import("./recording.js").Recording} Recording
  * @typedef {import("./scene.js").Scene} Scene
  */
 
@@ -25,11 +24,11 @@ function landingLine({ incoming, outgoing }) {
 
 /** Where it went: the mean of all landings, or of where tracks ended in a run without a belt to
  * land on; null as long as there is nothing.
- * @param {Recording} recording @param {boolean} lands @returns {[number, number] | null} */
-function whereTo(recording, lands) {
-  if (!lands && recording.state === "running") return null;
-  const places = lands
-    ? recording.events.filter(({ kind }) => kind === RELEASE_KINDS.landing)
+ * @param {Lab} lab @param {boolean} lands @returns {[number, number] | null} */
+function whereTo(lab, lands) {
+  const { recording } = lab;
+  if (!recording || (!lands && recording.state === "running")) return null;
+  const places = lands ? historyOf(lab)?.landings ?? []
     : recording.tracks.flatMap((track) => track.state(track.end) ?? []);
   if (!places.length) return null;
   const mean = (/** @type {"x" | "y"} */ axis) =>
@@ -99,7 +98,7 @@ class Prediction {
       lab.pause();
       this.lab.t = lab.start;
     }
-    stage.show.trails = stage.show.strobe = !hides;
+    stage.blind = hides;
     document.documentElement.classList.toggle("predicting", hides);
     for (const id of ["time", "back", "forward"]) {
       /** @type {any} */ (document.getElementById(id)).disabled = hides;
@@ -157,14 +156,13 @@ class Prediction {
   /** Put the mark where it belongs, and say how far off it was once that is known. */
   place() {
     const { lab, stage: { view }, words, grip, at: [x, y], belt } = this;
-    const { recording } = lab;
     grip.setAttribute("transform", `translate(${view.px(x)} ${view.py(y)})`);
     grip.setAttribute("aria-valuenow", String(x));
     grip.setAttribute("aria-valuetext",
       [x, ...(belt ? [] : [y])].map((value) => words.value({ value, unit: "m" })).join(", "));
     grip.setAttribute("aria-disabled", String(!this.hides));
     grip.style.display = this.always ? "none" : "";
-    const went = recording && !this.hides && this.isSet ? whereTo(recording, Boolean(belt)) : null;
+    const went = !this.hides && this.isSet ? whereTo(lab, Boolean(belt)) : null;
     this.line.setAttribute("d", went
       ? `M${view.px(x)} ${view.py(y)}L${view.px(went[0])} ${view.py(went[1])}` : "");
     const off = went ? Math.hypot(went[0] - x, belt ? 0 : went[1] - y) : 0;

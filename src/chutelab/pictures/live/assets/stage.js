@@ -77,6 +77,9 @@ class Stage {
     else this.rebuild();
   }
 
+  /** Whether nothing of the run is shown yet that somebody is to predict. */
+  blind = false;
+
   /** Whether somebody has chosen what is shown. */
   moved = false;
 
@@ -102,7 +105,12 @@ class Stage {
     if (recording && !this.fitted && recording.state !== "running") this.fit();
     this.drawTracks();
     this.paint();
+    for (const draw of this.drawers) draw();
   }
+
+  /** What tools draw anew when the view, the machine or its run has changed.
+   * @type {(() => void)[]} */
+  drawers = [];
 
   rebuild() {
     if (this.view.width < 2) return;
@@ -110,6 +118,7 @@ class Stage {
     this.drawTracks();
     this.placeHandles();
     this.paint();
+    for (const draw of this.drawers) draw();
   }
 
   drawSurfaces() {
@@ -191,7 +200,7 @@ class Stage {
   drawTracks() {
     const { recording } = this.lab, { view } = this;
     this.paths.replaceChildren();
-    if (!recording || !this.show.trails) return;
+    if (!recording || !this.show.trails || this.blind) return;
     for (const points of this.trackPoints(recording)) {
       if (points.length < 2) continue;
       const line = points.map(({ x, y }) => `${view.px(x).toFixed(1)},${view.py(y).toFixed(1)}`);
@@ -217,7 +226,7 @@ class Stage {
     }
     const style = getComputedStyle(this.home);
     const ink = style.getPropertyValue("--particle"), rim = style.getPropertyValue("--ink");
-    if (this.show.strobe && !machine.interact) this.strobe(context, style);
+    if (this.show.strobe && !this.blind && !machine.interact) this.strobe(context, style);
     const spins = machine.inertia.some((value) => value > 0);
     context.lineWidth = 1;
     const kinds = machine.radius.length > 1 && new Set(machine.releases.map(({ stream }) => stream)).size > 1;
@@ -288,6 +297,7 @@ class Stage {
     const { data } = this.lab;
     this.handles = this.show.handles
       ? openHandles(new Handles(scene, machine, data).list, data) : [];
+    for (const more of this.further) this.handles.push(...more());
     const wanted = new Set(this.handles.map(({ id }) => id));
     for (const [id, grip] of this.gripOf) {
       if (wanted.has(id)) continue;
@@ -297,9 +307,13 @@ class Stage {
     for (const handle of this.handles) {
       const grip = this.gripOf.get(handle.id) ?? this.newGrip(handle.id);
       this.describe(grip, handle);
-      this.grips.append(grip);
+      // Put in anew it would lose the focus.
+      if (!grip.isConnected) this.grips.append(grip);
     }
   }
+
+  /** Handles of tools. @type {(() => Handle[])[]} */
+  further = [];
 
   /** @param {string} id */
   newGrip(id) {
@@ -324,7 +338,8 @@ class Stage {
     }
     const [first] = handle.axes;
     const name = `${words.name(handle.surface)}: ${words.say(`handle-${handle.what}`)}`;
-    const values = handle.axes.filter(({ step }) => step).map((axis) => words.value(axis));
+    const values = handle.says ? [handle.says]
+      : handle.axes.filter(({ step }) => step).map((axis) => words.value(axis));
     grip.setAttribute("aria-label", name);
     grip.setAttribute("aria-valuenow", String(first.value));
     grip.setAttribute("aria-valuetext", values.join(", "));
@@ -394,6 +409,10 @@ class Stage {
     const fine = /** @type {Record<string, number>} */ ({
       degrees: 0.5, "m/s": Math.max(0.01, 0.5 * 10 ** Math.ceil(Math.log10(snap / ARROW))),
     });
+    if (this.held.change) {
+      this.held.change(this.held.drag(x, y));
+      return;
+    }
     const numbers = this.held.drag(x, y).map((value, n) => roundTo(value, fine[axes[n].unit] ?? snap));
     this.lab.change(valuesOf(this.held, numbers), { done: false });
   }
@@ -418,6 +437,10 @@ class Stage {
     const numbers = handle.axes.map(({ value }) => value);
     const step = handle.axes[n].step * (shiftKey ? 0.1 : 1);
     numbers[n] = roundTo(numbers[n] + sign * step, step);
+    if (handle.change) {
+      handle.change(numbers);
+      return true;
+    }
     const axes = handle.axes.filter((axis, i) => i === n || axis.part !== undefined || !axis.step);
     this.lab.change(valuesOf({ ...handle, axes }, axes.map((axis) => numbers[handle.axes.indexOf(axis)])));
     return true;

@@ -203,12 +203,15 @@ REFUSED = {
 
 
 def keys_refused(document):
-    """Return the keys for which Python refuses a scene."""
+    """Return the keys for which Python refuses a scene, or to write a page of it as it is."""
     try:
-        build(from_dict(document))
+        scene = from_dict(document)
+        describe(scene)
+        build(scene)
     except SceneError as error:
         return [fault.key for fault in error.faults]
-    return []
+    measured = scene.outgoing is not None and scene.outgoing.drop_from == "impact"
+    return ["outgoing.drop_from"] if measured else []
 
 
 def test_what_cannot_be_built_is_refused_by_the_same_key():
@@ -406,3 +409,53 @@ def test_predictions_are_the_same_to_the_last_bit_and_have_the_same_reasons():
         assert not wrong, (document, str(mine.reason), found["prediction"]["reason"], wrong[:3])
     for reason in (None, *Reason):
         assert reasons.count(reason) > 10, (reason, reasons.count(reason))
+
+
+JUNK = (
+    0, -1, 1, 3.5, 1e-320, 1e300, 2**60, True, False, "", "x", "steel", "wall", "kind-0", "plate",
+    "a b", "𝔘", "120 t/h", "0 t/h", "landed", "adhesion", [], {}, [1.0], [0.0, 0.0], [2.0, 1.0],
+    [[0.0, 0.0], [1.0, 0.0]], [[0, 0], [0, 0]], {"x": 1},
+)  # fmt: skip
+
+
+def spoilt(rng, tables):
+    """Return a scene in which a key is lost, doubled, misspelt, or has another's value."""
+    tables = json.loads(json.dumps(tables))
+    place = tables
+    while True:
+        keys = [*place] if isinstance(place, dict) else [*range(len(place))]
+        if not keys:
+            return tables
+        key = keys[rng.integers(len(keys))]
+        inner = place[key]
+        if isinstance(inner, dict | list) and inner and rng.random() < 0.8:
+            place = inner
+            continue
+        way = rng.integers(5)
+        if way == 0:
+            del place[key]
+        elif way == 1 and isinstance(place, dict):
+            place[f"{key}x"] = inner
+        elif way == 2 and isinstance(place, dict):
+            other = ("opens_at", "center", "to", "name", "density", "pivot", "fill", "radius")
+            place[other[rng.integers(len(other))]] = JUNK[rng.integers(len(JUNK))]
+        else:
+            place[key] = JUNK[rng.integers(len(JUNK))]
+        return tables
+
+
+def test_what_is_taken_from_an_address_is_refused_where_python_refuses_it():
+    """Any text may be there: it must never do more than be refused."""
+    rng = np.random.default_rng(99)
+    seeds = [sandbox.tables(seed) for seed in range(40)]
+    documents = [spoilt(rng, seeds[n % len(seeds)]) for n in range(SCENES)]
+    refused = 0
+    for document, found in zip(documents, in_node(documents), strict=True):
+        keys = keys_refused(document)
+        refused += bool(keys)
+        assert ("fault" in found) == bool(keys), (document, keys, found.get("fault"))
+        if keys:
+            key = found["fault"]["key"]
+            near = [k for k in keys if k.startswith(key) or key.startswith(k) or not k]
+            assert near, (document, keys, key)
+    assert refused > 0.5 * SCENES

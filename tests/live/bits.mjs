@@ -1,7 +1,7 @@
 // What JavaScript says of scenes and transfers: `node bits.mjs ASSETS < {lab, scenes, transfers}`.
 //
-// Of each scene {toml, machine, prediction} or {toml, fault}, of parameters what `transfer` returns;
-// of an edit [keys, values by path] the keys after it, as TOML, and what they have there.
+// Of each scene {toml, machine, prediction} or {toml, fault}, of parameters what `transfer`
+// returns; of an edit [keys, values by path] the keys after it, as TOML, and what they have there.
 //
 // JSON has no Infinity and no NaN: they come as text.
 import { readFileSync } from "node:fs";

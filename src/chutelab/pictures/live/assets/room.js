@@ -1,5 +1,6 @@
 // Where disks may be released: not in a surface that is there then.
-import { Fault, ON_BELT } from "./scene.js";
+import { ON_BELT } from "./belt.js";
+import { Fault } from "./scene.js";
 import { atan2, lengthOf, modulo, sinCos } from "./trig.js";
 
 /** @typedef {import("./machine.js").Segment} Segment */

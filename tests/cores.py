@@ -33,12 +33,12 @@ class Core:
 
     @property
     def surfaces(self):
-        return self._array("surfaces", "Surface", self.job.surface_count)
+        return self._array("surfaces", "Surface", self.world.surface_count)
 
     @property
     def pairs(self):
         """Disk against disk, then against each surface, as long as there is one kind of disk."""
-        return self._array("pairs", "Pair", 1 + self.job.surface_count)
+        return self._array("pairs", "Pair", 1 + self.job.materials)
 
     @property
     def world(self):

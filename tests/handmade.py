@@ -186,11 +186,13 @@ def machine_of(
 
 
 def recording_of(machine: Machine, *tracks: Any, ended: str = "time") -> Recording:
-    """A recording of tracks, one a particle, of rows t, x, y, vx, vy, ω."""
+    """A recording of tracks, one a particle, of rows t, x, y, vx, vy, ω; angles are their sum."""
     recorder = Recorder(machine)
     for i, track in enumerate(tracks):
         rows = np.array(track, float)
-        recorder.knots(np.full(len(rows), i), rows[:, 0], rows[:, 1:3], rows[:, 3:5], rows[:, 5])
+        t, omega = rows[:, 0], rows[:, 5]
+        angle = np.cumsum([0.0, *(0.5 * (omega[1:] + omega[:-1]) * np.diff(t))])
+        recorder.knots(np.full(len(rows), i), t, rows[:, 1:3], rows[:, 3:5], omega, angle)
         recorder.events(Kind.RELEASE, i, rows[0, 0], rows[0, 1:3], rows[0, 3:5])
     recorder.ended[:] = REASONS.index(ended)
     return recorder.finish(engine="exact", steps=0)

@@ -73,6 +73,15 @@ def test_angles_are_the_integral_of_the_angular_velocity(
     assert angles == pytest.approx([7.0 * now, integral], rel=1e-9, abs=1e-9)
 
 
+def test_an_angle_that_is_told_counts_more_than_the_sum_of_the_spin() -> None:
+    """0.3 rad more than ω = 1/s makes of the second interval, 2 s long: 0.15 rad by its middle."""
+    rows = [(0, 0, 0.5, 0, 0, 1), (1, 0, 0.5, 0, 0, 1), (3, 0, 0.5, 0, 0, 1)]
+    machine = machine_of(FLOOR, radius=0.054, outlines=(BOX,))
+    told = replace(recording_of(machine, rows), angle=np.array([0.0, 1.0, 3.3]))
+    angle = turned(told, np.array([0]), np.array([0.5, 1.0, 2.0, 2.999999, 3.0]))[:, 0]
+    assert angle == pytest.approx([0.5, 1.0, 2.15, 3.3, 3.3], abs=1e-5)
+
+
 def test_a_spin_that_an_impact_changes_turns_at_once_with_the_new_one() -> None:
     rows = [
         (0, 0, 0.5, 0, 0, 2),

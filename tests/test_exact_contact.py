@@ -88,8 +88,9 @@ def compare(seed):
         assert abs(len(a) - len(b)) <= 1 or shared == 4
 
 
-# 49: the end of a moving arc; 14, 350: past an arc outside; 773, 929: in at its opening.
-@pytest.mark.parametrize("seed", [*range(12), 14, 49, 350, 773, 929])
+# 49: the end of a moving arc; 14, 350: past an arc outside; 773, 929: in at its opening; 1047: out
+# of a gate that shut in it, past its end.
+@pytest.mark.parametrize("seed", [*range(12), 14, 49, 350, 773, 929, 1047])
 def test_blow_by_blow(seed):
     compare(seed)
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from chutelab.engines import exact
+from chutelab.engines import contact, exact
 from chutelab.engines.simulation import simulate
 from chutelab.machine.nominal import discharge
 from chutelab.results import REASONS, Kind
@@ -374,6 +374,50 @@ def test_a_gate_is_met_from_when_it_shuts_on_and_shuts_on_nobody(shuts, met):
         up = (speed - sqrt(speed**2 - 2.0 * G * (0.5 - 2.0 * radius))) / G
         assert run.surfaces[hits["surface"][1]] == "gate"
         assert hits["t"][1] == pytest.approx(down + up, rel=1e-12)
+
+
+@pytest.mark.parametrize("engine", [exact, contact])
+@pytest.mark.parametrize("post", [False, True])
+def test_along_a_gate_that_shut_in_it_a_disk_leaves_past_the_end(engine, post):
+    """The gate's end lies in the way, but the disk is in the gate; a post there it does strike."""
+    radius, above, speed = 0.05, 0.02, 2.0
+    parts = [face("gate", [0.0, 0.0], [1.0, 0.0], closes_at=0.1)]
+    if post:
+        parts.append(face("post", [1.0, 0.0], [1.0, -1.0], restitution=0.5, friction=0.0))
+    built = scene_of(
+        gravity=0.0, particle={"radius": radius, "spin": False}, surface=parts,
+        stream={"at": [0.5, above], "velocity": [speed, 0.0]}, run={"until": 0.5},
+    )  # fmt: skip
+    run = engine.run(built)
+    hits = run.select(Kind.IMPACT)
+    if not post:
+        assert len(hits) == 0
+        np.testing.assert_allclose(run.track(0)[-1]["position"], [1.5, above], rtol=1e-12)
+        return
+    x = 1.0 - sqrt(radius**2 - above**2)
+    assert hits["t"][0] == pytest.approx((x - 0.5) / speed, rel=1e-9)
+    normal = np.array([x - 1.0, above]) / radius
+    after = np.array([speed, 0.0]) - 1.5 * speed * normal[0] * normal
+    np.testing.assert_allclose(hits["velocity_after"][0], after, rtol=1e-9)
+
+
+@pytest.mark.parametrize("engine", [exact, contact])
+def test_a_ride_along_a_gate_that_shut_in_it_goes_on_past_the_end(engine):
+    """A bent gate about the same centre, through the middle of what swings in the bowl."""
+    bowl = {"center": (0.0, 0.0), "radius": 1.0, "begin": pi, "extent": pi}
+    gate = {"center": (0.0, 0.0), "radius": 0.94, "begin": 1.3 * pi, "extent": 0.2 * pi}
+    theta, length = -0.6, 0.95
+    built = scene_of(
+        particle={"radius": 0.05, "spin": False}, surface=[FAR],
+        stream={"at": [0.0, 5.0]}, run={"until": 0.8},
+    )  # fmt: skip
+    start = [[length * sin(theta), -length * cos(theta)]]
+    free = engine.run(bent(thrown(built, start), bowl))
+    with_gate = engine.run(bent(thrown(built, start), bowl, {**gate, "appears": 0.1}))
+    times = np.linspace(0.0, 0.8, 81)
+    place, _ = free.at(times)
+    assert place[-1, 0, 0] > 0.2
+    np.testing.assert_allclose(with_gate.at(times)[0], place, atol=1e-9)
 
 
 def test_over_a_shut_trapdoor_it_slides_and_into_an_open_one_it_falls():

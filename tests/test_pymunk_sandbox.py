@@ -705,3 +705,31 @@ def test_dominoes_fall_one_after_the_other_and_lie_still():
 def test_no_domino_falls_that_none_reaches():
     got = run(dominoes(1e-3, spacing=0.2, count=3))
     assert turned(got, 1) == pytest.approx(0.0, abs=1e-3)
+
+
+def test_the_angle_of_a_box_is_that_of_its_body():
+    """Dropped on an edge it tumbles and lies: its lowest corner is on the floor, at y = 0.
+
+    Of a box w wide and h high at an angle a that is (w |sin a| + h |cos a|)/2 below its centre.
+    What parts overlaps turns it without an ω, so the sum of ω is off by more.
+    """
+    floor = face("floor", (-1.0, 0.0), (1.0, 0.0), restitution=0.3, friction=0.5)
+    width, height, slope = 0.1, 0.06, radians(30.0)
+    m = lone((0.0, 1.0), until=1.5, surface=[floor])
+    m = boxed(m, (width, height), [(0.0, 0.2)], restitution=0.3, slope=slope)
+    got = run(m)
+    assert got.angle.shape == got.knots.shape
+    assert got.angle[0] == 0.0
+
+    def above(angle):
+        a = angle - slope
+        return got.knots["position"][-1, 1] - 0.5 * (width * abs(sin(a)) + height * abs(cos(a)))
+
+    assert abs(turned(got, 0)) > 0.3
+    assert above(got.angle[-1]) == pytest.approx(0.0, abs=1e-4)
+    assert abs(above(turned(got, 0))) > 5.0 * abs(above(got.angle[-1]))
+
+
+def test_disks_have_no_angle_but_the_sum_of_their_spin():
+    floor = face("floor", (-1.0, 0.0), (1.0, 0.0))
+    assert run(lone((0.0, 1.0), until=0.1, surface=[floor])).angle.shape == (0,)

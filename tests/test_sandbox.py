@@ -284,9 +284,12 @@ def unlike(reason):
 
 
 UNLIKE = {
-    60: unlike("ends after lasting contacts by 7e-5 m, at a finer step too"),
-    146: unlike("ends after lasting contacts by 7e-5 m, at a finer step too"),
-    156: unlike("how many blows of a chatter in a wedge are told"),
+    60: unlike(
+        "a belt kicks it against a wall 4,000 times a second, by 0.1 mm; a step sees it rest"
+    ),
+    156: unlike(
+        "gripped by two faces that run apart it is struck without end; each tells some blows"
+    ),
 }
 
 

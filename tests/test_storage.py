@@ -22,7 +22,7 @@ from chutelab.results import Kind, Recording, storage
 from chutelab.results.storage import RecordingError
 from chutelab.util.files import aside, together, whole
 
-ARRAYS = ("knots", "offsets", "ended", "events", "by_surface")
+ARRAYS = ("knots", "offsets", "ended", "events", "by_surface", "angle")
 
 
 @cache
@@ -41,6 +41,7 @@ def listing(folder):
         ("free-fall", ("particle.spin=true",)),
         ("perpendicular", ("run.engine=pymunk", 'title="Größe µ, \\"quoted\\""')),
         ("stream-independent", ("stream.count=100", "run.until=0.3")),
+        ("dominoes", ("run.until=0.2",)),
     ],
 )
 def test_a_recording_comes_back_to_the_last_bit(tmp_path, name, overrides):
@@ -199,6 +200,13 @@ def refused(path):
     assert str(path) in text
     assert "\n" not in text
     return text
+
+
+@pytest.mark.parametrize("angle", [np.zeros(3), np.zeros(0, dtype="f4"), np.array([np.nan])])
+def test_angles_that_are_not_one_a_knot_are_refused(tmp_path, angle):
+    path = run().save(tmp_path / "turned.npz")
+    altered(path, angle=angle)
+    refused(path)
 
 
 def test_another_version_is_refused(tmp_path):

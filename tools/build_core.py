@@ -20,7 +20,7 @@ CORE = Path(__file__).parents[1] / "src" / "chutelab" / "engines" / "contact" / 
 FLAGS = (
     "-target", "wasm32-wasi", "-mexec-model=reactor", "-std=c99", "-O3", "-flto", "-Wall",
     "-Wextra", "-Werror", "-ffp-contract=off", "-fvisibility=hidden", "-Wl,--export=run",
-    "-Wl,--export=world", "-Wl,--export=__heap_base", "-Wl,--strip-all",
+    "-Wl,--export=prepare", "-Wl,--export=world", "-Wl,--export=__heap_base", "-Wl,--strip-all",
 )  # fmt: skip
 """No fused multiply-add: every engine that runs the file has to round alike."""
 

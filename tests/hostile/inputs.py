@@ -6,6 +6,7 @@ Good files to begin with are made once, by `begin`, in the folder beside that on
 
 from __future__ import annotations
 
+import copy
 import io
 import json
 import random
@@ -21,6 +22,7 @@ import numpy as np
 import tomli_w
 
 import chutelab
+from broken_sandbox import BASES
 from chutelab import scene
 from chutelab.cli import main
 from chutelab.studies.sweep import planned
@@ -29,6 +31,9 @@ from hostile.mutants import NUMBERS, TEXTS, changed, garbled, value
 
 GOOD = Path("../good")
 SCENES = sorted(scene.shipped())
+PARTED = ("cascade", "cradle", "dominoes", "hopper", "spoon", "two-sizes")
+"""Shipped scenes of the parts that `machines` puts together, besides those of `broken_sandbox`."""
+
 SWEEP = ("sweep", "perpendicular", "--vary", "plate.restitution=0:1:40", "--engine", "pymunk")
 TRACK = "mass_A\nt\tx\ty\n" + "".join(
     f"{0.01 * n:.2f}\t{0.02 * n:.3f}\t{0.1 - 0.0005 * n * n:.4f}\n" for n in range(30)
@@ -54,6 +59,10 @@ USUAL = {
 """A good value for what a command takes, by its name there."""
 
 KEYS = (
+    "particle[0].radius", "particle.shape", "material[0].density", "pair[0].between",
+    "stream[1].rate", "stream.fill", "stream[0].to", "surface[0].center", "surface[0].to_deg",
+    "surface[0].opens_at", "surface[0].repeat", "conveyor[0].speed", "plate[1].pivot",
+    "string[0].length", "incoming.incline_deg",
     "plate.angle_deg", "plate.restitution", "incoming.speed", "outgoing.drop", "stream.count",
     "run.dt", "run.until",
     "run.engine", "particle.radius", "particle.spin", "surface.0.points", "gravity", "title",
@@ -93,23 +102,51 @@ def begin() -> None:
 
 
 def scenes(rng: random.Random) -> list[str]:
-    """A scene file with mistakes in its text or in its values."""
+    """A shipped scene with mistakes in its text or in its values."""
     text = scene.shipped()[rng.choice(SCENES)].read_bytes()
     if rng.random() < 0.25:
-        text = garbled(rng, text)
-    else:
-        tables = tomllib.loads(text.decode())
-        # Work that takes long is no hang.
-        streams = tables.get("stream", [])
-        for stream in streams if isinstance(streams, list) else [streams]:
-            stream["count"] = min(stream.get("count", 1), 200)
-        for _ in range(rng.choice((1, 1, 1, 2, 3))):
-            tables = changed(rng, tables)
-        try:
-            text = tomli_w.dumps(tables).encode("utf-8", "surrogatepass")
-        except (TypeError, AttributeError, ValueError):  # the whole is no table any more
-            text = repr(tables).encode("utf-8", "replace")
+        Path("mutant.toml").write_bytes(garbled(rng, text))
+        return _tried(rng)
+    return _mutant(rng, tomllib.loads(text.decode()))
+
+
+def machines(rng: random.Random) -> list[str]:
+    """A scene of all parts, or of parts of several machines, with mistakes in its values.
+
+    Half of them get a table from another machine: names then lead nowhere, or to another thing.
+    """
+    bases = [
+        *BASES.values(),
+        *(tomllib.loads(scene.shipped()[name].read_text()) for name in PARTED),
+    ]
+    tables = copy.deepcopy(rng.choice(bases))
+    while rng.random() < 0.5:
+        name, other = rng.choice(list(rng.choice(bases).items()))
+        own = tables.get(name)
+        # Tables of a list come to those that are there, others replace them.
+        tables[name] = (
+            [*own, *other] if isinstance(own, list) and isinstance(other, list) else other
+        )
+    return _mutant(rng, tables)
+
+
+def _mutant(rng: random.Random, tables: Any) -> list[str]:
+    # Work that takes long is no hang.
+    streams = tables.get("stream", [])
+    for stream in streams if isinstance(streams, list) else [streams]:
+        stream["count"] = min(stream.get("count", 1), 200)
+    for _ in range(rng.choice((1, 1, 1, 2, 3))):
+        tables = changed(rng, tables)
+    try:
+        text = tomli_w.dumps(tables).encode("utf-8", "surrogatepass")
+    except (TypeError, AttributeError, ValueError):  # the whole is no table any more
+        text = repr(tables).encode("utf-8", "replace")
     Path("mutant.toml").write_bytes(text)
+    return _tried(rng)
+
+
+def _tried(rng: random.Random) -> list[str]:
+    """Return the words of a command on the mutant."""
     run = ["run", "mutant.toml", "--max-seconds", "0.3"]
     return rng.choice(
         ([*run, "--json"], run, [*run, "--out", "out", "--only", "csv,npz,json,png"], ["check",
@@ -253,6 +290,7 @@ def notebooks(rng: random.Random) -> list[str]:
 
 KINDS: dict[str, Callable[[random.Random], list[str]]] = {
     "scenes": scenes,
+    "machines": machines,
     "arguments": arguments,
     "tracks": tracks,
     "recordings": recordings,

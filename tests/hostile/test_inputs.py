@@ -1,4 +1,4 @@
-"""Scenes, arguments, tracks, recordings, unfinished sweeps and notebooks with mistakes in them."""
+"""Scenes, machines, arguments, tracks and other files with mistakes, see `hostile.inputs`."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ MEMORY = 2 << 20
 """kB that a process may have had at its peak."""
 
 SHARES = {
-    "scenes": 0.3,
-    "arguments": 0.3,
+    "scenes": 0.2,
+    "machines": 0.2,
+    "arguments": 0.2,
     "tracks": 0.15,
     "recordings": 0.15,
     "parts": 0.08,

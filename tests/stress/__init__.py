@@ -9,6 +9,7 @@
 `runs`           a case run within its time and judged; small runs, and spoilt ones
 `test_cases`     every case, a test for each engine and step
 `test_laws`      every law can fail
+`test_parts`     so can those on arcs, gates, several sizes and pairs
 `test_demands`   so can every demand, and the cases are all there
 ===============  ==================================================================================
 """

@@ -149,14 +149,16 @@ def by_name(engine: str) -> str:
 
 
 def scene_of(tables: Tables, name: str, engine: str, dt: float | None) -> Scene:
-    """Validate a scene for an engine and a step; particles have 4 mm if it does not say."""
+    """Validate a scene for an engine and a step; one kind of particles has 4 mm if not told."""
     run = {**tables.get("run", {})}
     run["engine"] = by_name(engine)
     if dt is not None:
         run["dt"] = dt
     if engine == "fixed":
         run["align"] = False
-    particle = {"radius": 0.004, **tables.get("particle", {})}
+    particle = tables.get("particle", {})
+    if isinstance(particle, dict):
+        particle = {"radius": 0.004, **particle}
     return from_dict({"title": name, **tables, "particle": particle, "run": run}, name)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from chutelab.checks.stress import EPS, Evidence, Verdict
-from chutelab.checks.stress.barriers import closest, gaps
+from chutelab.checks.stress.barriers import closest
 from chutelab.results import REASONS
 from stress.case import Case, Ladder, Twin
 
@@ -51,11 +51,12 @@ def sunk(e: Evidence) -> Verdict:
     _, last = e.recording.ends()
     position = last["position"]
     deepest, of = 0.0, "r"
-    for name, gap in gaps(e.machine, position):
+    for piece in e.pieces:
+        name, gap = piece.name, piece.gap(position, r)
         i = int(np.argmin(gap))
         if -gap[i] > deepest:
             deepest, of = -float(gap[i]), f"r, particle {i} in {name}"
-    found, i, j = closest(position, r)
+    found, i, j = closest(position, np.full(len(position), r))
     if found > deepest:
         deepest, of = found, f"r, particles {i} and {j}"
     return Verdict(deepest / r, SUNK, of)

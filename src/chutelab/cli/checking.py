@@ -117,18 +117,17 @@ def stress(
     Nobody passes a surface, sinks into one or bounces off nothing; energy never rises but by a
     belt's work; ledger and momentum close. Each law that has something to say about the scene is a
     line, with what was found and what it must not exceed. What the engine does not promise for
-    such a scene is told with the reason. Exit code 1 if a law is broken. For scenes of straight
-    surfaces, without gates, and of disks of one size.
+    such a scene is told with the reason. Exit code 1 if a law is broken. For scenes of disks
+    without strings.
     """
-    from chutelab.checks.stress import Evidence, judge
+    from chutelab.checks.stress import Evidence, judge, need_judged
     from chutelab.engines.simulation import simulate
     from chutelab.machine import build
     from chutelab.results.recorder import StalledError
-    from chutelab.scene import need_plain
     from chutelab.util.tables import Sheet, plain
 
     loaded = loaded_as_told(scene, overrides, engine, dt)
-    need_plain(loaded, "not judged: the laws are about straight surfaces and disks of one size")
+    need_judged(loaded)
     try:
         with progress("simulating") as update:
             recording = simulate(loaded, progress=update)

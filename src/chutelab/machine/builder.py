@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
-from math import ceil, hypot, inf, pi, prod
+from math import ceil, inf, pi, prod
 from sys import float_info
 from typing import Any, NamedTuple
 
@@ -26,6 +26,7 @@ from chutelab.scene import Conveyor, Fault, Plate, Scene, SceneError, Surface
 from chutelab.scene.conflicts import ON_BELT
 from chutelab.scene.units import polygon_moment
 from chutelab.util.arrays import Bools, Floats, Ints, Numbers
+from chutelab.util.trig import RADIANS, atan2, hypot, sin_cos
 
 
 class RefusedError(SceneError):
@@ -62,13 +63,13 @@ def _on_arc(places: Floats, arcs: Arcs, n: int) -> Floats:
     """Return the nearest points of arc n, (2, n), m."""
     center, radius = arcs.center[..., n, :].T, arcs.radius[..., n]
     away = places.T - (center[:, None] if center.ndim == 1 else center)
-    away = np.where(np.hypot(*away) > 0.0, away, np.array([[1.0], [0.0]]))
-    angle = np.mod(np.arctan2(away[1], away[0]) - arcs.begin[..., n], 2.0 * pi)
-    on_it = radius * away / np.hypot(*away)
+    away = np.where(hypot(*away) > 0.0, away, np.array([[1.0], [0.0]]))
+    angle = np.mod(atan2(away[1], away[0]) - arcs.begin[..., n], 2.0 * pi)
+    on_it = radius * away / hypot(*away)
     first, last = (end[..., n, :].T - center for end in arcs.ends)
     if first.ndim == 1:
         first, last = first[:, None], last[:, None]
-    nearer = np.hypot(*(away - first)) <= np.hypot(*(away - last))
+    nearer = hypot(*(away - first)) <= hypot(*(away - last))
     found = np.where(angle <= arcs.extent[..., n], on_it, np.where(nearer, first, last))
     return np.asarray(found + (center[:, None] if center.ndim == 1 else center))
 
@@ -90,9 +91,9 @@ class _Room:
 
     def surfaces(self, low: Floats, high: Floats) -> Iterator[tuple[int, float, float, Any]]:
         """Yield what may reach into a box (m): whose, from when to when, and its nearest points."""
-        x0, y0, x1, y1 = self.ends
-        near = (np.maximum(x0, x1) > low[0]) & (np.minimum(x0, x1) < high[0])
-        near &= (np.maximum(y0, y1) > low[1]) & (np.minimum(y0, y1) < high[1])
+        a, b = self.ends[:2], self.ends[2:]
+        beside = (np.maximum(a, b) > low[:, None]) & (np.minimum(a, b) < high[:, None])
+        near = beside[0] & beside[1]
         for n in near.any(axis=(*range(1, near.ndim),)).nonzero()[0].tolist():
             yield (*_when(self.segments, n), partial(_on_segment, ends=self.ends[:, n]))
         for n in range(len(self.arcs.surface)):
@@ -104,7 +105,7 @@ class _Room:
         if not len(places):
             return free
         for *_, nearest in self.surfaces(places.min(axis=0) - radius, places.max(axis=0) + radius):
-            free &= np.hypot(*(places.T - nearest(places))) >= radius
+            free &= hypot(*(places.T - nearest(places))) >= radius
         return free
 
     def cleared(self, releases: Releases, radius: Numbers) -> Releases:
@@ -116,19 +117,23 @@ class _Room:
         places = releases.position.T.copy()
         low, high = places - radius, places + radius
         if not self.scene.shape:
-            low, high = low.min(axis=1), high.max(axis=1)
+            low, high = np.minimum.reduce(low, axis=1), np.maximum.reduce(high, axis=1)
+        belt, walks = self.scene.incoming, ~releases.carried
+        others = np.count_nonzero(walks) > 0
         for surface, appears, vanishes, nearest in self.surfaces(low, high):
+            onto = surface == 0 and belt is not None
+            if onto and not others:
+                continue
             there = (appears <= releases.t) & (releases.t < vanishes)
-            if surface == 0 and self.scene.incoming is not None:
-                there &= ~releases.carried
+            if onto:
+                there &= walks
             if np.count_nonzero(there):
                 releases = self.out(releases, nearest, radius, there, self.names[surface])
-        belt = self.scene.incoming
-        if belt is not None and not releases.carried.all():
+        if belt is not None and others:
             # A point may start anywhere.
             reach = np.where(np.greater(radius, 0.0), belt.pulley_radius + radius, 0.0)
             axis = np.zeros((2, 1))
-            releases = self.out(releases, lambda _: axis, reach, ~releases.carried, "incoming")
+            releases = self.out(releases, lambda _: axis, reach, walks, "incoming")
         return releases
 
     def out(
@@ -138,7 +143,7 @@ class _Room:
         scene, places = self.scene, releases.position
         points = nearest(places)
         away = places.T - points
-        distance = np.hypot(*away)
+        distance = hypot(*away)
         for kind, particle in enumerate(scene.particles):
             # A box reaches as far as its furthest corner that way.
             boxes = (releases.kind == kind).nonzero()[0] if particle.outline else []
@@ -233,7 +238,7 @@ def build(scene: Scene) -> Machine:
             bends += [(number, gate, (*bend, *values)) for bend in part.bends]
     columns, common = _pieces(scene, lines, 5)
     along = columns[2:4] - columns[0:2]
-    length = np.hypot(along[0], along[1])
+    length = hypot(along[0], along[1])
     segments = Segments(
         start=columns[0:2].T,
         tangent=(along / length).T,
@@ -257,7 +262,7 @@ def build(scene: Scene) -> Machine:
             friction=np.array(grip) if len(grip) > 1 else grip[0],
             restitution=np.array(bounce) if len(grip) > 1 else bounce[0],
             surface=0,
-            incline=belt.incline_deg * (pi / 180.0),
+            incline=belt.incline_deg * RADIANS,
         )
     every = range(len(particles))
     pairs = np.array([[scene.met(a, b) for b in every] for a in every])
@@ -300,6 +305,9 @@ def _pieces(scene: Scene, pieces: Sequence[Piece], count: int) -> tuple[Floats, 
     kinds = 1 if scene.shape else len(scene.particles)
     columns = np.empty((count + 2 * kinds, len(pieces), *scene.shape))
     for n, (_, _, numbers) in enumerate(pieces):
+        if not scene.shape:
+            columns[:, n] = numbers
+            continue
         for column, value in zip(columns, numbers, strict=True):
             column[n] = value
     appears, vanishes = np.array([gate for _, gate, _ in pieces]).reshape(-1, 2).T.copy()
@@ -355,7 +363,11 @@ def _particle(scene: Scene, kind: Ints, radius: Floats | None) -> Particle:
     nominal = np.array([one.radius for one in scene.particles])[kind]
     radius = nominal if radius is None else radius
     size = radius / nominal
-    return Particle(radius, np.array(masses)[kind] * size**3, np.array(inertias)[kind] * size**5)
+    # Powers of libraries differ in the last bit.
+    square = size * size
+    cube = square * size
+    mass, inertia = np.array(masses)[kind], np.array(inertias)[kind]
+    return Particle(radius, mass * cube, inertia * (cube * square))
 
 
 def _threads(scene: Scene, releases: Releases) -> tuple[Thread, ...]:
@@ -370,14 +382,14 @@ def _threads(scene: Scene, releases: Releases) -> tuple[Thread, ...]:
 def _turned(x: Numbers, y: Numbers, alpha: Numbers, below: Numbers, above: Numbers) -> list[Point]:
     """Return the ends of a plate that hangs from a pivot (m), at an angle (rad) from upright."""
     # Upwards, so that the struck face (-cos α, -sin α) lies to the left of the tangent.
-    sine, cosine = np.sin(alpha), np.cos(alpha)
+    sine, cosine = sin_cos(alpha)
     return [(x - reach * sine, y + reach * cosine) for reach in (-below, above)]
 
 
 def _hanging(plate: Plate) -> Part:
     assert plate.pivot is not None
     below = REACH_HANGING if plate.below is None else plate.below
-    ends = _turned(*plate.pivot, np.radians(plate.angle_deg), below, plate.above)
+    ends = _turned(*plate.pivot, plate.angle_deg * RADIANS, below, plate.above)
     return Part(str(plate.name), [(ends, 0.0)])
 
 
@@ -411,7 +423,7 @@ def _free(surface: Surface) -> Part:
         return Part(surface.name, lines, gates=gates)
     assert surface.radius is not None
     (x, y), r = surface.center, surface.radius
-    first, last = np.radians(surface.from_deg), np.radians(surface.to_deg)
+    first, last = surface.from_deg * RADIANS, surface.to_deg * RADIANS
     speed = surface.speed if surface.to_deg < surface.from_deg else -surface.speed
     begin, extent = np.minimum(first, last), np.abs(last - first)
     bends = [(x + a, y + b, r, begin, extent, speed) for a, b in shifts]
@@ -441,8 +453,8 @@ def _conveyors(scene: Scene) -> tuple[list[Part], list[Caution]]:
         _refuse(scene, missed, "outgoing.drop_from", "impact", lambda _: text)
         height = hit[1] - out.drop - r
     if plate is not None:
-        alpha = np.radians(plate.angle_deg)
-        sine, cosine = np.sin(alpha), np.cos(alpha)
+        alpha = plate.angle_deg * RADIANS
+        sine, cosine = sin_cos(alpha)
         x, y = top + plate.distance, plate.pivot_height
         below: Numbers = REACH_WITHOUT_BELT
         if plate.below is not None:

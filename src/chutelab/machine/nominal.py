@@ -22,6 +22,7 @@ from chutelab.mechanics.contact import (
 )
 from chutelab.scene import Scene
 from chutelab.util.arrays import Bools, Floats, Ints, Numbers
+from chutelab.util.trig import RADIANS, sin_cos
 
 STEPS = 100_000
 """Knots of a ride after which it counts as one without an end; a quarter turn takes 65, the slowest
@@ -48,15 +49,19 @@ def discharge(scene: Scene) -> tuple[Pair, Pair]:
     if scene.incoming is None or not on_belt(scene):
         return position, velocity
     (x, y), (vx, vy), (cosine, sine) = position, velocity, up_belt(scene)
-    if np.count_nonzero(np.abs(vy * cosine - vx * sine) > ALONG * np.hypot(vx, vy)):
-        return position, velocity
+    if scene.stream.velocity is not None:
+        across = np.abs(vy * cosine - vx * sine)
+        if np.count_nonzero(across > ALONG * np.hypot(vx, vy)):
+            return position, velocity
     rho, speed = scene.incoming.pulley_radius + scene.particle.radius, scene.incoming.speed
     if not isinstance(scene.met(scene.kinds[0], "incoming")[1], str):
         return _slip_round(scene, rho, vx * cosine + vy * sine, 0.0 - (x * cosine + y * sine))
     # Adhesion lets go where cos φ1 = v²/(g ρ), Eq. (2), or where the belt ends if that is more.
     ratio = np.divide(speed * speed, scene.gravity * rho)
     grip = np.where(np.greater(speed, 0.0), np.minimum(ratio, cosine), nan)
-    side = np.where(grip < cosine, np.sqrt((1.0 - grip) * (1.0 + grip)), grip * 0.0 - sine)
+    side = np.sqrt((1.0 - grip) * (1.0 + grip))
+    if np.count_nonzero(sine):
+        side = np.where(grip < cosine, side, grip * 0.0 - sine)
     return (rho * side, rho * grip), (speed * grip, 0.0 - speed * side)
 
 
@@ -155,8 +160,8 @@ def plate_hit(scene: Scene) -> Pair:
     """
     if scene.plate is None or scene.incoming is None:
         return nan, nan
-    alpha = np.radians(scene.plate.angle_deg)
-    nx, ny = -np.cos(alpha), -np.sin(alpha)
+    sine, cosine = sin_cos(scene.plate.angle_deg * RADIANS)
+    nx, ny = -cosine, -sine
     pivot_x = scene.incoming.pulley_radius + scene.plate.distance
     pivot_y = scene.plate.pivot_height
     (x, y), (vx, vy) = discharge(scene)

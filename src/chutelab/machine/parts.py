@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 from chutelab.machine.releases import Releases
 from chutelab.scene import Scene
 from chutelab.util.arrays import Bools, Floats, Ints
+from chutelab.util.trig import sin_cos
 
 DRIVE_PULLEY = "the drive pulley"
 
@@ -206,7 +207,8 @@ class Arcs(Pieces):
 
     def point(self, angle: ArrayLike) -> Floats:
         """Return the points of the arcs at angles (..., A) from the x axis, (..., A, 2), m."""
-        direction = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        sine, cosine = sin_cos(np.asarray(angle))
+        direction = np.stack([cosine, sine], axis=-1)
         return np.asarray(self.center + self.radius[..., None] * direction)
 
     @property
@@ -351,8 +353,7 @@ def origin(machine: Machine) -> tuple[float, float]:
     It is (0, 0) unless the machine is many times its own size away from there; and so round a
     number that taking it off a coordinate loses no digit.
     """
-    corners = machine.corners
-    if machine.pulley is not None or not corners.size:
+    if machine.pulley is not None or not (corners := machine.corners).size:
         return 0.0, 0.0
     axes = tuple(range(corners.ndim - 1))
     low, high = corners.min(axis=axes), corners.max(axis=axes)

@@ -12,6 +12,7 @@ from chutelab.scene import Fault, Scene, SceneError, Stream
 from chutelab.scene.conflicts import beside
 from chutelab.util.arrays import Bools, Floats, Ints, Numbers
 from chutelab.util.tables import number
+from chutelab.util.trig import RADIANS, hypot, sin_cos
 
 TRIES = 1000
 """Draws of a height that may overlap an earlier particle before it has to wait for its place."""
@@ -59,9 +60,7 @@ def up_belt(scene: Scene) -> tuple[float, float]:
     assert scene.incoming is not None
     if not np.count_nonzero(scene.incoming.incline_deg):
         return 1.0, 0.0
-    incline: float = np.radians(scene.incoming.incline_deg)
-    cosine: float = np.cos(incline)
-    sine: float = np.sin(incline)
+    sine, cosine = sin_cos(scene.incoming.incline_deg * RADIANS)
     return cosine, sine
 
 
@@ -268,14 +267,14 @@ def _draw(scene: Scene, n: int) -> Draw:
     stream, particle = scene.streams[n], scene.particles[scene.kinds[n]]
     every = stream.count * prod(scene.shape)
     # Those of each scene of a family follow another.
-    t = np.tile(np.arange(stream.count), prod(scene.shape)) / stream.rate
+    t = np.arange(every) % stream.count / stream.rate
     if stream.at_once:
         t = np.zeros(every)
     if stream.start:
         t += stream.start
     position, velocity = np.empty((2, every, 2))
     velocity[:, 0], velocity[:, 1] = release_velocity(scene, n)
-    height, radii, faster = np.zeros(every), None, np.zeros(every)
+    height, radii = np.zeros(every), None
     crowded = stream.count > 1 and scene.crowded
     # The first one has no spread. Making a generator takes as long as all other preparations.
     spread = stream.bed_height > 0.0 or stream.speed_spread > 0.0
@@ -286,7 +285,7 @@ def _draw(scene: Scene, n: int) -> Draw:
         faster = stream.speed_spread * rng.uniform(-1.0, 1.0, every)
         faster[0] = 0.0
         x, y = release_velocity(scene, n)
-        speed = float(np.hypot(x, y))
+        speed = float(hypot(x, y))
         velocity += faster[:, None] * ((x / speed, y / speed) if speed > 0.0 else (1.0, 0.0))
         radii = _radii(scene, n, rng)
     if stream.to is not None:
@@ -346,7 +345,7 @@ def _pour(scene: Scene, n: int, before: Sequence[Draw], clear: Clear) -> Draw:
         other = scene.particles[kind].radius if one.radius is None else one.radius
         theirs = one.releases.position
         for place, r in zip(theirs, np.broadcast_to(other, len(theirs)), strict=True):
-            free &= np.hypot(*(places - place).T) >= largest + r
+            free &= hypot(*(places - place).T) >= largest + r
     places = places[free]
     if len(places) < stream.count:
         several = f"[{n}]" * (len(scene.streams) > 1)

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from chutelab.machine import Machine
 from chutelab.results.recording import EVENT, KNOT, Kind, Recording
-from chutelab.util.arrays import Ints
+from chutelab.util.arrays import Floats, Ints
 
 
 class StalledError(RuntimeError):
@@ -69,6 +69,8 @@ class Recorder:
         self.contacts = 0
         self._knots: list[NDArray[Any]] = []
         self._owners: list[Ints] = []
+        self._angles: list[Floats] = []
+        self._angular = any(outline is not None for outline in machine.outlines)
         self._events: list[NDArray[Any]] = []
 
     def knots(
@@ -78,6 +80,7 @@ class Recorder:
         position: ArrayLike,
         velocity: ArrayLike,
         omega: ArrayLike,
+        angle: ArrayLike = 0.0,
     ) -> None:
         """Add one knot for each of some particles, with the entries booked so far.
 
@@ -88,12 +91,17 @@ class Recorder:
         chunk = np.empty(len(owner), dtype=KNOT)
         chunk["t"], chunk["position"], chunk["velocity"] = t, position, velocity
         chunk["omega"], chunk["entries"] = omega, self.entries[owner]
-        self.add(owner, chunk)
+        self.add(owner, chunk, angle)
 
-    def add(self, particle: Ints, knots: NDArray[Any]) -> None:
-        """Add finished knots (k,) of particles (k,), each particle's in the order of time."""
+    def add(self, particle: Ints, knots: NDArray[Any], angle: ArrayLike = 0.0) -> None:
+        """Add finished knots (k,) of particles (k,), each particle's in the order of time.
+
+        Angles (rad) are kept where some are boxes or polygons.
+        """
         self._knots.append(knots)
         self._owners.append(particle)
+        if self._angular:
+            self._angles.append(np.broadcast_to(np.asarray(angle, dtype=float), len(knots)).copy())
 
     def book(
         self,
@@ -154,14 +162,20 @@ class Recorder:
         knots = _joined(self._knots, KNOT)
         owners = np.concatenate([np.empty(0, dtype=np.int64), *self._owners])
         self._owners.clear()
+        angle = np.concatenate([np.zeros(0), *self._angles])
+        self._angles.clear()
         if np.any(owners[1:] < owners[:-1]):
-            knots = knots.take(np.argsort(owners, kind="stable"))
+            order = np.argsort(owners, kind="stable")
+            knots = knots.take(order)
+            angle = angle.take(order) if self._angular else angle
         sizes = np.bincount(owners, minlength=count)
         offsets = np.zeros(count + 1, dtype=np.int64)
         sizes.cumsum(out=offsets[1:])
         lonely = (sizes == 1).nonzero()[0]
         if len(lonely):
             # A track needs an interval: a lone knot is its own end.
+            if self._angular:
+                angle = np.insert(angle, offsets[lonely], angle[offsets[lonely]])
             knots = np.insert(knots, offsets[lonely], knots[offsets[lonely]])
             np.cumsum(np.where(sizes == 1, 2, sizes), out=offsets[1:])
         events = _joined(self._events, EVENT)
@@ -184,6 +198,7 @@ class Recorder:
             steps=steps,
             contacts=self.contacts,
             seconds=seconds,
+            angle=angle,
         )
 
 

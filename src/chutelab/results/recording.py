@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import cached_property
 from math import isnan, nan
@@ -164,6 +164,10 @@ class Recording(Shown):
         Impacts and collisions resolved.
     seconds : float
         Wall time from the validated scene to the recording; NaN in one that was loaded.
+    angle : ndarray, shape (K,), or (0,)
+        How far a particle has turned counterclockwise since its release at each knot, rad, where
+        some are boxes or polygons: Chipmunk turns them to part what overlaps, and ω does not tell.
+        Empty where all are round: there it is the integral of ω.
     """
 
     machine: Machine
@@ -176,9 +180,10 @@ class Recording(Shown):
     steps: int
     contacts: int
     seconds: float = nan
+    angle: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
-        for name in ("knots", "offsets", "ended", "events", "by_surface"):
+        for name in ("knots", "offsets", "ended", "events", "by_surface", "angle"):
             getattr(self, name).flags.writeable = False
 
     @property

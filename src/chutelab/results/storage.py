@@ -35,7 +35,9 @@ ARRAYS = {
     "ended": np.dtype("i1"),
     "events": EVENT,
     "by_surface": np.dtype("f8"),
+    "angle": np.dtype("f8"),
 }
+"""Arrays of a file and their types; `angle` is left out where it is empty."""
 
 HEADERS = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
 """Readers of an array's shape and type, by the version of its format."""
@@ -71,7 +73,9 @@ def save(recording: Recording, path: str | Path) -> Path:
     """Write a recording to an npz file, whole or not at all."""
     path = Path(path)
     header = json.dumps(_about(recording))
-    arrays = {name: getattr(recording, name) for name in ARRAYS}
+    arrays = {
+        name: getattr(recording, name) for name in ARRAYS if name != "angle" or recording.angle.size
+    }
     with whole(path) as unfinished, unfinished.open("wb") as file:
         np.savez_compressed(file, about=np.array(header), **arrays)
     return path
@@ -176,13 +180,17 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Recording:
     scene = from_dict(json.loads(about["scene"]), about["title"])
     # Of particles that were never released, any number is packed into next to nothing.
     room = 8 * (scene.count + 1)
-    arrays: dict[str, Any] = {name: _array(archive, name, room) for name in ARRAYS}
+    arrays: dict[str, Any] = {
+        name: _array(archive, name, room)
+        for name in ARRAYS
+        if name != "angle" or "angle.npy" in archive.namelist()
+    }
     about.pop("seconds", None)  # earlier files tell how long the run took
     told = {name: about[name] for name in ("engine", "steps", "contacts")}
     recording = Recording(machine=build(scene), **told, **arrays)
     if _about(recording) | {"scene": about["scene"]} != about:
         raise _UnfitError("the header is of another scene")
-    numbers = {"by_surface": arrays["by_surface"]}
+    numbers = {"by_surface": arrays["by_surface"], "angle": recording.angle}
     for name, dtype in (("knots", KNOT), ("events", EVENT)):
         numbers |= {f"{name}.{key}": arrays[name][key] for key in dtype.names or ()}
     for name, values in numbers.items():
@@ -197,6 +205,7 @@ def _recording(about: dict[str, Any], archive: zipfile.ZipFile) -> Recording:
         and offsets[0] == 0
         and offsets[-1] == len(knots)
         and not np.any((sizes < 0) | (sizes == 1))
+        and recording.angle.shape in ((0,), knots.shape)
         and recording.ended.shape == sizes.shape
         and not np.any((recording.ended < 0) | (recording.ended >= len(REASONS)))
         and recording.by_surface.shape == (surfaces, len(ENTRIES))

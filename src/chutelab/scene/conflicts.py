@@ -16,6 +16,7 @@ from chutelab.scene.materials import PRESETS
 from chutelab.scene.rules import SYMBOLS, THEORY, UNPROMISED, suggestion, unit_of
 from chutelab.scene.units import MOST_PARTICLES, read_size, write_size
 from chutelab.util.errors import MISSING, Fault, did_you_mean
+from chutelab.util.trig import RADIANS, sin_cos
 
 ON_BELT: Final = 1e-9
 """How near to the belt's height R + r a release counts as lying on the belt, m."""
@@ -93,7 +94,7 @@ class Look:
         """Return the value of a key, or its default; NaN if it is at fault or its table absent."""
         path = self.path(table, key, row)
         self.asked.add(path)
-        if not self.sound(path):
+        if self._faulty and not self.sound(path):
             return math.nan
         value = self._content(table, row).get(key)
         if value is not None:
@@ -110,10 +111,9 @@ class Look:
     def _content(self, table: str, row: int) -> dict[str, Any]:
         """Return the keys of a table, none of what is no table."""
         found = self._document.get(table)
-        if isinstance(found, LIST):
-            found = found[row] if row < len(found) else None
-        elif row:
-            found = None
+        if isinstance(found, dict):
+            return {} if row else found
+        found = found[row] if isinstance(found, LIST) and row < len(found) else None
         return found if isinstance(found, dict) else {}
 
 
@@ -171,7 +171,10 @@ def _names(look: Look) -> Iterator[Fault]:
     for table in (*SURFACES, "particle", "stream", "material"):
         known = surfaces if table in SURFACES else {}
         for row in range(look.rows(table)):
-            path, name = look.path(table, "name", row), look(table, "name", row)
+            name = look(table, "name", row)
+            if name is None and table != "particle":
+                continue
+            path = look.path(table, "name", row)
             if not isinstance(name, str):
                 if table == "particle" and look.rows(table) > 1 and look.sound(path):
                     yield Fault(path, MISSING, "a name; needed where there are several kinds")
@@ -333,8 +336,8 @@ def _release(look: Look, row: int) -> Iterator[Fault]:
         yield Fault(path("speed_spread"), look("stream", "speed_spread", row), text)
     if given("velocity") and look.sound(path("velocity")):
         velocity, speed = look("stream", "velocity", row), look("incoming", "speed")
-        angle = math.radians(look("incoming", "incline_deg"))
-        wanted = speed * math.cos(angle), speed * math.sin(angle)
+        sine, cosine = sin_cos(look("incoming", "incline_deg") * RADIANS)
+        wanted = speed * cosine, speed * sine
         if any(abs(v - w) > 1e-12 * abs(speed) for v, w in zip(velocity, wanted, strict=True)):
             text = f"{advice}; give a Coulomb coefficient, or leave the velocity out"
             yield Fault(path("velocity"), velocity, text)
@@ -353,9 +356,9 @@ def beside(x: float, y: float, height: float, length: float, incline_deg: float)
     The height is the pulley's radius and the particle's, m; the belt rises by the angle to where it
     is tangential to the pulley.
     """
-    angle = math.radians(incline_deg)
-    along = x * math.cos(angle) + y * math.sin(angle)
-    above = y * math.cos(angle) - x * math.sin(angle)
+    sine, cosine = sin_cos(incline_deg * RADIANS)
+    along = x * cosine + y * sine
+    above = y * cosine - x * sine
     return -length <= along <= 0.0 and abs(above - height) <= ON_BELT
 
 

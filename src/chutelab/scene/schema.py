@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import hypot, pi
+from math import hypot, pi, sqrt
 from typing import Annotated, Any, Final, Self
 
 from pydantic import BeforeValidator, Field, PrivateAttr, model_validator
@@ -122,7 +122,10 @@ class Scene(Table):
     @property
     def plate(self) -> Plate | None:
         """The damping plate."""
-        return next((plate for plate in self.plates if plate.pivot is None), None)
+        for plate in self.plates:
+            if plate.pivot is None:
+                return plate
+        return None
 
     @property
     def stream(self) -> Stream:
@@ -172,7 +175,9 @@ class Scene(Table):
         else:
             with_it = self.particles[other].name
             pairs = zip(self.met(kind, kind), self.met(other, other), strict=True)
-            values = tuple((a * b) ** 0.5 for a, b in pairs)
+            products: list[Any] = [a * b for a, b in pairs]
+            # A power of a half is no square root to the last bit.
+            values = tuple(sqrt(p) if isinstance(p, float) else p**0.5 for p in products)
         restitution, friction = values
         for pair in reversed(self.pair):
             if set(pair.between) == {particle.name, with_it}:
@@ -180,8 +185,10 @@ class Scene(Table):
                 friction = friction if pair.friction is None else pair.friction
         return restitution, friction
 
-    def _own(self, particle: Particle, homes: Sequence[Table], column: str = "") -> Any:
+    def _own(self, particle: Particle, homes: Sequence[Any], column: str = "") -> Any:
         """Return what tables say, else the material, else the default of the first."""
+        if particle.material is None and len(homes) == 1:
+            return homes[0].restitution, homes[0].friction
         material, values = self._material(particle), []
         for key in ("restitution", "friction"):
             said = [home for home in homes if key in home.model_fields_set]
@@ -327,7 +334,8 @@ class Scene(Table):
         if shaped:
             filled._fill("radius", max(hypot(x, y) for x, y in filled.outline))
         if density is not None:
-            filled._fill("mass", density * (4.0 / 3.0 * pi) * filled.radius**3)
+            size = filled.radius
+            filled._fill("mass", density * (4.0 / 3.0 * pi) * (size * size * size))
         return filled
 
     def _with_rate(self, stream: Stream, number: int, kind: int) -> Stream:

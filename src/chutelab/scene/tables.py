@@ -95,7 +95,8 @@ class Particle(Resolved):
         if self.span is None:
             return self.mass
         low, high = self.span
-        return self.mass * 0.25 * (low + high) * (low * low + high * high) / self.radius**3
+        cube = self.radius * self.radius * self.radius
+        return self.mass * 0.25 * (low + high) * (low * low + high * high) / cube
 
     @property
     def moment(self) -> float:

@@ -24,6 +24,7 @@ from chutelab.theory.obstacles import (
 )
 from chutelab.theory.results import Reason, Transfer, cut, unanswered
 from chutelab.theory.transfer import Rebound, transfer
+from chutelab.util.trig import RADIANS, hypot, sin_cos
 
 if TYPE_CHECKING:
     # The paper's tables are there without the model of a scene.
@@ -58,23 +59,25 @@ class Course:
         self.own = scene.particles[self.kind]
         self.radius = self.own.radius
         self.ride_radius = self.belt.pulley_radius + self.radius
-        self.angle = np.radians(plate.angle_deg)
+        self.angle = plate.angle_deg * RADIANS
         # Up along the plate, and out of its struck face.
-        self.up = np.array([-np.sin(self.angle), np.cos(self.angle)])
-        self.normal = np.array([-np.cos(self.angle), -np.sin(self.angle)])
+        sin, cos = sin_cos(self.angle)
+        self.up = np.array([-sin, cos])
+        self.normal = np.array([-cos, -sin])
         ahead = self.belt.pulley_radius + plate.distance
         self.pivot = np.array([ahead, plate.pivot_height], dtype=np.float64)
-        self.incline = float(np.radians(self.belt.incline_deg))
+        self.incline = self.belt.incline_deg * RADIANS
         # Up along the incoming belt, and out of its upper side.
-        self.along = np.array([np.cos(self.incline), np.sin(self.incline)])
-        self.above = np.array([-np.sin(self.incline), np.cos(self.incline)])
+        sin, cos = sin_cos(self.incline)
+        self.along = np.array([cos, sin])
+        self.above = np.array([-sin, cos])
 
-        cos, sin = np.cos(found.phi1), np.sin(found.phi1)
+        sin, cos = sin_cos(float(found.phi1))
         left = self.ride_radius * np.array([sin, cos])
         self.separation = Flight(left, found.v1 * np.array([cos, -sin]), scene.gravity)
         # The centre on the plate's line; NaN if it never gets there.
         self.impact = np.array([left[0] + found.x2, left[1] - found.y2])
-        away, down = found.v2r * np.sin(found.phi2r), found.v2r * np.cos(found.phi2r)
+        away, down = (found.v2r * part for part in sin_cos(float(found.phi2r)))
         self.rebounded = Flight(self.impact, away * self.normal - down * self.up, scene.gravity)
 
         # None if there is no outgoing belt, or nothing to measure its height from.
@@ -88,7 +91,7 @@ class Course:
             below = REACH_WITHOUT_BELT
             if self.belt_height is not None:
                 lowest = self.belt_height + max(LEAST_CLEARANCE, RADII_CLEARANCE * self.radius)
-                below = max((self.pivot[1] - lowest) / np.cos(self.angle), 0.0)
+                below = max((self.pivot[1] - lowest) / sin_cos(self.angle)[1], 0.0)
         # From the pivot upwards along the plate.
         self.plate_reach = -below, plate.above
         # Plate, outgoing belt and free surfaces, in this order; and round ones.
@@ -123,15 +126,15 @@ def free_surfaces(scene: Scene) -> tuple[list[Line], list[Bend]]:
     bends: list[Bend] = []
     for plate in scene.plates:
         if plate.pivot is not None:
-            angle = np.radians(plate.angle_deg)
-            up = np.array([-np.sin(angle), np.cos(angle)])
+            sin, cos = sin_cos(plate.angle_deg * RADIANS)
+            up = np.array([-sin, cos])
             below = REACH_HANGING if plate.below is None else plate.below
             pivot = np.array(plate.pivot)
             lines.append((str(plate.name), pivot - below * up, pivot + plate.above * up))
     for belt in scene.conveyor:
         axes, r = np.array([belt.from_, belt.to]), belt.pulley_radius
         way = axes[1] - axes[0]
-        off = r / np.hypot(*way) * np.array([-way[1], way[0]])
+        off = r / hypot(*way) * np.array([-way[1], way[0]])
         lines += [(belt.name, axes[0] + side, axes[1] + side) for side in (off, -off)]
         bends += [(belt.name, axis, r, 0.0, 2.0 * np.pi) for axis in axes]
     for free in scene.surface:
@@ -144,7 +147,7 @@ def free_surfaces(scene: Scene) -> tuple[list[Line], list[Bend]]:
                 points = shift + np.array(free.points)
                 lines += [(free.name, first, second) for first, second in pairwise(points)]
             else:
-                first, last = np.radians([free.from_deg, free.to_deg])
+                first, last = free.from_deg * RADIANS, free.to_deg * RADIANS
                 place = shift + np.array(free.center)
                 bends.append((free.name, place, free.radius, min(first, last), abs(last - first)))
     return lines, bends
@@ -214,17 +217,18 @@ def unbounded(scene: Scene, rebound: Rebound = "corrected") -> Transfer:
     own = scene.particles[kind]
     restitution, plate_friction = scene.met(kind, "plate")
     _, friction = scene.met(kind, "incoming")
-    incline = np.radians(belt.incline_deg)
+    incline = belt.incline_deg * RADIANS
     ride_length = belt.length
     if stream.at is not None:
-        ride_length = -(stream.at[0] * np.cos(incline) + stream.at[1] * np.sin(incline))
+        sin, cos = sin_cos(incline)
+        ride_length = -(stream.at[0] * cos + stream.at[1] * sin)
 
     def found(drop: ArrayLike, belt_speed: ArrayLike) -> Transfer:
         return transfer(
             speed=belt.speed,
             pulley_radius=belt.pulley_radius,
             distance=plate.distance,
-            angle=np.radians(plate.angle_deg),
+            angle=plate.angle_deg * RADIANS,
             pivot_height=plate.pivot_height,
             restitution=restitution,
             drop=drop,
@@ -250,7 +254,7 @@ def unbounded(scene: Scene, rebound: Rebound = "corrected") -> Transfer:
     impact = found(0.0, out.speed)
     # Eq. (16) solved for d2; `predict` refuses a belt above the impact
     ride_radius = belt.pulley_radius + own.radius
-    sunk = ride_radius * (1.0 - np.cos(impact.phi1)) + impact.y2
+    sunk = ride_radius * (1.0 - sin_cos(impact.phi1)[1]) + impact.y2
     return found(np.maximum(out.drop - sunk, 0.0), out.speed)
 
 
@@ -269,7 +273,7 @@ def _outside(scene: Scene) -> str:
         return "the particle hangs on a string"
     if stream.fill is not None or stream.to is not None:
         return "the stream is not released at a point of the incoming belt"
-    cos, sin = np.cos(np.radians(belt.incline_deg)), np.sin(np.radians(belt.incline_deg))
+    sin, cos = sin_cos(belt.incline_deg * RADIANS)
     if stream.at is not None:
         x, y = stream.at
         above = y * cos - x * sin - belt.pulley_radius - own.radius
@@ -366,7 +370,7 @@ def _after_the_rebound(course: Course) -> Trouble:
 def _plate_again(course: Course, horizon: float) -> float:
     """Return when the plate is touched again, inf if not before `horizon`."""
     flight = course.rebounded
-    pressing = -flight.gravity * np.sin(course.angle)
+    pressing = -flight.gravity * sin_cos(course.angle)[0]
     if pressing <= 0.0:
         return np.inf
     low, high = course.plate_reach

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from chutelab.util.arrays import Bools, Floats, Ints
+from chutelab.util.trig import arc_cos, atan2, sin_cos
 
 MOST_ROUNDS = 100
 """Newton rounds; fewer than 20 are ever used, as it starts within e² of the root."""
@@ -90,7 +91,7 @@ def separation(
     sin = np.sqrt((1.0 - cos) * (1.0 + cos))
     count = len(speed)
     never, sound = np.full(count, np.inf), np.zeros(count, dtype=np.int64)
-    left = Separation(np.arctan2(sin, cos), cos, sin, speed.copy(), np.zeros(count), never, sound)
+    left = Separation(atan2(sin, cos), cos, sin, speed.copy(), np.zeros(count), never, sound)
     slips = (start < 1.0) & np.isfinite(friction)
     if not (slips.any() or np.any(incline)):
         return left
@@ -172,7 +173,7 @@ def _inclined(
     """
     unit, endless = gravity * radius, np.isinf(friction)
     friction, turns = np.where(endless, 0.0, friction), spin & ~endless
-    sin, cos, rises = np.sin(incline), np.cos(incline), incline > 0.0
+    (sin, cos), rises = sin_cos(incline), incline > 0.0
     # Held, friction bears this share of the weight along the path, and the rest accelerates.
     share = np.where(turns, inertia / (1.0 + inertia), 1.0)
     slides = ~endless & (np.abs(sin) * share > friction * cos)
@@ -192,7 +193,7 @@ def _inclined(
     # On the pulley the load is less: it may slip at once, forward or back.
     forward = ~lifts & ~rises & slides
     back = ~lifts & rises & (slides | (~endless & (sin * share > friction * (cos - u))))
-    phi1 = np.where(lifts, -incline, np.arccos(np.where(lifts, 1.0, u)))
+    phi1 = np.where(lifts, -incline, arc_cos(np.where(lifts, 1.0, u)))
     gain = np.where(turns, 2.0 / (1.0 + inertia), 0.0)
     start = np.where(turns & ~slides, u - gain * (1.0 - cos), np.minimum(belt, u))
     begin = -incline
@@ -211,7 +212,8 @@ def _inclined(
         start[dragged] = np.minimum(belt[dragged], 1.0)
     bad = fault != 0
     phi1, v, rim = (np.where(bad, np.nan, part) for part in (phi1, v, rim))
-    left = Separation(phi1, np.cos(phi1), np.sin(phi1), v, rim, again, fault)
+    sin, cos = sin_cos(phi1)
+    left = Separation(phi1, cos, sin, v, rim, again, fault)
     return left, _Ride(begin, start, belt, forward, u, rim / np.sqrt(unit)), slips
 
 

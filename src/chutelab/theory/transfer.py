@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from chutelab.theory.results import STAGES, Reason, Transfer
 from chutelab.theory.separation import FAULTS, separation
 from chutelab.util.arrays import Bools, Floats
+from chutelab.util.trig import atan2, hypot, sin_cos
 
 Rebound = Literal["corrected", "as-printed"]
 
@@ -281,11 +282,11 @@ def stages(
     # Fly to the plate: the gap between disk and plate's line is a quadratic in time.
     found.require("|angle| < π/2", np.abs(angle) < 0.5 * np.pi)
     found.require("finite distance and pivot_height", np.isfinite(distance + pivot_height))
-    cos, sin = np.cos(angle), np.sin(angle)
+    sin, cos = sin_cos(angle)
     to_pivot = (pulley_radius + distance) * cos + pivot_height * sin - particle_radius
     # The gap on the pulley is least where the centre's radius is square to the plate.
     closest = np.clip(0.5 * np.pi - angle, -incline, left.phi1)
-    behind = to_pivot < ride_radius * np.sin(closest + angle)
+    behind = to_pivot < ride_radius * sin_cos(closest + angle)[0]
     behind &= found.fine
     if unbounded_plate:
         found.fail(behind, Reason.EARLY.because("plate: its line is reached during the ride"))
@@ -312,7 +313,7 @@ def stages(
     v2x = left.v1 * left.cos
     v2y = left.v1 * left.sin + gravity * t2
     tangential = v2x * sin + v2y * cos
-    v2, phi2 = np.hypot(v2x, v2y), np.arctan2(normal, tangential)  # Eqs. (6), (7)
+    v2, phi2 = hypot(v2x, v2y), atan2(normal, tangential)  # Eqs. (6), (7)
     found.keep(t2=t2, x2=x2, y2=y2, v2x=v2x, v2y=v2y, v2=v2, phi2=phi2)
 
     # Leave the plate: normal and tangential (down the plate) velocity, and the rim's.
@@ -323,17 +324,17 @@ def stages(
             "plate_friction = 0 and angle = 0 for Eq. (9) as printed",
             (plate_friction == 0.0) & (angle == 0.0),
         )
-        v2r = np.hypot(normal, restitution * tangential)  # Eq. (9) as printed
-        phi2r = np.arctan2(restitution * normal, tangential)  # Eq. (8)
-        away, down = v2r * np.sin(phi2r), v2r * np.cos(phi2r)
+        v2r = hypot(normal, restitution * tangential)  # Eq. (9) as printed
+        phi2r = atan2(restitution * normal, tangential)  # Eq. (8)
+        away, down = (v2r * part for part in sin_cos(phi2r))
         rim = left.rim
     else:
         away, down, rim = rebound(
             normal=normal, tangential=tangential, rim=left.rim, restitution=restitution,
             friction=plate_friction, spin=spin, inertia=inertia,
         )  # fmt: skip
-        v2r = np.hypot(away, down)  # Eq. (9) corrected
-        phi2r = np.arctan2(away, down)  # Eq. (8)
+        v2r = hypot(away, down)  # Eq. (9) corrected
+        phi2r = atan2(away, down)  # Eq. (8)
     found.keep(phi2r=phi2r, v2r=v2r, omega2=turning(rim))
 
     # Fall on the outgoing belt, and be taken along by it.
@@ -367,7 +368,7 @@ def stages(
         y3=drop,  # Eq. (11), solved for t3
         v3x=v3x,
         v3y=v3y,
-        v3=np.hypot(v3x, v3y),  # Eq. (13)
+        v3=hypot(v3x, v3y),  # Eq. (13)
         d3=ride_radius * lost_height + found.values["y2"] + drop,  # Eq. (16)
         dEk=dEk,
         P=dEk / interval,  # Eq. (15)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import inf
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from chutelab.checks.stress.evidence import ON_ARCS, PIECES, PRESSED, Evidence, Verdict, worst
-from chutelab.machine import Machine
+from chutelab.checks.stress.surfaces import Piece
 from chutelab.results import REASONS, Kind
 from chutelab.util.arrays import Floats, Ints
 
@@ -26,48 +27,67 @@ COLLISIONS = 300
 """Collisions, and releases, at which that is done besides, at most."""
 
 
+def _touchable(e: Evidence, piece: Piece) -> tuple[Ints, Floats]:
+    """Return the samples (c,) at which a piece is there for a particle, and their gaps (c,), m.
+
+    A gate shuts on nobody: who is in the way as it appears is not touched until clear of it. A step
+    that is under way as it appears may end before it is noticed.
+    """
+    s = e.samples
+    if piece.appears == -inf and piece.vanishes == inf:
+        return np.arange(len(s.t)), piece.gap(s.position, e.radii[s.particle])
+    late = e.dt or 0.0
+    on = np.flatnonzero(piece.there(s.t) & (s.t >= piece.appears + late))
+    who = s.particle[on]
+    gap = piece.gap(s.position[on], e.radii[who])
+    if piece.appears == -inf or not len(on):
+        return on, gap
+    clear = np.cumsum(gap >= -(e.rounding + e.arcs + e.late))
+    first = np.flatnonzero(np.diff(who, prepend=-1))
+    begun: Ints = clear[first] - np.diff(clear, prepend=0)[first]
+    before = np.repeat(begun, np.diff(first, append=len(on)))
+    kept = clear > before
+    return on[kept], gap[kept]
+
+
 def no_one_through(e: Evidence) -> Verdict | None:
     """No centre passes a surface between its ends; the figure counts the passages."""
-    s, segments = e.samples, e.machine.segments
-    if not len(segments.length) or not len(s.t):
+    s = e.samples
+    if not e.pieces or not len(s.t):
         return None
-    clear = max(e.rounding, ON_ARCS * e.machine.particle.radius)
+    clear = max(e.rounding, ON_ARCS * e.radius)
     passages = []
-    for k in range(len(segments.length)):
-        aside, _ = _beside(e, k, s.position)
+    for piece in e.pieces:
+        rows, _ = _touchable(e, piece)
+        aside = piece.beside(s.position[rows])
         # Side on which it was last seen clearly, carried on through touches.
         seen = np.where(np.abs(aside) > clear, np.sign(aside), 0.0)
         last = np.maximum.accumulate(np.where(seen != 0.0, np.arange(len(seen)), 0))
-        side = seen[last]
-        flips = (side[1:] * side[:-1] < 0.0) & (s.particle[last[1:]] == s.particle[last[:-1]])
-        name = e.machine.surfaces[segments.surface[k]]
+        side, who = seen[last], s.particle[rows]
+        flips = (side[1:] * side[:-1] < 0.0) & (who[last[1:]] == who[last[:-1]])
         for at in np.flatnonzero(flips).tolist():
-            where = f"particle {s.particle[at]} through {name} at t = {s.t[at]:.6g} s"
-            if clear < _crossing(e, k, at, side[at]) < segments.length[k] - clear:
-                passages.append(where)
+            row = int(rows[at])
+            if piece.within(_crossing(e, piece, row, side[at]), clear).all():
+                passages.append(
+                    f"particle {s.particle[row]} through {piece.name} at t = {s.t[row]:.6g} s"
+                )
     return Verdict(len(passages), 0.0, passages[0] if passages else "passages")
 
 
-def _beside(e: Evidence, k: int, position: Floats) -> tuple[Floats, Floats]:
-    """Distances of places (c, 2) from the line of segment k, left positive, and along it, m."""
-    from_start, tangent = position - e.machine.segments.start[k], e.machine.segments.tangent[k]
-    return tangent[0] * from_start[:, 1] - tangent[1] * from_start[:, 0], from_start @ tangent
-
-
-def _crossing(e: Evidence, k: int, at: int, side: float) -> float:
-    """Return where along segment k a centre goes over from a side, between two samples, m."""
+def _crossing(e: Evidence, piece: Piece, at: int, side: float) -> Floats:
+    """Return where (1, 2) the line of a piece is crossed from a side, between two samples, m."""
     s = e.samples
     if s.left[at] != s.left[at + 1]:
         # A jump, from one interval to the next.
-        return float(_beside(e, k, s.position[at : at + 1])[1][0])
+        return s.position[at : at + 1]
     low, high = s.share[at], s.share[at + 1]
     for _ in range(ZOOMS):
         shares = np.linspace(low, high, PIECES + 1)
-        aside, foot = _beside(e, k, e.between(np.full(len(shares), s.left[at]), shares))
+        places = e.between(np.full(len(shares), s.left[at]), shares)
         # The last place on the old side: before it there may be a touch, where signs are rounding.
-        before = int(np.flatnonzero(aside * side > 0.0)[-1:].sum())
+        before = int(np.flatnonzero(piece.beside(places) * side > 0.0)[-1:].sum())
         low, high = shares[before], shares[min(before + 1, PIECES)]
-    return float(foot[before])
+    return places[before : before + 1]
 
 
 def depth(e: Evidence) -> Verdict | None:
@@ -75,29 +95,21 @@ def depth(e: Evidence) -> Verdict | None:
 
     What overlapped at the release may go on doing so, no deeper.
     """
-    s, m = e.samples, e.machine
-    if not len(s.t) or not (len(m.segments.length) or m.pulley is not None):
+    s = e.samples
+    if not len(s.t) or not e.pieces:
         return None
-    starts = np.flatnonzero(np.diff(s.particle, prepend=-1))
     found = []
-    for name, gap in gaps(m, s.position):
+    for piece in e.pieces:
+        rows, gap = _touchable(e, piece)
+        if not len(rows):
+            continue
+        starts = np.flatnonzero(np.diff(s.particle[rows], prepend=-1))
         first = np.minimum(gap[starts], 0.0)
         deeper = np.repeat(first, np.diff(starts, append=len(gap))) - gap
         at = int(np.argmax(deeper))
-        found.append((deeper[at], f"particle {s.particle[at]} in {name} at t = {s.t[at]:.6g} s"))
+        where = f"particle {s.particle[rows[at]]} in {piece.name} at t = {s.t[rows[at]]:.6g} s"
+        found.append((deeper[at], where))
     return worst(found, e.rounding + e.arcs + e.late, "m")
-
-
-def gaps(machine: Machine, position: Floats) -> Iterator[tuple[str, Floats]]:
-    """Yield every surface's name and its distances from disks round places (c, 2), m."""
-    seg, r = machine.segments, machine.particle.radius
-    for k in range(len(seg.length)):
-        from_start = position - seg.start[k]
-        foot = np.clip(from_start @ seg.tangent[k], 0.0, seg.length[k])
-        away = from_start - foot[:, None] * seg.tangent[k]
-        yield machine.surfaces[seg.surface[k]], np.hypot(away[:, 0], away[:, 1]) - r
-    if machine.pulley is not None:
-        yield "pulley", np.hypot(position[:, 0], position[:, 1]) - machine.pulley.radius - r
 
 
 def overlap(e: Evidence) -> Verdict | None:
@@ -108,7 +120,7 @@ def overlap(e: Evidence) -> Verdict | None:
     for now in np.concatenate([_instants(e), _some(e, Kind.COLLISION)["t"]]):
         (position,), _ = e.recording.at([now])
         there = np.flatnonzero(np.isfinite(position[:, 0]))
-        deep, i, j = closest(position[there], e.machine.particle.radius)
+        deep, i, j = closest(position[there], e.radii[there])
         if deep > 0.0:
             found.append((deep, f"particles {there[i]} and {there[j]} at t = {now:.6g} s"))
     return worst(found, e.rounding + 2.0 * e.late, "m")
@@ -123,32 +135,32 @@ def pressed(e: Evidence) -> Verdict | None:
     """
     if not e.crowd or e.dt is None:
         return None
-    r = e.machine.particle.radius
     found = []
     for now, (i, j), before, after in _pairs(e, e.dt):
-        deep = 2.0 - np.maximum(np.hypot(*before.T), np.hypot(*after.T)) / r
+        apart = np.maximum(np.hypot(*before.T), np.hypot(*after.T))
+        deep = (e.radii[i] + e.radii[j] - apart) / np.minimum(e.radii[i], e.radii[j])
         at = int(np.argmax(deep))
         found.append((deep[at], f"particles {i[at]} and {j[at]} at t = {now:.6g} s"))
-    return worst(found, PRESSED if e.engine == "contact" else 2.0 * e.late / r, "r")
+    return worst(found, PRESSED if e.engine == "contact" else 2.0 * e.late / e.radii.min(), "r")
 
 
 def no_one_through_another(e: Evidence) -> Verdict | None:
     """Slow disks do not pass through each other; the figure counts the pairs.
 
-    Slow are two that come nearer by less than a radius in a step: an engine sees them in touch
-    before they are inside. They pass where the centre of one gets into the other.
+    Slow are two that come nearer by less than the smaller radius in a step: an engine sees them in
+    touch before they are inside. They pass where the centre of the smaller gets into the other.
     """
     if not e.crowd or e.dt is None:
         return None
     passed: dict[tuple[int, int], str] = {}
-    r = e.machine.particle.radius
     for now, pairs, before, after in _pairs(e, e.dt):
         along = after - before
         way = np.hypot(*along.T)
         # Closest approach on the straight way of a step.
         share = -(before * along).sum(axis=1) / np.where(way > 0.0, way, 1.0) ** 2
         nearest = np.hypot(*(before + np.clip(share, 0.0, 1.0)[:, None] * along).T)
-        for a, b in np.sort(pairs.T[(way < r) & (nearest < r)]).tolist():
+        small, large = np.sort(e.radii[pairs], axis=0)
+        for a, b in np.sort(pairs.T[(way < small) & (nearest < large)]).tolist():
             passed.setdefault((a, b), f"pairs: {a} and {b} at t = {now:.6g} s")
     return Verdict(len(passed), 0.0, next(iter(passed.values()), "pairs"))
 
@@ -169,14 +181,14 @@ def _some(e: Evidence, kind: Kind) -> NDArray[Any]:
 
 def _pairs(e: Evidence, dt: float) -> Iterator[tuple[float, Ints, Floats, Floats]]:
     """Yield instants, pairs (2, k) in touch then or a step later, and b - a (k, 2) at both, m."""
-    reach = 2.0 * e.machine.particle.radius
+    reach = 2.0 * e.radius
     for now in _instants(e):
         (first, last), _ = e.recording.at([now, now + dt])
         there = np.flatnonzero(np.isfinite(first[:, 0]) & np.isfinite(last[:, 0]))
         room = reach + 2.0 * np.abs(last[there] - first[there]).max(initial=0.0)
         i, j = pairs = there[_neighbours(first[there, 0], room)]
         before, after = first[j] - first[i], last[j] - last[i]
-        touch = np.minimum(np.hypot(*before.T), np.hypot(*after.T)) < reach
+        touch = np.minimum(np.hypot(*before.T), np.hypot(*after.T)) < e.radii[i] + e.radii[j]
         if touch.any():
             yield float(now), pairs[:, touch], before[touch], after[touch]
 
@@ -191,14 +203,14 @@ def _neighbours(x: Floats, room: float) -> Ints:
     return order[np.stack([left, right])]
 
 
-def closest(position: Floats, radius: float) -> tuple[float, int, int]:
-    """Deepest overlap (m, negative if there is none) of places (n, 2), and of which two."""
-    i, j = _neighbours(position[:, 0], 2.0 * radius)
+def closest(position: Floats, radius: Floats) -> tuple[float, int, int]:
+    """Deepest overlap (m, negative if there is none) of disks (n, 2) and (n,), and of which two."""
+    i, j = _neighbours(position[:, 0], 2.0 * radius.max(initial=0.0))
     if not len(i):
-        return -np.inf, 0, 0
-    apart = np.hypot(*(position[j] - position[i]).T)
-    low = int(np.argmin(apart))
-    return 2.0 * radius - float(apart[low]), int(i[low]), int(j[low])
+        return -inf, 0, 0
+    deep = radius[i] + radius[j] - np.hypot(*(position[j] - position[i]).T)
+    at = int(np.argmax(deep))
+    return float(deep[at]), int(i[at]), int(j[at])
 
 
 def on_something(e: Evidence) -> Verdict | None:
@@ -206,14 +218,16 @@ def on_something(e: Evidence) -> Verdict | None:
 
     The figure is the largest distance of an event's place from what it names, less the radius, m.
     """
-    surfaces, found = e.machine.surfaces, []
+    surfaces, found, late = e.machine.surfaces, [], e.dt or 0.0
     events = e.recording.select(*AT_SURFACES)
     events = events[(events["surface"] >= 0) & (events["surface"] < len(surfaces))]
     if len(events):
-        off = np.full((len(surfaces), len(events)), np.inf)
-        for name, gap in gaps(e.machine, events["position"]):
-            row = surfaces.index("incoming" if name == "pulley" else name)
-            off[row] = np.minimum(off[row], np.abs(gap))
+        off = np.full((len(surfaces), len(events)), inf)
+        for piece in e.pieces:
+            gap = np.abs(piece.gap(events["position"], e.radii[events["particle"]]))
+            there = piece.there(events["t"], late)
+            row = off[piece.surface]
+            row[there] = np.minimum(row, gap)[there]
         far = off[events["surface"], np.arange(len(events))]
         hit = events[np.argmax(far)]
         place = f"particle {hit['particle']} off {surfaces[hit['surface']]}"
@@ -221,9 +235,9 @@ def on_something(e: Evidence) -> Verdict | None:
     for hit in _some(e, Kind.COLLISION):
         i, j = int(hit["particle"]), int(hit["other"])
         (place,), _ = e.recording.at([hit["t"]])
-        far = abs(np.hypot(*(place[j] - hit["position"])) - 2.0 * e.machine.particle.radius)
+        far = abs(np.hypot(*(place[j] - hit["position"])) - (e.radii[i] + e.radii[j]))
         # Of a partner that is not there it is no number.
-        far = np.nan_to_num(far, nan=np.inf)
+        far = np.nan_to_num(far, nan=inf)
         found.append((far, f"particles {i} and {j} at t = {hit['t']:.6g} s"))
     if not found:
         return None
@@ -236,16 +250,20 @@ def released_free(e: Evidence) -> Verdict | None:
     if not (e.crowd or len(e.machine.surfaces)) or not len(releases):
         return None
     found = []
-    for name, gap in gaps(e.machine, releases["position"]):
-        at = int(np.argmin(gap))
-        found.append((-gap[at], f"particle {releases['particle'][at]} in {name}"))
+    for piece in e.pieces:
+        there = releases[piece.there(releases["t"])]
+        if len(there):
+            gap = piece.gap(there["position"], e.radii[there["particle"]])
+            at = int(np.argmin(gap))
+            found.append((-gap[at], f"particle {there['particle'][at]} in {piece.name}"))
     for event in _some(e, Kind.RELEASE) if e.crowd else ():
         (place,), _ = e.recording.at([event["t"]])
-        apart = np.nan_to_num(np.hypot(*(place - event["position"]).T), nan=np.inf)
-        apart[event["particle"]] = np.inf
-        other = int(np.argmin(apart))
+        apart = np.nan_to_num(np.hypot(*(place - event["position"]).T), nan=inf)
+        deep = e.radii[event["particle"]] + e.radii - apart
+        deep[event["particle"]] = -inf
+        other = int(np.argmax(deep))
         where = f"particle {event['particle']} in {other} at t = {event['t']:.6g} s"
-        found.append((2.0 * e.machine.particle.radius - apart[other], where))
+        found.append((deep[other], where))
     # One that is released just behind another, in touch, may be seen a rounding too near.
     return worst(found, e.rounding, "m")
 
@@ -261,11 +279,11 @@ def settled_to_stay(e: Evidence) -> Verdict | None:
     if not len(settled):
         return None
     last = e.recording.knots[e.recording.offsets[settled + 1] - 1]
-    near = e.rounding + ON_ARCS * m.particle.radius + e.late
-    throws = [*(m.segments.speed != 0.0) & (m.segments.surface != m.landing)]
-    throws.append(m.pulley is not None and m.pulley.speed != 0.0)
+    near = e.rounding + ON_ARCS * e.radius + e.late
     thrown: dict[int, str] = {}
-    for moving, (name, gap) in zip(throws, gaps(m, last["position"]), strict=False):
-        for i in settled[(gap < near) & moving].tolist():
-            thrown.setdefault(i, f"particles: {i} on {name}")
+    for piece in e.pieces:
+        if piece.speed != 0.0 and piece.surface != m.landing:
+            on = piece.gap(last["position"], e.radii[settled]) < near
+            for i in settled[on & piece.there(last["t"])].tolist():
+                thrown.setdefault(i, f"particles: {i} on {piece.name}")
     return Verdict(len(thrown), 0.0, next(iter(thrown.values()), "particles"))

@@ -6,9 +6,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from operator import itemgetter
+from typing import Any
 
 import numpy as np
 
+from chutelab.checks.stress.surfaces import Bow, Piece, pieces
 from chutelab.machine import Machine
 from chutelab.results import Recording
 from chutelab.results.ledger import ledger
@@ -78,6 +80,29 @@ class Evidence:
         return self.engine == "pymunk" and (self.crowd or not self.machine.align)
 
     @cached_property
+    def pieces(self) -> list[Piece]:
+        """All pieces of its surfaces."""
+        return pieces(self.machine)
+
+    @cached_property
+    def radii(self) -> Floats:
+        """Radius of each particle, (N,), m."""
+        return self._of_each(self.machine.particle.radius)
+
+    @cached_property
+    def masses(self) -> Floats:
+        """Mass of each particle, (N,), kg."""
+        return self._of_each(self.machine.particle.mass)
+
+    @cached_property
+    def inertias(self) -> Floats:
+        """Moment of inertia of each particle, (N,), kg m²."""
+        return self._of_each(self.machine.particle.inertia)
+
+    def _of_each(self, value: Any) -> Floats:
+        return np.broadcast_to(np.asarray(value, dtype=float), self.recording.count)
+
+    @cached_property
     def samples(self) -> Samples:
         """Every knot, and places between: what happens in between is no shorter than a piece."""
         knots, offsets = self.recording.knots, self.recording.offsets
@@ -99,7 +124,7 @@ class Evidence:
     @cached_property
     def speed(self) -> float:
         """Largest speed of anything that moves, belts included, m/s."""
-        moving = np.abs(self.machine.segments.speed).max(initial=0.0)
+        moving = max((abs(piece.speed) for piece in self.pieces), default=0.0)
         velocity = self.recording.knots["velocity"]
         if len(velocity):
             moving = max(moving, np.hypot(velocity[:, 0], velocity[:, 1]).max())
@@ -113,9 +138,9 @@ class Evidence:
         """
         m = self.machine
         ends = np.concatenate([m.segments.start, m.segments.end]).ravel()
-        size = max(np.abs(ends).max(initial=0.0), m.particle.radius)
-        if m.pulley is not None:
-            size = max(size, m.pulley.radius + m.particle.radius)
+        size = max(np.abs(ends).max(initial=0.0), self.radius)
+        for bow in self.bows:
+            size = max(size, np.abs(bow.center).max() + bow.radius + self.radius)
         if len(self.samples.t):
             size = max(size, np.abs(self.samples.position).max())
             size = max(size, self.speed * np.abs(self.samples.t).max())
@@ -146,19 +171,39 @@ class Evidence:
         return float(np.max(self.machine.particle.radius))
 
     @property
-    def arcs(self) -> float:
-        """How far a cubic between two knots may leave the ride round the pulley or an end, m."""
-        pulley = self.machine.pulley
-        return ON_ARCS * (self.radius + (pulley.radius if pulley else 0.0))
+    def bows(self) -> list[Bow]:
+        """Its bent pieces, the drive pulley among them."""
+        return [piece for piece in self.pieces if isinstance(piece, Bow)]
 
-    @property
+    @cached_property
+    def arcs(self) -> float:
+        """How far a cubic between two knots may leave the way along an arc or round an end, m."""
+        return ON_ARCS * (self.radius + max((bow.radius for bow in self.bows), default=0.0))
+
+    @cached_property
+    def bent(self) -> float:
+        """Largest acceleration towards the centre of an arc that somebody moves along inside, m/s².
+
+        Outside it is never more than gravity's: what is faster leaves.
+        """
+        found, radii = 0.0, self.radii[self.samples.particle]
+        for bow in self.bows:
+            inner = bow.radius - radii
+            off = np.abs(bow.beside(self.samples.position) + radii)
+            along = (inner > 0.0) & (off < 0.1 * radii) & bow.within(self.samples.position, 0.0)
+            if along.any():
+                found = max(found, self.speed**2 / float(inner[along].min()))
+        return found
+
+    @cached_property
     def late(self) -> float:
         """How far beyond a surface a step may take a disk, m; 0 for the exact engine.
 
         Where steps are all alike a contact is seen up to a step late, so by the way of a step, and
         Chipmunk leaves its slop. A lone particle's blows are found at their own instants; where it
         stays in contact a step goes straight on, off by less than a dt². On a straight surface a is
-        the weight, on a rim it is v²/ρ besides, which is no more than g where it does not lift off.
+        the weight, on a rim it is v²/ρ besides, which is no more than g where it does not lift off;
+        inside an arc it may be more.
         In a crowd of the contact engine disks are pressed, by what `PRESSED` says.
         """
         if self.dt is None:
@@ -167,7 +212,7 @@ class Evidence:
             return self.speed * self.dt + SLOP * self.radius
         if self.crowd:
             return PRESSED * self.radius
-        return 2.0 * self.machine.gravity * self.dt**2
+        return (2.0 * self.machine.gravity + self.bent) * self.dt**2
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,10 @@ from chutelab.checks.stress.barriers import (
     released_free,
     settled_to_stay,
 )
+from chutelab.checks.stress.blows import cone, rebound
 from chutelab.checks.stress.evidence import EPS, ROUNDINGS, Evidence, Verdict, worst
 from chutelab.results.ledger import ledger
+from chutelab.scene import Fault, Scene, SceneError
 
 Law = Callable[[Evidence], Verdict | None]
 
@@ -102,13 +104,7 @@ def energy(e: Evidence) -> Verdict | None:
             t = knots["t"][offsets[i] + at]
             rises.append((rise[at] / e.energy, f"particle {i} at t = {t:.6g} s"))
     # A knot in contact holds the mean velocity of a step, half a step's pull off its books.
-    known = (
-        e.speed
-        * e.machine.gravity
-        * (e.dt or 0.0)
-        * float(np.max(e.machine.particle.mass))
-        / e.energy
-    )
+    known = e.speed * e.machine.gravity * (e.dt or 0.0) * float(e.masses.max()) / e.energy
     return worst(rises, _energy_bound(e) + known, f"of {e.energy:.3g} J")
 
 
@@ -137,12 +133,11 @@ def _energy_of_crowd(e: Evidence) -> Verdict:
     at = int(np.argmax(rise))
     where = f"of {e.energy:.3g} J, at t = {times[at]:.6g} s"
     # An overlap that is parted lifts a disk by no more than it was deep.
-    p = e.machine.particle
-    allowed = e.recording.count * p.mass * e.machine.gravity * e.late
+    allowed = float(e.masses.sum()) * e.machine.gravity * e.late
     if e.alike and e.dt is not None:
         # The pymunk engine leaves out touches that move a track by less than `ROUGH` of the radius.
         # A cubic whose end velocity is off by w is off by 4/27 w τ in place, τ a step or more.
-        allowed += 2.0 * p.mass * e.speed * 27.0 / 4.0 * ROUGH * p.radius / e.dt
+        allowed += 2.0 * e.masses.max() * e.speed * 27.0 / 4.0 * ROUGH * e.radius / e.dt
     return Verdict(float(rise[at]) / e.energy, _energy_bound(e) + allowed / e.energy, where)
 
 
@@ -169,9 +164,7 @@ def _energy_bound(e: Evidence) -> float:
     touched = max(1, e.recording.contacts)
     if e.engine != "contact":
         steps += touched * HAIR
-    return (
-        rounding + steps + touched * float(np.max(m.particle.mass)) * m.gravity * e.late / e.energy
-    )
+    return rounding + steps + touched * float(e.masses.max()) * m.gravity * e.late / e.energy
 
 
 def momentum(e: Evidence) -> Verdict | None:
@@ -182,7 +175,7 @@ def momentum(e: Evidence) -> Verdict | None:
     sizes m |v|.
     """
     m = e.machine
-    if not e.crowd or m.pulley is not None:
+    if not e.crowd or e.bows:
         return None
     along = np.eye(2)
     if len(m.segments.length):
@@ -194,10 +187,11 @@ def momentum(e: Evidence) -> Verdict | None:
             return None
         along = tangent[None]
     first, last = e.recording.ends()
+    mass = e.masses[e.recording.released, None]
     fall = np.zeros((len(first), 2))
     fall[:, 1] = -m.gravity * (last["t"] - first["t"])
-    change = ((last["velocity"] - first["velocity"] - fall) @ along.T).sum(axis=0)
-    size = np.hypot(*first["velocity"].T).sum() + np.hypot(*fall.T).sum()
+    change = (mass * (last["velocity"] - first["velocity"] - fall) @ along.T).sum(axis=0)
+    size = (mass[:, 0] * (np.hypot(*first["velocity"].T) + np.hypot(*fall.T))).sum()
     figure = float(np.abs(change).max() / size)
     rounding = EPS * (ROUNDINGS + A_CONTACT * max(e.recording.contacts, e.recording.steps))
     return Verdict(figure, rounding, "of the sum of m |v|")
@@ -211,26 +205,41 @@ def spin(e: Evidence) -> Verdict | None:
     was found is of the radius.
     """
     m = e.machine
-    if not e.crowd or m.pulley is not None or len(m.segments.length) or m.gravity > 0.0:
+    if not e.crowd or e.pieces or m.gravity > 0.0:
         return None
     first, last = e.recording.ends()
     middle = last["position"].mean(axis=0)
-    p, inertia = m.particle, m.particle.inertia
-    if inertia == 0.0:
+    mass, inertia, radius = (of[e.recording.released] for of in (e.masses, e.inertias, e.radii))
+    if (inertia == 0.0).any():
         return None
 
     def total(knots: NDArray[Any]) -> float:
         x, v = knots["position"] - middle, knots["velocity"]
-        turning = p.mass * (x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0])
+        turning = mass * (x[:, 0] * v[:, 1] - x[:, 1] * v[:, 0])
         return float((turning + inertia * knots["omega"]).sum())
 
-    arms = np.hypot(*(last["position"] - middle).T) + p.radius
-    size = float((p.mass * arms * np.hypot(*last["velocity"].T)).sum())
+    arms = np.hypot(*(last["position"] - middle).T) + radius
+    size = float((mass * arms * np.hypot(*last["velocity"].T)).sum())
     sunk = overlap(e)
     assert sunk is not None
     rounding = EPS * (ROUNDINGS + A_CONTACT * e.recording.steps)
-    bound = rounding + sunk.figure / p.radius
+    bound = rounding + sunk.figure / float(radius.min())
     return Verdict(abs(total(last) - total(first)) / size, bound, "of the sum of m |x| |v|")
+
+
+def need_judged(scene: Scene) -> None:
+    """Raise a `SceneError` unless the laws are about a scene: about disks, without strings."""
+    allowed = "not judged: the laws are about disks without strings"
+    several = len(scene.particles) > 1
+    faults = [
+        Fault(f"particle[{i}].shape" if several else "particle.shape", kind.shape, allowed)
+        for i, kind in enumerate(scene.particles)
+        if kind.shape not in {"disk", "sphere"}
+    ]
+    if scene.string:
+        faults.append(Fault("string", None, allowed))
+    if faults:
+        raise SceneError(scene.source, faults)
 
 
 UNSEEN = ("no one through", "no one through another")
@@ -244,11 +253,11 @@ def unseen(e: Evidence) -> str:
     farther than its radius in one may have its centre on the other side then, to which it is
     pushed. So the pymunk engine does not promise the laws named in `UNSEEN` there.
     """
-    velocity, r = e.recording.knots["velocity"], e.machine.particle.radius
+    velocity, r = e.recording.knots["velocity"], e.radii[e.recording.owner]
     if not e.alike or not len(velocity):
         return ""
     assert e.dt is not None
-    radii = float(np.hypot(*velocity.T).max()) * e.dt / r
+    radii = float((np.hypot(*velocity.T) * e.dt / r).max())
     if radii <= 1.0:
         return ""
     return f"up to {radii:.2g} radii in a step, and contacts are looked for at its end only"
@@ -263,6 +272,8 @@ LAWS: dict[str, Law] = {
     "no one inside": depth,
     "bounces off something": on_something,
     "released into room": released_free,
+    "friction of the pair": cone,
+    "rebound of the pair": rebound,
     "settled to stay": settled_to_stay,
     "no overlap": overlap,
     "pressed for a step": pressed,

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import replace
-from math import inf, pi
+from math import inf
 from time import perf_counter
 from typing import Any
 
@@ -28,10 +27,6 @@ from chutelab.util.arrays import Progress
 GREATEST = 1e300
 """Friction without a bound, as a number that can be multiplied by zero."""
 
-JOINED, SMOOTH = 1e-3, 1e-2
-"""Radii, rad: pieces whose ends are no further apart and whose directions there differ by no more
-are one smooth surface, as one whose points are written with some digits is meant to be."""
-
 INTEGER, REAL = np.dtype("<i4"), np.dtype("<f8")
 
 GROWING = {
@@ -54,9 +49,6 @@ SLICE = 0.05
 
 MOST_STEPS = 512
 """Steps between two looks, at most: what follows may take a thousand times as long as what was."""
-
-SWEEPS, SWEEPS_ALONE = 100, 500
-"""Most sweeps of the contact solver in a step: with 60 a pile of 2,000 hardly comes to rest."""
 
 
 def run(machine: Machine, progress: Progress | None = None) -> Recording:
@@ -101,85 +93,27 @@ def run(machine: Machine, progress: Progress | None = None) -> Recording:
 
 
 def pieces(machine: Machine) -> NDArray[Any]:
-    """Return the pieces of all surfaces, segments, pulley and arcs, as rows of the core."""
+    """Return all surfaces, segments, pulley and arcs, as rows of the core, as far as it asks."""
     seg, arcs, wheel = machine.segments, machine.arcs, machine.pulley
     s, w = len(seg.length), int(wheel is not None)
-    # A piece is met in one place at a time: an arc of which a disk can touch both ends is two.
-    half, r = 0.5 * arcs.extent, np.max(machine.particle.radius)
-    narrow = (arcs.radius <= r) | ((half > 0.5 * pi) & (arcs.radius * np.sin(half) <= r))
-    parts = np.where(narrow & ~arcs.whole, 2, 1)
-    which = np.repeat(np.arange(len(parts)), parts)
-    arcs = replace(arcs, **{name: values[which] for name, values in vars(arcs).items()
-                            if name not in ("restitution", "friction")})  # fmt: skip
-    a, half = len(which), half[which] / parts[which]
-    second = np.append(False, which[1:] == which[:-1])[:a]
-    arcs = replace(arcs, begin=arcs.begin + np.where(second, 2.0 * half, 0.0), extent=2.0 * half)
-    rows = np.zeros(s + w + a, dtype("Surface"))
-    rows["material"] = np.append(np.arange(s + w), s + w + which)
-    rows["opens"], rows["closes"], rows["mates"] = -inf, inf, -1
+    rows = np.zeros(s + w + len(arcs.surface), dtype("Surface"))
     shapes = constants("Shape")
     flat, bent = rows[:s], rows[s + w :]
+    for some, its in ((flat, seg), (bent, arcs)):
+        some["speed"], some["owner"] = its.speed, its.surface
+        some["opens"], some["closes"] = its.appears, its.vanishes
     flat["x"], flat["y"] = seg.start.T
     flat["tx"], flat["ty"] = seg.tangent.T
-    flat["length"], flat["speed"], flat["owner"] = seg.length, seg.speed, seg.surface
-    flat["opens"], flat["closes"] = seg.appears, seg.vanishes
-    flat["end"][:, :2], flat["end"][:, 2:] = seg.start, seg.end
-    low, high = np.minimum(seg.start, seg.end), np.maximum(seg.start, seg.end)
-    flat["box"][:, :2], flat["box"][:, 2:] = low, high
+    flat["length"] = seg.length
     if wheel is not None:
         rows["shape"][s] = shapes["CIRCLE"]
         rows["radius"][s], rows["speed"][s] = wheel.radius, wheel.speed
         rows["owner"][s] = wheel.surface
-        rows["box"][s] = -wheel.radius, -wheel.radius, wheel.radius, wheel.radius
-    if a:
-        bent["shape"] = np.where(arcs.whole, shapes["CIRCLE"], shapes["ARC"])
-        bent["x"], bent["y"] = arcs.center.T
-        bent["tx"], bent["ty"] = np.cos(arcs.begin + half), np.sin(arcs.begin + half)
-        bent["cos_half"] = np.cos(np.minimum(half, pi))
-        bent["radius"], bent["speed"], bent["owner"] = arcs.radius, arcs.speed, arcs.surface
-        bent["opens"], bent["closes"] = arcs.appears, arcs.vanishes
-        bent["end"][:, :2], bent["end"][:, 2:] = arcs.ends
-        corners = arcs.corners.reshape(-1, a, 2)
-        bent["box"][:, :2], bent["box"][:, 2:] = corners.min(axis=0), corners.max(axis=0)
-        _join(rows, s, s + w, float(np.min(machine.particle.radius)))
-    comes = np.isfinite(rows["opens"]) | np.isfinite(rows["closes"])
-    rows["gate"] = np.where(comes, np.cumsum(comes) - 1, -1)
+        rows["opens"][s], rows["closes"][s] = -inf, inf
+    bent["shape"] = shapes["ARC"]
+    bent["x"], bent["y"] = arcs.center.T
+    bent["radius"], bent["begin"], bent["extent"] = arcs.radius, arcs.begin, arcs.extent
     return rows
-
-
-def _join(rows: NDArray[Any], straight: int, bent: int, radius: float) -> None:
-    """Note which pieces go on smoothly beyond an end: an arc, or beyond a segment an arc or circle.
-
-    The first `straight` rows are segments, those from `bent` on arcs and circles.
-    """
-    circle = rows["shape"] == constants("Shape")["CIRCLE"]
-    circle[:bent] = False
-    ended = np.flatnonzero(
-        (np.arange(len(rows)) < straight) | ((np.arange(len(rows)) >= bent) & ~circle)
-    )
-    # Ends by piece: where, and which way the piece would go on.
-    place = rows["end"][ended].reshape(-1, 2, 2)
-    onward = np.stack([rows["tx"], rows["ty"]], axis=1)[ended]
-    onward = np.stack([-onward, onward], axis=1)
-    of_arc = ended >= bent
-    center = np.stack([rows["x"], rows["y"]], axis=1)
-    out = (place - center[ended][:, None])[of_arc] / rows["radius"][ended][of_arc][:, None, None]
-    onward[of_arc] = np.stack([out[..., 1], -out[..., 0]], axis=-1) * [[1.0], [-1.0]]
-    for n, piece in enumerate(ended):
-        for end in range(2):
-            near = np.hypot(*np.moveaxis(place - place[n, end], -1, 0)) <= JOINED * radius
-            near &= np.hypot(*np.moveaxis(onward + onward[n, end], -1, 0)) <= SMOOTH
-            near[n] = False
-            near &= of_arc[:, None] | of_arc[n]
-            if near.any():
-                rows["mates"][piece, end] = ended[np.flatnonzero(near.any(axis=1))[0]]
-                continue
-            away = place[n, end] - center
-            distance = np.hypot(*away.T)
-            on = circle & (np.abs(distance - rows["radius"]) <= JOINED * radius)
-            on &= np.abs(away @ onward[n, end]) <= SMOOTH * distance
-            if on.any():
-                rows["mates"][piece, end] = np.flatnonzero(on)[0]
 
 
 class Job:
@@ -193,54 +127,51 @@ class Job:
         self.stopped_from = machine.count
         n = machine.count
         self.pieces = pieces(machine)
-        count = self.surface_count = len(self.pieces)
-        self.kinds = len(machine.rolling)
-        self.materials = int(self.pieces["material"].max(initial=-1)) + 1
-        gates = int(self.pieces["gate"].max(initial=-1)) + 1
+        self.kinds, self.materials = len(machine.rolling), len(self.pieces)
+        # An arc may become two.
+        room = self.materials + len(machine.arcs.surface)
+        comes = np.isfinite(self.pieces["opens"]) | np.isfinite(self.pieces["closes"])
+        gates = 2 * int(np.count_nonzero(comes))
         self.owners = len(machine.surfaces)
         buckets = 1 << (4 * n + 16).bit_length() if machine.interact else 1
         cells = 12 * n + 64 if machine.interact else 1
         module.place(
             ("disks", dtype("Disk"), n), ("tracks", dtype("Track"), n),
-            ("surfaces", dtype("Surface"), count),
+            ("surfaces", dtype("Surface"), room),
             ("pairs", dtype("Pair"), self.kinds * (self.kinds + self.materials)),
             ("books", REAL, 3 * (self.owners + 1)), ("cells", dtype("Cell"), cells),
             ("heads", INTEGER, buckets), ("heap", INTEGER, n), ("queue", INTEGER, n + 1),
             ("moved", INTEGER, n), ("found", INTEGER, 2 * n),
-            ("nearby", INTEGER, number("MAX_NEARBY") * n), ("everything", INTEGER, count),
-            ("spared", INTEGER, n * gates),
+            ("nearby", INTEGER, number("MAX_NEARBY") * n), ("everything", INTEGER, room),
+            ("spared", INTEGER, gates * n),
         )  # fmt: skip
         self.make_room("knot", (100 if machine.releases.carried.any() else 30) * n + 200)
         self.make_room("event", 40 * n + 1200)
         self.make_room("contact", 8 * n + 16)
         self.make_room("near", 16 * n + 16 if machine.interact else 1)
-        self.settings(buckets, cells, gates)
+        self.settings(buckets, cells)
         self.fill()
+        module.prepare()
 
     def make_room(self, what: str, room: int) -> None:
         """Make room for so many, in the arrays of `GROWING`."""
         self.module.place(*((name, kind, rows * room) for name, kind, rows in GROWING[what]))
         setattr(self.module.world, f"{what}_room", room)
 
-    def settings(self, buckets: int, cells: int, gates: int) -> None:
+    def settings(self, buckets: int, cells: int) -> None:
         """Fill in the numbers of the world."""
-        machine, world = self.machine, self.module.world
-        alone = not machine.interact
+        machine, world, wheel = self.machine, self.module.world, self.machine.pulley
         left, right, bottom, top = machine.exit_box
         for name, value in (
-            ("disk_count", machine.count), ("surface_count", self.surface_count),
+            ("disk_count", machine.count), ("surface_count", len(self.pieces)),
             ("kind_count", self.kinds), ("material_count", self.materials),
-            ("gate_count", gates),
             ("owner_count", self.owners), ("bucket_count", buckets), ("cell_room", cells),
             ("interact", machine.interact),
             ("until", constants("Until")[f"UNTIL_{machine.until.upper()}"]),
             ("landing", machine.landing), ("ride_owner", 0),
-            ("ride_incline", 0.0 if machine.pulley is None else machine.pulley.incline),
-            ("sweeps", SWEEPS_ALONE if alone else SWEEPS), ("sleeps", not alone),
-            ("gy", -machine.gravity), ("g", machine.gravity), ("dt", machine.dt),
-            ("end_time", machine.end_time),
-            ("smooth_x", 1e-5 if alone else 1e-4), ("smooth_v", 1e-4),
-            ("accurate", 1e-15 if alone else 3e-4),
+            ("pulley", -1 if wheel is None else len(machine.segments.length)),
+            ("ride_incline", 0.0 if wheel is None else wheel.incline),
+            ("g", machine.gravity), ("dt", machine.dt), ("end_time", machine.end_time),
         ):  # fmt: skip
             setattr(world, name, value)
         world.exit_box[:] = left, bottom, right, top
@@ -256,15 +187,8 @@ class Job:
         disks["radius"], disks["mass"] = particle.radius, particle.mass
         disks["inertia"] = particle.inertia
         disks["kind"] = releases.kind
-        carried = releases.carried
-        if machine.pulley is not None and carried.any():
-            sine, cosine = np.sin(machine.pulley.incline), np.cos(machine.pulley.incline)
-            (x, y), (vx, vy) = releases.position[carried].T, releases.velocity[carried].T
-            disks["ride_x"][carried] = x * cosine + y * sine
-            disks["ride_rho"][carried] = y * cosine - x * sine
-            disks["ride_speed"][carried] = vx * cosine + vy * sine
-        module.array("surfaces", dtype("Surface"), self.surface_count)[:] = self.pieces
-        module.array("everything", INTEGER, self.surface_count)[:] = np.arange(self.surface_count)
+        disks["rides"] = releases.carried
+        module.array("surfaces", dtype("Surface"), len(self.pieces))[:] = self.pieces
         pairs = module.array("pairs", dtype("Pair"), self.kinds * (self.kinds + self.materials))
         pairs = pairs.reshape(self.kinds, -1)
         own, wheel = pairs[:, : self.kinds], machine.pulley

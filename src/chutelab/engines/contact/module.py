@@ -100,6 +100,7 @@ class Module:
         initialize(self._store)
         self._memory: Any = exports["memory"]
         self._run: Any = exports["run"]
+        self._prepare: Any = exports["prepare"]
         base: Any = exports["__heap_base"]
         world: Any = exports["world"]
         self._base: int = base.value(self._store)
@@ -143,6 +144,10 @@ class Module:
         begin: int = getattr(self.world, name)
         rows: NDArray[Any] = self._bytes[begin : begin + kind.itemsize * count].view(kind)
         return rows
+
+    def prepare(self) -> None:
+        """Have the core work out what follows from the arrays as they are filled in."""
+        self._prepare(self._store)
 
     def run(self, steps: int) -> Status:
         """Run on for at most so many steps."""

@@ -58,10 +58,21 @@ class Motion:
         return self.position + t * (self.velocity + 0.5 * t * self.acceleration)
 
 
-def there(obstacles: Obstacles, gates: Floats, t: Floats, obstacle: Ints) -> Bools:
-    """Tell which obstacles are there after times t (..., k), by the times `gates` (T, k)."""
-    epoch = sum((gate <= t for gate in gates), np.zeros(t.shape, dtype=np.int64))
-    return np.asarray(obstacles.present[epoch, obstacle])
+def epoch_of(gates: Floats, t: Floats) -> Ints:
+    """Return how many of the changes at times `gates` (T, k) have been by times t (..., k)."""
+    return sum((gate <= t for gate in gates), np.zeros(t.shape, dtype=np.int64))
+
+
+def _counts(
+    obstacles: Obstacles, gates: Floats | None, t: Floats, rows: Ints, circle: Ints, away: Floats
+) -> Bools:
+    """Tell which contacts with circles (k,) count: on the arc, and with what is there then."""
+    counts = np.ones(len(rows), dtype=bool)
+    if obstacles.span.size:
+        counts &= obstacles.spanned(rows, circle, away)
+    if gates is not None:
+        counts &= obstacles.reached(rows, circle, away, epoch_of(gates, t))
+    return counts
 
 
 GLANCING = 1e-3
@@ -127,11 +138,8 @@ def first_circle(
         closing &= sense * (np.hypot(then[0], then[1]) - rho) >= -touch
     order = np.where(leaving, motion.order[index], np.where(touching & ~closing, 1, 0))
     now = closing & ~leaving
-    if obstacles.span.size:
-        now &= obstacles.spanned(rows, circle, d)
-    if motion.gates is not None:
-        gates, number = motion.gates[:, index], circle + obstacles.segments
-        now &= there(obstacles, gates, np.zeros(len(index)), number)
+    gates = None if motion.gates is None else motion.gates[:, index]
+    now &= _counts(obstacles, gates, np.zeros(len(index)), rows, circle, d)
     for n in range(1, 4):
         shift = order >= n
         gap[:-1, shift] = gap[1:, shift]
@@ -144,12 +152,12 @@ def first_circle(
     if len(open_):
         d, v, a = d[:, open_], v[:, open_], a[:, open_]
         found = descents(gap[:, open_], until[index[open_]])
-        if obstacles.span.size:
+        if obstacles.span.size or gates is not None:
+            gates = None if gates is None else gates[:, open_]
             for times in found:
                 place = d + times * (v + 0.5 * times * a)
-                times[~obstacles.spanned(rows[open_], circle[open_], place)] = np.inf
-        if motion.gates is not None:
-            found[~there(obstacles, gates[:, open_], found, number[open_])] = np.inf
+                ends = rows[open_], circle[open_]
+                times[~_counts(obstacles, gates, times, *ends, place)] = np.inf
         t[open_] = _polished(
             found.min(axis=0), d, v, a, sense[open_] * rho[open_], order[open_] == 0
         )
@@ -349,7 +357,7 @@ def _faces(
         outward = ((foot <= reach) & (pace < 0.0)) | ((foot >= length - reach) & (pace > 0.0))
         valid &= ~(grazing & outward)
     if motion.gates is not None:
-        valid &= there(obstacles, motion.gates, time, segments[:, None, None])
+        valid &= obstacles.present[epoch_of(motion.gates, time), segments[:, None, None]]
     time[~valid] = np.inf
     flat = time.reshape(-1, time.shape[-1])
     nearest, column = flat.argmin(axis=0), np.arange(flat.shape[1])
@@ -448,7 +456,6 @@ def bounds(
         distance = np.hypot(apart[0], apart[1])
         distinct = (circle != other) & (distance > rows_of(obstacles.touch, rows))
         distinct &= ~joints.beside[circle, other + obstacles.segments, 0]
-        distinct &= obstacles.present[epoch, other + obstacles.segments]
         reach = rows_of(obstacles.rho[other], rows)
         level = (rho**2 + distance**2 - reach**2) / np.where(distinct, 2.0 * rho * distance, 1.0)
         met = distinct & (np.abs(level) < 1.0)
@@ -456,10 +463,11 @@ def bounds(
         tilt = np.arctan2(apart[0], apart[1])
         for angle in (tilt - half, tilt + half):
             closing = -np.sign(reach) * facing * np.sin(angle - tilt)
-            spans = met
+            spans, which, away = met, np.full(len(rows), other), rho * _up(angle) - apart
             if obstacles.span.size:
-                which = np.full(len(rows), other)
-                spans = met & obstacles.spanned(rows, which, rho * _up(angle) - apart)
+                spans = spans & obstacles.spanned(rows, which, away)
+            if len(obstacles.changes):
+                spans = spans & obstacles.reached(rows, which, away, epoch)
             narrow(angle, closing, spans, other + obstacles.segments, 0)
     return found
 

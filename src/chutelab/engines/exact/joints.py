@@ -137,6 +137,17 @@ class Joints:
         return obstacle, side
 
     @cached_property
+    def meeting(self) -> Ints:
+        """Numbers of the ends that lie on a circle, 2 piece + end, (M, C); -1 if there is none."""
+        o = self._o
+        found: list[list[int]] = [[] for _ in range(len(o.rho))]
+        for piece, end in np.argwhere(o.end_circle != NONE).tolist():
+            found[o.end_circle[piece, end] - o.segments].append(2 * piece + end)
+        most = max(map(len, found), default=0)
+        rows = [ends + [NONE] * (most - len(ends)) for ends in found]
+        return np.array(rows, dtype=np.int64).reshape(len(found), most).T
+
+    @cached_property
     def owns(self) -> Bools:
         """Tell of which segments a circle is an end, (C, S)."""
         o = self._o

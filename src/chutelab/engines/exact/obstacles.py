@@ -24,7 +24,7 @@ import numpy as np
 
 from chutelab.engines.exact.joints import NONE, Joints
 from chutelab.machine import Machine
-from chutelab.util.arrays import Bools, Floats, Ints, Numbers
+from chutelab.util.arrays import Bools, Floats, Ints
 
 PER_PARTICLE = (
     "faces", "length", "center", "rho", "span", "bend", "material", "low", "high", "touch",
@@ -130,6 +130,25 @@ class Obstacles:
         begin, extent = pick(self.span, rows, circle)
         turn = np.mod(np.arctan2(away[1], away[0]) - begin + FOOT, 2.0 * np.pi)
         return np.asarray(turn <= extent + 2.0 * FOOT)
+
+    def reached(self, rows: Ints, circle: Ints, away: Floats, epoch: Ints) -> Bools:
+        """Tell which circles (k,) are met from directions (2, k), as far as gates are concerned.
+
+        Not those that are not there after so many changes as `epoch` tells. A gate that appears in
+        a disk does not act on it until the disk is clear of it; so neither does its end, where the
+        disk comes to it along the gate, which goes on into the disk there.
+        """
+        met = self.present[epoch, circle + self.segments]
+        ends = self.joints.meeting[:, circle]
+        ahead = self.joints.tips[1]
+        ahead = ahead.reshape(2, -1, ahead.shape[-1])
+        clear = (ends == NONE).all(axis=0)
+        for number in ends:
+            piece = number // 2
+            face = np.where(piece < self.segments, piece, piece - self.segments + self.first_arc)
+            beyond = dot(pick(ahead, rows, number), away) >= -rows_of(self.touch, rows)
+            clear |= (number != NONE) & beyond & self.present[epoch, face]
+        return np.asarray(met & clear)
 
     def of(self, first: int, last: int) -> Obstacles:
         """Return the obstacles of the particles from `first` up to `last`."""
@@ -336,14 +355,14 @@ def obstacles(machine: Machine, far: float = 0.0) -> Obstacles:
         # It takes the first segment's values until its own are put in.
         own.append(0)
     centers, rhos, which = joined(center, 1), joined(rho, 0), np.array(own, dtype=np.int64)
-    names = ("speed", "restitution", "friction")
-    material = joined([_values(machine, name)[None] for name in names], 0).take(which, axis=1)
+    material = _materials(machine).take(which, axis=1)
     surface = np.concatenate([seg.surface, machine.arcs.surface]).take(which)
     first, pulley = flat + len(ends), NONE
     if wheel is not None:
         pulley, surface[-1] = first + 2 * arcs, wheel.surface
         for row, value in enumerate((wheel.speed, wheel.restitution, wheel.friction)):
-            material[row, -1] = _of_kind(machine, value) if np.ndim(value) else value
+            several = isinstance(value, np.ndarray)
+            material[row, -1] = _of_kind(machine, value) if several else value
     start, stop = corners[:, :flat], corners[:, len(spots) : len(spots) + flat]
     faces = np.empty((2, 4, flat, 1, length.shape[1]))
     faces[0, 0], faces[1, 0] = -tangent[1][:, None], tangent[0][:, None]
@@ -404,21 +423,21 @@ def joined(parts: Sequence[Floats], axis: int) -> Floats:
         return np.concatenate(alike, axis)
 
 
-def _of_kind(machine: Machine, values: Numbers) -> Floats:
+def _of_kind(machine: Machine, values: Floats) -> Floats:
     """Return values of each particle, (N, ...), from those of each kind, (K, ...)."""
-    values = np.asarray(values)
     return values if machine.segments.start.ndim == 3 else values[machine.releases.kind]
 
 
-def _values(machine: Machine, name: str) -> Floats:
-    """Return a number of all segments and then all arcs, (S + A, n)."""
+def _materials(machine: Machine) -> Floats:
+    """Return `Obstacles.material` of all segments and then all arcs, (3, S + A, n)."""
     parts = []
     for part in (
         (machine.segments, machine.arcs) if len(machine.arcs.surface) else (machine.segments,)
     ):
-        array = getattr(part, name)
-        parts.append(_scalars(array if array.ndim == 1 else _of_kind(machine, array)))
-    return parts[0] if len(parts) == 1 else joined(parts, 0)
+        rows = part.speed, part.restitution, part.friction
+        each = (row if row.ndim == 1 else _of_kind(machine, row) for row in rows)
+        parts.append(joined([_scalars(row)[None] for row in each], 0))
+    return joined(parts, 1)
 
 
 def corners_of(machine: Machine, bends: Bends) -> Floats:

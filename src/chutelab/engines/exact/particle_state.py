@@ -116,19 +116,22 @@ class State:
         mine, particle = slice(first, last), machine.particle
         self.radius, self.mass = self.each(particle.radius), self.each(particle.mass)
         self.gravity, inertia = self.each(machine.gravity), self.each(particle.inertia)
-        self.fall = np.stack([np.zeros(count), -self.gravity])
+        self.fall = np.zeros((2, count))
+        self.fall[1] = -self.gravity
         self.falls = bool(self.gravity[0] != 0.0)
         # Who turns, and whether anybody does; m*/m and m r²/I (or 0), see `rim_share`.
         self.turns = inertia > 0.0
         self.spins = np.count_nonzero(self.turns) > 0
+        # Rolling friction, of those that turn; the sign of the spin it opposes, 0 while it holds.
         self.share, self.lever = np.ones(count), np.zeros(count)
+        self.rolling, self.roll = np.zeros((2, count))
         if self.spins:
             self.share = rim_share(self.radius, self.mass, inertia)
             self.lever = 1.0 / self.share - 1.0
-        # Rolling friction, of those that turn; the sign of the spin it opposes, 0 while it holds.
-        kind = machine.releases.kind[mine] if len(machine.rolling) > 1 else np.zeros(count, int)
-        self.rolling = np.where(self.turns, machine.rolling[kind], 0.0)
-        self.rolls, self.roll = np.count_nonzero(self.rolling) > 0, np.zeros(count)
+            arms = machine.rolling
+            arm = arms[machine.releases.kind[mine]] if len(arms) > 1 else arms[0]
+            self.rolling = np.where(self.turns, arm, 0.0)
+        self.rolls = np.count_nonzero(self.rolling) > 0
         start = machine.releases
         self.released = start.t[mine]
         self.staggered = np.count_nonzero(self.released) > 0
@@ -171,8 +174,8 @@ class State:
 
     def each(self, value: Numbers) -> Floats:
         """Return a number of the machine for each of the particles, (k,)."""
-        if np.ndim(value):
-            return np.asarray(value)[self.first : self.first + self.count]
+        if isinstance(value, np.ndarray):
+            return value[self.first : self.first + self.count]
         return np.full(self.count, value)
 
     @cached_property

@@ -103,6 +103,9 @@ class Shared:
         self.r: Any = p.radius if not np.ndim(p.radius) else self.radius
         self.alike = len(machine.pair_restitution) == 1 and not np.ndim(p.radius)
         self.tracks = Tracks(recorder, self.shapes.smallest, range(count), turning=self.corners)
+        # How far each has turned, where that is seen.
+        self.fields = _BODY | batch.BodyFields.ANGLE if self.corners else _BODY
+        self.angle = np.zeros(rows) if self.corners else None
         self.g = machine.gravity
         self.pull = Vec2d(0.0, -self.g)
         # A whole number of steps ends the run.
@@ -282,18 +285,25 @@ class Shared:
         t, self.t = self.t, self.begin + self.clock * self.h
         entries = self.entries[:, : self.count].copy()
         self.buffer.clear()
-        batch.get_space_bodies(space, _BODY, self.buffer)
+        batch.get_space_bodies(space, self.fields, self.buffer)
         ids = np.frombuffer(self.buffer.int_buf(), dtype=np.uintp)
         self.state[0], after = self.state[1], self.state[1]
         known = ids != self.nobody
         rows = self.row[self.ids.searchsorted(ids[known])]
-        after[:, rows] = np.frombuffer(self.buffer.float_buf()).reshape(-1, 5)[known].T
+        told = np.frombuffer(self.buffer.float_buf()).reshape(len(ids), -1)[known].T
+        turned = self.angle
+        if turned is not None:
+            # Like its place a body's angle, which comes third, is half a step behind.
+            self.angle = turned.copy()
+            self.angle[rows] = told[2] + (0.5 * self.h) * told[5]
+            told = told[[0, 1, 3, 4, 5]]
+        after[:, rows] = told
         after[:2] += (0.5 * self.h) * after[2:4]
         after[:, self.count :] = 0.0
         self._contacts()
         if self.strings:
             self._pulled()
-        self.tracks.step(self.free, (t, self.t), self.state[..., : self.count], entries)
+        self.tracks.step(self.free, (t, self.t), self.state[..., : self.count], entries, turned)
         self._endings(t, entries)
 
     def _contacts(self) -> None:
@@ -544,7 +554,8 @@ class Shared:
         if i in self.rides:
             self.rides.pop(i).write(self.recorder, t)
         else:
-            self.tracks.knot(i, t, x, v, omega)
+            angle = 0.0 if self.angle is None else self.angle[i] + (t - self.t) * omega
+            self.tracks.knot(i, t, x, v, omega, angle)
         if kind is not None:
             surface = self.on[i] if kind == Kind.SETTLE else -1
             self.recorder.events(kind, i, t, x, v, omega, surface=surface)

@@ -499,17 +499,26 @@ class Tracks:
         self.pull, self.fresh = np.zeros((2, count)), np.ones(count, dtype=bool)
         self.omega, self.twist = np.zeros((2, count))
 
-    def knot(self, i: int, t: float, x: ArrayLike, v: ArrayLike, omega: float = 0.0) -> None:
+    def knot(
+        self, i: int, t: float, x: ArrayLike, v: ArrayLike, omega: float = 0.0, angle: float = 0.0
+    ) -> None:
         """Write a knot of the particle in a row, with the entries booked so far."""
-        self.recorder.knots(self.first + i, t, x, v, omega)
+        self.recorder.knots(self.first + i, t, x, v, omega, angle)
         self.t[i], self.x[:, i], self.v[:, i], self.fresh[i] = t, x, v, True
         self.omega[i] = omega
 
-    def step(self, rows: Bools, times: tuple[float, float], state: Floats, entries: Floats) -> None:
+    def step(
+        self,
+        rows: Bools,
+        times: tuple[float, float],
+        state: Floats,
+        entries: Floats,
+        angle: Floats | None = None,
+    ) -> None:
         """Note a step of the particles in some rows; write knots of the states before where due.
 
         `times` (s) and `state` (2, 5, N), of x, y, vx, vy and ω, are those at both ends; `entries`
-        (3, N) are those before.
+        (3, N) and `angle` (N,), how far all have turned (rad), are those before.
         """
         tau = times[1] - self.t
         x, v = state[1, :2], state[1, 2:4]
@@ -532,7 +541,7 @@ class Tracks:
             before = state[0][:, due]
             knots["t"], knots["position"], knots["velocity"] = times[0], before[:2].T, before[2:4].T
             knots["omega"], knots["entries"] = before[4], entries[:, due].T
-            self.recorder.add(self.first + due, knots)
+            self.recorder.add(self.first + due, knots, 0.0 if angle is None else angle[due])
             self.t[due], self.x[:, due], self.v[:, due] = times[0], before[:2], before[2:4]
             self.pull[:, due] = (v[:, due] - before[2:4]) / (times[1] - times[0])
             self.omega[due] = before[4]

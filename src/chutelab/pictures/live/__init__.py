@@ -6,6 +6,7 @@
 - `picture`: a run as SVG and a table; drawn as text, since that takes a few milliseconds.
 - `board`: the sliders and the picture together; the only module that needs ipywidgets.
 - `runs`: every variant of a page simulated, and packed.
+- `describe`: what a page is told of its scene: keys, their rules, materials.
 - `page`: `write`, a scene and its variants as one HTML file.
 - ``assets``: HTML, CSS and JavaScript of the page: ``tracks.js`` (curves between knots),
   ``books.js`` (the energy ledger), ``view.js``, ``picture.js`` and ``film.js`` (the canvas: scale,

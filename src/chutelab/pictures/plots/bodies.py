@@ -33,19 +33,22 @@ def turned(recording: Recording, particles: Ints, times: Floats) -> Floats:
     """Return how far particles have turned counterclockwise since their release, (T, n), rad.
 
     Angular velocity is linear between knots, and so its integral is exact for what the knots say.
-    NaN where a particle is not seen, see `chutelab.pictures.plots.scenery.places`.
+    Where they say more, see `Recording.angle`, it is corrected evenly from one to the next. NaN
+    where a particle is not seen, see `chutelab.pictures.plots.scenery.places`.
     """
     some = subset(recording, particles)
     t, omega, offsets = some.knots["t"], some.knots["omega"], some.offsets
     passed = np.concatenate([[0.0], np.cumsum(0.5 * (omega[1:] + omega[:-1]) * np.diff(t))])
+    told = some.angle if len(some.angle) else passed
     angle = np.full((len(times), len(particles)), np.nan)
     for row, particle, left, share in blocks(some.knots, offsets, times):
         h = t[left + 1] - t[left]
         gained = h * share * (omega[left] + 0.5 * share * (omega[left + 1] - omega[left]))
-        angle[row, particle] = passed[left] - passed[offsets[particle]] + gained
+        missed = share * (np.diff(told)[left] - np.diff(passed)[left])
+        angle[row, particle] = told[left] - told[offsets[particle]] + gained + missed
     for i in np.flatnonzero(stays(recording)[particles]).tolist():
         last = offsets[i + 1] - 1
-        angle[times > t[last], i] = passed[last] - passed[offsets[i]]
+        angle[times > t[last], i] = told[last] - told[offsets[i]]
     return angle
 
 

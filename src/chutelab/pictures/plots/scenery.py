@@ -23,14 +23,16 @@ STROBES = 10
 
 def subset(recording: Recording, particles: Sequence[int] | Ints) -> Recording:
     """Return the recording of some particles only; its events are left out."""
-    tracks = [recording.track(int(i)) for i in particles]
-    offsets = np.concatenate([[0], np.cumsum([len(track) for track in tracks])]).astype(np.int64)
+    begin, end = (recording.offsets[np.asarray(particles, dtype=np.int64) + n] for n in (0, 1))
+    offsets = np.concatenate([[0], np.cumsum(end - begin)]).astype(np.int64)
+    rows = np.arange(offsets[-1]) + np.repeat(begin - offsets[:-1], end - begin)
     return replace(
         recording,
-        knots=np.concatenate(tracks) if tracks else recording.knots[:0],
+        knots=recording.knots[rows],
         offsets=offsets,
         ended=recording.ended[np.asarray(particles, dtype=np.int64)],
         events=recording.events[:0],
+        angle=recording.angle[rows] if len(recording.angle) else recording.angle,
     )
 
 

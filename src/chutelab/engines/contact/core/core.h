@@ -142,10 +142,15 @@ double left_over(const Disk *d, int impacts, int surface, double radius);
 void lie_down(int i);
 void was_moved(int i);
 
-/* solver.c */
+/* touching.c */
+double time_unloaded(const double *load, const double *t);
 int find_contacts(double h, int *woke);
+
+/* solver.c */
 void sweep_contacts(Contact *list, int count, int rounds, int plain, double accurate, double enough);
 void solve_contacts(void);
+
+/* closing.c */
 void close_step(double h);
 void take_back(int i);
 void end_in_contact(int i, int reason);

@@ -39,10 +39,10 @@ typedef struct {
     double inertia;             /* [in] kg m2; 0: it does not turn */
     double inv_mass, inv_inertia; /* 1/kg, 1/(kg m2); 0 for one that does not turn */
     double release;             /* [in] s; it waits from then on until its place is free */
-    double ride_x;              /* [in] m along the belt from where that meets the pulley, where a ride
-                                   by adhesion begins, <= 0 ... */
-    double ride_rho;            /* [in] ... and its distance from the axis on the pulley; 0: no ride */
-    double ride_speed;          /* [in] m/s */
+    double ride_x;              /* m along the belt from where that meets the pulley, where a ride by
+                                   adhesion begins, <= 0 ... */
+    double ride_rho;            /* ... and its distance from the axis on the pulley; 0: no ride */
+    double ride_speed;          /* m/s */
     double ride_from, ride_to;  /* s; when the ride began and ends */
     double left, bottom, right, top; /* box that it can reach in this step */
     double zone[4];             /* the box, and room round it, for which `World.nearby` is right */
@@ -54,7 +54,8 @@ typedef struct {
     double gain[3];             /* J; what this step's lasting contacts add to them */
     double ahead[3];            /* J; the second half of it */
     int kind;                   /* [in] row of the table of pairs */
-    int mode;                   /* [in] WAITING */
+    int rides;                  /* [in] the incoming belt carries it by adhesion */
+    int mode;                   /* WAITING at first */
     int changes;                /* counts changes of path, so that foreseen events can be outdated */
     int impacts;                /* in this step */
     int supports;               /* contacts that pressed in this step or the one before */
@@ -98,23 +99,24 @@ typedef struct {
     int stays;            /* steps on one surface, blows or not */
     int held_back;        /* `knot` is one after a blow and not written yet */
     int again;            /* the latest blow may be told together with the one before */
-    int pad;
+    int ground;           /* surface that `stays` are on: who leaves it may have struck another last */
 } Track;
 
 typedef struct {
     double x, y;            /* [in] segment: first end; circle and arc: centre */
-    double tx, ty;          /* [in] segment: unit tangent; arc: unit vector to its middle */
+    double tx, ty;          /* segment: unit tangent [in]; arc: unit vector to its middle */
     double length;          /* [in] segment */
     double radius;          /* [in] circle and arc */
-    double cos_half;        /* [in] arc: cosine of half its angle */
-    double end[4];          /* [in] segment and arc: both ends, x and y */
+    double begin, extent;   /* [in] arc: angle of its first end, and from there on, rad */
+    double cos_half;        /* arc: cosine of half its angle */
+    double end[4];          /* segment and arc: both ends, x and y */
     double speed;           /* [in] m/s along the tangent; round a circle or arc clockwise */
     double opens, closes;   /* [in] s; it is there from the one to the other */
-    int shape;
-    int material;           /* [in] column of the table of pairs, behind the kinds of disks */
+    int shape;              /* [in] an arc all round becomes a circle */
+    int material;           /* column of the table of pairs, behind the kinds of disks */
     int owner;              /* [in] number of the surface it is part of */
-    int mates[2];           /* [in] pieces that go on smoothly beyond its ends, or -1 */
-    int gate;               /* [in] column of `spared` if it comes and goes, else -1 */
+    int mates[2];           /* pieces that go on smoothly beyond its ends, or -1 */
+    int gate;               /* column of `spared` if it comes and goes, else -1 */
     int there;              /* whether it is there in this step; LEAVING: until just now */
     double box[4];          /* m; left, bottom, right, top */
 } Surface;
@@ -160,7 +162,7 @@ typedef struct {
     /* arrays, laid out by the host */
     Disk *disks;
     Track *tracks;
-    Surface *surfaces;
+    Surface *surfaces;   /* with room for twice the arcs */
     Pair *pairs;         /* (kinds, kinds + materials) */
     double *books;       /* (owners + 1, 3), J; the last row is the disks' among themselves */
     Knot *knots;
@@ -176,7 +178,7 @@ typedef struct {
     int *moved;          /* (disks) */
     int *found;          /* (2 disks) */
     int *nearby;         /* (disks, MAX_NEARBY) surfaces near each, ascending */
-    int *everything;     /* (surfaces) [in] 0, 1, ... */
+    int *everything;     /* (surfaces) 0, 1, ... */
     int *spared;         /* (disks, gates) 1: what shut on this disk, and does not touch it yet */
     /* sizes */
     int disk_count, surface_count, kind_count, material_count, owner_count;
@@ -188,6 +190,7 @@ typedef struct {
     int until;
     int landing;         /* owner that a disk lands on, or -1 */
     int ride_owner;      /* owner that rides are on */
+    int pulley;          /* row of the drive pulley among the surfaces, or -1 */
     double ride_incline; /* rad; at which the belt rises to the pulley */
     int sweeps;          /* of the contact solver, at most */
     int sleeps;          /* whether islands may fall asleep */

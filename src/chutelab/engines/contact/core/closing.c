@@ -1,0 +1,289 @@
+/* After the solve of a step: what lasting contacts do to the ledger, who sticks, slips, parts or comes to
+   rest, and how tracks end in contact. */
+
+#include "core.h"
+
+/* Steps that a contact in a crowd lasts at least if its end is told as a separation. */
+#define LASTS 10
+/* m/s; below it the contacts of a crowd count as calm: `settled` in the contract. */
+#define CALM 1e-3
+/* m/s; of a disk by itself: what is left of a speed that has come to nothing. */
+#define STOPPED 1e-9
+/* Of sqrt(g r): below it an island may fall asleep; 0.5 mm/s for r = 4 mm. */
+#define REST 2.5e-3
+
+/* Note whether a disk that lasts on one surface slips there, sticks, or has come to rest. */
+static void note_grip(Disk *d, const Contact *c, const double *u, const double *v, double h) {
+    int i = c->i;
+    double most = c->friction * c->impulse[0], slip = v[1] + c->drift;
+    /* The impulses stand for the second half of the last step, if it lasted, and the first of this. */
+    double past = W.tracks[c->i].lasted ? 0.5 * W.length_before : 0, span = past + 0.5 * h;
+    int grips = fabs(c->impulse[1]) < most * (1 - 1e-12) || (most == 0 && slip == 0 && c->drift == 0);
+    Track *track = W.tracks + i;
+    for (int n = 2; n > 0; n--) {
+        track->load[n] = track->load[n - 1];
+        track->load_t[n] = track->load_t[n - 1];
+    }
+    track->load[0] = c->impulse[0] / span;
+    track->load_t[0] = d->t;
+    if (d->on != c->owner) {
+        /* It came to lie there without an impact that was told. */
+        write_event(IMPACT, i, -1, c->owner, d->t, &d->x, &d->ux, &d->vx, c->impulse[0], c->impulse[1]);
+        d->on = c->owner;
+        d->slips = 1;
+    }
+    if (grips && d->slips) {
+        /* Friction slows the slip evenly; it is used up so long after the last mid-step. */
+        double s = u[1] - c->pull * past, pull = c->pull;
+        double rate = most / (c->mass[1] * span) - (s > 0 ? pull : -pull);
+        double t = d->t - past + (rate > 0 ? fabs(s) / rate : 0);
+        t = MAX(t, d->since);
+        double place[2] = {d->x + (t - d->t) * 0.5 * (d->ux + d->vx), d->y + (t - d->t) * 0.5 * (d->uy + d->vy)};
+        double after[3] = {d->vx + 0.5 * W.gx * h, d->vy + 0.5 * W.gy * h, d->spin};
+        write_event(STICK, i, -1, c->owner, t, place, after, after, 0, 0);
+        d->since = t;
+    } else if (!grips && !d->slips)
+        event_here(SLIP, i, c->owner);
+    d->slips = !grips;
+}
+
+/* Whether a disk by itself that grips stays as it is: nothing pulls it along, and on what is round, or
+   slows its rolling, it has stopped. */
+static int lies(const Disk *d, const Contact *c, double h) {
+    const Surface *s = W.surfaces + (-1 - c->j);
+    double speed = fabs(d->vx + 0.5 * h * W.gx) + fabs(d->vy + 0.5 * h * W.gy);
+    if (s->speed != 0 && c->owner != W.landing) return 0;
+    if (bending(s, d->x, d->y, d->radius) != 0 && (speed > STOPPED || c->other[1] != 0)) return 0;
+    if (c->arm > 0 && fabs(d->spin - c->other[2]) * d->radius > STOPPED) return 0;
+    /* Its arm may have stopped it for a moment, or holds it. */
+    int held = speed <= STOPPED && fabs(c->pull) * d->radius <= c->arm * press_on(d, s, c->nx, c->ny);
+    return d->inertia == 0 || c->pull == 0 || held;
+}
+
+/* End the track of a disk that came to rest on one surface, when its slip was used up: `d->since`.
+
+   From the velocity after the impulses to that in the middle of the step it is a hop, which is left
+   out: an impulse of its own. At that velocity it has gone since, and what gravity did then the
+   drive paid. */
+static void settle(int i, const Contact *last, double h) {
+    Disk *d = W.disks + i;
+    Contact hop = *last;
+    double u[3], v[3], entries[3], given[3], jx = 0.5 * h * d->mass * W.gx, jy = 0.5 * h * d->mass * W.gy;
+    hop.impulse[0] = jx * hop.nx + jy * hop.ny;
+    hop.impulse[1] = jx * hop.ny - jy * hop.nx;
+    hop.impulse[2] = 0;
+    for (int n = 0; n < 3; n++) d->entries[n] += d->gain[n];
+    relative(&hop, 0, u);
+    d->vx += jx / d->mass;
+    d->vy += jy / d->mass;
+    relative(&hop, 0, v);
+    share_out(&hop, u, v, 0, entries, given);
+    double back = d->t - d->since;
+    entries[0] += d->mass * (W.gx * hop.ny - W.gy * hop.nx) * hop.other[1] * back;
+    book(d->entries, 0, hop.owner, entries);
+    d->x -= d->vx * back;
+    d->y -= d->vy * back;
+    d->t = d->since;
+    if (W.tracks[i].open) knot_held(i);
+    W.tracks[i].lasted = 0;
+    knot_now(i);
+    event_here(SETTLE, i, hop.owner);
+    finish(i, BY_SETTLING);
+}
+
+/* Write the separation of a disk that no surface presses any more. */
+static void tell_separation(int i) {
+    const Disk *d = W.disks + i;
+    const Track *track = W.tracks + i;
+    if (track->lasted < 3) {
+        event_here(SEPARATION, i, track->ground);
+        return;
+    }
+    double t = time_unloaded(track->load + 1, track->load_t + 1);
+    if (t > 2 * d->t - track->load_t[0]) {
+        /* It was not worn off, the face ended: the last impulse tells how long the load went on. */
+        double past = 0.5 * (track->load_t[0] - track->load_t[1]);
+        double span = past + 0.5 * (d->t - track->load_t[0]);
+        t = track->load_t[0] - past + track->load[0] / track->load[1] * span;
+    }
+    t = MIN(MAX(t, track->load_t[1]), d->t);
+    /* It has flown since. */
+    Disk then = *d;
+    advance(&then, t);
+    write_event(SEPARATION, i, -1, track->ground, t, &then.x, &then.vx, &then.vx, 0, 0);
+}
+
+/* After the solve: entries, supports, timers, tracks. */
+void close_step(double h) {
+    /* The share of the impulses that belongs to the step before; of a new contact, none. */
+    W.before = W.length_before > 0 ? W.length_before / (W.length_before + h) : 0.5;
+    if (!W.interact && !W.tracks[W.low].lasted) W.before = 0;
+    for (int i = W.low; i < W.high; i++) {
+        Disk *d = W.disks + i;
+        d->links = d->before = -1;
+        /* A disk by itself that leaves what it lay on may come back to it in this step, off by what a
+           step is: that is no blow, and of endless friction it would be one however soft. */
+        if (d->mode == FREE && (W.interact || !d->supports)) d->held_count = 0;
+        d->supports = 0;
+        if (W.length_before > 0.01 * W.dt) d->impacts = 0;
+        for (int n = 0; n < 3; n++) d->gain[n] = d->ahead[n] = 0;
+        if (d->mode == FREE) {
+            d->calm += h;
+            d->rest += h;
+        }
+    }
+    for (int n = 0; n < W.contact_count; n++) {
+        Contact *c = W.contacts + n;
+        Disk *a = W.disks + c->i, *b = c->j >= 0 ? W.disks + c->j : 0;
+        double u[3], v[3], entries[3], given[3];
+        c->next = a->before;
+        a->before = n;
+        W.links[2 * n] = a->links;
+        a->links = 2 * n;
+        if (b) {
+            W.links[2 * n + 1] = b->links;
+            b->links = 2 * n + 1;
+        }
+        if (c->impulse[0] == 0) continue;
+        if (!W.interact && !a->supports) a->held_count = 0;
+        if (!b && a->held_count < MAX_HELD) a->held[a->held_count++] = -1 - c->j;
+        relative(c, 1, u);
+        relative(c, 0, v);
+        share_out(c, u, v, 0, entries, given);
+        book(a->gain, c->two ? b->gain : 0, c->owner, entries);
+        if (given[0] != 0) book(a->gain, 0, W.ride_owner, given);
+        share_out(c, u, v, W.before, entries, given);
+        for (int k = 0; k < 3; k++) {
+            a->ahead[k] += (c->two ? 0.5 : 1) * entries[k] + given[k];
+            if (c->two) b->ahead[k] += 0.5 * entries[k];
+        }
+        a->supports++;
+        if (b) b->supports++;
+        else if (c->owner == W.landing && !a->landed) {
+            write_event(LANDING, c->i, -1, c->owner, a->t, &a->x, &a->ux, &a->vx, c->impulse[0],
+                        c->impulse[1]);
+            a->landed = 1;
+            a->on = c->owner;
+            a->slips = 1;
+        }
+        /* Halfway through the impulses the hop is left out. */
+        double off = fabs(0.5 * (u[0] + v[0])), slip = fabs(v[1] + c->drift);
+        double turn = fabs(v[2]) * a->radius, rest = REST * sqrt(W.g * a->radius);
+        int driven = !b && W.surfaces[-1 - c->j].speed != 0 && c->owner != W.landing;
+        if (off > CALM || slip > CALM || driven || (b && b->mode == RIDING)) {
+            a->calm = 0;
+            if (b) b->calm = 0;
+        }
+        if (off > rest || slip > rest || turn > rest || (b && b->mode == RIDING)) {
+            a->rest = 0;
+            if (b) b->rest = 0;
+        }
+    }
+    for (int i = W.low; i < W.high; i++) {
+        Disk *d = W.disks + i;
+        Track *track = W.tracks + i;
+        d->ends = -1;
+        if (d->mode != FREE) continue;
+        if (!d->supports) {
+            d->calm = d->rest = 0;
+            if (track->stays >= (W.interact ? LASTS : 3)) tell_separation(i);
+            if (track->lasted || track->stays) d->on = -1;
+            track->stays = 0;
+            flush_track(i);
+            continue;
+        }
+        const Contact *only = 0;
+        int reason = -1;
+        int owners = 0;
+        for (int link = d->links; link >= 0; link = W.links[link]) {
+            const Contact *c = W.contacts + link / 2;
+            if (c->impulse[0] == 0) continue;
+            if (!only || c->owner != only->owner || c->j >= 0) owners++;
+            if (!only || c->impulse[0] > only->impulse[0]) only = c;
+        }
+        if (owners == 1 && only->j < 0) {
+            double u[3], v[3];
+            relative(only, 1, u);
+            relative(only, 0, v);
+            note_grip(d, only, u, v, h);
+            if (!W.interact && W.until == UNTIL_SETTLED && !d->slips && d->since <= d->t + h
+                    && lies(d, only, h)) {
+                /* What rolled stops now, not when it began to. */
+                if (only->arm > 0 && d->inertia > 0) d->since = MAX(d->since, d->t);
+                settle(i, only, h);
+            }
+        } else {
+            /* On several; of a surface it lies on, if any, it may still part. */
+            int ground = -1;
+            for (int link = d->links; link >= 0; link = W.links[link]) {
+                const Contact *c = W.contacts + link / 2;
+                if (c->impulse[0] > 0 && c->j < 0) ground = c->owner;
+            }
+            if (ground < 0 && track->stays >= LASTS) event_here(SEPARATION, i, track->ground);
+            if (track->ground != ground) track->stays = 0;
+            d->slips = 1;
+            d->on = ground;
+        }
+        track->ground = d->on;
+        if (d->on >= 0) track->stays++;
+        d->changes++;
+        if (d->mode == GONE) continue;
+        track_lasting(i);
+        for (int n = 0; n < 3; n++) d->entries[n] += d->gain[n];
+        /* Held in a corner by what is at rest. */
+        if (owners > 1 && !W.interact && W.until == UNTIL_SETTLED && track->lasted > 3) {
+            const double *s = track->held + 3, *p = track->past + 3;
+            double most = MAX(fabs(s[0]) + fabs(s[1]), fabs(p[0]) + fabs(p[1]));
+            for (int link = d->links; link >= 0; link = W.links[link])
+                if (W.contacts[link / 2].impulse[0] > 0)
+                    most = MAX(most, fabs(W.contacts[link / 2].other[1]));
+            if (most + fabs(s[2]) * d->radius < STOPPED) reason = BY_SETTLING;
+        }
+        if (W.until == UNTIL_LANDED && d->landed) reason = BY_LANDING;
+        d->ends = reason;
+    }
+    /* All are asked for what they are ahead before the state of any changes. */
+    for (int i = W.low; i < W.high; i++)
+        if (W.disks[i].mode == FREE && W.disks[i].ends >= 0) take_back(i);
+    for (int i = W.low; i < W.high; i++)
+        if (W.disks[i].mode == FREE && W.disks[i].ends >= 0) end_in_contact(i, W.disks[i].ends);
+}
+
+/* Take back what the second half of this step's impulses did to the ledger by disk i. */
+void take_back(int i) {
+    Disk *d = W.disks + i;
+    for (int link = d->links; link >= 0; link = W.links[link]) {
+        const Contact *c = W.contacts + link / 2;
+        double u[3], v[3], entries[3], given[3];
+        if (c->impulse[0] == 0) continue;
+        relative(c, 1, u);
+        relative(c, 0, v);
+        share_out(c, u, v, W.before, entries, given);
+        for (int n = 0; n < 3; n++) {
+            double back = (c->two ? 0.5 : 1) * entries[n];
+            if (c->i != i && !c->two) back = 0;
+            W.books[3 * c->owner + n] -= back;
+            d->entries[n] -= back;
+            if (c->i == i) {
+                W.books[3 * W.ride_owner + n] -= given[n];
+                d->entries[n] -= given[n];
+            }
+        }
+    }
+}
+
+/* End the track of a disk in lasting contact in the state halfway through this step's impulses. */
+void end_in_contact(int i, int reason) {
+    Disk *d = W.disks + i;
+    Track *track = W.tracks + i;
+    const double *s = track->held;
+    d->x = s[1];
+    d->y = s[2];
+    d->vx = s[3];
+    d->vy = s[4];
+    d->spin = s[5];
+    if (d->t > track->knot[0]) knot_now(i);
+    track->lasted = 0;
+    if (reason == BY_SETTLING) event_here(SETTLE, i, W.surfaces[d->held[0]].owner);
+    finish(i, reason);
+}

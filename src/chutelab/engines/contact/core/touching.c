@@ -1,0 +1,185 @@
+/* What touches at the beginning of a step, and what each contact needs: the change of normal velocity
+   that keeps its gap closed at the step's end. */
+
+#include "core.h"
+
+/* Overlap that is left alone, in radii; of what is beyond, a tenth is parted in each step: gently,
+   since parting does work. Of an overlap as deep as DEEP more, up to all. */
+#define SLOP 1e-3
+#define PART 0.1
+#define DEEP 0.03
+/* Gap, in radii, up to which what was pressed still touches: what sweeps leave open. */
+#define LEAVE 1e-4
+
+static double gap_later(const Contact *c, double h) {
+    const Disk *a = W.disks + c->i;
+    double x = a->x + (a->vx + 0.5 * W.gx * h) * h, y = a->y + (a->vy + 0.5 * W.gy * h) * h, nx, ny;
+    if (c->j < 0) return gap_to(face_at(W.surfaces + (-1 - c->j), x, y), x, y, a->radius, &nx, &ny);
+    const Disk *b = W.disks + c->j;
+    x -= b->x + (b->vx + 0.5 * W.gx * h) * h;
+    y -= b->y + (b->vy + 0.5 * W.gy * h) * h;
+    return sqrt(x * x + y * y) - a->radius - b->radius;
+}
+
+/* Time until the foot of a disk on a face passes its end, INFINITY where there is none or the face
+   goes on smoothly, and not so bent that the disk flies on. */
+static double time_on_face(const Contact *c) {
+    const Disk *d = W.disks + c->i;
+    const Surface *s = W.surfaces + (-1 - c->j);
+    double x = d->x - s->x, y = d->y - s->y, along, run, length = s->length;
+    if (s->shape == CIRCLE) return INFINITY;
+    if (s->shape == SEGMENT) {
+        along = x * s->tx + y * s->ty;
+        run = d->vx * s->tx + d->vy * s->ty;
+    } else {
+        /* Angles; the foot of a disk in contact turns with its centre. */
+        double half = acos(s->cos_half), square_away = x * x + y * y;
+        if (square_away == 0) return INFINITY;
+        along = atan2(s->tx * y - s->ty * x, s->tx * x + s->ty * y) + half;
+        run = (x * d->vy - y * d->vx) / square_away;
+        length = 2 * half;
+    }
+    if (along < 0 || along > length || run == 0) return INFINITY;
+    if (s->mates[run > 0] >= 0) {
+        const Surface *next = W.surfaces + s->mates[run > 0];
+        double load = -(W.gx * c->nx + W.gy * c->ny), fast = d->vx * c->ny - d->vy * c->nx;
+        int round = next->shape != SEGMENT
+            && square(d->x - next->x) + square(d->y - next->y) >= square(next->radius);
+        if (!round || load > fast * fast / (next->radius + d->radius)) return INFINITY;
+    }
+    return (run > 0 ? length - along : along) / fabs(run);
+}
+
+/* When a load (N s of impulse per time, newest first) falls to nothing, by the line through two. */
+double time_unloaded(const double *load, const double *t) {
+    return load[1] > load[0] ? t[0] + load[0] / (load[1] - load[0]) * (t[0] - t[1]) : INFINITY;
+}
+
+/* Add a contact if it touches and hardly approaches; `least` is the smaller radius. */
+static int add(int i, int j, double least, double bound, double h) {
+    if (W.contact_count >= W.contact_room) return 0;
+    Contact *c = W.contacts + W.contact_count;
+    const Disk *d = W.disks + i;
+    double u[3], later;
+    if (j < 0 && face_at(W.surfaces + (-1 - j), d->x, d->y) != W.surfaces + (-1 - j)) return 1;
+    describe(c, i, j);
+    /* The next face or pulley that a disk by itself slides on to may be further off. */
+    int far = c->gap > TOUCH * least;
+    if (far && (W.interact || j >= 0 || !d->supports)) return 1;
+    later = gap_later(c, h);
+    if (far && later > 0) return 1;
+    relative(c, 0, u);
+    /* What has sunk in counts however it moves: else what parts others would press it, or what knocks
+       on it in each step. */
+    if (c->gap > -SUNK * least && (-u[0] > bound || u[0] > W.soft)) return 1;
+    double aim = MIN(c->gap, 0);
+    if (c->gap < -SLOP * least) {
+        double part = MIN(MAX(PART, -c->gap / (DEEP * least)), 1);
+        aim = -SLOP * least + (1 - part) * (c->gap + SLOP * least);
+    }
+    c->need = (aim - later) / h;
+    c->drift = 0.5 * h * c->pull;
+    c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
+    for (int k = d->before; k >= 0; k = W.earlier[k].next)
+        if (goes_on(W.earlier[k].j, j))
+            for (int n = 0; n < 3; n++) c->impulse[n] = W.again * W.earlier[k].impulse[n];
+    int pressed = c->impulse[0] > 0;
+    for (int n = 0; n < d->held_count; n++) pressed |= goes_on(-1 - d->held[n], j);
+    /* What was pressed came down from its last hop: it may leave along the surface, not into it, and
+       above the face while that lasts. Beyond, the end presses it only if it is slow enough. */
+    double floor = -u[0], until = j < 0 ? time_on_face(c) : INFINITY, least_need = floor;
+    if (until < h) {
+        double press = press_on(d, W.surfaces + (-1 - j), c->nx, c->ny);
+        double along = d->vx * c->ny - d->vy * c->nx;
+        floor += 0.5 * until * MAX(press, 0);
+        least_need = press > along * along / d->radius ? floor : -u[0] + until * MAX(press, 0);
+    } else least_need = floor;
+    int gone = j < 0 && W.surfaces[-1 - j].there == LEAVING, ends = until < h || gone;
+    if (gone && !pressed) return 1;
+    if (gone) c->need = -INFINITY;
+    /* A load that wears off leaves nothing to stop; friction goes on as long as the load does, not to
+       the middle of the step. */
+    const Track *track = W.tracks + i;
+    double wears = W.interact || ends ? INFINITY : time_unloaded(track->load, track->load_t) - W.t;
+    /* In a corner the other surface may press it on this one. */
+    int alone = d->supports <= 1 || gone;
+    c->leaves = pressed && alone && wears > 3 * h && c->gap <= LEAVE * least && c->need < least_need;
+    if (c->leaves) c->need = floor;
+    if (c->leaves) c->drift = (until < h ? until : 0) * c->pull;
+    else if (pressed && wears < h) c->drift = MAX(wears, -0.5 * W.length_before) * c->pull;
+    W.contact_count++;
+    return 1;
+}
+
+/* A disk that leaves all surfaces in this step, over the end of a face, is carried until then: it
+   gets what gravity takes from it up to there. */
+static void carry_to_end(int i, int first, double h) {
+    const Disk *d = W.disks + i;
+    Contact *last = 0;
+    double until = 0, nx, ny;
+    for (int n = first; n < W.contact_count; n++) {
+        Contact *c = W.contacts + n;
+        double t = c->leaves ? time_on_face(c) : INFINITY;
+        if (t < h && t >= until) {
+            last = c;
+            until = t;
+        }
+    }
+    if (!last) return;
+    /* Without a hop it would fall from the end on; whatever it would fall into carries it on. */
+    double u[3], fall = 0.5 * square(h - until);
+    relative(last, 0, u);
+    double x = d->x + (d->vx - u[0] * last->nx) * h + fall * W.gx;
+    double y = d->y + (d->vy - u[0] * last->ny) * h + fall * W.gy;
+    const int *list;
+    int count = surfaces_near(i, &list);
+    for (int n = 0; n < count; n++) {
+        const Surface *s = W.surfaces + list[n];
+        if (is_near(s, d) && gap_to(s, x, y, d->radius, &nx, &ny)
+                < MIN(0, gap_to(s, d->x, d->y, d->radius, &nx, &ny)))
+            return;
+    }
+    double press = press_on(d, W.surfaces + (-1 - last->j), last->nx, last->ny);
+    last->need += 0.5 * MAX(press, 0) * until;
+}
+
+/* List the contacts of the step, waking sleepers that are touched; 0 if there is no room. */
+int find_contacts(double h, int *woke) {
+    W.contact_count = 0;
+    *woke = 0;
+    for (int n = 0; n < W.near_count; n++) {
+        int i = W.near[2 * n], j = W.near[2 * n + 1];
+        Disk *a = W.disks + i, *b = W.disks + j;
+        double least = MIN(a->radius, b->radius), reach = a->radius + b->radius + TOUCH * least;
+        if (square(a->x - b->x) + square(a->y - b->y) > reach * reach) continue;
+        /* What the step before left over is taken up here. */
+        int impacts = MAX(a->impacts, b->impacts);
+        double bound = impacts > CROWDED ? INFINITY : left_over(a, impacts, -1, least);
+        if (a->supports || b->supports || a->mode != FREE || b->mode != FREE)
+            bound = MAX(bound, MAX(W.soft, W.skip * least));
+        if (a->mode == ASLEEP || b->mode == ASLEEP) {
+            wake(a->mode == ASLEEP ? i : j, W.t);
+            *woke = 1;
+        }
+        if (a->mode != FREE) { int k = i; i = j; j = k; }
+        if (!add(i, j, least, bound, h)) return 0;
+    }
+    if (*woke) return 1;
+    for (int i = W.low; i < W.high; i++) {
+        Disk *d = W.disks + i;
+        if (d->mode != FREE) continue;
+        int first = W.contact_count;
+        double bound = d->impacts > CROWDED ? INFINITY : left_over(d, d->impacts, -1, d->radius);
+        if (d->supports) bound = MAX(bound, W.interact ? MAX(W.soft, W.skip * d->radius) : W.soft);
+        const int *list;
+        int count = surfaces_near(i, &list);
+        for (int n = 0; n < count; n++) {
+            int k = list[n];
+            if (!is_near(W.surfaces + k, d)) continue;
+            double inside = pressed_inside(d, k), most = MAX(bound, inside ? W.soft + 2 * h * inside : 0);
+            if (!add(i, -1 - k, d->radius, most, h)) return 0;
+        }
+        if (W.contact_count > first) carry_to_end(i, first, h);
+    }
+    return 1;
+}

@@ -1,0 +1,287 @@
+// Where, when and how fast each particle starts: drawn as Python's `machine/releases.py` does.
+import { generator } from "./random.js";
+import { Fault, onBelt } from "./scene.js";
+import { RADIANS, lengthOf, sinCos } from "./trig.js";
+
+/** @typedef {import("./random.js").Generator} Generator */
+/** @typedef {import("./scene.js").Scene} Scene */
+/** @typedef {import("./scene.js").Point} Point */
+
+/**
+ * @typedef {object} Release
+ * @property {number} t s
+ * @property {number} x m
+ * @property {number} y
+ * @property {number} vx m/s
+ * @property {number} vy
+ * @property {boolean} carried rides the incoming belt by adhesion
+ * @property {number} stream
+ * @property {number} kind
+ */
+
+/** @typedef {(places: Point[], radius: number) => boolean[]} Clear which places are free */
+
+/** Draws of a height that may overlap an earlier particle before it has to wait for its place. */
+const TRIES = 1000;
+
+/** Distance of neighbours in a packed box, in radii of the largest. */
+const PITCH = 2.04;
+
+/** How far a place in it is moved at random each way, in the same unit. */
+const JITTER = 0.01;
+
+/**
+ * Returns the direction in which the incoming belt runs, cosine and sine.
+ * @param {Scene} scene
+ * @returns {[number, number]}
+ */
+export function upBelt(scene) {
+  if (!scene.incoming?.incline_deg) return [1.0, 0.0];
+  const [sine, cosine] = sinCos(scene.incoming.incline_deg * RADIANS);
+  return [cosine, sine];
+}
+
+/**
+ * Returns where the lowest layer of a stream is released, m.
+ * @param {Scene} scene
+ * @param {number} n of the stream
+ * @returns {Point}
+ */
+function releasePoint(scene, n) {
+  const { at } = scene.streams[n];
+  const belt = scene.incoming;
+  if (belt === null || (at !== undefined && !onBelt(scene, n))) {
+    return /** @type {Point} */ (at);
+  }
+  const riding = belt.pulley_radius + scene.particles[scene.kinds[n]].radius;
+  const [cosine, sine] = upBelt(scene);
+  const along = at === undefined ? -belt.length : at[0] * cosine + at[1] * sine;
+  return [along * cosine - riding * sine, along * sine + riding * cosine];
+}
+
+/**
+ * Returns with what velocity a stream is released, m/s.
+ * @param {Scene} scene
+ * @param {number} n of the stream
+ * @returns {Point}
+ */
+function releaseVelocity(scene, n) {
+  const { velocity, fill } = scene.streams[n];
+  if (velocity !== undefined) return velocity;
+  if (fill !== undefined || scene.incoming === null) return [0.0, 0.0];
+  const [cosine, sine] = upBelt(scene);
+  const { speed } = scene.incoming;
+  return [speed * cosine, sine === 0.0 ? 0.0 : speed * sine];
+}
+
+/**
+ * Draws the releases of all streams, one after the other, and the radii of the particles.
+ * @param {Scene} scene
+ * @param {Clear} clear
+ * @returns {{releases: Release[], radius: number[]}}
+ * @throws {Fault} if a box has not room for all
+ */
+export function draw(scene, clear) {
+  /** @type {Release[]} */
+  const releases = [];
+  /** @type {number[]} */
+  const radius = [];
+  scene.streams.forEach((stream, n) => {
+    const drawn = stream.fill === undefined
+      ? drawStream(scene, n) : pour(scene, n, releases, radius, clear);
+    releases.push(...drawn.releases);
+    radius.push(...drawn.radius);
+  });
+  return { releases, radius };
+}
+
+/**
+ * @param {Scene} scene
+ * @param {number} n
+ */
+function diceOf(scene, n) {
+  const { seed } = scene.streams[n];
+  return n ? generator(seed, n) : generator(seed);
+}
+
+/**
+ * Draws radii from the range of a stream's kind, m; the first has the mean.
+ * @param {Scene} scene
+ * @param {number} n
+ * @param {Generator | null} dice
+ * @returns {number[]}
+ */
+function drawRadii(scene, n, dice) {
+  const { radius, span } = scene.particles[scene.kinds[n]];
+  const { count } = scene.streams[n];
+  if (span === undefined || dice === null) return new Array(count).fill(radius);
+  const radii = Array.from({ length: count }, () => dice.uniform(span[0], span[1]));
+  radii[0] = radius;
+  return radii;
+}
+
+/**
+ * Draws the releases of one stream, at a point or along a line.
+ * @param {Scene} scene
+ * @param {number} n
+ */
+function drawStream(scene, n) {
+  const stream = scene.streams[n];
+  const { count, to } = stream;
+  const kind = scene.kinds[n];
+  const particle = scene.particles[kind];
+  const every = Array.from({ length: count }, (_, i) => i);
+  const atOnce = to !== undefined && !("rate" in stream.given);
+  const t = every.map((i) => (atOnce ? 0.0 : i / stream.rate) + stream.start);
+  const [vx, vy] = releaseVelocity(scene, n);
+  const velocity = every.map(() => ({ vx, vy }));
+  const crowded = count > 1 && scene.crowded;
+  // The first one has no spread.
+  const spread = stream.bed_height > 0.0 || stream.speed_spread > 0.0;
+  const draws = count > 1 && (crowded || spread || to !== undefined || particle.span !== undefined);
+  const dice = draws ? diceOf(scene, n) : null;
+  const height = every.map(() => 0.0);
+  if (dice !== null) {
+    every.forEach((i) => { height[i] = stream.bed_height * dice.random(); });
+    height[0] = 0.0;
+    const faster = every.map(() => stream.speed_spread * dice.uniform(-1.0, 1.0));
+    faster[0] = 0.0;
+    const speed = lengthOf(vx, vy);
+    const [x, y] = speed > 0.0 ? [vx / speed, vy / speed] : [1.0, 0.0];
+    velocity.forEach((one, i) => {
+      one.vx += faster[i] * x;
+      one.vy += faster[i] * y;
+    });
+  }
+  const radius = drawRadii(scene, n, dice);
+  const common = { carried: false, stream: n, kind };
+  if (to !== undefined) {
+    const [x, y] = /** @type {Point} */ (stream.at);
+    const step = 1.0 / (count - 1);
+    const share = every.map((i) => {
+      if (i === 0 || dice === null) return 0.0;
+      return atOnce ? (i === count - 1 ? 1.0 : i * step) : dice.random();
+    });
+    const releases = every.map((i) => ({
+      t: t[i], x: x + share[i] * (to[0] - x), y: y + share[i] * (to[1] - y), ...velocity[i],
+      ...common,
+    }));
+    return { releases, radius };
+  }
+  const rides = onBelt(scene, n);
+  const adheres = rides && scene.incoming?.friction === "adhesion";
+  const [cosine, sine] = rides ? upBelt(scene) : [1.0, 0.0];
+  if (crowded && dice !== null) {
+    const fall = adheres ? 0.0 : 0.5 * scene.gravity;
+    const lowest = rides ? 0.0 : -Infinity;
+    // Seen from the belt, if it rises.
+    const along = velocity.map(({ vx: u, vy: v }) => {
+      return /** @type {Point} */ ([u * cosine + v * sine, v * cosine - u * sine]);
+    });
+    spreadApart(stream.bed_height, t, height, along, radius, fall, lowest, dice);
+  }
+  if (rides) every.forEach((i) => { height[i] += radius[i] - particle.radius; });
+  const [x, low] = releasePoint(scene, n);
+  const releases = every.map((i) => ({
+    t: t[i], x: x - sine * height[i], y: low + cosine * height[i], ...velocity[i],
+    ...common, carried: adheres,
+  }));
+  return { releases, radius };
+}
+
+/**
+ * Redraws heights, in place, so that no particle starts inside one released before it.
+ *
+ * Earlier particles are taken to have moved on at their release velocity, and to have fallen by
+ * `fall` (m/s²) times their age squared, but not below `lowest` (m above the lowest layer).
+ * @param {number} bed height that is drawn from, m
+ * @param {number[]} t
+ * @param {number[]} height
+ * @param {Point[]} velocity
+ * @param {number[]} radius
+ * @param {number} fall
+ * @param {number} lowest
+ * @param {Generator} dice
+ */
+function spreadApart(bed, t, height, velocity, radius, fall, lowest, dice) {
+  let largest = 0.0;
+  for (const r of radius) largest = Math.max(largest, r);
+  const diameter = 2.0 * largest;
+  // Who may still be in the way: whoever has moved on by a diameter, or has fallen below the bed
+  // by one, stays away for good.
+  /** @type {number[]} */
+  let close = [];
+  for (let i = 1; i < t.length; i++) {
+    close.push(i - 1);
+    /** @type {{dx: number, dy: number, reach: number}[]} */
+    const near = [];
+    close = close.filter((j) => {
+      const age = t[i] - t[j];
+      const dx = velocity[j][0] * age;
+      const dy = Math.max(height[j] + velocity[j][1] * age - fall * (age * age), lowest);
+      const sinks = velocity[j][1] <= 2.0 * fall * age;
+      const stays = Math.abs(dx) < diameter && !(sinks && dy <= -diameter);
+      if (stays) near.push({ dx, dy, reach: radius[j] + radius[i] });
+      return stays;
+    });
+    for (let tries = bed > 0.0 ? TRIES : 0; tries > 0; tries--) {
+      const free = near.every(({ dx, dy, reach }) => {
+        const up = dy - height[i];
+        return dx * dx + up * up >= reach * reach;
+      });
+      if (free) break;
+      height[i] = bed * dice.random();
+    }
+  }
+}
+
+/**
+ * Packs a stream's box from below: rows of places, every other one shifted by half a pitch.
+ * @param {Scene} scene
+ * @param {number} n
+ * @param {Release[]} before of the streams before it
+ * @param {number[]} their radii
+ * @param {Clear} clear
+ */
+function pour(scene, n, before, their, clear) {
+  const stream = scene.streams[n];
+  const kind = scene.kinds[n];
+  const particle = scene.particles[kind];
+  const box = /** @type {[Point, Point]} */ (stream.fill);
+  const [[left, bottom], [right, top]] = box;
+  const dice = diceOf(scene, n);
+  const radius = drawRadii(scene, n, dice);
+  const largest = particle.span === undefined ? particle.radius : particle.span[1];
+  const pitch = PITCH * largest;
+  const room = largest * (1.0 + JITTER);
+  const rise = pitch * Math.sqrt(0.75);
+  const rows = Math.max(0, Math.floor((top - bottom - 2.0 * room) / rise) + 1);
+  const across = Math.max(0, Math.floor((right - left - 2.0 * room) / pitch) + 1);
+  /** @type {Point[]} */
+  let places = [];
+  for (let row = 0; row < rows; row++) {
+    for (let column = 0; column < across; column++) {
+      const x = left + room + (column * pitch + 0.5 * pitch * (row % 2));
+      if (x <= right - room) places.push([x, bottom + room + row * rise]);
+    }
+  }
+  for (const place of places) {
+    place[0] += JITTER * largest * dice.uniform(-1.0, 1.0);
+    place[1] += JITTER * largest * dice.uniform(-1.0, 1.0);
+  }
+  const free = clear(places, largest);
+  places = places.filter(([x, y], i) => {
+    return free[i] && before.every((other, j) => {
+      return lengthOf(x - other.x, y - other.y) >= largest + their[j];
+    });
+  });
+  if (places.length < stream.count) {
+    const key = scene.streams.length > 1 ? `stream[${n}].fill` : "stream.fill";
+    throw new Fault(key, box, "box-full", { count: places.length, radius: largest });
+  }
+  const [vx, vy] = releaseVelocity(scene, n);
+  const releases = places.slice(0, stream.count).map(([x, y]) => ({
+    t: stream.start, x, y, vx, vy, carried: false, stream: n, kind,
+  }));
+  return { releases, radius };
+}

@@ -1,0 +1,159 @@
+// Where disks may be released: not in a surface that is there then.
+import { Fault, ON_BELT } from "./scene.js";
+import { atan2, lengthOf, modulo, sinCos } from "./trig.js";
+
+/** @typedef {import("./machine.js").Segment} Segment */
+/** @typedef {import("./machine.js").Arc} Arc */
+/** @typedef {import("./releases.js").Release} Release */
+/** @typedef {import("./scene.js").Scene} Scene */
+/** @typedef {import("./scene.js").Point} Point */
+/** @typedef {{segments: Segment[], arcs: Arc[], names: string[]}} Room */
+/** @typedef {(x: number, y: number) => Point} Nearest the point of a surface nearest to a place */
+
+/** Share of the largest coordinate by which a contact may seem to overlap. */
+const ROUNDING = 64.0 * Number.EPSILON;
+
+/**
+ * @param {Segment} segment
+ * @returns {Nearest}
+ */
+function nearestOnSegment({ ends: [x0, y0, x1, y1] }) {
+  const dx = x1 - x0;
+  const dy = y1 - y0;
+  const square = dx * dx + dy * dy;
+  return (x, y) => {
+    const along = (x - x0) * dx + (y - y0) * dy;
+    const share = Math.min(Math.max(along / (square > 0.0 ? square : 1.0), 0.0), 1.0);
+    return [x0 + share * dx, y0 + share * dy];
+  };
+}
+
+/**
+ * @param {Arc} arc
+ * @returns {Nearest}
+ */
+function nearestOnArc({ x: cx, y: cy, radius, begin, extent }) {
+  const [first, last] = [begin, begin + extent].map((angle) => {
+    const [sine, cosine] = sinCos(angle);
+    // Of the point, for its digits are those of its coordinates.
+    return [(cx + radius * cosine) - cx, (cy + radius * sine) - cy];
+  });
+  return (x, y) => {
+    let dx = x - cx;
+    let dy = y - cy;
+    if (!(lengthOf(dx, dy) > 0.0)) [dx, dy] = [1.0, 0.0];
+    const far = lengthOf(dx, dy);
+    if (modulo(atan2(dy, dx) - begin, 2.0 * Math.PI) <= extent) {
+      return [radius * dx / far + cx, radius * dy / far + cy];
+    }
+    const near = lengthOf(dx - first[0], dy - first[1]) <= lengthOf(dx - last[0], dy - last[1]);
+    const [ex, ey] = near ? first : last;
+    return [ex + cx, ey + cy];
+  };
+}
+
+/**
+ * Returns the surfaces that may reach into the box of some places, each with its nearest points.
+ * @param {Room} room
+ * @param {Point[]} places
+ * @param {(i: number) => number} reach m
+ */
+function* surfacesNear({ segments, arcs }, places, reach) {
+  let [left, right, bottom, top] = [Infinity, -Infinity, Infinity, -Infinity];
+  places.forEach(([x, y], i) => {
+    const r = reach(i);
+    left = Math.min(left, x - r);
+    right = Math.max(right, x + r);
+    bottom = Math.min(bottom, y - r);
+    top = Math.max(top, y + r);
+  });
+  for (const segment of segments) {
+    const [x0, y0, x1, y1] = segment.ends;
+    const across = Math.max(x0, x1) > left && Math.min(x0, x1) < right;
+    if (across && Math.max(y0, y1) > bottom && Math.min(y0, y1) < top) {
+      yield { piece: segment, nearest: nearestOnSegment(segment) };
+    }
+  }
+  for (const arc of arcs) yield { piece: arc, nearest: nearestOnArc(arc) };
+}
+
+/**
+ * Tells which places a disk of a radius (m) can be in.
+ * @param {Room} room
+ * @param {Point[]} places
+ * @param {number} radius
+ * @returns {boolean[]}
+ */
+export function clearOf(room, places, radius) {
+  const free = places.map(() => true);
+  if (!places.length) return free;
+  for (const { nearest } of surfacesNear(room, places, () => radius)) {
+    places.forEach(([x, y], i) => {
+      const [px, py] = nearest(x, y);
+      free[i] = free[i] && lengthOf(x - px, y - py) >= radius;
+    });
+  }
+  return free;
+}
+
+/**
+ * Returns releases of which none lies in a surface; one that does by rounding only is moved out.
+ * @param {Scene} scene
+ * @param {Room} room
+ * @param {Release[]} releases
+ * @param {number[]} radius
+ * @returns {Release[]}
+ * @throws {Fault} if one does by more
+ */
+export function movedOut(scene, room, releases, radius) {
+  let out = releases;
+  const belt = scene.incoming;
+  const places = releases.map(({ x, y }) => /** @type {Point} */ ([x, y]));
+  for (const { piece, nearest } of surfacesNear(room, places, (i) => radius[i])) {
+    const there = (/** @type {Release} */ { t, carried }) => {
+      const rides = piece.surface === 0 && belt !== null && carried;
+      return piece.appears <= t && t < piece.vanishes && !rides;
+    };
+    out = pushedOut(scene, out, nearest, radius, there, room.names[piece.surface]);
+  }
+  if (belt === null) return out;
+  const reach = radius.map((r) => belt.pulley_radius + r);
+  return pushedOut(scene, out, () => [0.0, 0.0], reach, ({ carried }) => !carried, "incoming");
+}
+
+/**
+ * Returns releases of which those told are at least `reach` (m) away from a surface.
+ * @param {Scene} scene
+ * @param {Release[]} releases
+ * @param {Nearest} nearest
+ * @param {number[]} reach
+ * @param {(release: Release) => boolean} who
+ * @param {string} name of the surface
+ */
+function pushedOut(scene, releases, nearest, reach, who, name) {
+  let deepest = -Infinity;
+  /** @type {Fault | null} */
+  let fault = null;
+  const moved = releases.map((release, i) => {
+    if (!who(release)) return release;
+    const { x, y } = release;
+    const [px, py] = nearest(x, y);
+    const [dx, dy] = [x - px, y - py];
+    const distance = lengthOf(dx, dy);
+    const depth = reach[i] - distance;
+    const size = Math.max(Math.abs(px), Math.abs(py), Math.abs(x), Math.abs(y));
+    const rounding = ROUNDING * size;
+    if (depth > Math.max(ON_BELT, rounding) && depth >= deepest) {
+      const { stream } = release;
+      const key = scene.streams.length > 1 ? `stream[${stream}].at` : "stream.at";
+      deepest = depth;
+      fault = new Fault(key, scene.streams[stream].at, "release-inside", {
+        surface: name, particle: i, distance, reach: reach[i],
+      });
+    }
+    if (!(depth > rounding)) return release;
+    return { ...release, x: x + dx * (depth / distance), y: y + dy * (depth / distance) };
+  });
+  if (fault !== null) throw fault;
+  return moved;
+}

@@ -1,0 +1,116 @@
+"""What a page is told of its scene and of scene files: `describe`."""
+
+from __future__ import annotations
+
+from math import nextafter
+from typing import Any, Final
+
+from chutelab.machine import build
+from chutelab.scene import Fault, Scene, SceneError
+from chutelab.scene.conflicts import EITHER
+from chutelab.scene.materials import PRESETS, VALUES
+from chutelab.scene.overrides import limits_of, rule_at
+from chutelab.scene.schema import as_written
+
+SAFE: Final = 2**53
+"""JavaScript's numbers have all digits of whole numbers up to here."""
+
+LISTS: Final = ("material", "pair", "conveyor", "surface")
+
+
+def describe(scene: Scene) -> dict[str, Any]:
+    """Return the scene and the rules of scene files as plain data for JSON.
+
+    A drop that is measured from the impact is written as one from the top of the pulley: the
+    outgoing belt stays where it is while the plate is turned.
+
+    Parameters
+    ----------
+    scene : Scene
+        One scene, no family; of disks and spheres.
+
+    Returns
+    -------
+    dict
+        ``scene``: its keys as its file has them, with a seed beyond 2**53 as text. ``tables``: of
+        each key of each table (those outside of tables under ``scene``) default, unit, low and
+        high, or that it is required. ``presets``: the numbers of each material.
+
+    Raises
+    ------
+    SceneError
+        If the page cannot show it: mass points, boxes, polygons or strings.
+    """
+    _need_disks(scene)
+    tables = as_written(scene)
+    out = scene.outgoing
+    if out is not None and out.drop_from == "impact":
+        machine = build(scene)
+        height = machine.segments.start[machine.segments.surface == machine.landing][0, 1].item()
+        assert scene.incoming is not None
+        drop = scene.incoming.pulley_radius - height
+        tables["outgoing"] = {**tables["outgoing"], "drop": drop, "drop_from": "top"}
+    tables.pop("expect", None)
+    for key in EITHER:
+        rows = tables.get(key, ())
+        for row in (rows,) if isinstance(rows, dict) else rows:
+            if row.get("seed", 0) > SAFE:
+                row["seed"] = str(row["seed"])
+    presets = {
+        name: {key: getattr(preset.material, key) for key in VALUES}
+        for name, preset in PRESETS.items()
+    }
+    return {"scene": tables, "tables": _rules(), "presets": presets}
+
+
+def _need_disks(scene: Scene) -> None:
+    allowed = "a page that answers shows disks and spheres"
+    several = len(scene.particles) > 1
+    faults = []
+    for n, kind in enumerate(scene.particles):
+        table = f"particle[{n}]" if several else "particle"
+        if kind.outline:
+            faults.append(Fault(f"{table}.shape", kind.shape, allowed))
+        elif kind.radius == 0.0:
+            faults.append(Fault(f"{table}.radius", 0.0, f"more than 0; {allowed}"))
+    if scene.string:
+        faults.append(Fault("string", None, f"{allowed}, without strings"))
+    if faults:
+        raise SceneError(scene.source, faults)
+
+
+def _rules() -> dict[str, dict[str, dict[str, Any]]]:
+    """Return default, unit and range of each key, by tables."""
+    rules: dict[str, dict[str, dict[str, Any]]] = {"scene": {}}
+    for name, field in Scene.model_fields.items():
+        key = field.alias or name
+        if key in Scene.tables():
+            continue
+        rules["scene"][key] = _rule([key])
+    for table, model in Scene.tables().items():
+        if table in ("string", "expect"):
+            continue
+        several = table in LISTS or table in EITHER
+        rules[table] = {}
+        for name, field in model.model_fields.items():
+            key = field.alias or name
+            rule = _rule([table, 0, key] if several else [table, key])
+            if field.is_required():
+                rule["required"] = True
+            rules[table][key] = rule
+    # Mass points are for the exact engine alone.
+    rules["particle"]["radius"]["low"] = nextafter(0.0, 1.0)
+    return rules
+
+
+def _rule(path: list[str | int]) -> dict[str, Any]:
+    rule = rule_at(path) or {}
+    found = {"default": rule["default"]} if "default" in rule else {}
+    if "x-unit" in rule:
+        found["unit"] = rule["x-unit"]
+    limits = limits_of(rule)
+    if rule.get("type") == "integer":
+        limits = rule["minimum"], rule["maximum"]
+    if limits is not None:
+        found["low"], found["high"] = limits
+    return found

@@ -1,0 +1,217 @@
+"""Sine, cosine and their inverses of + - * / and square roots alone: the same bits everywhere.
+
+Those of libraries differ in the last bit from one to another, and JavaScript's are not NumPy's.
+``pictures/live/assets/trig.js`` has the same operations in the same order. The polynomials are
+those of fdlibm (Sun Microsystems, 1993), which are free to use.
+
+All take plain numbers, for which NumPy is not loaded, or arrays.
+"""
+
+from __future__ import annotations
+
+from math import nan, pi, sqrt
+from typing import TYPE_CHECKING, Any, overload
+
+if TYPE_CHECKING:
+    from chutelab.util.arrays import Floats, Numbers
+
+RADIANS = pi / 180.0
+"""Of one degree."""
+
+FEW = 32
+"""Numbers that are faster one by one than as an array."""
+
+LARGEST_ANGLE = 1e6
+"""rad; beyond, π/2 in three parts of 33 bits is no longer subtracted exactly."""
+
+_ROUND = 1.5 * 2.0**52
+"""Adding and subtracting it rounds to a whole number."""
+
+_QUARTERS = 6.36619772367581382433e-01  # 2/π
+_PART1, _PART2, _PART3, _REST = (
+    1.57079632673412561417e00, 6.07710050630396597660e-11,
+    2.02226624871116645580e-21, 8.47842766036889956997e-32,
+)  # fmt: skip
+_S1, _S2, _S3, _S4, _S5, _S6 = (
+    -1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04,
+    2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10,
+)  # fmt: skip
+_C1, _C2, _C3, _C4, _C5, _C6 = (
+    4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05,
+    -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11,
+)  # fmt: skip
+_A0, _A1, _A2, _A3, _A4, _A5, _A6, _A7, _A8, _A9, _A10 = (
+    3.33333333333329318027e-01, -1.99999999998764832476e-01, 1.42857142725034663711e-01,
+    -1.11111104054623557880e-01, 9.09088713343650656196e-02, -7.69187620504482999495e-02,
+    6.66107313738753120669e-02, -5.83357013379057348645e-02, 4.97687799461593236017e-02,
+    -3.65315727442169155270e-02, 1.62858201153657823623e-02,
+)  # fmt: skip
+
+# Angles and what their doubles lack: the arc tangent of 1/2, π/4, π/2 and π.
+_HALF, _HALF_LOW = 4.63647609000806093515e-01, 2.26987774529616870924e-17
+_EIGHTH, _EIGHTH_LOW = 7.85398163397448278999e-01, 3.06161699786838301793e-17
+_QUARTER, _QUARTER_LOW = 1.57079632679489655800e00, 6.12323399573676603587e-17
+_STRAIGHT, _STRAIGHT_LOW = 3.14159265358979311600e00, 1.22464679914735317723e-16
+
+
+@overload
+def sin_cos(angle: float) -> tuple[float, float]: ...
+@overload
+def sin_cos(angle: Floats) -> tuple[Floats, Floats]: ...
+def sin_cos(angle: Numbers) -> tuple[Numbers, Numbers]:
+    """Return sine and cosine, each to less than 1 unit in the last place.
+
+    Parameters
+    ----------
+    angle : float or ndarray
+        rad; NaN comes of those beyond `LARGEST_ANGLE`.
+
+    Examples
+    --------
+    >>> sin_cos(0.5 * pi)
+    (1.0, 6.123233995736766e-17)
+    """
+    if not isinstance(angle, float | int):
+        return _sin_cos(angle)
+    angle = float(angle)
+    if not -LARGEST_ANGLE <= angle <= LARGEST_ANGLE:
+        return nan, nan
+    turns, sine, cosine = _octant(angle)
+    quarter = int(turns) & 3
+    if quarter == 0:
+        return sine, cosine
+    if quarter == 1:
+        return cosine, -sine
+    return (-sine, -cosine) if quarter == 2 else (-cosine, sine)
+
+
+def _sin_cos(angle: Floats) -> tuple[Floats, Floats]:
+    import numpy as np
+
+    if angle.size <= FEW:
+        pairs = np.array([*map(sin_cos, angle.ravel().tolist())]).reshape(-1, 2)
+        return pairs[:, 0].reshape(angle.shape), pairs[:, 1].reshape(angle.shape)
+    turns, sine, cosine = _octant(np.where(np.abs(angle) <= LARGEST_ANGLE, angle, nan))
+    quarter = turns - 4.0 * np.floor(0.25 * turns)
+    odd = (quarter == 1.0) | (quarter == 3.0)
+    up, across = np.where(odd, cosine, sine), np.where(odd, sine, cosine)
+    return (
+        np.where(quarter >= 2.0, -up, up),
+        np.where((quarter == 1.0) | (quarter == 2.0), -across, across),
+    )
+
+
+def _octant(angle: Any) -> tuple[Any, Any, Any]:
+    """Return how many quarter turns an angle is, rounded; sine and cosine of what is left."""
+    turns = (angle * _QUARTERS + _ROUND) - _ROUND
+    # The rest, as the sum of x and a tail, without its first digits cancelling away.
+    first = angle - turns * _PART1
+    second = first - turns * _PART2
+    lost = (first - second) - turns * _PART2
+    third = second - turns * _PART3
+    tail = lost + ((second - third) - turns * _PART3) - turns * _REST
+    x = third + tail
+    tail = (third - x) + tail
+    z = x * x
+    w = z * z
+    v = z * x
+    r = _S2 + z * (_S3 + z * _S4) + z * w * (_S5 + z * _S6)
+    sine = x - ((z * (0.5 * tail - v * r) - tail) - v * _S1)
+    r = z * (_C1 + z * (_C2 + z * _C3)) + w * w * (_C4 + z * (_C5 + z * _C6))
+    half = 0.5 * z
+    one = 1.0 - half
+    cosine = one + (((1.0 - one) - half) + (z * r - x * tail))
+    return turns, sine, cosine
+
+
+@overload
+def atan2(y: float, x: float) -> float: ...
+@overload
+def atan2(y: Floats, x: Floats) -> Floats: ...
+def atan2(y: Numbers, x: Numbers) -> Numbers:
+    """Return the angle of a vector from the x axis, to 1.5 units in the last place.
+
+    Parameters
+    ----------
+    y, x : float or ndarray
+        Finite; the sign of a zero does not matter, and the vector (0, 0) has the angle 0.
+
+    Returns
+    -------
+    float or ndarray
+        rad, more than -π, at most π.
+    """
+    if isinstance(y, float | int) and isinstance(x, float | int):
+        return _angle(float(y), float(x))
+    import numpy as np
+
+    y, x = np.broadcast_arrays(np.asarray(y, dtype=np.float64), np.asarray(x, dtype=np.float64))
+    if y.size <= FEW:
+        return np.array([*map(_angle, y.ravel().tolist(), x.ravel().tolist())]).reshape(y.shape)
+    up, across = np.abs(y), np.abs(x)
+    steep, back = up > across, x < 0.0
+    low, high = np.where(steep, across, up), np.where(steep, up, across)
+    middle, most = low > 0.4375 * high, low > 0.6875 * high
+    at = np.where(middle, np.where(most, 1.0, 0.5), 0.0)
+    t = (low - at * high) / np.where(high == 0.0, 1.0, high + at * low)
+    angle = np.where(middle, np.where(most, _EIGHTH, _HALF), 0.0)
+    rest = np.where(middle, np.where(most, _EIGHTH_LOW, _HALF_LOW), 0.0)
+    base = np.where(steep, _QUARTER, np.where(back, _STRAIGHT, 0.0))
+    lack = np.where(steep, _QUARTER_LOW, np.where(back, _STRAIGHT_LOW, 0.0))
+    turned = _summed(base, lack, np.where(steep != back, -1.0, 1.0), angle, rest, t)
+    return np.asarray(np.where(y < 0.0, -turned, turned))
+
+
+def _angle(y: float, x: float) -> float:
+    up, across = abs(y), abs(x)
+    steep, back = up > across, x < 0.0
+    low, high = (across, up) if steep else (up, across)
+    at, angle, rest = 0.0, 0.0, 0.0
+    if low > 0.6875 * high:
+        at, angle, rest = 1.0, _EIGHTH, _EIGHTH_LOW
+    elif low > 0.4375 * high:
+        at, angle, rest = 0.5, _HALF, _HALF_LOW
+    t = (low - at * high) / (1.0 if high == 0.0 else high + at * low)
+    base, lack = 0.0, 0.0
+    if steep:
+        base, lack = _QUARTER, _QUARTER_LOW
+    elif back:
+        base, lack = _STRAIGHT, _STRAIGHT_LOW
+    turned: float = _summed(base, lack, -1.0 if steep != back else 1.0, angle, rest, t)
+    return -turned if y < 0.0 else turned
+
+
+def _summed(base: Any, lack: Any, sign: Any, angle: Any, rest: Any, t: Any) -> Any:
+    """Return base + lack + sign (angle + rest + the arc tangent of t), rounded once."""
+    z = t * t
+    w = z * z
+    odd = z * (_A0 + w * (_A2 + w * (_A4 + w * (_A6 + w * (_A8 + w * _A10)))))
+    even = w * (_A1 + w * (_A3 + w * (_A5 + w * (_A7 + w * _A9))))
+    part = sign * angle
+    most = base + part
+    lost = part - (most - base)
+    return most + (((lost + lack) + sign * rest) + sign * (t - t * (odd + even)))
+
+
+@overload
+def arc_cos(cosine: float) -> float: ...
+@overload
+def arc_cos(cosine: Floats) -> Floats: ...
+def arc_cos(cosine: Numbers) -> Numbers:
+    """Return the angle from 0 to π (rad) of a cosine, to 2.5 units in the last place, or NaN."""
+    square = (1.0 - cosine) * (1.0 + cosine)
+    if isinstance(cosine, float | int):
+        return _angle(sqrt(square), float(cosine)) if square >= 0.0 else nan
+    import numpy as np
+
+    return atan2(np.sqrt(np.where(square >= 0.0, square, nan)), cosine)
+
+
+def hypot(x: Any, y: Any) -> Any:
+    """Return the length of a vector, for sizes of which squares neither overflow nor vanish."""
+    square = x * x + y * y
+    if isinstance(square, float):
+        return sqrt(square)
+    import numpy as np
+
+    return np.sqrt(square)

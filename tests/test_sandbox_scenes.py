@@ -112,21 +112,26 @@ def test_the_bins_of_the_galton_board_are_binomial():
 
 
 @pytest.mark.parametrize(
-    ("bar", "small", "large"),
-    [(0.004, [0.002, 0.003], [0.013, 0.015]), (0.0055, [0.002, 0.003], [0.013, 0.015])]
-    + [pytest.param(0.0015, [0.002, 0.003], [0.005, 0.0055], marks=pytest.mark.slow)],
+    ("bar", "small", "large", "share"),
+    [
+        (0.004, [0.002, 0.003], [0.013, 0.015], 0.8),
+        # What is as large as a gap lodges in it, and what is smaller lies on that.
+        (0.0055, [0.0015, 0.0035], [0.013, 0.015], 0.3),
+        pytest.param(0.0015, [0.002, 0.003], [0.005, 0.0055], 0.8, marks=pytest.mark.slow),
+    ],
 )
-def test_who_falls_through_the_screen_is_smaller_than_its_gap(bar, small, large):
+def test_who_falls_through_the_screen_is_smaller_than_its_gap(bar, small, large, share):
     changes = {"surface.bars.radius": bar, "stream.fines.count": 100, "stream.lumps.count": 20}
     changes |= {"particle.small.radius": small, "particle.large.radius": large, "expect": None}
     recording = simulate(sc.load("mixture").with_values(changes))
     gap = hypot(0.013, 0.0093) - 2.0 * bar
     size = 2.0 * recording.particle.radius
     # The engine lets disks sink in by up to 3 % of their radius.
-    fits, never = size < gap, 0.97 * size > gap
+    fits, never = size < 0.8 * gap, 0.97 * size > gap
     through = (last_places(recording) < [0.465, -0.333]).all(axis=1)
+    assert fits.any()
     assert not through[never].any()
-    assert through[fits].mean() > 0.8
+    assert through[fits].mean() > share
 
 
 # Gallery.

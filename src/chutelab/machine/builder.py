@@ -91,9 +91,8 @@ class _Room:
         found: list[tuple[str, Floats, Numbers]] = []
         if belt is not None:
             found.append(("incoming", np.zeros((2, 1)), belt.pulley_radius))
-        for one in self.scene.conveyor:
-            for axis in (one.from_, one.to):
-                found.append((one.name, np.array(axis)[:, None], one.pulley_radius))
+        axes = ((one, axis) for one in self.scene.conveyor for axis in (one.from_, one.to))
+        found += [(one.name, np.array(axis)[:, None], one.pulley_radius) for one, axis in axes]
         return found
 
     def clear(self, places: Floats, radius: float) -> Bools:

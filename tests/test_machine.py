@@ -435,7 +435,7 @@ def test_nothing_is_released_in_a_conveyors_pulley(end):
         assert caught.value.faults[0].key == "stream.at"
     above = {"at": [x, y + 0.2 / cos(atan2(0.5, 2.0)) + 0.021], "velocity": [0, 0]}
     falling(particle=disk, conveyor=[belt], stream=above)
-    packed = {"fill": [[x - 0.4, y - 0.4], [x + 0.4, y + 0.4]], "count": 40}
+    packed = {"fill": [[x - 0.4, y - 0.4], [x + 0.4, y + 0.4]], "count": 250}
     places = falling(particle=disk, conveyor=[belt], stream=packed).releases.position
     assert np.hypot(*(places - (x, y)).T).min() >= 0.22
 

@@ -115,10 +115,9 @@ def _lenses(arcs: Arcs, near: float) -> Bools:
     aside = np.stack([-towards[..., 1], towards[..., 0]], axis=-1)
     foot = 0.5 * (distance + (one - other) * (one + other) / distance)
     half = np.sqrt(np.maximum(one**2 - foot**2, 0.0))
-    crossed = np.zeros(distance.shape, dtype=bool)
-    for h in (-half, half):
-        place = center + foot[..., None] * towards + h[..., None] * aside
-        crossed |= arcs.holds(place, near) & arcs.holds(place.swapaxes(0, 1), near).T
+    # Of the two points in which circles meet the one to the left; the other way round the other.
+    place = center + foot[..., None] * towards + half[..., None] * aside
+    crossed = arcs.holds(place, near) & arcs.holds(place.swapaxes(0, 1), near).T
     return crossed & (distance < one + other - near) & (distance > np.abs(one - other) + near)
 
 

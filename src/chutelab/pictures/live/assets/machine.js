@@ -134,7 +134,7 @@ export function build(scene) {
     }
   });
   const room = { segments, arcs, names };
-  const drawn = draw(scene, (places, radius) => clearOf(room, places, radius));
+  const drawn = draw(scene, (places, radius) => clearOf(scene, room, places, radius));
   const releases = movedOut(scene, room, drawn.releases, drawn.radius);
   const { incoming: belt, run, particles } = scene;
   let last = -Infinity;

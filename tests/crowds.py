@@ -321,7 +321,7 @@ def _deep(machine, x, free):
         if free[i] or free[j]:
             yield (i, j), 2.0 - np.hypot(*(x[i] - x[j])) / r
     here = here[free[here]]
-    for which, depths in surface_depths(machine, x[here]).items():
+    for which, depths in surface_depths(machine, x[here], r, 0.0).items():
         depth, name = depths / r, which
         if which != "pulley":
             name = f"{machine.surfaces[machine.segments.surface[which]]}[{which}]"

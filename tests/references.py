@@ -606,15 +606,18 @@ def maxwell_boltzmann(velocity):
 
 
 class Depth(NamedTuple):
-    """Overlaps in radii: the largest, the 99th percentile of all there are, and their number."""
+    """Overlaps in radii: the largest, the 99th percentile of all there are, and their number.
+
+    Of two disks it is the radius of the smaller.
+    """
 
     worst: float
     percentile_99: float
     count: int
 
     @classmethod
-    def of(cls, found, radius):
-        depth = np.concatenate([np.zeros(0), *found]) / radius
+    def of(cls, found):
+        depth = np.concatenate([np.zeros(0), *found])
         depth = depth[depth > 0.0]
         if not len(depth):
             return cls(0.0, 0.0, 0)
@@ -627,34 +630,47 @@ def overlaps(recording, times):
     Of all pairs of free disks that touch then; disks carried by adhesion do not count, as nothing
     can push them.
     """
-    r = recording.particle.radius
-    return Depth.of([pair_overlaps(x, r) for x in _free(recording, times)], r)
+    return Depth.of(pair_overlaps(x, r) for _, x, r in _free(recording, times))
 
 
 def pair_overlaps(x, r):
-    """Return the overlaps (m) of all disks of radius r at places x (k, 2) that touch."""
+    """Return the overlaps, in the smaller's radii, of all disks (k, 2), (k,) that touch."""
     if not len(x):
         return np.zeros(0)
-    pairs = cKDTree(x).query_pairs(2.0 * r, output_type="ndarray")
-    apart = x[pairs[:, 0]] - x[pairs[:, 1]]
-    return 2.0 * r - np.hypot(apart[:, 0], apart[:, 1])
+    i, j = cKDTree(x).query_pairs(2.0 * np.max(r), output_type="ndarray").T
+    r = np.broadcast_to(r, len(x))
+    deep = r[i] + r[j] - np.hypot(*(x[i] - x[j]).T)
+    return deep / np.minimum(r[i], r[j])
 
 
 def inside_surfaces(recording, machine, times):
     """Return how deep free disks are in surfaces at times (T,), s, as `Depth`."""
-    found = [
-        depth for x in _free(recording, times) for depth in surface_depths(machine, x).values()
-    ]
-    return Depth.of(found, recording.particle.radius)
+    return Depth.of(
+        depth / r
+        for t, x, r in _free(recording, times)
+        for depth in surface_depths(machine, x, r, t).values()
+    )
 
 
-def surface_depths(machine, x):
-    """Return how deep (m) disks at x (k, 2) are in each segment, by number, and in the pulley."""
-    r, s, found = machine.particle.radius, machine.segments, {}
-    for k in range(len(s.length)):
+def surface_depths(machine, x, r, t):
+    """Return how deep (m) disks (k, 2), (k,) are in what is there at a time (s).
+
+    By numbers of segments and, from there on, of arcs; and in the pulley.
+    """
+    s, found = machine.segments, {}
+    for k in np.flatnonzero((s.appears <= t) & (t < s.vanishes)).tolist():
         d = x - s.start[k]
         d = d - np.clip(d @ s.tangent[k], 0.0, s.length[k])[:, None] * s.tangent[k]
         found[k] = r - np.hypot(*d.T)
+    a = machine.arcs
+    for k in np.flatnonzero((a.appears <= t) & (t < a.vanishes)).tolist():
+        # The nearest point is where the ray from the centre meets the arc, or else an end: the
+        # angle from the arc's middle, 0 to pi, clipped to half of its extent.
+        d, middle = x - a.center[k], a.begin[k] + 0.5 * a.extent[k]
+        angle = np.angle((d[:, 0] + 1j * d[:, 1]) * np.exp(-1j * middle))
+        angle = middle + np.clip(angle, -0.5 * a.extent[k], 0.5 * a.extent[k])
+        nearest = a.radius[k] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        found[len(s.length) + k] = r - np.hypot(*(d - nearest).T)
     if machine.pulley is not None:
         found["pulley"] = machine.pulley.radius + r - np.hypot(*x.T)
     return found
@@ -670,9 +686,10 @@ def free_from(recording, carried):
 
 
 def _free(recording, times):
-    """Yield places (k, 2) of the disks that are there, and not carried, at each time."""
+    """Yield each time, and places (k, 2) and radii (k,) of who is there then, and not carried."""
     free = free_from(recording, recording.machine.releases.carried)
-    times = np.atleast_1d(times)
+    times, r = np.atleast_1d(times), np.broadcast_to(recording.particle.radius, recording.count)
     for some in np.array_split(times, max(1, len(times) // 100)):
         for t, x in zip(some, recording.at(some)[0], strict=True):
-            yield x[np.isfinite(x[:, 0]) & (free <= t)]
+            there = np.isfinite(x[:, 0]) & (free <= t)
+            yield t, x[there], r[there]

@@ -93,3 +93,27 @@ def test_who_is_struck_off_a_ramp_has_left_the_ramp(crowded):
     np.testing.assert_allclose(
         blow["velocity_after"], speed * side * np.array([1.0, 0.5]), rtol=2e-3
     )
+
+
+@pytest.mark.parametrize("crowded", [False, True])
+@pytest.mark.parametrize("aside", [0.1, 0.2, 0.4])
+@pytest.mark.parametrize("share", [1.0, 1.0001, 1.003])
+def test_a_disk_squeezes_through_the_gap_of_a_ring_and_feels_both_ends(share, aside, crowded):
+    """The gap is hardly wider than the disk: next to one end it may not be in the other.
+
+    It falls in through the top, and comes to lie at the bottom of the ring. A thousandth of the
+    radius of overlap is left alone.
+    """
+    ring, half = 5.0 * R, np.arcsin(share / 5.0)
+    arc = {"center": (0.0, 0.0), "radius": ring, "begin": 0.5 * pi + half,
+           "extent": 2.0 * (pi - half), "friction": 0.0, "restitution": 0.0}  # fmt: skip
+    machine = bent(scene_of(surface=[FAR], run={"until": 0.3}), arc)
+    ends = ring * np.array([[sin(half), cos(half)], [-sin(half), cos(half)]])
+    for speed in (1.0, 3.0):
+        places = [(aside * R, 0.08), (5.0, 5.0)] if crowded else [(aside * R, 0.08)]
+        recording = run(thrown(machine, places, [0.0, -speed]))
+        way = np.concatenate([
+            recording.track(0)["position"], recording.at(np.linspace(0.0, 0.299, 1000))[0][:, 0]
+        ])  # fmt: skip
+        assert np.hypot(*(way[:, None] - ends).transpose(2, 0, 1)).min() > 0.999 * R
+        assert np.hypot(*way[-1]) < ring - 0.999 * R

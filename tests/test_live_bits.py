@@ -15,6 +15,8 @@ import sandbox
 from chutelab.machine import build
 from chutelab.pictures.live.describe import describe
 from chutelab.scene import SceneError, from_dict, load, parse, shipped
+from chutelab.theory import Reason, predict, transfer
+from chutelab.theory.results import STAGES
 
 NODE = shutil.which("node")
 ASSETS = Path(chutelab.pictures.live.__file__).parent / "assets"
@@ -24,17 +26,18 @@ pytestmark = pytest.mark.skipif(NODE is None, reason="node is not installed")
 SCENES = 500
 
 
-def in_node(documents):
-    """Return what JavaScript says of scenes, given as their files have them."""
+def in_node(documents=(), transfers=()):
+    """Return what JavaScript says of scenes, given as their files have them, or of transfers."""
     lab = describe(load("perpendicular"))
-    told = json.dumps({"lab": lab, "scenes": documents})
+    told = json.dumps({"lab": lab, "scenes": [*documents], "transfers": [*transfers]})
     script = Path(__file__).parent / "live" / "bits.mjs"
     done = subprocess.run(
         [NODE, str(script), str(ASSETS)], input=told, capture_output=True, text=True, check=False,
         timeout=120,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    return json.loads(done.stdout)
+    found = json.loads(done.stdout)
+    return found["scenes"] if documents else found["transfers"]
 
 
 def plain(value):
@@ -252,3 +255,115 @@ def test_a_belt_below_the_impact_is_told_from_the_top():
     assert told.outgoing.drop_from == "top"
     mine, other = (build(one).segments.start[2, 1] for one in (scene, told))
     assert other == pytest.approx(mine, abs=1e-15)
+
+
+CLAIMS = {
+    "outside": Reason.OUTSIDE, "early": Reason.EARLY, "no-impact": Reason.NO_IMPACT,
+    "second": Reason.SECOND, "misses": Reason.MISSES, None: None,
+}  # fmt: skip
+SYMBOLS = [name for names in STAGES.values() for name in names]
+
+
+def unlike(mine, found):
+    """Return what differs between a transfer in Python and in JavaScript."""
+    values = {name: float(getattr(mine, name)) for name in SYMBOLS}
+    claim = CLAIMS[(found["reason"] or {"claim": None})["claim"]]
+    wrong = list(differences(plain(values), found["numbers"]))
+    if claim != Reason.of(mine.reason):
+        wrong.append(f"{mine.reason} in Python, {found['reason']} in JavaScript")
+    return wrong
+
+
+def camel(name):
+    head, *rest = name.split("_")
+    return head + "".join(map(str.capitalize, rest))
+
+
+def test_transfers_are_the_same_to_the_last_bit():
+    rng = np.random.default_rng(2016)
+    drawn = []
+    for n in range(SCENES):
+        values = {
+            "speed": rng.uniform(0.2, 4.0), "pulley_radius": rng.uniform(0.05, 0.5),
+            "distance": rng.uniform(-0.2, 1.0), "angle": rng.uniform(-1.4, 1.4),
+            "pivot_height": rng.uniform(-0.5, 0.5), "restitution": rng.uniform(0.0, 1.0),
+            "drop": rng.uniform(0.0, 2.0), "belt_speed": rng.uniform(-2.0, 3.0),
+            "particle_radius": rng.uniform(0.001, 0.05), "mass": rng.uniform(0.001, 1.0),
+            "gravity": rng.uniform(0.1, 20.0), "spin": bool(rng.random() < 0.5),
+            "inertia": rng.uniform(0.1, 1.0), "incline": rng.uniform(-0.9, 0.9),
+            "plate_friction": rng.uniform(0.0, 1.0), "interval": rng.uniform(0.001, 1.0),
+            "unbounded_plate": bool(rng.random() < 0.5),
+        }  # fmt: skip
+        # Some at their defaults, and what is special: a level belt, an upright plate, no gravity.
+        if n % 3 == 0:
+            values |= {"incline": 0.0, "angle": 0.0 if n % 2 else values["angle"]}
+        elif n % 25 == 1:
+            values |= {"gravity": 0.0}
+        elif n % 25 == 2:
+            values |= {"restitution": 1.5, "speed": -1.0 if n % 2 else 1.0}
+        kept = {"speed", "pulley_radius", "distance"}
+        drawn.append({
+            name: value for name, value in values.items() if name in kept or rng.random() < 0.9
+        })  # fmt: skip
+    told = [{camel(name): value for name, value in values.items()} for values in drawn]
+    answered = 0
+    for values, found in zip(drawn, in_node(transfers=told), strict=True):
+        mine = transfer(**values)
+        answered += not np.isnan(mine.x3)
+        assert not unlike(mine, found), (values, unlike(mine, found))
+    assert 0.2 * SCENES < answered < 0.8 * SCENES
+
+
+def transfer_scene(seed):
+    """Draw a belt, a plate and a belt, and now and then something that is in the way."""
+    rng = np.random.default_rng(seed)
+    draw = sandbox.Drawing(rng, meet=False)
+    wheel = draw.number(0.05, 0.3)
+    tables = {
+        "gravity": draw.one_of(9.81, 9.81, draw.number(1.0, 20.0), 0.0),
+        "particle": {"radius": draw.number(0.002, 0.03), **draw.some(
+            mass=draw.number(0.01, 1.0), spin=True, shape="sphere",
+        )},
+        "incoming": {"speed": draw.number(0.3, 4.0), "pulley_radius": wheel, **draw.some(
+            length=draw.number(0.3, 1.0), incline_deg=draw.number(-25.0, 35.0),
+        )},
+        "plate": {"distance": draw.number(0.05, 0.8), **draw.some(
+            angle_deg=draw.number(-50.0, 70.0), above=draw.number(0.05, 0.5),
+            below=draw.number(0.05, 0.8), pivot_height=draw.number(-0.2, 0.4),
+        ), **draw.values()},
+        "stream": draw.some(rate=draw.number(1.0, 300.0)),
+    }  # fmt: skip
+    if tables["gravity"] == 0.0:
+        # Straight back from an upright plate it would graze the belt all along.
+        tables["plate"]["angle_deg"] = draw.number(1.0, 40.0) * draw.one_of(-1.0, 1.0)
+    if draw.chance(0.9):
+        tables["outgoing"] = {
+            "drop": draw.number(0.3, 1.5) + 2.0 * wheel, "drop_from": "top",
+            **draw.some(speed=draw.number(-2.0, 3.0), start=draw.number(-2.0, 0.3), length=3.0),
+        }  # fmt: skip
+    if draw.chance(0.4):
+        draw.transfer = True
+        tables["surface"] = [
+            {"name": f"s{n}", **draw._course(), **draw.some(opens_at=draw.number(0.1, 2.0))}
+            for n in range(draw.whole(1, 2))
+        ]
+    if draw.chance(0.1):
+        tables["plate"] = [tables["plate"], draw._hanging()]
+    return tables
+
+
+def test_predictions_are_the_same_to_the_last_bit_and_have_the_same_reasons():
+    documents = []
+    for seed in range(SCENES + 200):
+        tables = transfer_scene(seed)
+        if not keys_refused(tables):
+            documents.append(tables)
+    assert len(documents) > 400
+    reasons = []
+    for document, found in zip(documents, in_node(documents), strict=True):
+        mine = predict(from_dict(document))
+        reasons.append(Reason.of(mine.reason))
+        wrong = unlike(mine, found["prediction"])
+        assert not wrong, (document, str(mine.reason), found["prediction"]["reason"], wrong[:3])
+    for reason in (None, *Reason):
+        assert reasons.count(reason) > 10, (reason, reasons.count(reason))

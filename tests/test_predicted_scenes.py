@@ -274,3 +274,17 @@ def test_quantities_of_mixed_particles_are_each_particles_own() -> None:
     energy = [0.5 * m * (vx**2 + 4.0) for m, vx in zip((0.01, 0.3), each(run, "v3x"), strict=True)]
     assert each(run, "dEk") == pytest.approx(energy, rel=1e-13)
     assert each(run, "d3") == pytest.approx([0.9, 0.9], rel=1e-12)
+
+
+def test_what_a_rising_belt_throws_off_fast_never_comes_down_on_the_pulley():
+    """|p|² - Rc² = t² (v² - g Rc cos β - g v sin β t + g² t²/4): no root if v² cos β > g Rc."""
+    rng = np.random.default_rng(7)
+    for _ in range(100):
+        wheel, incline = rng.uniform(0.05, 0.3), rng.uniform(0.2, 30.0)
+        speed = np.sqrt(9.81 * (wheel + 0.01) / np.cos(np.radians(incline))) * rng.uniform(1.01, 4)
+        scene = from_dict({
+            "particle": {"radius": 0.01},
+            "incoming": {"speed": speed, "pulley_radius": wheel, "incline_deg": incline},
+            "plate": {"distance": rng.uniform(0.2, 0.6), "above": 2.0},
+        })  # fmt: skip
+        assert "pulley" not in str(predict(scene).reason), scene

@@ -44,10 +44,6 @@ than it went in."""
 ORDERS: Final = {"contact": 2.0, "pymunk": 1.0}
 """Order at which the error of a stepped engine vanishes, at least."""
 
-JOINTS: Final = 1e-5
-"""Of the pymunk engine's error, where there are arcs: they go on a little past their ends, so that
-what slides on to one is not caught by its end. No step is short enough to see them end in time."""
-
 REFINED: Final = 4.0
 """Ratio of one step to the next of the three that show an order."""
 
@@ -156,9 +152,7 @@ def _with_base(
         errors.append(distance(answer(finer, name), base)[0])
     seen = ", ".join(f"{error:.0e}" for error in errors)
     least = ORDERS[name] - CHANCE[name]
-    ends = name == "pymunk" and not base.machine.arcs.whole.all()
-    floor = JOINTS if ends else BLOWS[name]
-    return Agreement(pair, f"order ({seen})", order(errors, REFINED, floor), least, True)
+    return Agreement(pair, f"order ({seen})", order(errors, REFINED, BLOWS[name]), least, True)
 
 
 def order(errors: list[float], ratio: float, floor: float) -> float:

@@ -316,9 +316,12 @@ def _before_the_plate(course: Course) -> Trouble:
     plate = Obstacles.of(course.lines[:1])
     obstacles = Obstacles.of(course.lines[1:] if hit else course.lines, course.bends)
     horizon = float(found.t2) if hit else flight.horizon(plate, radius)
-    # Thrown up slowly, it may come down on the pulley again.
-    centre, rides = np.zeros(2), course.ride_radius
-    again = next(ring_times(flight, centre, rides, horizon), np.inf) if found.phi1 < 0.0 else np.inf
+    # Thrown up slowly, it may come down on the pulley again. Faster, it would only seem to at once,
+    # by rounding: it starts on the circle.
+    centre, rides, again = np.zeros(2), course.ride_radius, np.inf
+    slow = found.v1 * found.v1 * sin_cos(found.phi1)[1] < flight.gravity * rides
+    if found.phi1 < 0.0 and slow:
+        again = next(ring_times(flight, centre, rides, horizon), np.inf)
     hops = again < horizon
     index = first_in_flight(flight, obstacles, radius, min(horizon, again))[1]
     # What is in the way of a flight that misses the plate anyway does not matter.

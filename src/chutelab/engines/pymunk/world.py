@@ -47,8 +47,8 @@ CREEP = 1e-7
 """Share of the radius; how finely the ends of an arc are told from what is between them."""
 
 JOINT = 4.0
-"""An arc goes on past its ends by the angle at which a tangent is this many times a hair away: what
-slides on to it from a face that it is joined to meets it before that face ends."""
+"""Where another piece goes on from its end, an arc reaches past it by the angle at which a tangent
+is this many times a hair away: what slides on to it meets it before that other piece ends."""
 
 ARC = 0.025
 """rad between knots round the pulley: ρ Δφ⁴/384, the curve's error, is 1e-9 of the radius."""
@@ -326,16 +326,39 @@ class World:
         if whole:
             self._add(Bend(circle, tangent=None, foot=foot, begin=0.0, extent=inf, **about))
             return
+        outs = [
+            way * Vec2d(sin(angle), -cos(angle))
+            for way, angle in ((1.0, begin), (-1.0, begin + extent))
+        ]
         more = sqrt(2.0 * JOINT * self.hair / radius)
+        before, after = (
+            more if self._goes_on(end[n], out, more) else 0.0
+            for end, out in zip(arcs.ends, outs, strict=True)
+        )
         self._add(Bend(
-            circle, tangent=None, foot=foot, begin=begin - more, extent=extent + 2.0 * more, **about
+            circle, tangent=None, foot=foot, begin=begin - before, extent=extent + before + after,
+            **about,
         ))  # fmt: skip
         # Out of it is along the surface at the first end, against it at the last.
-        for end, angle, way in zip(arcs.ends, (begin, begin + extent), (1.0, -1.0), strict=True):
+        for end, out, way in zip(arcs.ends, outs, (1.0, -1.0), strict=True):
             still = pymunk.Body(body_type=pymunk.Body.STATIC)
-            out = way * Vec2d(sin(angle), -cos(angle))
             point = pymunk.Circle(still, 0.0, end[n].tolist())
             self._add(Face(point, tangent=out, **about | {"speed": way * about["speed"]}))
+
+    def _goes_on(self, end: Floats, out: Vec2d, bend: float) -> bool:
+        """Tell whether another piece goes on from an end (m), turning by less than `bend` (rad)."""
+        parts, arcs = self.machine.segments, self.machine.arcs
+        first, last = arcs.begin, arcs.begin + arcs.extent
+        onward = [
+            parts.tangent, -parts.tangent,
+            np.stack([-np.sin(first), np.cos(first)], axis=-1),
+            np.stack([np.sin(last), -np.cos(last)], axis=-1),
+        ]  # fmt: skip
+        near = (
+            np.hypot(*(np.concatenate([parts.start, parts.end, *arcs.ends]) - end).T) <= self.hair
+        )
+        near[2 * len(parts.length) :] &= ~np.tile(arcs.whole, 2)
+        return bool((np.hypot(*(np.concatenate(onward) - out)[near].T) <= bend).any())
 
     def _add(self, face: Face) -> None:
         shape = face.touched

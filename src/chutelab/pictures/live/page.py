@@ -101,15 +101,16 @@ def joined(name: str) -> str:
             order.append(module)
 
     visit(name)
-    parts = (re.sub(TAKEN_OFF, "", _asset(module)) for module in order)
-    # A worker's text stands in a script element too.
-    return "".join(parts).replace("</", "<\\/")
+    text = "".join(re.sub(TAKEN_OFF, "", _asset(module)) for module in order)
+    # Half of the modules is what they say to developers. A worker's text is in a script element.
+    return re.sub(COMMENT, "", text).replace("</", "<\\/")
 
 
 IMPORTED = re.compile(r'^import [^;]+ from "\./([\w-]+\.js)";$', re.MULTILINE)
 TAKEN_OFF = re.compile(
     r"^import [^;]+;\n|^export \{[^}]+\};\n|^export (?=async|class|const|function)", re.MULTILINE
 )
+COMMENT = re.compile(r"/\*\*(?:[^*]|\*(?!/))*\*/\s*|^ *//.*\n|^ +|^\n", re.MULTILINE)
 
 
 @cache

@@ -13,11 +13,11 @@
 #define SWEEPS 100
 #define SWEEPS_ALONE 500
 
-/* Whether a disk of radius r can touch both ends of an arc at a time. */
+/* Whether a disk of radius r can touch both ends of an arc at a time, or nearly. */
 static int is_narrow(const Surface *s, double r) {
     double half = 0.5 * s->extent;
     if (s->shape != ARC) return 0;
-    return s->radius <= r || (half > 0.5 * PI && s->radius * sin(half) <= r);
+    return s->radius <= r || (half > 0.5 * PI && s->radius * sin(half) <= (1 + TOUCH) * r);
 }
 
 /* A piece is met in one place at a time: make two of each narrow arc. */

@@ -1,6 +1,7 @@
 // The page: reads its data, starts the engine's thread, and joins the parts.
 
 import { Engine } from "./engine.js";
+import { toToml } from "./keys.js";
 import { Lab } from "./lab.js";
 import { EnergyPanel, NumbersPanel } from "./panels.js";
 import { Stage } from "./stage.js";
@@ -31,7 +32,7 @@ function start() {
   new EnergyPanel(byId("panels"), lab, words);
   new NumbersPanel(byId("panels"), lab, words);
   new Transport(lab, stage, words);
-  Object.assign(globalThis, { chutelab: { lab, stage } });
+  Object.assign(globalThis, { chutelab: { lab, stage, toml: () => toToml(/** @type {any} */ (lab.given)) } });
 }
 
 start();

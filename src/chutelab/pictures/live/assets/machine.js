@@ -106,8 +106,7 @@ const ALWAYS = [[-Infinity, Infinity]];
  * @throws {Fault} if the geometry contradicts itself
  */
 export function build(scene) {
-  const parts = [...beltsOf(scene), ...scene.plates.filter(({ pivot }) => pivot).map(hangingPlate),
-    ...scene.conveyor.map(conveyorPart), ...scene.surface.map(surfacePart)];
+  const parts = surfaceParts(scene);
   const names = parts.map((part) => part.name);
   const every = scene.particles.map((_, kind) => kind);
   const values = names.map((name) => {
@@ -167,6 +166,18 @@ export function build(scene) {
 }
 
 /**
+ * Returns all surfaces, in the order of the ledger.
+ * @param {Scene} scene
+ * @returns {Part[]}
+ * @throws {Fault} if the plate has no length
+ */
+export function surfaceParts(scene) {
+  const hanging = scene.plates.filter(({ pivot }) => pivot !== undefined);
+  return [...beltsOf(scene), ...hanging.map(hangingPlate), ...scene.conveyor.map(conveyorPart),
+    ...scene.surface.map(surfacePart)];
+}
+
+/**
  * Returns mass and moment of inertia of each particle: with the cube and the fifth power of size.
  * @param {Scene} scene
  * @param {Release[]} releases
@@ -209,7 +220,6 @@ function beltsOf(scene) {
   const { incoming: belt, outgoing: out } = scene;
   if (belt === null) return [];
   const top = belt.pulley_radius;
-  const { radius } = scene.particles[scene.kinds[0]];
   const [cosine, sine] = upBelt(scene);
   const x = -top * sine;
   const y = top * cosine;
@@ -220,13 +230,7 @@ function beltsOf(scene) {
   const plate = scene.plates.find(({ pivot }) => pivot === undefined);
   if (plate !== undefined) {
     const turn = sinCos(plate.angle_deg * RADIANS);
-    let below = plate.below;
-    if (below === undefined && height === null) below = REACH_WITHOUT_BELT;
-    if (below === undefined && height !== null) {
-      const lowest = height + Math.max(CLEARANCE, CLEARANCE_RADII * radius);
-      below = Math.max((plate.pivot_height - lowest) / turn[1], 0.0);
-    }
-    const reach = /** @type {number} */ (below);
+    const reach = reachBelow(scene, plate);
     if (reach + plate.above <= 0.0) throw new Fault("plate.above", plate.above, "no-length");
     const pivot = /** @type {Point} */ ([top + plate.distance, plate.pivot_height]);
     parts.push(straightPart("plate", plateEnds(pivot, turn, reach, plate.above), 0.0));
@@ -236,6 +240,22 @@ function beltsOf(scene) {
       out.speed));
   }
   return parts;
+}
+
+/**
+ * Returns how far the damping plate reaches below its pivot, m.
+ * @param {Scene} scene
+ * @param {Plate} plate
+ */
+export function reachBelow(scene, plate) {
+  if (plate.below !== undefined) return plate.below;
+  const { incoming: belt, outgoing: out } = scene;
+  if (belt === null || out === null) return REACH_WITHOUT_BELT;
+  const { radius } = scene.particles[scene.kinds[0]];
+  const height = belt.pulley_radius - out.drop;
+  const lowest = height + Math.max(CLEARANCE, CLEARANCE_RADII * radius);
+  const [, cosine] = sinCos(plate.angle_deg * RADIANS);
+  return Math.max((plate.pivot_height - lowest) / cosine, 0.0);
 }
 
 /**

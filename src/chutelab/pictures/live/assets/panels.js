@@ -1,7 +1,7 @@
 // Beside the picture: the energy ledger as bars that close, and the numbers of one transfer.
 
 import { RADIANS, arcCos } from "./trig.js";
-import { predict } from "./transfer.js";
+import { predict } from "./prediction.js";
 
 /**
  * @typedef {import("./lab.js").Lab} Lab

@@ -333,28 +333,23 @@ class Stage {
   listen() {
     this.front.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
       const grip = /** @type {Element} */ (event.target).closest(".grip");
-      const handle = this.handles.find(({ id }) => id === grip?.getAttribute("data-id"));
-      if (!handle || !grip) return;
+      if (!grip || !this.take(grip.getAttribute("data-id") ?? "")) return;
       event.preventDefault();
       /** @type {any} */ (grip).focus();
       this.front.setPointerCapture(event.pointerId);
-      this.held = handle;
-      grip.classList.add("held");
     });
     this.front.addEventListener("pointermove", (/** @type {PointerEvent} */ event) => {
       if (!this.held) return;
       const [px, py] = this.placeOf(event);
-      this.latest = { x: this.view.worldX(px), y: this.view.worldY(py) };
+      this.latest = [this.view.worldX(px), this.view.worldY(py)];
       // More events than frames come: the latest counts.
-      if (!this.waiting) this.waiting = requestAnimationFrame(() => this.dragOn());
+      if (!this.waiting) this.waiting = requestAnimationFrame(() => this.follow());
     });
     for (const end of ["pointerup", "pointercancel"]) {
       this.front.addEventListener(end, () => {
         if (!this.held) return;
-        this.dragOn();
-        this.gripOf.get(this.held.id)?.classList.remove("held");
-        this.held = null;
-        this.lab.settle();
+        this.follow();
+        this.letGo();
       });
     }
     this.front.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
@@ -364,7 +359,7 @@ class Stage {
     });
   }
 
-  /** @type {{x: number, y: number} | undefined} */
+  /** Where the pointer has moved since the last frame. @type {[number, number] | undefined} */
   latest;
 
   waiting = 0;
@@ -375,17 +370,36 @@ class Stage {
     return [event.clientX - box.left, event.clientY - box.top];
   }
 
-  dragOn() {
+  follow() {
     cancelAnimationFrame(this.waiting);
     this.waiting = 0;
-    if (!this.held || !this.latest) return;
-    const { snap } = this.view, handle = this.held;
-    const numbers = handle.drag(this.latest.x, this.latest.y).map((value, n) =>
-      roundTo(value, handle.axes[n].unit === "degrees" ? 0.5
-        : handle.axes[n].unit === "m/s" ? Math.max(0.01, 10 ** Math.ceil(Math.log10(snap / ARROW)) / 2)
-          : snap));
+    if (this.latest) this.dragTo(...this.latest);
     this.latest = undefined;
-    this.lab.change(valuesOf(handle, numbers), { done: false });
+  }
+
+  /** Take hold of a handle. @param {string} id */
+  take(id) {
+    this.held = this.handles.find((handle) => handle.id === id) ?? null;
+    this.gripOf.get(id)?.classList.add("held");
+    return this.held;
+  }
+
+  /** Move what is held to a place in the world, m. @param {number} x @param {number} y */
+  dragTo(x, y) {
+    if (!this.held) return;
+    const { snap } = this.view, { axes } = this.held;
+    const fine = /** @type {Record<string, number>} */ ({
+      degrees: 0.5, "m/s": Math.max(0.01, 0.5 * 10 ** Math.ceil(Math.log10(snap / ARROW))),
+    });
+    const numbers = this.held.drag(x, y).map((value, n) => roundTo(value, fine[axes[n].unit] ?? snap));
+    this.lab.change(valuesOf(this.held, numbers), { done: false });
+  }
+
+  letGo() {
+    if (!this.held) return;
+    this.gripOf.get(this.held.id)?.classList.remove("held");
+    this.held = null;
+    this.lab.settle();
   }
 
   /** @param {Handle} handle @param {KeyboardEvent} event @returns {boolean} */

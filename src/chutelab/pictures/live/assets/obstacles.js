@@ -1,0 +1,349 @@
+// First contacts of one disk with finite surfaces, on the ride and in flight, as Python's
+// `theory/obstacles.py` finds them: only whether, when and with what.
+import { arcCos, atan2, lengthOf, modulo, sinCos } from "./trig.js";
+
+/** @typedef {import("./scene.js").Point} Point */
+/** @typedef {{name: string, start: Point, end: Point}} Line a straight surface */
+/**
+ * @typedef {object} Bend a round one
+ * @property {string} name
+ * @property {Point} center
+ * @property {number} radius
+ * @property {number} begin
+ * @property {number} extent
+ */
+/** @typedef {{lines: Line[], bends: Bend[]}} Obstacles */
+
+/**
+ * A parabola from t = 0: place (m), velocity (m/s), gravity downward (m/s²).
+ * @typedef {{x: number, y: number, vx: number, vy: number, gravity: number}} Flight
+ */
+
+/** @typedef {{time: number, name: string}} Hit the first of all; Infinity if there is none */
+
+/** Bisections: they exhaust a double's digits. */
+const HALVINGS = 60;
+
+/** @type {Hit} */
+const NO_HIT = { time: Infinity, name: "" };
+
+/**
+ * @param {Hit} hit
+ * @param {number} time
+ * @param {string} name
+ * @returns {Hit}
+ */
+function earlier(hit, time, name) {
+  return time < hit.time ? { time, name } : hit;
+}
+
+/**
+ * @param {Flight} flight
+ * @param {number} t
+ * @returns {Point}
+ */
+export function placeAt({ x, y, vx, vy, gravity }, t) {
+  return [x + t * vx, y + t * vy - 0.5 * gravity * (t * t)];
+}
+
+/** @param {Line} line */
+function frameOf({ start, end }) {
+  const [dx, dy] = [end[0] - start[0], end[1] - start[1]];
+  const length = lengthOf(dx, dy);
+  return { tx: dx / length, ty: dy / length, length };
+}
+
+/** @param {Line[]} lines */
+function endsOf(lines) {
+  return [...lines.map(({ name, start }) => ({ name, point: start })),
+    ...lines.map(({ name, end }) => ({ name, point: end }))];
+}
+
+/**
+ * Returns the ends of bends; a whole circle has none.
+ * @param {Bend[]} bends
+ */
+function tipsOf(bends) {
+  const tip = (/** @type {Bend} */ { name, center, radius }, /** @type {number} */ angle) => {
+    const [sine, cosine] = sinCos(angle);
+    const point = /** @type {Point} */ ([center[0] + radius * cosine, center[1] + radius * sine]);
+    return { name, point };
+  };
+  const open = bends.filter(({ extent }) => extent < 2.0 * Math.PI);
+  return [...open.map((bend) => tip(bend, bend.begin)),
+    ...open.map((bend) => tip(bend, bend.begin + bend.extent))];
+}
+
+/**
+ * Tells whether the direction from a bend's centre to a point is on the bend.
+ * @param {Bend} bend
+ * @param {Point} point
+ */
+function holds({ center, begin, extent }, [x, y]) {
+  return modulo(atan2(y - center[1], x - center[0]) - begin, 2.0 * Math.PI) <= extent;
+}
+
+/**
+ * Returns the first surface that is closer to a point than a radius (m).
+ * @param {Obstacles} obstacles
+ * @param {Point} point
+ * @param {number} radius
+ * @returns {string | undefined} its name
+ */
+export function overlapped({ lines, bends }, [x, y], radius) {
+  const line = lines.find((one) => {
+    const { tx, ty, length } = frameOf(one);
+    const [x0, y0] = one.start;
+    const share = Math.min(Math.max((x - x0) * tx + (y - y0) * ty, 0.0), length);
+    return lengthOf(x0 + share * tx - x, y0 + share * ty - y) < radius;
+  });
+  if (line !== undefined) return line.name;
+  return bends.find((bend) => {
+    if (holds(bend, [x, y])) {
+      return Math.abs(lengthOf(x - bend.center[0], y - bend.center[1]) - bend.radius) < radius;
+    }
+    return tipsOf([bend]).some(({ point }) => lengthOf(point[0] - x, point[1] - y) < radius);
+  })?.name;
+}
+
+/**
+ * Returns a time after which a disk has passed all obstacles.
+ * @param {Flight} flight
+ * @param {Obstacles} obstacles
+ * @param {number} radius
+ */
+export function horizonOf({ x, y, vx, vy, gravity }, { lines, bends }, radius) {
+  const corners = endsOf(lines).map(({ point }) => point);
+  for (const { center: [cx, cy], radius: r } of bends) {
+    corners.push([cx - r, cy - r], [cx + r, cy + r]);
+  }
+  if (gravity > 0.0) {
+    const rise = y - (Math.min(...corners.map((point) => point[1])) - radius);
+    const square = vy * vy + 2.0 * gravity * rise;
+    return square <= 0.0 ? 0.0 : Math.max((vy + Math.sqrt(square)) / gravity, 0.0);
+  }
+  const far = Math.max(...corners.map(([px, py]) => lengthOf(px - x, py - y)));
+  const pace = lengthOf(vx, vy);
+  return pace > 0.0 ? (far + 2.0 * radius) / pace : 0.0;
+}
+
+/**
+ * @param {number[]} polynomial highest power first
+ * @param {number} t
+ */
+function valueOf(polynomial, t) {
+  return polynomial.reduce((sum, factor) => sum * t + factor, 0.0);
+}
+
+/** @param {number[]} polynomial */
+function slopeOf(polynomial) {
+  const degree = polynomial.length - 1;
+  return polynomial.slice(0, -1).map((factor, n) => factor * (degree - n));
+}
+
+/**
+ * Returns where a polynomial changes sign between two times, in order.
+ *
+ * Between the changes of its derivative it rises or falls all the way.
+ * @param {number[]} polynomial
+ * @param {number} low
+ * @param {number} high
+ * @returns {number[]}
+ */
+function changesOf(polynomial, low, high) {
+  if (polynomial.length < 2) return [];
+  const marks = [low, ...changesOf(slopeOf(polynomial), low, high), high];
+  return marks.slice(1).flatMap((end, n) => {
+    const [before, after] = [valueOf(polynomial, marks[n]), valueOf(polynomial, end)];
+    if (before < 0.0 === after < 0.0) return [];
+    const sign = before < 0.0 ? -1.0 : 1.0;
+    return [fallOf(polynomial.map((factor) => sign * factor), marks[n], end)];
+  });
+}
+
+/**
+ * Returns where a polynomial that is negative at `high` falls through 0.
+ * @param {number[]} polynomial
+ * @param {number} low
+ * @param {number} high
+ */
+function fallOf(polynomial, low, high) {
+  let [first, last] = [low, high];
+  for (let n = 0; n < HALVINGS; n++) {
+    const middle = 0.5 * (first + last);
+    if (valueOf(polynomial, middle) < 0.0) last = middle;
+    else first = middle;
+  }
+  return last;
+}
+
+/**
+ * Returns the square of the distance from a point, less that of a radius, as a quartic in time.
+ * @param {Flight} flight
+ * @param {Point} point
+ * @param {number} radius
+ */
+function distanceTo({ x, y, vx, vy, gravity }, point, radius) {
+  const fall = -0.5 * gravity;
+  const [dx, dy] = [x - point[0], y - point[1]];
+  return [
+    fall * fall, 2.0 * vy * fall, vx * vx + vy * vy + 2.0 * dy * fall,
+    2.0 * (dx * vx + dy * vy), dx * dx + dy * dy - radius * radius,
+  ];
+}
+
+/**
+ * Returns when the centre of a disk comes into a circle, or goes out of it, in order.
+ * @param {Flight} flight
+ * @param {Point} center
+ * @param {number} radius
+ * @param {number} horizon
+ * @param {boolean} [outward]
+ * @returns {number[]}
+ */
+export function ringTimes(flight, center, radius, horizon, outward = false) {
+  const quartic = distanceTo(flight, center, radius).map((part) => (outward ? -part : part));
+  const marks = [0.0, ...changesOf(slopeOf(quartic), 0.0, horizon), horizon];
+  return marks.slice(1).flatMap((end, n) => {
+    const falls = valueOf(quartic, marks[n]) >= 0.0 && valueOf(quartic, end) < 0.0;
+    return falls ? [fallOf(quartic, marks[n], end)] : [];
+  });
+}
+
+/**
+ * Returns when the centre first is as close to a point as a radius; Infinity if never.
+ * @param {Flight} flight
+ * @param {Point} point
+ * @param {number} radius
+ * @param {number} horizon
+ */
+export function cornerTime(flight, point, radius, horizon) {
+  if (radius <= 0.0 || horizon <= 0.0) return Infinity;
+  const quartic = distanceTo(flight, point, radius);
+  const marks = [0.0, ...changesOf(slopeOf(quartic), 0.0, horizon), horizon];
+  const inside = marks.findIndex((mark) => valueOf(quartic, mark) < 0.0);
+  return inside < 0 ? Infinity : fallOf(quartic, marks[Math.max(inside - 1, 0)], marks[inside]);
+}
+
+/**
+ * Returns the circles of a disk's centre at contacts with a bend, and if it comes from inside.
+ * @param {Bend} bend
+ * @param {number} radius
+ * @returns {[number, boolean][]}
+ */
+function ringsOf(bend, radius) {
+  const outside = bend.radius + radius;
+  return bend.radius > radius
+    ? [[outside, false], [bend.radius - radius, true]] : [[outside, false]];
+}
+
+/**
+ * Returns when a disk first collides with the face of a line; Infinity if not up to `horizon`.
+ * @param {Flight} flight
+ * @param {Line} line
+ * @param {number} radius
+ * @param {number} horizon
+ */
+function faceTime(flight, line, radius, horizon) {
+  const { tx, ty, length } = frameOf(line);
+  const [nx, ny] = [-ty, tx];
+  const [x0, y0] = line.start;
+  const height = (flight.x - x0) * nx + (flight.y - y0) * ny;
+  const speed = flight.vx * nx + flight.vy * ny;
+  const bend = -0.5 * flight.gravity * ny;
+  const times = [1.0, -1.0].map((side) => {
+    // Where c + b t + a t² falls through 0, without cancellation; NaN if nowhere.
+    const [c, b, a] = [side * height - radius, side * speed, side * bend];
+    const root = Math.sqrt(b * b - 4.0 * a * c);
+    const t = b > 0.0 ? -(b + root) / (2.0 * a) : 2.0 * c / (root - b);
+    if (!(t >= 0.0 && t <= horizon)) return Infinity;
+    const [x, y] = placeAt(flight, t);
+    const foot = (x - x0) * tx + (y - y0) * ty;
+    return foot >= 0.0 && foot <= length ? t : Infinity;
+  });
+  return Math.min(...times);
+}
+
+/**
+ * Returns when and with what the disk first collides up to `horizon`.
+ * @param {Flight} flight
+ * @param {Obstacles} obstacles
+ * @param {number} radius
+ * @param {number} horizon
+ * @returns {Hit}
+ */
+export function firstInFlight(flight, { lines, bends }, radius, horizon) {
+  let hit = NO_HIT;
+  for (const line of lines) hit = earlier(hit, faceTime(flight, line, radius, horizon), line.name);
+  for (const { name, point } of endsOf(lines)) {
+    hit = earlier(hit, cornerTime(flight, point, radius, horizon), name);
+  }
+  if (horizon <= 0.0) return hit;
+  for (const bend of bends) {
+    for (const [size, outward] of ringsOf(bend, radius)) {
+      const times = ringTimes(flight, bend.center, size, horizon, outward);
+      const time = times.find((t) => holds(bend, placeAt(flight, t)));
+      hit = earlier(hit, time ?? Infinity, bend.name);
+    }
+  }
+  for (const { name, point } of tipsOf(bends)) {
+    hit = earlier(hit, cornerTime(flight, point, radius, horizon), name);
+  }
+  return hit;
+}
+
+/**
+ * Returns the first collision of a ride round the pulley; its `time` is an angle from `begin`.
+ * @param {number} rideRadius of the centre's path round the origin, m
+ * @param {number} begin angle from the top, rad
+ * @param {number} last
+ * @param {Obstacles} obstacles
+ * @param {number} radius
+ * @returns {Hit}
+ */
+export function firstOnPulley(rideRadius, begin, last, { lines, bends }, radius) {
+  let hit = NO_HIT;
+  const meet = (/** @type {number} */ angle, /** @type {string} */ name) => {
+    const turned = modulo(angle - begin, 2.0 * Math.PI);
+    if (turned <= last - begin) hit = earlier(hit, turned, name);
+  };
+  const place = (/** @type {number} */ angle) => {
+    const [sine, cosine] = sinCos(angle);
+    return /** @type {Point} */ ([rideRadius * sine, rideRadius * cosine]);
+  };
+  // From the top where the ride is so far away from a point; NaN if nowhere.
+  const around = (/** @type {Point} */ [x, y], /** @type {number} */ size) => {
+    const far = lengthOf(x, y);
+    const square = rideRadius * rideRadius + far * far - size * size;
+    const spread = arcCos(square / (2.0 * rideRadius * far));
+    const lean = atan2(x, y);
+    return [lean - spread, lean + spread];
+  };
+  for (const line of lines) {
+    const { tx, ty, length } = frameOf(line);
+    const [x0, y0] = line.start;
+    const level = x0 * -ty + y0 * tx;
+    for (const side of [radius, -radius]) {
+      const lean = atan2(-ty, tx);
+      const spread = arcCos((level + side) / rideRadius);
+      for (const angle of [lean - spread, lean + spread]) {
+        const [x, y] = place(angle);
+        const foot = (x - x0) * tx + (y - y0) * ty;
+        if (foot >= 0.0 && foot <= length) meet(angle, line.name);
+      }
+    }
+  }
+  if (radius > 0.0) {
+    for (const { name, point } of [...endsOf(lines), ...tipsOf(bends)]) {
+      for (const angle of around(point, radius)) meet(angle, name);
+    }
+  }
+  for (const bend of bends) {
+    for (const [size] of ringsOf(bend, radius)) {
+      for (const angle of around(bend.center, size)) {
+        if (holds(bend, place(angle))) meet(angle, bend.name);
+      }
+    }
+  }
+  return hit;
+}

@@ -1,10 +1,16 @@
 // The page: reads its data, starts the engine's thread, and joins the parts.
 
 import { Engine } from "./engine.js";
+import { Arrows } from "./arrows.js";
+import { CurvesPanel } from "./curves.js";
+import { EnergyPanel } from "./energy.js";
 import { toToml } from "./keys.js";
 import { Lab } from "./lab.js";
-import { EnergyPanel, NumbersPanel } from "./panels.js";
+import { LandingPanel } from "./landing.js";
+import { NumbersPanel } from "./numbers.js";
 import { Stage } from "./stage.js";
+import { Symbols } from "./symbols.js";
+import { Tools } from "./tools.js";
 import { Transport } from "./transport.js";
 import { Words } from "./words.js";
 
@@ -29,10 +35,14 @@ function start() {
   }
   const lab = new Lab(data, engine);
   const stage = new Stage(byId("stage"), lab, words);
-  new EnergyPanel(byId("panels"), lab, words);
-  new NumbersPanel(byId("panels"), lab, words);
+  const panels = [EnergyPanel, NumbersPanel, LandingPanel, CurvesPanel]
+    .map((Panel) => new Panel(byId("panels"), lab, words));
+  new Arrows(stage, words);
+  new Tools(byId("stage").parentElement, lab, stage, words, new Symbols(stage));
   new Transport(lab, stage, words);
-  Object.assign(globalThis, { chutelab: { lab, stage, toml: () => toToml(/** @type {any} */ (lab.given)) } });
+  Object.assign(globalThis, {
+    chutelab: { lab, stage, panels, toml: () => toToml(/** @type {any} */ (lab.given)) },
+  });
 }
 
 start();

@@ -7,8 +7,10 @@
  *   low: number, high: number}} Axis  a number of the scene; `part` of one that is a point
  * @typedef {{id: string, surface: string, what: string, shape: "point" | "turn" | "arrow",
  *   x: number, y: number, from?: [number, number], axes: Axis[],
- *   drag: (x: number, y: number) => number[]}} Handle
- *   `what` is a word of the catalogue; `drag` tells the axes' values for a place in the world.
+ *   drag: (x: number, y: number) => number[], change?: (numbers: number[]) => void,
+ *   says?: string}} Handle
+ *   `what` is a word of the catalogue; `drag` tells the axes' values for a place in the world. One
+ *   of a tool takes them by `change` itself, and may say more than its values.
  */
 
 /** m of arrow for each m/s. */

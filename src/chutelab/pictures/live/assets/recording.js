@@ -43,10 +43,14 @@ class Track {
 
   /** Lowest knot, m. */
   get lowest() {
-    let low = Infinity;
-    for (let i = 0; i < this.count; i += 1) low = Math.min(low, this.at(i, Y));
-    return low;
+    for (; this.seen < this.count; this.seen += 1) this.low = Math.min(this.low, this.at(this.seen, Y));
+    return this.low;
   }
+
+  /** The lowest of the first so many knots. */
+  low = Infinity;
+
+  seen = 0;
 
   get begin() {
     return this.count ? this.rows[0] : Infinity;
@@ -77,6 +81,8 @@ class Track {
   /** Forget what is after t, but for the state then. @param {number} t */
   cut(t) {
     if (!this.count || this.end <= t) return;
+    this.low = Infinity;
+    this.seen = 0;
     if (this.begin > t) {
       this.count = 0;
       return;
@@ -187,13 +193,6 @@ class Recording {
     this.state = state;
     const done = state !== "running";
     this.now = done ? Math.max(this.end, now + this.shift) : now + this.shift;
-  }
-
-  /** Potential energy of all at the lowest point that each has been at, J. */
-  get lowest() {
-    const { mass, gravity } = this.machine;
-    return this.tracks.reduce((sum, track, i) =>
-      (track.count ? sum + mass[i] * gravity * track.lowest : sum), 0);
   }
 
   get end() {

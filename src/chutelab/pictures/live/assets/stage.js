@@ -101,7 +101,12 @@ class Stage {
     if (recording && !this.fitted && recording.state !== "running") this.fit();
     this.drawTracks();
     this.paint();
+    for (const draw of this.drawers) draw();
   }
+
+  /** What tools draw anew when the view, the machine or its run has changed.
+   * @type {(() => void)[]} */
+  drawers = [];
 
   rebuild() {
     if (this.view.width < 2) return;
@@ -109,6 +114,7 @@ class Stage {
     this.drawTracks();
     this.placeHandles();
     this.paint();
+    for (const draw of this.drawers) draw();
   }
 
   drawSurfaces() {
@@ -285,6 +291,7 @@ class Stage {
     const { machine, scene } = this.lab;
     if (!machine || !scene) return;
     this.handles = this.show.handles ? new Handles(scene, machine, this.lab.data).list : [];
+    for (const more of this.further) this.handles.push(...more());
     const wanted = new Set(this.handles.map(({ id }) => id));
     for (const [id, grip] of this.gripOf) {
       if (wanted.has(id)) continue;
@@ -294,9 +301,13 @@ class Stage {
     for (const handle of this.handles) {
       const grip = this.gripOf.get(handle.id) ?? this.newGrip(handle.id);
       this.describe(grip, handle);
-      this.grips.append(grip);
+      // Put in anew it would lose the focus.
+      if (!grip.isConnected) this.grips.append(grip);
     }
   }
+
+  /** Handles of tools. @type {(() => Handle[])[]} */
+  further = [];
 
   /** @param {string} id */
   newGrip(id) {
@@ -321,7 +332,8 @@ class Stage {
     }
     const [first] = handle.axes;
     const name = `${words.name(handle.surface)}: ${words.say(`handle-${handle.what}`)}`;
-    const values = handle.axes.filter(({ step }) => step).map((axis) => words.value(axis));
+    const values = handle.says ? [handle.says]
+      : handle.axes.filter(({ step }) => step).map((axis) => words.value(axis));
     grip.setAttribute("aria-label", name);
     grip.setAttribute("aria-valuenow", String(first.value));
     grip.setAttribute("aria-valuetext", values.join(", "));
@@ -391,6 +403,10 @@ class Stage {
     const fine = /** @type {Record<string, number>} */ ({
       degrees: 0.5, "m/s": Math.max(0.01, 0.5 * 10 ** Math.ceil(Math.log10(snap / ARROW))),
     });
+    if (this.held.change) {
+      this.held.change(this.held.drag(x, y));
+      return;
+    }
     const numbers = this.held.drag(x, y).map((value, n) => roundTo(value, fine[axes[n].unit] ?? snap));
     this.lab.change(valuesOf(this.held, numbers), { done: false });
   }
@@ -415,6 +431,10 @@ class Stage {
     const numbers = handle.axes.map(({ value }) => value);
     const step = handle.axes[n].step * (shiftKey ? 0.1 : 1);
     numbers[n] = roundTo(numbers[n] + sign * step, step);
+    if (handle.change) {
+      handle.change(numbers);
+      return true;
+    }
     const axes = handle.axes.filter((axis, i) => i === n || axis.part !== undefined || !axis.step);
     this.lab.change(valuesOf({ ...handle, axes }, axes.map((axis) => numbers[handle.axes.indexOf(axis)])));
     return true;

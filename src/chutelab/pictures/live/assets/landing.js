@@ -1,0 +1,143 @@
+// Where the particles of a stream land: a histogram, and the mean of the first n with its error.
+
+import { Chart, onWidth, rangeOf, roundUp } from "./chart.js";
+import { card, follow, html } from "./panels.js";
+import { svg } from "./stage.js";
+import { historyOf } from "./stages.js";
+
+/**
+ * @typedef {import("./lab.js").Lab} Lab
+ * @typedef {import("./words.js").Words} Words
+ * @typedef {{from: number, width: number, counts: number[]}} Histogram
+ */
+
+/** Points of a running mean that are drawn at most. */
+const MOST_POINTS = 300;
+
+/** How often values lie in bins of a round width, √n of them or a few more or less.
+ * @param {number[]} values @param {number[]} [of] those that the bins are made for
+ * @returns {Histogram} */
+function histogram(values, of = values) {
+  const [low, high] = rangeOf(of, 0);
+  // All may land at one place.
+  const span = Math.max(high - low, 1e-6 * Math.max(Math.abs(low), Math.abs(high), 1e-6));
+  const width = roundUp(span / Math.max(4, Math.min(40, Math.sqrt(of.length))));
+  const first = Math.floor(low / width), last = Math.floor(high / width);
+  const counts = new Array(last - first + 1).fill(0);
+  for (const value of values) counts[Math.floor(value / width) - first] += 1;
+  return { from: first * width, width, counts };
+}
+
+/** The mean of the first n values and its standard error s/√n, for n = 1, 2, ...
+ * (Welford's recurrence); the error of a single value is not known.
+ * @param {number[]} values @returns {{mean: number, error: number}[]} */
+function runningMean(values) {
+  let mean = 0, squares = 0;
+  return values.map((value, i) => {
+    const n = i + 1, off = value - mean;
+    mean += off / n;
+    squares += off * (value - mean);
+    return { mean, error: n > 1 ? Math.sqrt(squares / (n - 1) / n) : NaN };
+  });
+}
+
+class LandingPanel {
+  /** @param {Element} home @param {Lab} lab @param {Words} words */
+  constructor(home, lab, words) {
+    this.lab = lab;
+    this.words = words;
+    this.bars = new Chart(words, 150);
+    this.means = new Chart(words, 130);
+    this.result = html("p", { class: "result" });
+    this.panel = card("landing", words.say("landing"),
+      html("p", { class: "chart-title" }, words.say("landing-histogram")), this.bars.root,
+      html("p", { class: "chart-title" }, words.say("landing-mean")), this.means.root, this.result,
+      html("p", { class: "note" }, words.say("landing-note")));
+    this.panel.hidden = true;
+    home.append(this.panel);
+    lab.on("scene", () => { this.panel.hidden = (lab.machine?.releases.length ?? 0) < 2; });
+    this.panel.hidden = (lab.machine?.releases.length ?? 0) < 2;
+    follow(lab, this.panel, ["run"], () => this.draw());
+    follow(lab, this.panel, ["time"], () => this.fill());
+    onWidth(this.bars.root, (width) => {
+      this.bars.width = this.means.width = width;
+      this.draw();
+    });
+  }
+
+  /** Landings in the order of time. @type {{t: number, x: number}[]} */
+  landings = [];
+
+  draw() {
+    const { words } = this;
+    if (this.panel.hidden || !this.panel.open) return;
+    // The history's own list grows.
+    this.landings = [...historyOf(this.lab)?.landings ?? []];
+    const places = this.landings.map(({ x }) => x);
+    const all = histogram(places);
+    const { from, width, counts } = all;
+    this.all = all;
+    this.bars.frame([from, from + width * Math.max(1, counts.length)], [0, Math.max(1, ...counts) * 1.08],
+      { below: "x / m", beside: "n", whole: true });
+    this.outline = svg("path", { class: "bins", d: this.steps(all) });
+    this.filled = svg("path", { class: "bins filled" });
+    this.bars.marks.append(this.outline, this.filled);
+    this.running = runningMean(places);
+    const { running } = this;
+    const some = running.map((_, i) => i)
+      .filter((i) => i % Math.ceil(running.length / MOST_POINTS) === 0 || i === running.length - 1);
+    const sides = [1, -1].map((sign) => some.filter((i) => isFinite(running[i].error))
+      .map((i) => [i + 1, running[i].mean + sign * running[i].error]));
+    // The first few are far off, and are not to make all the others flat.
+    const seen = sides.flat().filter(([n]) => n > Math.min(5, 0.5 * running.length)).map(([, x]) => x);
+    this.means.frame([0, Math.max(2, running.length)], rangeOf(seen), { below: "n", beside: "x / m" });
+    const { means } = this;
+    const path = [...sides[0], ...sides[1].reverse()]
+      .map(([n, x]) => `${means.px(n).toFixed(1)} ${means.py(x).toFixed(1)}`);
+    if (path.length) means.marks.append(svg("path", { class: "band", d: `M${path.join("L")}Z` }));
+    means.line(some.map((i) => i + 1), some.map((i) => running[i].mean), "curve-a");
+    this.result.textContent = places.length ? "" : words.say("landing-none");
+    this.fill();
+  }
+
+  /** @param {Histogram} bins */
+  steps({ from, width, counts }) {
+    const { bars } = this;
+    const tops = counts.map((count, i) =>
+      `V${bars.py(count).toFixed(1)}H${bars.px(from + (i + 1) * width).toFixed(1)}`);
+    return `M${bars.px(from).toFixed(1)} ${bars.py(0)}${tops.join("")}V${bars.py(0)}Z`;
+  }
+
+  /** What has landed up to now. */
+  fill() {
+    const { landings, words, all } = this;
+    if (this.panel.hidden || !all || !landings.length) return;
+    let n = 0;
+    const counts = all.counts.map(() => 0);
+    for (; n < landings.length && landings[n].t <= this.lab.t; n += 1) {
+      const bin = Math.floor(landings[n].x / all.width) - Math.round(all.from / all.width);
+      counts[bin] += 1;
+    }
+    this.filled.setAttribute("d", this.steps({ ...all, counts }));
+    this.means.point(n || NaN);
+    // Before the first one lands the whole is told.
+    const which = n || landings.length, { mean, error } = this.running[which - 1];
+    this.result.textContent = words.say(isFinite(error) ? "landing-result" : "landing-first", {
+      n: which, mean: words.number(mean), error: words.number(error, 2),
+    });
+  }
+
+  /** @type {Histogram | undefined} */
+  all;
+
+  /** @type {{mean: number, error: number}[]} */
+  running = [];
+
+  /** @type {any} */
+  outline;
+
+  /** @type {any} */
+  filled;
+}
+
+export { LandingPanel, histogram, runningMean };

@@ -1,0 +1,96 @@
+// What has happened to each particle, kept as the events of a run come in.
+
+/**
+ * @typedef {import("./lab.js").Lab} Lab
+ * @typedef {import("./recording.js").Recording} Recording
+ * @typedef {import("./scene.js").Scene} Scene
+ * @typedef {import("./core.js").Event} Event
+ * @typedef {{left?: Event, hit?: Event, down?: Event}} Stages  separation, impact, landing
+ * @typedef {{t: number, x: number, y: number, px: number, py: number}} Blow  impulse, N s
+ */
+
+const STAGE = { separation: 1, impact: 3, landing: 4, collision: 5 };
+
+/** The name of the plate that the paper's numbers are about. @param {Scene} scene */
+const plateName = ({ plates }) => (plates[0]?.pivot && plates[0].name) || "plate";
+
+class RunHistory {
+  /** @param {Recording} recording @param {string} plate its name */
+  constructor(recording, plate) {
+    this.recording = recording;
+    this.events = recording.events;
+    this.target = recording.machine.surfaces.indexOf(plate);
+    this.seen = 0;
+    /** The first separation, impact on the damping plate and landing of each particle.
+     * @type {Stages[]} */
+    this.stages = recording.machine.releases.map(() => ({}));
+    /** First landings in the order of time. @type {Event[]} */
+    this.landings = [];
+    /** All impacts in the order of time. @type {Blow[]} */
+    this.blows = [];
+    this.largestBlow = 0;
+    this.update();
+  }
+
+  /** Whether it is of this run, and nothing has been forgotten of it since.
+   * @param {Recording} recording */
+  isOf(recording) {
+    return this.recording === recording && this.events === recording.events
+      && this.stages.length === recording.machine.releases.length;
+  }
+
+  /** Take in what is new. */
+  update() {
+    const { events } = this, begin = this.seen;
+    for (; this.seen < events.length; this.seen += 1) this.add(events[this.seen]);
+    if (begin === this.seen) return;
+    // Particles that do not meet are run one after the other.
+    this.landings.sort((a, b) => a.t - b.t);
+    this.blows.sort((a, b) => a.t - b.t);
+  }
+
+  /** @param {Event} event */
+  add(event) {
+    const { kind, disk, before, after, t, x, y } = event, its = this.stages[disk];
+    if ([STAGE.impact, STAGE.landing, STAGE.collision].includes(kind)) {
+      const mass = this.recording.machine.mass[disk];
+      const px = mass * (after[0] - before[0]), py = mass * (after[1] - before[1]);
+      this.blows.push({ t, x, y, px, py });
+      this.largestBlow = Math.max(this.largestBlow, Math.hypot(px, py));
+    }
+    if (kind === STAGE.separation) its.left ??= event;
+    else if (kind === STAGE.impact && event.surface === this.target) its.hit ??= event;
+    else if (kind === STAGE.landing && !its.down) {
+      its.down = event;
+      this.landings.push(event);
+    }
+  }
+
+  /** Impacts after one time, up to another. @param {number} from @param {number} to s */
+  blowsBetween(from, to) {
+    const { blows } = this;
+    let low = 0, high = blows.length;
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (blows[middle].t > from) high = middle;
+      else low = middle + 1;
+    }
+    let end = low;
+    while (end < blows.length && blows[end].t <= to) end += 1;
+    return blows.slice(low, end);
+  }
+}
+
+/** @type {RunHistory | undefined} */
+let latest;
+
+/** The history of a lab's run as it is now; all that show it share it.
+ * @param {Lab} lab */
+function historyOf({ recording, scene }) {
+  if (!recording || !scene) return null;
+  if (latest?.isOf(recording)) latest.update();
+  else latest = new RunHistory(recording, plateName(scene));
+  return latest;
+}
+
+export { RunHistory, historyOf };

@@ -6,7 +6,6 @@ import json
 import re
 import shutil
 import subprocess
-from importlib.resources import files
 from pathlib import Path
 
 import pytest
@@ -15,7 +14,7 @@ from chutelab.pictures.live.page import LANGUAGES, joined
 
 LIVE = Path(__file__).parent / "live"
 NODE = shutil.which("node")
-ASSETS = files("chutelab.pictures.live") / "assets"
+ASSETS = LIVE.parents[1] / "src" / "chutelab" / "pictures" / "live" / "assets"
 
 needs_node = pytest.mark.skipif(NODE is None, reason="needs node")
 needs_tools = pytest.mark.skipif(
@@ -33,11 +32,14 @@ def test_joined_the_modules_are_one_script_without_two_of_a_name(tmp_path, name)
 
 @needs_tools
 def test_types_and_style():
-    for command in (["typescript/bin/tsc", "-p", "."], ["eslint/bin/eslint.js", str(ASSETS), "."]):
-        tool, *arguments = command
+    root, config = LIVE.parents[1], "tests/live/eslint.config.js"
+    for tool, *arguments in (
+        ("typescript/bin/tsc", "-p", "tests/live"),
+        ("eslint/bin/eslint.js", "-c", config, str(ASSETS.relative_to(root)), "tests/live"),
+    ):
         done = subprocess.run(
             [str(NODE), LIVE / "node_modules" / tool, *arguments],
-            cwd=LIVE, capture_output=True, text=True,
+            cwd=root, capture_output=True, text=True,
         )  # fmt: skip
         assert done.returncode == 0, done.stdout + done.stderr
 

@@ -53,7 +53,7 @@ def test_a_bundle_has_an_index_and_a_page_for_each_lesson(web):
     for name in ("02-letting-go", "06-grip-or-slip"):
         files = {path.name for path in (web / name).iterdir()}
         assert files >= {"index.html", "page.html", "lesson.gif", "still.png", "README.md"}
-        assert (web / name / "page.html").stat().st_size < 500_000
+        assert (web / name / "page.html").stat().st_size <= 400_000
     page = (web / "06-grip-or-slip" / "index.html").read_text(encoding="utf-8")
     assert "The textbook angle is the limit" in page
     assert '<a rel="next" href="../02-letting-go/index.html">2. When does it let go? →</a>' in page
@@ -84,9 +84,7 @@ def test_the_bundle_of_all_lessons_is_whole_and_small(tmp_path):
     assert broken_links(tmp_path / "web") == set()
     pages = {path.parent.name: path.stat().st_size for path in tmp_path.rglob("page.html")}
     assert len(pages) == len(shipped_lessons())
-    # Lesson 9 varies two keys at many places each.
-    assert max(pages.values()) < 2_000_000
-    assert sorted(pages.values())[-2] < 500_000
+    assert max(pages.values()) <= 400_000
     assert sum(path.stat().st_size for path in tmp_path.rglob("*.*")) < 8_000_000
 
 
@@ -188,7 +186,7 @@ def test_a_bundle_works_from_a_file_in_a_browser(web):
         browser.close()
     assert troubles == []
     assert wide == 360
-    assert all(url.startswith(("file:", "data:")) for url in requests)
+    assert all(url.startswith(("file:", "data:", "blob:")) for url in requests)
 
 
 EVIL = "<script>alert(1)</script>\"'><img src=x onerror=alert(1)> & $x"
@@ -250,7 +248,7 @@ def test_a_page_of_a_scene_has_its_texts_as_texts(tmp_path):
     for title in ("x", f"{EVIL} </title><!-- \N{LINE SEPARATOR}"):
         path = tmp_path / "page.html"
         override = f"title={json.dumps(title)}"
-        assert chutelab("page", "free-fall", "--set", override, "-o", path).exit_code == 0
+        assert chutelab("live", "free-fall", "--set", override, "-o", path).exit_code == 0
         found = Tags(path.read_text(encoding="utf-8"))
         names[title] = [(tag, *attributes) for tag, attributes in found.tags]
         assert title in found.text

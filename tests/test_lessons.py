@@ -12,9 +12,10 @@ import pytest
 from click.testing import CliRunner
 from PIL import Image
 
-from chutelab.classroom.lessons import LessonError, find, read, shipped_lessons
+from chutelab.classroom.lessons import LessonError, find, read, scene_of, shipped_lessons
 from chutelab.classroom.lessons.building import build, comment_of, is_current, start
 from chutelab.cli import main
+from chutelab.scene.overrides import value_at
 
 NAMES = [
     "the-parabola",
@@ -66,6 +67,42 @@ def test_what_is_not_there_is_refused_with_advice(wanted, said):
     assert said in result.stderr
 
 
+CONTROLS = {
+    1: ("incoming.speed", "outgoing.drop"),
+    2: ("incoming.speed",),
+    3: ("plate.restitution", "incoming.speed"),
+    4: ("plate.angle_deg",),
+    5: ("outgoing.speed", "outgoing.friction"),
+    6: ("incoming.friction",),
+    7: ("stream.bed_height", "plate.angle_deg"),
+    8: ("run.dt",),
+    9: ("plate.angle_deg", "plate.restitution"),
+}
+
+
+@pytest.mark.parametrize("number", CONTROLS)
+def test_pages_of_lessons_let_one_predict_and_change_what_the_lesson_is_about(number):
+    lesson = find(number)
+    scene = scene_of(lesson, lesson.page.scene, lesson.page.settings)
+    assert scene.live.predict
+    assert scene.live.controls == CONTROLS[number]
+    for key, (low, high) in scene.live.ranges.items():
+        assert key in CONTROLS[number]
+        value = value_at(scene, key)
+        assert value == "adhesion" or low <= value <= high
+
+
+def test_a_lesson_may_show_all_at_once(tmp_path):
+    plan = start(tmp_path / "mine") / "lesson.toml"
+    text = plan.read_text(encoding="utf-8")
+    plan.write_text(text.replace("predict = true", "predict = false"), encoding="utf-8")
+    lesson = read(tmp_path / "mine")
+    assert not scene_of(lesson, settings=lesson.page.settings).live.predict
+    plan.write_text(text.replace("predict = true ", "# "), encoding="utf-8")
+    lesson = read(tmp_path / "mine")
+    assert scene_of(lesson, settings=lesson.page.settings).live.predict
+
+
 # lesson.toml -------------------------------------------------------------------------------------
 
 
@@ -84,7 +121,6 @@ widht = 3
 
 [page]
 scene = "elsewhere"
-vary = ["plate.angle_deg=0:60:4"]
 """
 
 
@@ -113,11 +149,18 @@ def test_all_faults_of_a_file_are_in_one_message(tmp_path):
     [
         ('x3 = "way', 'x9 = "way', 'quantities.x9 = "way back from the plate to the landing": no'),
         ("set = []", 'set = ["plate.tilt=3"]', "picture.set = "),
-        ("=0:1:21", "=0:1", 'page.vary[0] = "plate.restitution=0:1": must be KEY=FROM:TO:COUNT'),
         (
-            "plate.restitution=0:",
-            "plate.tilt=0:",
-            'page.vary[0] = "plate.tilt=0:1:21": unknown',
+            'controls = ["plate.restitution"]',
+            'controls = ["plate.tilt"]',
+            'page.live.controls[0] = "plate.tilt": unknown',
+        ),
+        ("[page.live]", "live = 3\n[other]", "page.live = 3: must be a table such as [live] of"),
+        ("[page.live]", "[page.vary]", "page.vary = a table: unknown key; known are scene, set, l"),
+        ("predict = true", "predict = 1", "page.live.predict = 1: must be true or false"),
+        (
+            "predict = true",
+            "panel = []",
+            "page.live.panel = []: unknown key; did you mean live.pan",
         ),
         ("minutes = 45", "minutes = true", "minutes = true: must be a whole number"),
         ('["scene.toml"]', '["../scene.toml"]', 'scenes[0] = "../scene.toml": no shipped scene'),
@@ -369,7 +412,7 @@ def test_the_template_and_the_lessons_know_the_same_keys():
 
     assert set(keys) == set(Lesson.model_fields)
     assert set(keys["picture"]) == set(Picture.model_fields)
-    assert set(keys["page"]) <= set(Page.model_fields)
+    assert set(keys["page"]) == set(Page.model_fields)
 
 
 @pytest.mark.parametrize(

@@ -54,6 +54,21 @@ def test_what_the_page_offers_can_be_set_and_is_no_change_of_the_machine(tmp_pat
     assert "; with" not in found["scene"]["title"]
 
 
+def test_a_scene_saved_from_the_page_offers_the_same(tmp_path):
+    """Keys by index, and drops from where the page measures them: from the top of the pulley."""
+    name, path = tmp_path / "own.toml", tmp_path / "lab.html"
+    name.write_text(
+        "[incoming]\nspeed = 2\npulley_radius = 0.1\n[plate]\ndistance = 0.5\n"
+        "[outgoing]\ndrop = 0.5\n[live]\nranges = { outgoing.drop = [0.4, 1] }\n"
+    )
+    call(name, "-o", path)
+    found = data_of(path)
+    # A throw at 2 m/s from the height R + r falls so far to the impact at x = R + d - r.
+    fall = 0.5 * 9.81 * ((0.1 + 0.5 - 0.0063) / 2.0) ** 2
+    assert found["live"]["ranges"]["outgoing.drop"] == pytest.approx([0.4 + fall, 1.0 + fall])
+    assert found["scene"]["live"] == {"ranges": found["live"]["ranges"]}
+
+
 def test_quiet_says_nothing_and_a_file_that_is_there_is_replaced(tmp_path):
     path = tmp_path / "lab.html"
     path.write_text("mine")

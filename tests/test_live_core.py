@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from live.machines import as_page_has_it, dumps
 
 from chutelab.engines.contact import engine, module
 from chutelab.machine import build
 from chutelab.scene import load
+from live.machines import as_page_has_it, dumps
 
 HERE = Path(__file__).parent
 NODE = shutil.which("node")

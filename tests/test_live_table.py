@@ -70,8 +70,8 @@ def test_a_page_gets_every_key_by_index():
 
 
 def test_drops_are_measured_from_where_the_page_measures_them():
-    live = 'ranges = { outgoing.drop = [0.4, 1] }\npresets = [{ name = "a", set = { outgoing.drop = 0.6 } }]'
-    scene = sc.parse(f"{MACHINE}[live]\n{live}")
+    presets = 'presets = [{ name = "a", set = { outgoing.drop = 0.6 } }]'
+    scene = sc.parse(f"{MACHINE}[live]\nranges = {{ outgoing.drop = [0.4, 1] }}\n{presets}")
     page = sc.to_dict(scene)
     page["outgoing"] |= {"drop": 0.75, "drop_from": "top"}  # 0.25 more than from the impact
     found = live_of(scene, page)

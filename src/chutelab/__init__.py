@@ -19,9 +19,9 @@ The rooms of the house; each imports only those below it:
 - `scene`: scene files; `util`: small things for all.
 
 What most people need is here: `load`, `Scene`, `SceneError`, `simulate`, `Recording`, `theory`,
-`compare`, `overlay`, `animate`, `live`, and `exercises`, `measured`, `design`, `figures`. Each is imported
-when it is first asked for, so that text output never waits for matplotlib, nor the exact engine for
-pymunk or wasmtime.
+`compare`, `overlay`, `animate`, `live`, and `exercises`, `measured`, `design`, `figures`. Each is
+imported when it is first asked for, so that text output never waits for matplotlib, nor the exact
+engine for pymunk or wasmtime.
 """
 
 from __future__ import annotations

@@ -178,9 +178,9 @@ def new(name: Path, model: str | None) -> None:
 def page(wanted: tuple[str, ...], out: Path, quiet: bool) -> None:
     """Bundle lessons (without LESSON: all that are shipped) into a folder of web pages.
 
-    index.html, and for each lesson its worksheet, animation, files, and a page with sliders. All
-    links are relative: the folder works from a memory stick, from any static web server, and on a
-    phone.
+    index.html, and for each lesson its worksheet, animation, files, and a live page, which offers
+    what [page.live] of lesson.toml says. All links are relative: the folder works from a memory
+    stick, from any static web server, and on a phone.
     """
     from chutelab.classroom.lessons.building import bundle
 

@@ -136,7 +136,8 @@ def retitled(scene: Scene, changes: Sequence[str]) -> Scene:
     """
     if any(change.partition("=")[0].strip() == "title" for change in changes):
         return scene
-    told = [change.strip() for change in changes if not change.strip().startswith(("run.", "live."))]
+    stripped = [change.strip() for change in changes]
+    told = [change for change in stripped if not change.startswith(("run.", "live."))]
     if not told:
         return scene
     title = f"{scene.title}; with {', '.join(told)}"

@@ -2,7 +2,7 @@
 
 - `plots`: figures of recordings, sweeps, designs, fits and benchmarks, by matplotlib.
 - `animation`: the lesson picture, a film as GIF or video.
-- `live`: one HTML page with sliders, and the sliders of a notebook.
+- `live`: one HTML page that answers when something is dragged, also in a notebook.
 
 Here are the colours of all pictures, pages and notebooks: those of Okabe and Ito (2008), "Color
 Universal Design", told apart by readers with any common colour blindness.

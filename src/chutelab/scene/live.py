@@ -24,7 +24,7 @@ from chutelab.scene.overrides import (
     resolved,
     rule_at,
 )
-from chutelab.scene.schema import TABLES, Scene, as_written
+from chutelab.scene.schema import TABLES, Scene
 from chutelab.scene.tables import Live
 from chutelab.util.errors import MISSING, Fault, InputError
 

@@ -206,31 +206,6 @@ def from_dict(
     return scene
 
 
-def need_plain(scene: Scene, allowed: str) -> None:
-    """Raise a `SceneError` unless a scene is plain.
-
-    That is: straight surfaces that are always there, a level belt, and one stream of disks of one
-    size. `allowed` says what to do with others.
-    """
-    kind, belt = scene.particle, scene.incoming
-    has: list[tuple[str, object, bool]] = [
-        ("particle", f"{len(scene.particles)} kinds", len(scene.particles) > 1),
-        ("particle.shape", kind.shape, kind.shape != "disk"),
-        ("particle.radius", list(kind.span or ()), kind.span is not None),
-        ("stream", f"{len(scene.streams)} streams", len(scene.streams) > 1),
-        ("conveyor", None, bool(scene.conveyor)),
-        ("string", None, bool(scene.string)),
-    ]
-    if belt is not None:
-        has.append(("incoming.incline_deg", belt.incline_deg, belt.incline_deg != 0.0))
-    for i, surface in enumerate(scene.surface):
-        for name in ("center", "opens_at", "closes_at"):
-            value = getattr(surface, name)
-            has.append((f"surface[{i}].{name}", value, value is not None))
-    if faults := [Fault(key, value, allowed) for key, value, there in has if there]:
-        raise SceneError(scene.source, faults)
-
-
 SURROGATE: Final = re.compile("[\ud800-\udfff]")
 
 

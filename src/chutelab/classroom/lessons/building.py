@@ -274,7 +274,6 @@ def bundle(
     with together(folder) as made:
         cards = ""
         for i, lesson in enumerate(lessons):
-
             before = _link(lessons[i - 1], "prev", "← {}") if i > 0 else ""
             after = _link(lessons[i + 1], "next", "{} →") if i + 1 < len(lessons) else ""
             cards += _lesson(lesson, made / lesson.folder.name, before, after)

@@ -42,9 +42,13 @@ def html(scene: Scene, *, language: str = "en", home: tuple[str, str] | None = N
     css = f":root {{\n{_palette()}}}\n{_asset('page.css')}"
     core = files("chutelab.engines.contact") / "core"
     facts = describe(scene)
+    live = live_of(scene, facts["scene"])
+    if given := facts["scene"].get("live"):
+        # As what is saved from the page will have it.
+        facts["scene"]["live"] = {key: live[key] for key in given}
     data = {
         **facts,
-        "live": live_of(scene, facts["scene"]),
+        "live": live,
         "version": own_version(),
         "language": language,
         "strings": json.loads(_asset(f"strings/{language}.json")),

@@ -1,13 +1,18 @@
 // The page: reads its data, starts the engine's thread, and joins the parts.
 
+import { Bench } from "./bench.js";
 import { Engine } from "./engine.js";
 import { Arrows } from "./arrows.js";
 import { CurvesPanel } from "./curves.js";
 import { EnergyPanel } from "./energy.js";
+import { Inspector } from "./inspector.js";
+import { Keep } from "./keep.js";
+import { listenToKeys } from "./keyboard.js";
 import { toToml } from "./keys.js";
 import { Lab } from "./lab.js";
 import { LandingPanel } from "./landing.js";
 import { NumbersPanel } from "./numbers.js";
+import { Prediction } from "./predict.js";
 import { Stage } from "./stage.js";
 import { Symbols } from "./symbols.js";
 import { Tools } from "./tools.js";
@@ -33,13 +38,25 @@ function start() {
   for (const element of document.querySelectorAll("[data-say]")) {
     element.textContent = words.say(/** @type {HTMLElement} */ (element).dataset.say ?? "");
   }
+  for (const element of document.querySelectorAll("[data-label]")) {
+    element.setAttribute("aria-label", words.say(element.getAttribute("data-label") ?? ""));
+  }
   const lab = new Lab(data, engine);
   const stage = new Stage(byId("stage"), lab, words);
   const panels = [EnergyPanel, NumbersPanel, LandingPanel, CurvesPanel]
     .map((Panel) => new Panel(byId("panels"), lab, words));
   new Arrows(stage, words);
   new Tools(byId("stage").parentElement, lab, stage, words, new Symbols(stage));
+  const inspector = new Inspector(byId("panels"), lab, words);
+  const bench = new Bench(byId("bench"), stage, inspector, lab, words);
   new Transport(lab, stage, words);
+  new Keep(byId("panels"), stage, lab, words);
+  if (data.live?.predict) new Prediction(stage, lab, words);
+  listenToKeys(bench, lab, words);
+  for (const panel of document.querySelectorAll("#panels > .card, .tools, .watch")) {
+    const name = panel.id || "tools";
+    if (data.live?.panels && !data.live.panels.includes(name)) panel.classList.add("unwanted");
+  }
   Object.assign(globalThis, {
     chutelab: { lab, stage, panels, toml: () => toToml(/** @type {any} */ (lab.given)) },
   });

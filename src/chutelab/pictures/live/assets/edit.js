@@ -48,13 +48,39 @@ function withArc(given, a, b, c) {
   };
 }
 
-/** A particle that is let go at rest. @param {Given} given @param {[number, number]} at
- * @param {number} start s @returns {Given} */
-const withParticle = (given, at, start) => ({
-  ...given,
-  stream: [...(given.stream === undefined ? [{}] : listed(given.stream)),
-    { name: freeName(given, "drop"), at, velocity: [0, 0], count: 1, start }],
-});
+/** A particle that is let go at rest, of the first kind; with what is there already.
+ * @param {Given} given @param {[number, number]} at @param {number} start s @returns {Given} */
+function withParticle(given, at, start) {
+  const kinds = listed(given.particle), kind = kinds.length > 1 ? { particle: kinds[0].name } : {};
+  return {
+    ...given,
+    stream: [...(given.stream === undefined ? [{}] : listed(given.stream)),
+      { name: freeName(given, "drop"), ...kind, at, velocity: [0, 0], count: 1, start }],
+  };
+}
+
+/** The surface nearest to a place within reach; "" if none is.
+ * @param {import("./machine.js").Machine} machine @param {number} x @param {number} y
+ * @param {number} reach m */
+function surfaceAt({ surfaces, segments, arcs, pulley }, x, y, reach) {
+  let least = reach, found = "";
+  const take = (/** @type {number} */ far, /** @type {number} */ surface) => {
+    if (far < least) [least, found] = [far, surfaces[surface]];
+  };
+  for (const one of segments) {
+    const [u, v] = [x - one.x, y - one.y];
+    const along = Math.min(one.length, Math.max(0, u * one.tx + v * one.ty));
+    take(Math.hypot(u - along * one.tx, v - along * one.ty), one.surface);
+  }
+  const round = 2 * Math.PI;
+  for (const one of arcs) {
+    const [u, v] = [x - one.x, y - one.y], turn = Math.atan2(v, u) - one.begin;
+    if (turn - round * Math.floor(turn / round) > one.extent) continue;
+    take(Math.abs(Math.hypot(u, v) - one.radius), one.surface);
+  }
+  if (pulley) take(Math.max(0, Math.hypot(x, y) - pulley.radius), pulley.surface);
+  return found;
+}
 
 /** What has a name of its own, or the damping plate or the outgoing belt, taken away.
  * @param {Given} given @param {string} name @returns {Given} */
@@ -72,7 +98,7 @@ function without(given, name) {
 }
 
 /** Whether `without` takes something away. @param {string} name */
-const canGo = (/** @type {Given} */ given, name) => without(given, name) !== given
-  && JSON.stringify(without(given, name)) !== JSON.stringify(given);
+const canGo = (/** @type {Given} */ given, name) =>
+  JSON.stringify(without(given, name)) !== JSON.stringify(given);
 
-export { canGo, listed, withArc, withLine, withParticle, without };
+export { canGo, listed, surfaceAt, withArc, withLine, withParticle, without };

@@ -75,6 +75,12 @@ class Lab {
     return !this.fault;
   }
 
+  /** Say why something cannot be; all stays as it is. @param {Fault} fault */
+  refuse(fault) {
+    this.fault = fault;
+    this.tell("scene");
+  }
+
   /** Run from a time on, with what is there then: a crowd goes on under somebody's hands, all
    * others begin anew, since they take no time.
    * @param {number} from s */
@@ -159,7 +165,11 @@ class Lab {
     return this.recording?.state !== "running" && this.t >= this.end;
   }
 
+  /** Whether play may begin. */
+  mayPlay = () => true;
+
   play() {
+    if (!this.mayPlay()) return;
     if (this.isOver) this.restart();
     this.playing = true;
     this.tell("play");

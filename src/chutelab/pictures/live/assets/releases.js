@@ -1,7 +1,8 @@
 // Where, when and how fast each particle starts: drawn as Python's `machine/releases.py` does.
+import { onBelt, upBelt } from "./belt.js";
 import { generator } from "./random.js";
-import { Fault, onBelt } from "./scene.js";
-import { RADIANS, lengthOf, sinCos } from "./trig.js";
+import { Fault } from "./scene.js";
+import { lengthOf } from "./trig.js";
 
 /** @typedef {import("./random.js").Generator} Generator */
 /** @typedef {import("./scene.js").Scene} Scene */
@@ -29,17 +30,6 @@ const PITCH = 2.04;
 
 /** How far a place in it is moved at random each way, in the same unit. */
 const JITTER = 0.01;
-
-/**
- * Returns the direction in which the incoming belt runs, cosine and sine.
- * @param {Scene} scene
- * @returns {[number, number]}
- */
-export function upBelt(scene) {
-  if (!scene.incoming?.incline_deg) return [1.0, 0.0];
-  const [sine, cosine] = sinCos(scene.incoming.incline_deg * RADIANS);
-  return [cosine, sine];
-}
 
 /**
  * Returns where the lowest layer of a stream is released, m.

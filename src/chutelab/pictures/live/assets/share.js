@@ -1,6 +1,12 @@
 // A scene in an address, and as files.
 
-/** @typedef {import("./scene.js").Given} Given */
+import { KNOT_ROW } from "./core.js";
+
+/**
+ * @typedef {import("./scene.js").Given} Given
+ * @typedef {import("./recording.js").Recording} Recording
+ * @typedef {(string | number)[][]} Rows
+ */
 
 /** The tables in which a scene differs from the page's, as a text for an address; "" if in none.
  * @param {Given} first @param {Given} given */
@@ -17,15 +23,48 @@ function toHash(first, given) {
   return `#${btoa(text).replace(/\+/g, "-").replace(/\//g, "_").replace(/=+$/, "")}`;
 }
 
-/** The scene that an address tells, or null if it tells none.
- * @param {Given} first @param {string} hash @returns {Given | null} */
-function fromHash(first, hash) {
+/** Keys that may hold a word where others hold a number. */
+const WORDY = ["friction", "rate", "until", "seed"];
+
+/** @param {any} value */
+const isTable = (value) => typeof value === "object" && value !== null && !Array.isArray(value);
+
+/** Whether tables have only known keys, and numbers where those belong. Ranges, and whether keys go
+ * together, are what building it shows.
+ * @param {Given} changed @param {Record<string, Record<string, any>>} tables */
+function isSound(changed, tables) {
+  const simple = (/** @type {any} */ value) => ["string", "boolean"].includes(typeof value)
+    || (typeof value === "number" && isFinite(value));
+  const numbers = (/** @type {any} */ value) => [value].flat(3)
+    .every((entry) => typeof entry === "number" && isFinite(entry));
+  /** @type {(table: string, key: string, value: any) => boolean} */
+  const fits = (table, key, value) => {
+    const rule = Object.hasOwn(tables[table], key) ? tables[table][key] : undefined;
+    if (!rule) return false;
+    if (rule.low === undefined && rule.unit === undefined) {
+      return [value].flat(2).every(simple);
+    }
+    return numbers(value) || (WORDY.includes(key) && typeof value === "string");
+  };
+  return Object.entries(changed).every(([table, rows]) => {
+    if (rows === null) return true;
+    if (Object.hasOwn(tables.scene, table)) return fits("scene", table, rows);
+    if (!Object.hasOwn(tables, table)) return false;
+    return [rows].flat().every((row) => isTable(row)
+      && Object.entries(row).every(([key, value]) => fits(table, key, value)));
+  });
+}
+
+/** The scene that an address tells, or null if it tells none that there can be.
+ * @param {Given} first @param {string} hash @param {Record<string, Record<string, any>>} tables
+ * @returns {Given | null} */
+function fromHash(first, hash, tables) {
   if (hash.length < 2) return null;
   try {
     const text = atob(hash.slice(1).replace(/-/g, "+").replace(/_/g, "/"));
     const bytes = Uint8Array.from(text, (letter) => letter.charCodeAt(0));
     const changed = JSON.parse(new TextDecoder().decode(bytes));
-    if (typeof changed !== "object" || changed === null) return null;
+    if (!isTable(changed) || !isSound(changed, tables)) return null;
     const given = { ...first, ...changed };
     for (const table of Object.keys(given)) if (given[table] === null) delete given[table];
     return given;
@@ -43,4 +82,35 @@ function download(name, content, type) {
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 }
 
-export { download, fromHash, toHash };
+/** All knots: where each particle is and how fast, at the times between which the engine computes.
+ * @param {Recording} recording @returns {Rows} */
+function knotRows(recording) {
+  /** @type {Rows} */
+  const rows = [["particle", "t [s]", "x [m]", "y [m]", "vx [m/s]", "vy [m/s]", "omega [rad/s]"]];
+  recording.tracks.forEach((track, index) => {
+    for (let n = 0; n < track.count; n += 1) {
+      rows.push([index, ...track.rows.subarray(n * KNOT_ROW, n * KNOT_ROW + 6)]);
+    }
+  });
+  return rows;
+}
+
+/** Rows as text for a spreadsheet. Where numbers have a comma, semicolons part them.
+ * @param {Rows} rows @param {boolean} comma */
+function toCsv(rows, comma) {
+  const cell = (/** @type {string | number} */ value) => {
+    if (typeof value === "number") {
+      return isFinite(value) ? String(value).replace(".", comma ? "," : ".") : "";
+    }
+    // A text must not become a formula, nor break the row.
+    const tame = /^[=+@\-\t]/.test(value) ? `'${value}` : value;
+    return /[",;\n]/.test(tame) ? `"${tame.replace(/"/g, '""')}"` : tame;
+  };
+  return rows.map((row) => row.map(cell).join(comma ? ";" : ",")).join("\r\n").concat("\r\n");
+}
+
+/** What a file of a scene is called. @param {string} title */
+const fileStem = (title) =>
+  title.normalize("NFKD").replace(/[^\w]+/g, "-").replace(/^-+|-+$/g, "").slice(0, 60) || "scene";
+
+export { download, fileStem, fromHash, knotRows, toCsv, toHash };

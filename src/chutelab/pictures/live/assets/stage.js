@@ -1,5 +1,6 @@
 // The picture: surfaces, tracks and handles as SVG, particles on a canvas between them.
 
+import { openHandles } from "./controls.js";
 import { ARROW, Handles, roundTo, valuesOf } from "./handles.js";
 import { View, boxOf } from "./view.js";
 
@@ -75,6 +76,9 @@ class Stage {
     if (!this.fitted || !this.moved) this.fit();
     else this.rebuild();
   }
+
+  /** Whether nothing of the run is shown yet that somebody is to predict. */
+  blind = false;
 
   /** Whether somebody has chosen what is shown. */
   moved = false;
@@ -196,7 +200,7 @@ class Stage {
   drawTracks() {
     const { recording } = this.lab, { view } = this;
     this.paths.replaceChildren();
-    if (!recording || !this.show.trails) return;
+    if (!recording || !this.show.trails || this.blind) return;
     for (const points of this.trackPoints(recording)) {
       if (points.length < 2) continue;
       const line = points.map(({ x, y }) => `${view.px(x).toFixed(1)},${view.py(y).toFixed(1)}`);
@@ -222,7 +226,7 @@ class Stage {
     }
     const style = getComputedStyle(this.home);
     const ink = style.getPropertyValue("--particle"), rim = style.getPropertyValue("--ink");
-    if (this.show.strobe && !machine.interact) this.strobe(context, style);
+    if (this.show.strobe && !this.blind && !machine.interact) this.strobe(context, style);
     const spins = machine.inertia.some((value) => value > 0);
     context.lineWidth = 1;
     const kinds = machine.radius.length > 1 && new Set(machine.releases.map(({ stream }) => stream)).size > 1;
@@ -290,7 +294,9 @@ class Stage {
   placeHandles() {
     const { machine, scene } = this.lab;
     if (!machine || !scene) return;
-    this.handles = this.show.handles ? new Handles(scene, machine, this.lab.data).list : [];
+    const { data } = this.lab;
+    this.handles = this.show.handles
+      ? openHandles(new Handles(scene, machine, data).list, data) : [];
     for (const more of this.further) this.handles.push(...more());
     const wanted = new Set(this.handles.map(({ id }) => id));
     for (const [id, grip] of this.gripOf) {

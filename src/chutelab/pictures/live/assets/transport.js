@@ -85,7 +85,7 @@ class Transport {
     this.undoButton.disabled = !lab.past.length;
     this.redoButton.disabled = !lab.future.length;
     this.fault.hidden = !lab.fault;
-    if (lab.fault) this.fault.textContent = lab.fault.text;
+    if (lab.fault) this.fault.textContent = words.fault(lab.fault);
   }
 }
 

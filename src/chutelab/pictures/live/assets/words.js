@@ -23,6 +23,44 @@ class Words {
     return this.catalogue[`name-${name}`] ?? name;
   }
 
+  /** A key of the scene, such as `plate.angle_deg`. @param {string} table @param {string} key */
+  key(table, key) {
+    const { catalogue } = this;
+    return catalogue[`key-${table}.${key}`] ?? catalogue[`key-${key}`] ?? key;
+  }
+
+  /** Why a scene cannot be. @param {import("./scene.js").Fault} fault */
+  fault({ key, text, words: found }) {
+    const [path, name] = key.replace(/(?<=\..*)\[\d+\]/g, "").split(".");
+    const [table, row] = path.split(/\[|\]/);
+    const part = `${this.name(table)}${row ? ` ${Number(row) + 1}` : ""}`;
+    const where = name ? `${part}, ${this.key(table, name)}`
+      : this.catalogue[`key-${table}`] ?? (table ? part : "");
+    /** @type {Record<string, string>} */
+    const values = {};
+    for (const [id, value] of Object.entries(found)) {
+      values[id] = typeof value === "number" ? this.bound(value) : value;
+    }
+    const above = text === "range" && Number(found.low) > 0 && Number(found.low) < 1e-300;
+    const why = this.say(`fault-${above ? "above" : text}`, values);
+    return where ? `${where}: ${why}` : why;
+  }
+
+  /** The end of a range. @param {number} value */
+  bound(value) {
+    return this.local(String(Number(value.toPrecision(6))));
+  }
+
+  /** A value with all the digits it has, to be typed over. @param {number} value */
+  plain(value) {
+    return this.local(String(Number(value.toPrecision(12))));
+  }
+
+  /** A unit as it is written behind a number. @param {string} unit */
+  unit(unit) {
+    return unit === "degrees" ? "°" : unit;
+  }
+
   /** A number with so many significant digits, 0 as 0.
    * @param {number} value @param {number} [digits] */
   number(value, digits = 4) {

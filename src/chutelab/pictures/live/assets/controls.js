@@ -1,0 +1,172 @@
+// Which numbers of a scene can be changed on this page, what holds them now, and how far they go.
+
+import { valueAt } from "./keys.js";
+import { pathOf } from "./checks.js";
+import { Fault, met } from "./scene.js";
+
+/**
+ * @typedef {import("./scene.js").Scene} Scene
+ * @typedef {import("./scene.js").Given} Given
+ * @typedef {import("./handles.js").Handle} Handle
+ * @typedef {{predict?: boolean, controls?: string[] | null, panels?: string[] | null,
+ *   ranges?: Record<string, [number, number]>,
+ *   presets?: {name: string, set: Record<string, unknown>}[]}} Live  `[live]` of the scene
+ * @typedef {{tables: Record<string, Record<string, any>>, live?: Live}} Page
+ * @typedef {{table: string, row: number, name: string}} Section  a part of the scene; "scene" of
+ *   the main numbers of all
+ * @typedef {{key: string, table: string, name: string, part: number, of: number, unit: string,
+ *   low: number, high: number, value: number | string}} Field  a number that can be typed; it is
+ *   the n-th `part` `of` so many
+ */
+
+/** A key of the only plate can be written in two ways: this is one of them. @param {string} key */
+const plainKey = (key) => key.replace(/^(\w+)\[0\]/, "$1");
+
+/** Whether a key is another one, or a part of it. @param {string} key @param {string} whole */
+const isWithin = (key, whole) =>
+  plainKey(key) === plainKey(whole) || plainKey(key).startsWith(`${plainKey(whole)}[`);
+
+/** @param {Page} page @param {string} key of a number, or of a point whole */
+function mayChange({ live }, key) {
+  const controls = live?.controls ?? [];
+  return !controls.length || controls.some((one) => isWithin(key, one) || isWithin(one, key));
+}
+
+/** Whether things may be drawn and deleted: where not only some keys can be changed.
+ * @param {Page} page */
+const mayDraw = ({ live }) =>
+  !live?.controls?.length && (!live?.panels || live.panels.includes("edit"));
+
+/** The handles of what can be changed. @param {Handle[]} handles @param {Page} page */
+function openHandles(handles, page) {
+  return handles.flatMap((handle) => {
+    const open = handle.axes.map((_, n) => n).filter((n) => mayChange(page, handle.axes[n].key));
+    if (open.length === handle.axes.length) return [handle];
+    if (!open.some((n) => handle.axes[n].step)) return [];
+    return [{
+      ...handle, axes: open.map((n) => handle.axes[n]),
+      drag: (/** @type {number} */ x, /** @type {number} */ y) => {
+        const numbers = handle.drag(x, y);
+        return open.map((n) => numbers[n]);
+      },
+    }];
+  });
+}
+
+/** Table and name of a key: `["surface", "from"]` of `surface[2].from[0]`. @param {string} key */
+function homeOf(key) {
+  const [table, name] = key.replace(/\[\d+\]/g, "").split(".");
+  return name === undefined ? ["scene", table] : [table, name];
+}
+
+/** Unit and range of a key. @param {Page} page @param {string} key */
+function boundsOf(page, key) {
+  const [table, name] = homeOf(key);
+  const rule = page.tables[table]?.[name] ?? {};
+  const own = Object.entries(page.live?.ranges ?? {}).find(([one]) => isWithin(key, one));
+  const [low, high] = own?.[1] ?? [rule.low ?? -Infinity, rule.high ?? Infinity];
+  return { unit: /** @type {string} */ (rule.unit ?? ""), low, high };
+}
+
+/** @param {Scene} scene @returns {Section[]} */
+function sectionsOf(scene) {
+  /** @type {Section[]} */
+  const found = [{ table: "scene", row: 0, name: "scene" }];
+  const add = (/** @type {string} */ table, /** @type {any[]} */ rows) => rows.forEach((one, row) =>
+    found.push({ table, row, name: one.name ?? (row ? `${table}${row + 1}` : table) }));
+  add("incoming", scene.incoming ? [{}] : []);
+  add("plate", scene.plates.map(({ pivot, name }) => (pivot ? { name } : {})));
+  add("outgoing", scene.outgoing ? [{}] : []);
+  for (const table of /** @type {const} */ (["conveyor", "surface"])) add(table, scene[table]);
+  add("stream", scene.streams);
+  add("particle", scene.particles);
+  return found;
+}
+
+/** The resolved table of a section. @param {Scene} scene @param {Section} section @returns {any} */
+function rowOf(scene, { table, row }) {
+  if (table === "scene") return scene;
+  const rows = { plate: scene.plates, stream: scene.streams, particle: scene.particles }[table]
+    ?? /** @type {any} */ (scene)[table];
+  return Array.isArray(rows) ? rows[row] : rows;
+}
+
+/** What is first to be changed in any scene, by table. */
+const MAIN = /** @type {Record<string, string[]>} */ ({
+  scene: ["gravity"], incoming: ["speed", "pulley_radius"],
+  plate: ["angle_deg", "distance", "restitution", "friction"],
+  outgoing: ["speed", "drop", "friction"], stream: ["count", "rate", "restitution", "friction"],
+  particle: ["radius", "mass"],
+});
+
+/** Keys that say nothing as the others are. @param {string} table @param {any} row */
+function idle(table, row) {
+  if (table === "surface") {
+    return [...(row.points ? ["center", "radius", "from_deg", "to_deg"] : []),
+      ...(row.given.from ? ["points"] : [])];
+  }
+  if (table === "stream") {
+    return [...(row.count === 1 ? ["rate", "bed_height", "speed_spread", "seed"] : []),
+      ...(row.interact ? [] : ["restitution", "friction"])];
+  }
+  const weighed = table === "particle" && (row.given.density ?? row.given.material) !== undefined;
+  return weighed ? ["mass"] : [];
+}
+
+/** @param {Scene} scene @param {Section} section @param {string} key */
+function numberAt(scene, section, key) {
+  const which = ["restitution", "friction"].indexOf(key), row = rowOf(scene, section);
+  if (which < 0 || ["stream", "material", "pair"].includes(section.table)) return row[key];
+  // It may be the material's.
+  const value = met(scene, 0, section.name)[which];
+  return value === Infinity ? "adhesion" : value;
+}
+
+/** The numbers of a section, in the order of their rules.
+ * @param {Page} page @param {Given} given @param {Scene} scene @param {Section} section
+ * @returns {Field[]} */
+function fieldsOf(page, given, scene, section) {
+  if (section.table === "scene") {
+    const firsts = sectionsOf(scene).filter(({ table, row }) => MAIN[table] && row === 0);
+    return firsts.flatMap((one) => ownFields(page, given, scene, one)
+      .filter(({ name }) => MAIN[one.table].includes(name)));
+  }
+  return ownFields(page, given, scene, section);
+}
+
+/** @param {Page} page @param {Given} given @param {Scene} scene @param {Section} section
+ * @returns {Field[]} */
+function ownFields(page, given, scene, section) {
+  const { table } = section, silent = idle(table, rowOf(scene, section));
+  /** @type {Field[]} */
+  const fields = [];
+  for (const [name, rule] of Object.entries(page.tables[table] ?? {})) {
+    if (silent.includes(name) || (rule.unit === undefined && rule.low === undefined)) continue;
+    const path = table === "scene" ? name
+      : given[table] === undefined ? `${table}.${name}` : pathOf(given, table, section.row, name);
+    const add = (/** @type {string} */ key, /** @type {any} */ value, part = 0, of = 1) => {
+      if (Array.isArray(value)) {
+        value.forEach((entry, n) => add(`${key}[${n}]`, entry, n, value.length));
+      } else if ((typeof value === "number" || value === "adhesion") && mayChange(page, key)) {
+        fields.push({ key, table, name, part, of, value, ...boundsOf(page, key) });
+      }
+    };
+    const written = valueAt(given, path);
+    add(path, Array.isArray(written) ? written : numberAt(scene, section, name));
+  }
+  return fields;
+}
+
+/** Refuse what is out of a field's range, or no number at all.
+ * @param {Field} field @param {number | string} value */
+function checked({ key, low, high, name }, value) {
+  if (value === "adhesion" && name === "friction") return value;
+  if (typeof value !== "number" || !isFinite(value)) throw new Fault(key, value, "number");
+  if (value < low || value > high) throw new Fault(key, value, "range", { low, high });
+  if (["count", "seed"].includes(name) && !Number.isInteger(value)) {
+    throw new Fault(key, value, "whole");
+  }
+  return value;
+}
+
+export { boundsOf, checked, fieldsOf, homeOf, mayChange, mayDraw, openHandles, sectionsOf };

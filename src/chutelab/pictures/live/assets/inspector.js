@@ -1,0 +1,137 @@
+// Numbers that can be typed: of one part of the scene, or the main ones of all.
+
+import { checked, fieldsOf, sectionsOf } from "./controls.js";
+import { canGo, without } from "./edit.js";
+import { card, html } from "./panels.js";
+import { Fault } from "./scene.js";
+
+/**
+ * @typedef {import("./lab.js").Lab} Lab
+ * @typedef {import("./words.js").Words} Words
+ * @typedef {import("./controls.js").Field} Field
+ */
+
+class Inspector {
+  /** @param {Element} home @param {Lab} lab @param {Words} words */
+  constructor(home, lab, words) {
+    this.lab = lab;
+    this.words = words;
+    /** The name of the part that is shown. */
+    this.part = "scene";
+    /** @type {(() => void)[]} */
+    this.listeners = [];
+    this.choice = html("select", { "aria-label": words.say("part") });
+    this.choice.addEventListener("change", () => this.choose(this.choice.value));
+    this.remove = html("button", { type: "button" }, words.say("delete"));
+    this.remove.addEventListener("click", () => this.takeAway());
+    this.list = html("div", { class: "fields" });
+    /** @type {Map<string, {input: any, field: Field}>} */
+    this.inputs = new Map();
+    home.append(card("edit", words.say("values"),
+      html("div", { class: "row" }, this.choice, this.remove), this.list));
+    lab.on("scene", () => this.refresh());
+    this.refresh();
+  }
+
+  /** Show a part of the scene; all of it where there is none of that name. @param {string} name */
+  choose(name) {
+    this.part = name;
+    this.refresh();
+    this.listeners.forEach((listener) => listener());
+  }
+
+  /** Whether what is shown can be deleted. */
+  get canDelete() {
+    return this.lab.given !== undefined && canGo(this.lab.given, this.part);
+  }
+
+  takeAway() {
+    const { lab, part } = this;
+    if (!lab.given || !this.canDelete) return;
+    lab.replace(without(lab.given, part));
+    if (!lab.fault) this.choose("scene");
+  }
+
+  refresh() {
+    const { lab, words, choice } = this;
+    if (!lab.given || !lab.scene) return;
+    const sections = sectionsOf(lab.scene);
+    const section = sections.find(({ name }) => name === this.part) ?? sections[0];
+    this.part = section.name;
+    const names = sections.map(({ name }) => name);
+    if (JSON.stringify(names) !== this.names) {
+      this.names = JSON.stringify(names);
+      choice.replaceChildren(...names.map((name) => new Option(words.name(name), name)));
+    }
+    choice.value = this.part;
+    this.remove.hidden = !this.canDelete || !this.mayDelete;
+    const fields = fieldsOf(lab.data, lab.given, lab.scene, section);
+    if (fields.map(({ key }) => key).join() !== [...this.inputs.keys()].join()) this.rebuild(fields);
+    for (const field of fields) this.fill(field);
+  }
+
+  /** Set where nothing may be taken away. */
+  mayDelete = true;
+
+  /** @type {string | undefined} */
+  names;
+
+  /** @param {Field[]} fields */
+  rebuild(fields) {
+    const { words } = this, several = new Set(fields.map(({ table }) => table)).size > 1;
+    this.inputs.clear();
+    this.list.replaceChildren(...fields.map((field) => {
+      const { key, table, name, part, of, unit, low, high } = field;
+      const input = html("input", { type: "text", inputmode: "decimal", autocomplete: "off" });
+      const ends = Math.abs(low) < 1e5 && Math.abs(high) < 1e5
+        ? words.say("from-to", { low: words.bound(low), high: words.bound(high) }) : "";
+      input.title = ends;
+      input.addEventListener("change", () => this.take(key));
+      input.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
+        if (event.key === "Enter") this.take(key);
+      });
+      this.inputs.set(key, { input, field });
+      const owner = several && table !== "scene" ? `${words.name(table)}: ` : "";
+      const which = of > 1 ? ` ${unit === "m" && name === "radius" ? ["≥", "≤"][part] : "xy"[part]}` : "";
+      return html("label", {}, html("span", {}, `${owner}${words.key(table, name)}${which}`), input,
+        html("span", { class: "unit" }, words.unit(unit)));
+    }));
+  }
+
+  /** Show the value that counts, unless somebody is about to type another.
+   * @param {Field} field */
+  fill(field) {
+    const its = this.inputs.get(field.key);
+    if (!its) return;
+    its.field = field;
+    const refused = its.input.getAttribute("aria-invalid") === "true";
+    if (refused && this.lab.fault) return;
+    its.input.removeAttribute("aria-invalid");
+    its.input.value = typeof field.value === "number" ? this.words.plain(field.value)
+      : this.words.say(field.value);
+  }
+
+  /** Take over what was typed. @param {string} key */
+  take(key) {
+    const { lab, words } = this, its = this.inputs.get(key);
+    if (!its) return;
+    const { input, field } = its, text = input.value.trim();
+    const word = text.toLowerCase() === words.say("adhesion").toLowerCase();
+    const value = word ? "adhesion" : words.parse(text);
+    const shown = typeof field.value === "number" ? Number(field.value.toPrecision(12)) : field.value;
+    // What was only looked at keeps all its digits.
+    if (value === shown && !lab.fault) return;
+    try {
+      checked(field, value);
+      input.removeAttribute("aria-invalid");
+      if (value === shown) lab.replace(/** @type {any} */ (lab.given));
+      else lab.change({ [key]: value });
+    } catch (error) {
+      if (!(error instanceof Fault)) throw error;
+      lab.refuse(error);
+    }
+    if (lab.fault) input.setAttribute("aria-invalid", "true");
+  }
+}
+
+export { Inspector };

@@ -1,0 +1,156 @@
+// What one takes along: a link, the scene, the picture, tables; and the address that follows.
+
+import { toToml } from "./keys.js";
+import { numbersOf } from "./numbers.js";
+import { card, html } from "./panels.js";
+import { predict } from "./prediction.js";
+import { Fault } from "./scene.js";
+import { download, fileStem, fromHash, knotRows, toCsv, toHash } from "./share.js";
+import { historyOf } from "./stages.js";
+
+/**
+ * @typedef {import("./lab.js").Lab} Lab
+ * @typedef {import("./stage.js").Stage} Stage
+ * @typedef {import("./words.js").Words} Words
+ */
+
+/** What a picture of its own needs of the page's style. */
+const KEPT = ["fill", "stroke", "stroke-width", "stroke-linecap", "stroke-dasharray", "opacity",
+  "font-family", "font-size", "display"];
+
+/** Pixels of a saved picture for each of the page's. */
+const DENSE = 2;
+
+class Keep {
+  /** @param {Element} home @param {Stage} stage @param {Lab} lab @param {Words} words */
+  constructor(home, stage, lab, words) {
+    this.stage = stage;
+    this.lab = lab;
+    this.words = words;
+    this.comma = html("input", { type: "checkbox", id: "comma" });
+    this.comma.checked = words.comma;
+    this.said = html("p", { class: "note", role: "status" });
+    const button = (/** @type {string} */ id, /** @type {() => void} */ act, reveals = false) => {
+      const made = html("button", { type: "button", class: reveals ? "reveals" : "" }, words.say(id));
+      made.addEventListener("click", act);
+      return made;
+    };
+    const hasAddress = /^(https?|file):$/.test(location.protocol);
+    home.append(card("share", words.say("share"), html("div", { class: "row" },
+      ...(hasAddress ? [button("copy-link", () => this.copy())] : []),
+      button("save-scene", () => this.save("toml", this.toml, "application/toml")),
+      button("save-picture", () => this.picture()),
+      button("save-knots", () => this.table("knots", knotRows(this.recording)), true),
+      button("save-numbers", () => this.table("numbers", this.numbers), true),
+      html("label", {}, this.comma, ` ${words.say("decimal-comma")}`)), this.said));
+    lab.on("scene", () => this.follow());
+    addEventListener("hashchange", () => this.open());
+    this.open();
+  }
+
+  get recording() {
+    return /** @type {import("./recording.js").Recording} */ (this.lab.recording);
+  }
+
+  get toml() {
+    return toToml(/** @type {import("./scene.js").Given} */ (this.lab.given));
+  }
+
+  /** @returns {(string | number)[][]} */
+  get numbers() {
+    const { lab, words } = this, machine = /** @type {any} */ (lab.machine);
+    const { numbers } = predict(/** @type {any} */ (lab.scene));
+    const found = numbersOf(historyOf(lab)?.stages ?? [], numbers,
+      machine.pulley?.radius ?? NaN, machine.radius);
+    return [["", words.say("simulated"), words.say("analytic"), ""],
+      ...found.map(({ symbol, simulated, analytic, unit }) => [symbol, simulated, analytic, unit])];
+  }
+
+  /** Take over the scene of the address, if it can be. */
+  open() {
+    const { lab } = this, { hash } = location;
+    if (hash === this.hash || (hash.length < 2 && !this.hash)) return;
+    this.hash = hash;
+    const given = hash.length < 2 ? lab.first : fromHash(lab.first, hash, lab.data.tables);
+    if (given) lab.replace(given);
+    else lab.refuse(new Fault("", hash, "address"));
+  }
+
+  hash = "";
+
+  /** @type {object | undefined} */
+  told;
+
+  /** What was changed and let go is in the address, and told to a page that this one is part of. */
+  follow() {
+    const { lab } = this, { given } = lab;
+    if (!given || lab.before || this.told === given) return;
+    const first = !this.told && given === lab.first;
+    this.told = given;
+    if (first) return;
+    this.hash = toHash(lab.first, given);
+    try {
+      history.replaceState(null, "", this.hash || location.href.replace(/#.*/s, ""));
+    } catch {
+      // A page without an address of its own, such as a frame's text, has none to change.
+    }
+    if (parent !== window) parent.postMessage({ chutelab: "scene", toml: this.toml }, "*");
+  }
+
+  async copy() {
+    try {
+      await navigator.clipboard.writeText(location.href);
+      this.said.textContent = this.words.say("copied");
+    } catch {
+      prompt(this.words.say("copy-link"), location.href);
+    }
+  }
+
+  /** @param {string} ending @param {BlobPart} content @param {string} type */
+  save(ending, content, type) {
+    const scene = /** @type {import("./scene.js").Scene} */ (this.lab.scene);
+    download(`${fileStem(scene.title)}.${ending}`, content, type);
+  }
+
+  /** @param {string} name @param {(string | number)[][]} rows */
+  table(name, rows) {
+    // The mark tells spreadsheets that it is Unicode.
+    this.save(`${name}.csv`, `\ufeff${toCsv(rows, this.comma.checked)}`, "text/csv");
+  }
+
+  /** The picture as it is now: surfaces and tracks, particles, tools. */
+  async picture() {
+    const { stage } = this, { width, height } = stage.view;
+    const canvas = document.createElement("canvas");
+    canvas.width = DENSE * width;
+    canvas.height = DENSE * height;
+    const context = /** @type {CanvasRenderingContext2D} */ (canvas.getContext("2d"));
+    context.scale(DENSE, DENSE);
+    context.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--card");
+    context.fillRect(0, 0, width, height);
+    const layers = [await drawnSvg(stage.back, stage.back, width, height), stage.canvas,
+      await drawnSvg(stage.front, stage.over, width, height)];
+    for (const layer of layers) context.drawImage(layer, 0, 0, width, height);
+    canvas.toBlob((blob) => { if (blob) this.save("png", blob, "image/png"); }, "image/png");
+  }
+}
+
+/** A part of an SVG as an image, with the style it has on the page.
+ * @param {any} whole @param {any} part @param {number} width @param {number} height
+ * @returns {Promise<HTMLImageElement>} */
+async function drawnSvg(whole, part, width, height) {
+  const root = whole.cloneNode(false), copy = part.cloneNode(true);
+  const [from, to] = [part, copy].map((one) => [one, ...one.querySelectorAll("*")]);
+  from.forEach((/** @type {Element} */ element, /** @type {number} */ n) => {
+    const style = getComputedStyle(element);
+    for (const name of KEPT) to[n].setAttribute(name, style.getPropertyValue(name));
+  });
+  root.append(...(part === whole ? copy.childNodes : [copy]));
+  for (const [name, value] of Object.entries({ width, height })) root.setAttribute(name, value);
+  const image = new Image();
+  image.src = `data:image/svg+xml,${encodeURIComponent(new XMLSerializer().serializeToString(root))}`;
+  await image.decode();
+  return image;
+}
+
+export { Keep };

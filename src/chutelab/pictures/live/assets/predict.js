@@ -1,0 +1,177 @@
+// First say where it will land, then see: path, landing and numbers are hidden until then.
+
+import { historyOf } from "./stages.js";
+import { svg } from "./stage.js";
+
+/**
+ * @typedef {import("./lab.js").Lab} Lab
+ * @typedef {import("./stage.js").Stage} Stage
+ * @typedef {import("./words.js").Words} Words
+ * @typedef {import("./scene.js").Scene} Scene
+ */
+
+/** Steps of arrow keys, m; with Shift a tenth of it. */
+const MARK_STEP = 0.01;
+
+/** Where the outgoing belt runs; null if there is none.
+ * @param {Scene} scene @returns {{y: number, left: number, right: number} | null} */
+function landingLine({ incoming, outgoing }) {
+  return outgoing && incoming ? {
+    y: incoming.pulley_radius - outgoing.drop, left: outgoing.start,
+    right: outgoing.start + outgoing.length,
+  } : null;
+}
+
+/** Where it went: the mean of all landings, or of where tracks ended in a run without a belt to
+ * land on; null as long as there is nothing.
+ * @param {Lab} lab @param {boolean} lands @returns {[number, number] | null} */
+function whereTo(lab, lands) {
+  const { recording } = lab;
+  if (!recording || (!lands && recording.state === "running")) return null;
+  const places = lands ? historyOf(lab)?.landings ?? []
+    : recording.tracks.flatMap((track) => track.state(track.end) ?? []);
+  if (!places.length) return null;
+  const mean = (/** @type {"x" | "y"} */ axis) =>
+    places.reduce((sum, place) => sum + place[axis], 0) / places.length;
+  return [mean("x"), mean("y")];
+}
+
+class Prediction {
+  /** @param {Stage} stage @param {Lab} lab @param {Words} words */
+  constructor(stage, lab, words) {
+    this.stage = stage;
+    this.lab = lab;
+    this.words = words;
+    /** Whether everything is hidden; whether the learner has said where. */
+    this.hides = true;
+    this.isSet = false;
+    this.always = false;
+    /** @type {[number, number]} */
+    this.at = [0, 0];
+    this.note = /** @type {any} */ (document.getElementById("guess"));
+    this.show = /** @type {any} */ (document.getElementById("show-all"));
+    this.grip = svg("g", { class: "guess", role: "slider", tabindex: 0 });
+    this.grip.append(svg("circle", { class: "room", r: 20 }),
+      svg("path", { d: "M0 0L-8 -17A9.5 9.5 0 1 1 8 -17Z" }));
+    this.grip.setAttribute("aria-label", words.say("mark"));
+    this.line = svg("path", { class: "miss" });
+    stage.over.append(this.line, this.grip);
+    this.show.hidden = false;
+    this.show.textContent = words.say("show-at-once");
+    this.show.addEventListener("click", () => {
+      this.always = !this.always;
+      this.show.setAttribute("aria-pressed", String(this.always));
+      this.hide(!this.always);
+    });
+    lab.mayPlay = () => this.begin();
+    lab.on("scene", () => this.changed());
+    lab.on("run", () => this.place());
+    stage.painters.push(() => this.place());
+    this.listen();
+    this.changed();
+  }
+
+  /** @type {object | undefined} */
+  given;
+
+  /** Another scene asks anew. */
+  changed() {
+    const { lab, stage } = this, { view } = stage;
+    if (this.given === lab.given || !lab.scene) return;
+    const first = !this.given;
+    this.given = lab.given;
+    this.belt = landingLine(lab.scene);
+    if (first || !this.isSet) {
+      this.at = this.belt
+        ? [Math.min(Math.max(view.x, this.belt.left), this.belt.right), this.belt.y]
+        : [view.x, view.y];
+    }
+    this.isSet = false;
+    if (!this.always) this.hide(true);
+  }
+
+  /** @param {boolean} hides */
+  hide(hides) {
+    const { lab, stage } = this;
+    this.hides = hides;
+    if (hides) {
+      lab.pause();
+      this.lab.t = lab.start;
+    }
+    stage.blind = hides;
+    document.documentElement.classList.toggle("predicting", hides);
+    for (const id of ["time", "back", "forward"]) {
+      /** @type {any} */ (document.getElementById(id)).disabled = hides;
+    }
+    if (!lab.playing) lab.tell("time");
+    stage.rebuild();
+  }
+
+  /** Play was pressed. */
+  begin() {
+    if (!this.hides) return true;
+    if (this.isSet) this.hide(false);
+    else this.grip.focus();
+    return this.isSet;
+  }
+
+  /** @param {number} x @param {number} y */
+  set(x, y) {
+    const { belt } = this;
+    this.at = belt ? [Math.min(Math.max(x, belt.left), belt.right), belt.y] : [x, y];
+    this.isSet = true;
+    this.place();
+  }
+
+  listen() {
+    const { grip, stage } = this;
+    let held = false;
+    grip.addEventListener("pointerdown", (/** @type {PointerEvent} */ event) => {
+      if (!this.hides) return;
+      event.preventDefault();
+      grip.focus();
+      grip.setPointerCapture(event.pointerId);
+      held = true;
+    });
+    grip.addEventListener("pointermove", (/** @type {PointerEvent} */ event) => {
+      const [px, py] = stage.placeOf(event);
+      if (held) this.set(stage.view.worldX(px), stage.view.worldY(py));
+    });
+    for (const end of ["pointerup", "pointercancel"]) {
+      grip.addEventListener(end, () => { held = false; });
+    }
+    grip.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
+      const ways = /** @type {Record<string, [number, number]>} */ ({
+        ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1],
+        PageUp: [10, 0], PageDown: [-10, 0],
+      });
+      const way = ways[event.key];
+      if (!way || !this.hides) return;
+      event.preventDefault();
+      const step = MARK_STEP * (event.shiftKey ? 0.1 : 1);
+      this.set(this.at[0] + way[0] * step, this.at[1] + way[1] * step);
+    });
+  }
+
+  /** Put the mark where it belongs, and say how far off it was once that is known. */
+  place() {
+    const { lab, stage: { view }, words, grip, at: [x, y], belt } = this;
+    grip.setAttribute("transform", `translate(${view.px(x)} ${view.py(y)})`);
+    grip.setAttribute("aria-valuenow", String(x));
+    grip.setAttribute("aria-valuetext",
+      [x, ...(belt ? [] : [y])].map((value) => words.value({ value, unit: "m" })).join(", "));
+    grip.setAttribute("aria-disabled", String(!this.hides));
+    grip.style.display = this.always ? "none" : "";
+    const went = !this.hides && this.isSet ? whereTo(lab, Boolean(belt)) : null;
+    this.line.setAttribute("d", went
+      ? `M${view.px(x)} ${view.py(y)}L${view.px(went[0])} ${view.py(went[1])}` : "");
+    const off = went ? Math.hypot(went[0] - x, belt ? 0 : went[1] - y) : 0;
+    const said = this.always ? "" : this.hides ? words.say(this.isSet ? "mark-play" : "mark-set")
+      : went ? words.say("mark-off", { distance: words.number(100 * off, 3) }) : "";
+    this.note.hidden = !said;
+    // Only what is new is read out.
+    if (this.note.textContent !== said) this.note.textContent = said;
+  }
+}
+
+export { Prediction, landingLine, whereTo };

@@ -20,10 +20,11 @@ pytestmark = pytest.mark.skipif(
 )
 
 # A page without `eval` cannot be waited for by a condition.
-READY = """() => new Promise((resolve) => {
+READY = """() => new Promise((resolve, reject) => {
   const look = () => (globalThis.chutelab?.lab.recording.state === "done"
     ? resolve() : setTimeout(look, 5));
   look();
+  setTimeout(() => reject(new Error("no run")), 20000);
 })"""
 
 
@@ -73,8 +74,11 @@ def middle_of(page, selector):
 
 def test_tape_and_tracer_with_the_keyboard_alone(show):
     page = show("perpendicular")
-    page.focus("#fit")
-    page.keyboard.press("Tab")
+    page.focus("#play")
+    for _ in range(30):
+        page.keyboard.press("Tab")
+        if page.evaluate("document.activeElement.id") == "tool-tape":
+            break
     assert page.evaluate("document.activeElement.id") == "tool-tape"
     page.keyboard.press("Enter")
     assert page.get_attribute("#tool-tape", "aria-pressed") == "true"

@@ -73,7 +73,9 @@ class Arrows {
       gravities.push([x, y, x, y + perNewton * its]);
       const [fx, fy] = contactForce(track, t, machine.mass[i], machine.gravity);
       // What is left over in flight is rounding.
-      if (Math.hypot(fx, fy) > 1e-6 * its) contacts.push([x, y, x + perNewton * fx, y - perNewton * fy]);
+      if (Math.hypot(fx, fy) > 1e-6 * its) {
+        contacts.push([x, y, x + perNewton * fx, y - perNewton * fy]);
+      }
     });
     const colour = (/** @type {string} */ name) => style.getPropertyValue(`--${name}`);
     /** @type {[string, string, string, number][]} name, colour, unit, px of one unit */

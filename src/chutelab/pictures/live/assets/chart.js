@@ -67,8 +67,9 @@ class Chart {
   }
 
   /** Empty it, and draw axes.
-   * @param {Range} x @param {Range} y @param {{below?: string, beside?: string, whole?: boolean}} [say]
-   *   names of the axes; `whole`: the numbers beside count something */
+   * @param {Range} x @param {Range} y
+   * @param {{below?: string, beside?: string, whole?: boolean}} [say] names of the axes;
+   *   `whole`: the numbers beside count something */
   frame(x, y, { below = "", beside = "", whole = false } = {}) {
     const { words, height } = this;
     this.x = x;
@@ -98,7 +99,8 @@ class Chart {
     for (const value of up) {
       this.grid.append(svg("path", { d: `M${LEFT} ${this.py(value)}H${right}`,
         class: value === 0 ? "zero" : "" }));
-      if (!beside || this.py(value) > TOP + 14) label(LEFT - 6, this.py(value) + 4, name(value, up), "end");
+      const py = this.py(value);
+      if (!beside || py > TOP + 14) label(LEFT - 6, py + 4, name(value, up), "end");
     }
     if (below) label(right, bottom + 15, below, "end");
     if (beside) label(LEFT - 6, TOP + 6, beside, "end");
@@ -118,7 +120,8 @@ class Chart {
   /** What is at a place of the screen along the axis below. @param {number} clientX */
   worldX(clientX) {
     const box = this.root.getBoundingClientRect();
-    const part = ((clientX - box.left) * (this.width / box.width) - LEFT) / (this.width - LEFT - RIGHT);
+    const px = (clientX - box.left) * (this.width / box.width);
+    const part = (px - LEFT) / (this.width - LEFT - RIGHT);
     return this.x[0] + Math.min(1, Math.max(0, part)) * (this.x[1] - this.x[0]);
   }
 

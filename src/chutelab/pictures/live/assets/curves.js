@@ -25,7 +25,7 @@ const DIAGRAMS = /** @type {{id: string, unit: string, lines: Line[]}[]} */ ([
 /** Times between the first and the last at which curves are drawn. */
 const MANY = 240;
 
-/** Events of a particle at which curves are drawn exactly; where there are more, nobody sees one. */
+/** Events of a particle at which curves are drawn exactly; of more, nobody sees one. */
 const MOST_BENDS = 60;
 
 /** Of a time, just before it: what an impact changes has two values then. */
@@ -52,7 +52,9 @@ function samplesOf(recording, index) {
     (disk === index || other === index) && t > begin && t <= end);
   const times = Array.from({ length: MANY + 1 }, (_, n) => begin + (span * n) / MANY);
   times[MANY] = end;
-  if (bends.length <= MOST_BENDS) for (const { t } of bends) times.push(Math.max(begin, t - JUST * span), t);
+  if (bends.length <= MOST_BENDS) {
+    for (const { t } of bends) times.push(Math.max(begin, t - JUST * span), t);
+  }
   return times.sort((a, b) => a - b)
     .map((t) => /** @type {Sample} */ (sampleAt(recording, index, t)));
 }
@@ -138,7 +140,7 @@ class CurvesPanel {
     const samples = this.samples = samplesOf(recording, this.index);
     if (!samples.length) return;
     const times = samples.map(({ t }) => t);
-    const span = /** @type {[number, number]} */ ([times[0], Math.max(times[times.length - 1], times[0] + 1e-9)]);
+    const span = rangeOf(times, 0);
     DIAGRAMS.forEach(({ unit, lines }, n) => {
       const chart = this.charts[n];
       const shown = lines.filter(({ name }, i) => unit !== "J" || i < 2
@@ -148,7 +150,8 @@ class CurvesPanel {
       chart.frame(span, rangeOf(curves.flat()), { below: "t / s", beside: factor > 1 ? "mJ" : unit });
       shown.forEach(({ kind }, i) => chart.line(times, curves[i], kind));
       this.legends[n].replaceChildren(...shown.map(({ name, kind }) => html("span", {},
-        html("i", { class: `swatch ${kind}` }), `${this.nameOf(name)} `, html("b", { "data-of": name }))));
+        html("i", { class: `swatch ${kind}` }), `${this.nameOf(name)} `,
+        html("b", { "data-of": name }))));
     });
     this.tabulate();
     this.read();

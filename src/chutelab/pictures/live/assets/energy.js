@@ -71,7 +71,8 @@ class EnergyPanel {
     this.longest ||= stacks(groundedLedger(recording, recording.end)).size;
     this.longest = Math.max(this.longest, size);
     [putIn, isNow].forEach((parts, n) => {
-      this.bars[n].replaceChildren(...parts.filter(([, value]) => value > 0).map(([name, value]) => {
+      const there = parts.filter(([, value]) => value > 0);
+      this.bars[n].replaceChildren(...there.map(([name, value]) => {
         const part = html("i", { class: `energy-${name}` });
         part.style.width = `${(100 * value) / (this.longest || 1)}%`;
         return part;

@@ -77,8 +77,8 @@ class LandingPanel {
     const all = histogram(places);
     const { from, width, counts } = all;
     this.all = all;
-    this.bars.frame([from, from + width * Math.max(1, counts.length)], [0, Math.max(1, ...counts) * 1.08],
-      { below: "x / m", beside: "n", whole: true });
+    this.bars.frame([from, from + width * Math.max(1, counts.length)],
+      [0, Math.max(1, ...counts) * 1.08], { below: "x / m", beside: "n", whole: true });
     this.outline = svg("path", { class: "bins", d: this.steps(all) });
     this.filled = svg("path", { class: "bins filled" });
     this.bars.marks.append(this.outline, this.filled);
@@ -89,7 +89,8 @@ class LandingPanel {
     const sides = [1, -1].map((sign) => some.filter((i) => isFinite(running[i].error))
       .map((i) => [i + 1, running[i].mean + sign * running[i].error]));
     // The first few are far off, and are not to make all the others flat.
-    const seen = sides.flat().filter(([n]) => n > Math.min(5, 0.5 * running.length)).map(([, x]) => x);
+    const few = Math.min(5, 0.5 * running.length);
+    const seen = sides.flat().filter(([n]) => n > few).map(([, x]) => x);
     this.means.frame([0, Math.max(2, running.length)], rangeOf(seen), { below: "n", beside: "x / m" });
     const { means } = this;
     const path = [...sides[0], ...sides[1].reverse()]

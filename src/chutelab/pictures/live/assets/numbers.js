@@ -22,6 +22,10 @@ const SYMBOLS = /** @type {Record<string, [string, string]>} */ ({
 /** What is below this is rounding, in any of the units. */
 const ROUNDED = 1e-12;
 
+/** Without the last digits: where a value is halfway, both columns are to round it the same way.
+ * @param {number} value */
+const tidy = (value) => Number(value.toPrecision(11));
+
 /** @param {number[]} values */
 function mean(values) {
   let sum = 0, many = 0;
@@ -85,16 +89,16 @@ class NumbersPanel {
 
   refresh() {
     const { words, lab } = this;
-    const recording = /** @type {Recording} */ (lab.recording), scene = /** @type {Scene} */ (lab.scene);
-    const { machine } = recording, many = machine.releases.length;
-    const { numbers, reason } = predict(scene);
+    const { machine } = /** @type {Recording} */ (lab.recording), many = machine.releases.length;
+    const { numbers, reason } = predict(/** @type {Scene} */ (lab.scene));
     const rows = numbersOf(historyOf(lab)?.stages ?? [], numbers,
-      machine.pulley?.radius ?? NaN, machine.radius).filter(({ simulated, analytic }) => isFinite(simulated) || isFinite(analytic));
+      machine.pulley?.radius ?? NaN, machine.radius)
+      .filter(({ simulated, analytic }) => isFinite(simulated) || isFinite(analytic));
     this.body.replaceChildren(...rows.map(({ id, symbol, unit, simulated, analytic }) =>
       html("tr", { "data-id": id },
         html("th", { scope: "row" }, html("b", {}, symbol), ` ${words.say(`number-${id}`)}, ${unit}`),
         ...[simulated, analytic].map((value) =>
-          html("td", {}, words.number(Math.abs(value) < ROUNDED ? 0 : value))))));
+          html("td", {}, words.number(Math.abs(value) < ROUNDED ? 0 : tidy(value)))))));
     this.simulated.textContent = many > 1 ? words.say("simulated-mean", { n: many })
       : words.say("simulated");
     const why = reason ? words.say(`reason-${reason.text}`, Object.fromEntries(Object

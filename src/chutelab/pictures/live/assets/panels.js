@@ -56,7 +56,8 @@ function eased(act) {
 }
 
 /** Draw a panel again at these news, as long as it is open and there is a run to show.
- * @param {Lab} lab @param {HTMLDetailsElement} panel @param {News[]} news @param {() => void} act */
+ * @param {Lab} lab @param {HTMLDetailsElement} panel @param {News[]} news
+ * @param {() => void} act */
 function follow(lab, panel, news, act) {
   const again = eased(() => {
     if (panel.open && lab.recording && isFinite(lab.recording.begin)) act();

@@ -25,7 +25,7 @@ function recordingOf(machine) {
   core.begin(machine);
   for (let state = "running"; state === "running";) {
     state = core.proceed(50);
-    recording.add({ ...core.take(), now: core.get("t"), state });
+    recording.add({ ...core.take(), tips: new Float64Array(), now: core.get("t"), state });
   }
   return recording;
 }

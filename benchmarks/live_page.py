@@ -1,6 +1,6 @@
 """How fast the live page is, in Debian's headless chromium driven by Playwright.
 
-    python benchmarks/live.py
+    python benchmarks/live_page.py
 
     open   from asking for the file to the first picture with a track, ms, of five times
     drag   the plate turned by its handle once a frame, a lone transfer: ms from the value to the

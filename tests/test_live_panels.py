@@ -26,7 +26,7 @@ pytestmark = pytest.mark.skipif(NODE is None, reason="needs node")
 
 # A lone particle and a stream, on plates, round a pulley with slip, on a belt, on arcs; a crowd.
 SCENES = [
-    ("perpendicular",), ("inclined-40",), ("slip",), ("low-speed",), ("belt-landing",), ("spoon",),
+    ("perpendicular",), ("inclined-20", "plate.angle_deg=-10"), ("inclined-40",), ("slip",), ("low-speed",), ("belt-landing",), ("spoon",),
     ("stream-independent", "stream.count=50"), ("stream", "stream.count=40"),
 ]  # fmt: skip
 
@@ -82,7 +82,7 @@ def test_until_the_impact_what_a_particle_began_with_is_all_there_is(runs):
 
 
 def test_the_numbers_are_those_of_pythons_recordings(runs):
-    for name in ("perpendicular", "inclined-40", "slip", "low-speed"):
+    for name in ("perpendicular", "inclined-20", "inclined-40", "slip", "low-speed"):
         scene, answer = runs[name]
         ours = chutelab.compare(chutelab.simulate(scene, engine="contact")).simulated
         its = {row["id"]: row["simulated"] for row in answer["numbers"]}

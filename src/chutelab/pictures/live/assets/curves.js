@@ -23,7 +23,7 @@ const DIAGRAMS = /** @type {{id: string, unit: string, lines: Line[]}[]} */ ([
 ]);
 
 /** Times between the first and the last at which curves are drawn. */
-const MANY = 240;
+const MANY = 160;
 
 /** Events of a particle at which curves are drawn exactly; of more, nobody sees one. */
 const MOST_BENDS = 60;

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from math import cos, degrees, hypot, inf, radians, sin, sqrt
+from math import atan2, cos, degrees, hypot, inf, radians, sin, sqrt
 
 import numpy as np
 import pytest
@@ -186,6 +186,62 @@ def test_a_flight_meets_a_leaning_plate_only_up_to_the_angle_of_the_formula():
         built(particle=point, plate={**plate, "angle_deg": limit * (1.0 + 1e-9)})
 
 
+def crossed(**tables):
+    found = falling(**tables).warnings
+    return {frozenset((caution.surface, caution.crosses)) for caution in found}
+
+
+@pytest.mark.parametrize("low", [False, True])
+@pytest.mark.parametrize("seed", range(25))
+def test_arcs_that_cross_are_warned_of(seed, low):
+    """By hand: along each of two pieces, the side of the other's carrier changes on the other."""
+    draw = np.random.default_rng(seed)
+    parts, curves = [], []
+    for name in ("one", "two"):
+        center, radius = draw.uniform(-0.5, 0.5, 2), draw.uniform(0.3, 0.9)
+        begin, extent = draw.uniform(-180.0, 180.0), draw.uniform(60.0, 300.0)
+        if name == "one" and low:
+            a, b = draw.uniform(-1.0, 1.0, (2, 2))
+            parts.append({"name": name, "from": a.tolist(), "to": b.tolist()})
+            curves.append(a + np.linspace(0.0, 1.0, 4001)[:, None] * (b - a))
+            continue
+        angle = np.radians(begin + np.linspace(0.0, extent, 4001))
+        parts.append({
+            "name": name, "center": center.tolist(), "radius": radius, "from_deg": begin,
+            "to_deg": begin + extent,
+        })  # fmt: skip
+        curves.append(center + radius * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+    inside = np.hypot(*(curves[0] - center).T) < radius
+    met = curves[0][1:][inside[1:] != inside[:-1]] - center
+    turn = np.degrees(np.arctan2(met[:, 1], met[:, 0])) - begin
+    want = bool((np.mod(turn, 360.0) < extent).any())
+    assert crossed(surface=parts) == ({frozenset(("one", "two"))} if want else set())
+
+
+def test_arcs_that_touch_do_not_cross():
+    """A chute that goes tangentially over into a spoon, pegs side by side, rings in each other."""
+    spoon = {"name": "spoon", "center": [0.0, 0.0], "radius": 0.5, "from_deg": 180, "to_deg": 270}
+    chute = {"name": "chute", "from": [-0.5, 1.0], "to": [-0.5, 0.0]}
+    assert crossed(surface=[spoon, chute]) == set()
+    assert crossed(surface=[spoon, {**chute, "to": [-0.5, -0.1]}]) == set()
+    through = {**chute, "from": [-0.4, 1.0], "to": [-0.4, -1.0]}
+    assert crossed(surface=[spoon, through]) == {frozenset(("chute", "spoon"))}
+    assert crossed(surface=[spoon, {**through, "to": [-0.4, -0.3]}]) == set()
+    ring = {"name": "one", "center": [0.0, 0.0], "radius": 0.5}
+    for x, radius in ((1.0, 0.5), (0.1, 0.4), (0.0, 0.3)):
+        other = {"name": "two", "center": [x, 0.0], "radius": radius}
+        assert crossed(surface=[ring, other]) == set()
+        wider = {**other, "radius": radius + 0.01}
+        assert len(crossed(surface=[ring, wider])) == (1 if x else 0)
+
+
+def test_arcs_in_the_drive_pulley_are_warned_of():
+    for angle, said in ((0.0, ()), (180.0, (machine.Caution("bow", machine.DRIVE_PULLEY),))):
+        bow = {"name": "bow", "center": [0.2, 0.0], "radius": 0.12, "from_deg": angle - 60.0,
+               "to_deg": angle + 60.0}  # fmt: skip
+        assert built(surface=[bow]).warnings == said
+
+
 def test_crossing_surfaces_are_warned_of():
     assert built().warnings == ()
     *_, high = built(outgoing={"drop_from": "top", "drop": 0.15}).warnings
@@ -366,6 +422,22 @@ def test_a_conveyor_runs_forward_on_top_and_back_below(to):
     assert found.segments.speed.tolist() == [3.0, 3.0]
     assert found.arcs.center.tolist() == [[1.0, 0.0], list(to)]
     assert found.arcs.speed.tolist() == [3.0 if way[0] > 0.0 else -3.0] * 2
+
+
+@pytest.mark.parametrize("end", ["from", "to"])
+def test_nothing_is_released_in_a_conveyors_pulley(end):
+    belt = {"name": "belt", "from": [1.0, 0.0], "to": [3.0, 0.5], "pulley_radius": 0.2,
+            "speed": 3.0}  # fmt: skip
+    disk, (x, y) = {"radius": 0.02}, belt[end]
+    for up in (0.0, 0.1, -0.17, 0.219):
+        with pytest.raises(scene.SceneError, match=r"stream\.at = .*from belt") as caught:
+            falling(particle=disk, conveyor=[belt], stream={"at": [x, y + up], "velocity": [0, 0]})
+        assert caught.value.faults[0].key == "stream.at"
+    above = {"at": [x, y + 0.2 / cos(atan2(0.5, 2.0)) + 0.021], "velocity": [0, 0]}
+    falling(particle=disk, conveyor=[belt], stream=above)
+    packed = {"fill": [[x - 0.4, y - 0.4], [x + 0.4, y + 0.4]], "count": 250}
+    places = falling(particle=disk, conveyor=[belt], stream=packed).releases.position
+    assert np.hypot(*(places - (x, y)).T).min() >= 0.22
 
 
 def test_an_inclined_belt_ends_where_the_pulley_is_tangential():

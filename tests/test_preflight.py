@@ -462,3 +462,12 @@ def test_a_density_that_no_solid_has_is_noticed():
     (warning,) = said("particle.radius=0.004")
     assert f"{0.008 / (4.0 / 3.0 * pi * 0.004**3):,.0f} kg/m³, more than any solid" in warning
     assert "less than any solid" in said("particle.mass=1e-5")[0]
+
+
+def test_a_release_between_the_sides_of_a_conveyor_is_warned_of():
+    belt = {"name": "belt", "from": [1.0, 0.0], "to": [3.0, 0.0], "pulley_radius": 0.2, "speed": 1}
+    for y, said in ((0.0, 1), (0.3, 0)):
+        stream = {"at": [2.0, y], "velocity": [0.0, 0.0]}
+        looked = preflight(sc.from_dict({"conveyor": [belt], "stream": stream}))
+        loops = [one for one in looked.advice if "inside its loop" in one.warning]
+        assert len(loops) == said

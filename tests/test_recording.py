@@ -298,3 +298,22 @@ def test_a_turning_disk_carries_energy_of_rotation():
     spin = 0.5 * 0.5 * np.array([2.0, 3.0, 4.0]) ** 2
     assert now["kinetic"] == pytest.approx(0.5 * M + spin, rel=1e-15, abs=0.0)
     assert now["residual"] == pytest.approx(spin - spin[0], rel=1e-15, abs=0.0)
+
+
+def test_of_several_blows_at_one_instant_the_first_and_the_last_state_are_kept():
+    """Who meets others has two knots at one time at most: nobody can ask for those between."""
+    crowd = scene.from_dict({
+        "stream": {"count": 2, "rate": 10.0, "at": [0.0, 1.0], "velocity": [0.0, 0.0],
+                   "interact": True},
+        "run": {"until": 1.0},
+    })  # fmt: skip
+    recorder = Recorder(machine.build(crowd))
+    # The other one's track ends at the time at which the first one's begins.
+    recorder.knots([1, 1], [0.0, 0.1], [0.0, 0.0], [0.0, 0.0], 0.0)
+    t, vx = [0.1, 0.2, 0.2, 0.2, 0.2, 0.3, 0.3], [1.0, 1.0, 2.0, 3.0, 4.0, 4.0, 5.0]
+    velocity = np.stack([vx, np.zeros(7)], axis=-1)
+    recorder.knots(np.zeros(7, dtype=int), t, [0.0, 0.0], velocity, 0.0)
+    found = recorder.finish(engine="contact", steps=1)
+    assert found.track(0)["t"].tolist() == [0.1, 0.2, 0.2, 0.3, 0.3]
+    assert found.track(0)["velocity"][:, 0].tolist() == [1.0, 1.0, 4.0, 4.0, 5.0]
+    assert found.track(1)["t"].tolist() == [0.0, 0.1]

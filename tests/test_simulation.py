@@ -35,6 +35,8 @@ AUTO = {
     "heap": "contact",
     "stream": "contact",
     "rock-box": "contact",
+    "galton": "contact",
+    "mixture": "contact",
     "cradle": "pymunk",
     "dominoes": "pymunk",
 }

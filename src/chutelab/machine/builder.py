@@ -26,7 +26,7 @@ from chutelab.scene import Conveyor, Fault, Plate, Scene, SceneError, Surface
 from chutelab.scene.conflicts import ON_BELT
 from chutelab.scene.units import polygon_moment
 from chutelab.util.arrays import Bools, Floats, Ints, Numbers
-from chutelab.util.trig import RADIANS, atan2, hypot, sin_cos
+from chutelab.util.trig import RADIANS, hypot, sin_cos
 
 
 class RefusedError(SceneError):
@@ -59,21 +59,6 @@ def _on_segment(places: Floats, ends: Floats) -> Floats:
     return np.stack([x0 + share * dx, y0 + share * dy])
 
 
-def _on_arc(places: Floats, arcs: Arcs, n: int) -> Floats:
-    """Return the nearest points of arc n, (2, n), m."""
-    center, radius = arcs.center[..., n, :].T, arcs.radius[..., n]
-    away = places.T - (center[:, None] if center.ndim == 1 else center)
-    away = np.where(hypot(*away) > 0.0, away, np.array([[1.0], [0.0]]))
-    angle = np.mod(atan2(away[1], away[0]) - arcs.begin[..., n], 2.0 * pi)
-    on_it = radius * away / hypot(*away)
-    first, last = (end[..., n, :].T - center for end in arcs.ends)
-    if first.ndim == 1:
-        first, last = first[:, None], last[:, None]
-    nearer = hypot(*(away - first)) <= hypot(*(away - last))
-    found = np.where(angle <= arcs.extent[..., n], on_it, np.where(nearer, first, last))
-    return np.asarray(found + (center[:, None] if center.ndim == 1 else center))
-
-
 def _when(pieces: Segments | Arcs, n: int) -> tuple[int, float, float]:
     """Return whose a piece is, and from when to when it is there, s."""
     return pieces.surface[n].item(), pieces.appears[n].item(), pieces.vanishes[n].item()
@@ -97,7 +82,18 @@ class _Room:
         for n in near.any(axis=(*range(1, near.ndim),)).nonzero()[0].tolist():
             yield (*_when(self.segments, n), partial(_on_segment, ends=self.ends[:, n]))
         for n in range(len(self.arcs.surface)):
-            yield (*_when(self.arcs, n), partial(_on_arc, arcs=self.arcs, n=n))
+            yield (*_when(self.arcs, n), partial(self.arcs.nearest, n))
+
+    @property
+    def wheels(self) -> list[tuple[str, Floats, Numbers]]:
+        """Pulleys, which are solid: whose, axis (2, 1) and radius, m."""
+        belt = self.scene.incoming
+        found: list[tuple[str, Floats, Numbers]] = []
+        if belt is not None:
+            found.append(("incoming", np.zeros((2, 1)), belt.pulley_radius))
+        axes = ((one, axis) for one in self.scene.conveyor for axis in (one.from_, one.to))
+        found += [(one.name, np.array(axis)[:, None], one.pulley_radius) for one, axis in axes]
+        return found
 
     def clear(self, places: Floats, radius: float) -> Bools:
         """Tell which places (n, 2), m, a disk (m) can be in."""
@@ -106,6 +102,8 @@ class _Room:
             return free
         for *_, nearest in self.surfaces(places.min(axis=0) - radius, places.max(axis=0) + radius):
             free &= hypot(*(places.T - nearest(places))) >= radius
+        for _, axis, wheel in self.wheels:
+            free &= hypot(*(places.T - axis)) >= wheel + radius
         return free
 
     def cleared(self, releases: Releases, radius: Numbers) -> Releases:
@@ -129,11 +127,12 @@ class _Room:
                 there &= walks
             if np.count_nonzero(there):
                 releases = self.out(releases, nearest, radius, there, self.names[surface])
-        if belt is not None and others:
-            # A point may start anywhere.
-            reach = np.where(np.greater(radius, 0.0), belt.pulley_radius + radius, 0.0)
-            axis = np.zeros((2, 1))
-            releases = self.out(releases, lambda _: axis, reach, walks, "incoming")
+        for name, axis, wheel in self.wheels:
+            who = walks if name == "incoming" else np.ones_like(walks)
+            if np.count_nonzero(who):
+                # A point may start anywhere.
+                reach = np.where(np.greater(radius, 0.0), wheel + radius, 0.0)
+                releases = self.out(releases, lambda _, axis=axis: axis, reach, who, name)
         return releases
 
     def out(

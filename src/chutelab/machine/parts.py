@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from chutelab.machine.releases import Releases
 from chutelab.scene import Scene
 from chutelab.util.arrays import Bools, Floats, Ints
-from chutelab.util.trig import sin_cos
+from chutelab.util.trig import atan2, hypot, sin_cos
 
 DRIVE_PULLEY = "the drive pulley"
 
@@ -49,35 +49,76 @@ class Caution:
         return f"{self.surface}: {self.text}"
 
 
+TOUCHES = 1e-9
+"""Share of the machine's size by which an arc and another piece must cross; joints only touch."""
+
+
 def crossings(
-    names: Sequence[str], rows: Floats, owner: Sequence[int], pulley: float | None
+    names: Sequence[str], segments: Segments, arcs: Arcs, pulley: float | None
 ) -> list[Caution]:
     """Return every two surfaces that cross; those that only touch, as at a shared end, do not.
 
-    Parameters
-    ----------
-    names, owner : sequence of str, sequence of int
-        Of the surfaces; and which of them each segment belongs to, (S,).
-    rows : ndarray, (S, 4)
-        x and y of the first and of the second end of each segment, m.
-    pulley : float or None
-        Radius of the drive pulley about the origin, m. The incoming belt, which lies on it, is
-        surface 0 then.
+    `pulley` is the radius of the drive pulley about the origin, m, if there is one. The incoming
+    belt, which lies on it, is surface 0 then.
     """
+    rows = np.concatenate([segments.start, segments.end], axis=1)
+    owner = segments.surface.tolist()
     found: dict[tuple[int, int], None] = {}
     for s, other in combinations(range(len(rows)), 2):
         if owner[s] == owner[other]:
             continue
         if _parts(rows[s], rows[other]) and _parts(rows[other], rows[s]):
             found[owner[s], owner[other]] = None
+    if len(arcs.surface):
+        near = TOUCHES * np.abs(np.concatenate([segments.end, arcs.corners])).max()
+        for pieces, crossed in (
+            (segments, _chords(segments, arcs, near)), (arcs, _lenses(arcs, near))
+        ):  # fmt: skip
+            for s, n in np.argwhere(crossed).tolist():
+                pair = sorted((pieces.surface[s].item(), arcs.surface[n].item()))
+                if pair[0] != pair[1]:
+                    found[pair[0], pair[1]] = None
     said = [Caution(names[b], names[a]) for a, b in found]
     if pulley is not None:
         start, along = rows[:, :2], rows[:, 2:] - rows[:, :2]
         share = np.clip(-(start * along).sum(axis=1) / (along * along).sum(axis=1), 0.0, 1.0)
-        distance = np.hypot(*(start + share[:, None] * along).T)
+        distance = np.hypot(*(start + share[:, None] * along).T).tolist()
+        bent = range(len(arcs.surface))
+        distance += [np.hypot(*arcs.nearest(n, np.zeros((1, 2)))).item() for n in bent]
+        owner += arcs.surface.tolist()
         into = {o for o, far in zip(owner, distance, strict=True) if o != 0 and far < pulley}
         said += [Caution(names[o], DRIVE_PULLEY) for o in sorted(into)]
     return said
+
+
+def _chords(segments: Segments, arcs: Arcs, near: float) -> Bools:
+    """Tell which segments cross which arcs by more than `near` (m), (S, A)."""
+    start, tangent = segments.start[:, None], segments.tangent[:, None]
+    away = arcs.center - start
+    foot = (away * tangent).sum(axis=-1)
+    off = np.abs(tangent[..., 0] * away[..., 1] - tangent[..., 1] * away[..., 0])
+    half = np.sqrt(np.maximum(arcs.radius**2 - off**2, 0.0))
+    crossed = np.zeros(off.shape, dtype=bool)
+    for s in (foot - half, foot + half):
+        on = (s > near) & (s < segments.length[:, None] - near)
+        crossed |= on & arcs.holds(start + s[..., None] * tangent, near)
+    return crossed & (off < arcs.radius - near)
+
+
+@np.errstate(divide="ignore", invalid="ignore")
+def _lenses(arcs: Arcs, near: float) -> Bools:
+    """Tell which arcs cross each other by more than `near` (m), (A, A)."""
+    center, one, other = arcs.center[:, None], arcs.radius[:, None], arcs.radius
+    apart = arcs.center - center
+    distance = np.hypot(apart[..., 0], apart[..., 1])
+    towards = apart / distance[..., None]
+    aside = np.stack([-towards[..., 1], towards[..., 0]], axis=-1)
+    foot = 0.5 * (distance + (one - other) * (one + other) / distance)
+    half = np.sqrt(np.maximum(one**2 - foot**2, 0.0))
+    # Of the two points in which circles meet the one to the left; the other way round the other.
+    place = center + foot[..., None] * towards + half[..., None] * aside
+    crossed = arcs.holds(place, near) & arcs.holds(place.swapaxes(0, 1), near).T
+    return crossed & (distance < one + other - near) & (distance > np.abs(one - other) + near)
 
 
 def _parts(line: Floats, ends: Floats) -> bool:
@@ -211,6 +252,27 @@ class Arcs(Pieces):
         direction = np.stack([cosine, sine], axis=-1)
         return np.asarray(self.center + self.radius[..., None] * direction)
 
+    def nearest(self, n: int, places: Floats) -> Floats:
+        """Return the points of arc n nearest to places (k, 2), one each in a family, (2, k), m."""
+        center, radius = self.center[..., n, :].T, self.radius[..., n]
+        first, last = (end[..., n, :].T - center for end in self.ends)
+        if center.ndim == 1:
+            center, first, last = center[:, None], first[:, None], last[:, None]
+        away = places.T - center
+        away = np.where(hypot(*away) > 0.0, away, np.array([[1.0], [0.0]]))
+        angle = np.mod(atan2(away[1], away[0]) - self.begin[..., n], 2.0 * pi)
+        on_it = radius * away / hypot(*away)
+        nearer = hypot(*(away - first)) <= hypot(*(away - last))
+        found = np.where(angle <= self.extent[..., n], on_it, np.where(nearer, first, last))
+        return np.asarray(found + center)
+
+    def holds(self, place: Floats, near: float) -> Bools:
+        """Tell whether points of the circles (..., A, 2) are on the arcs, not `near` (m) an end."""
+        away = place - self.center
+        way = self.radius * np.mod(np.arctan2(away[..., 1], away[..., 0]) - self.begin, 2.0 * pi)
+        between = (way > near) & (way < self.radius * self.extent - near)
+        return np.asarray(self.whole | between)
+
     @property
     def ends(self) -> tuple[Floats, Floats]:
         """First and last point of each, counterclockwise, (..., A, 2), m."""
@@ -321,10 +383,8 @@ class Machine:
     @cached_property
     def warnings(self) -> tuple[Caution, ...]:
         """What `chutelab check` tells about a machine that works but may surprise."""
-        ends = np.concatenate([self.segments.start, self.segments.end], axis=-1)
         radius = self.pulley.radius if self.pulley is not None else None
-        owner = self.segments.surface.tolist()
-        return (*self.plate_warnings, *crossings(self.surfaces, ends, owner, radius))
+        return (*self.plate_warnings, *crossings(self.surfaces, self.segments, self.arcs, radius))
 
     @cached_property
     def exit_box(self) -> tuple[float, float, float, float]:

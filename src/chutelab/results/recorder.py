@@ -168,6 +168,13 @@ class Recorder:
             order = np.argsort(owners, kind="stable")
             knots = knots.take(order)
             angle = angle.take(order) if self._angular else angle
+        if self.machine.interact:
+            # Of several blows at one instant the states between them are seen by nobody.
+            owners = np.sort(owners)
+            same = (np.diff(knots["t"]) == 0.0) & (np.diff(owners) == 0)
+            kept = ~np.concatenate([[False], same[:-1] & same[1:], [False]])[: len(knots)]
+            knots, owners = knots[kept], owners[kept]
+            angle = angle[kept] if self._angular else angle
         sizes = np.bincount(owners, minlength=count)
         offsets = np.zeros(count + 1, dtype=np.int64)
         sizes.cumsum(out=offsets[1:])

@@ -486,7 +486,8 @@ def stirred(scene: Scene, share: float) -> Scene:
     """Return a scene with gravity and speeds lower by a share, a tiny one.
 
     Lower, because many keys have an upper bound and none of these a lower one but 0. The belt and
-    what is released on it keep the same speed.
+    what is released on it keep the same speed. What is released from rest takes the same path with
+    less gravity, only later, so it is moved aside by that share of its radius.
     """
     less = 1.0 - share
     values: dict[str, object] = {"gravity": scene.gravity * less, "expect": None}
@@ -494,4 +495,7 @@ def stirred(scene: Scene, share: float) -> Scene:
         values["incoming.speed"] = scene.incoming.speed * less
     if scene.stream.velocity is not None:
         values["stream.velocity"] = [part * less for part in scene.stream.velocity]
+    if scene.stream.at is not None and not any(scene.stream.velocity or ()):
+        x, y = scene.stream.at
+        values["stream.at"] = [x + share * scene.particle.radius, y]
     return scene.with_values(values)

@@ -78,6 +78,22 @@ def _densities(scene: Scene) -> Iterator[Advice]:
         )
 
 
+def _in_loops(scene: Scene, machine: Machine) -> Iterator[Advice]:
+    """Warn of releases between the carrying and the returning side of a conveyor."""
+    for belt in scene.conveyor:
+        way = np.subtract(belt.to, belt.from_)
+        (x, y), (dx, dy) = (machine.releases.position - belt.from_).T, way / np.hypot(*way)
+        along, aside = x * dx + y * dy, np.abs(x * dy - y * dx)
+        inside = (along > 0.0) & (along < np.hypot(*way)) & (aside < belt.pulley_radius)
+        if inside.any():
+            yield Advice(
+                f"{belt.name}: {np.count_nonzero(inside)} of {machine.count} particles start inside"
+                " its loop, and fall on its returning side",
+                "a release above its carrying side",
+                {},
+            )
+
+
 def advice(
     scene: Scene, machine: Machine, tried: Trial, steps: Stepping | None, cost: Effort
 ) -> Iterator[Advice]:
@@ -92,6 +108,7 @@ def advice(
                     break
         yield _advised(str(caution), mended, otherwise=LEAVE if caution.crosses else LOOK)
     yield from _densities(scene)
+    yield from _in_loops(scene, machine)
     if steps is not None and not steps.safe and steps.way is not None and steps.longest is not None:
         yield _advised(
             f"a particle covers {write_size(steps.way, 'm')} in a step, but a surface catches it"

@@ -95,7 +95,8 @@ static void settle(int i, const Contact *last, double h) {
 static void tell_separation(int i) {
     const Disk *d = W.disks + i;
     const Track *track = W.tracks + i;
-    if (track->lasted < 3) {
+    /* In a crowd the loads may be of long ago: they are noted where it lies on one surface only. */
+    if (track->lasted < 3 || d->t - track->load_t[2] > 4 * W.dt) {
         event_here(SEPARATION, i, track->ground);
         return;
     }

@@ -26,6 +26,8 @@ static void note_grip(Disk *d, const Contact *c, const double *u, const double *
     }
     track->load[0] = c->impulse[0] / span;
     track->load_t[0] = d->t;
+    /* A smooth way may go on as another surface. */
+    if (d->on >= 0 && d->on == c->was) d->on = c->owner;
     if (d->on != c->owner) {
         /* It came to lie there without an impact that was told. */
         write_event(IMPACT, i, -1, c->owner, d->t, &d->x, &d->ux, &d->vx, c->impulse[0], c->impulse[1]);

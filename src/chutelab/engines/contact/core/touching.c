@@ -148,10 +148,10 @@ static void carry_to_end(int i, int first, double h) {
         }
     }
     if (!last) return;
-    /* From the end on it falls; whatever it would fall into carries it on. */
+    /* From the end on it falls; whatever it would fall into in as long as a step carries it on. */
     Disk then = *d;
     at_the_end(last, &then);
-    advance(&then, then.t + h - until);
+    advance(&then, then.t + h);
     const int *list;
     int count = surfaces_near(i, &list);
     for (int n = 0; n < count; n++) {

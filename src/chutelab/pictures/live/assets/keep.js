@@ -16,7 +16,8 @@ import { historyOf } from "./stages.js";
 
 /** What a picture of its own needs of the page's style. */
 const KEPT = ["fill", "stroke", "stroke-width", "stroke-linecap", "stroke-dasharray", "opacity",
-  "font-family", "font-size", "display"];
+  "font-family", "font-size", "font-style", "paint-order", "text-anchor", "dominant-baseline",
+  "display"];
 
 /** Pixels of a saved picture for each of the page's. */
 const DENSE = 2;

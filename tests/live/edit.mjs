@@ -30,7 +30,7 @@ const ASK = {
     built(changed);
     const hash = share.toHash(given, changed);
     return {
-      toml: keys.toToml(changed), changed, hash, back: share.fromHash(given, hash, page.tables),
+      toml: keys.toToml(changed), changed, hash, back: share.fromHash(given, hash),
     };
   }),
   fields: ({ given, name, live }) => {
@@ -49,7 +49,7 @@ const ASK = {
     const found = built(given);
     return places.map(([x, y]) => edit.surfaceAt(found, x, y, reach));
   },
-  hash: ({ given, hash }) => share.fromHash(given, hash, page.tables),
+  hash: ({ given, hash }) => share.fromHash(given, hash),
   csv: ({ rows, comma }) => share.toCsv(rows, comma),
   stem: ({ title }) => share.fileStem(title),
   parse: ({ texts }) => texts.map((text) => String(say.parse(text))),

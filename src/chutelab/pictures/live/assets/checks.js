@@ -92,7 +92,7 @@ function* misfitsOfTable(row, rules, path) {
       if (required) yield [path(key), value, "missing"];
     } else if (!fits(value, form)) {
       const number = typeof value === "number" && low !== undefined && high !== undefined;
-      if (number && low === Number.MIN_VALUE) yield [path(key), value, "positive", { high }];
+      if (number && low === Number.MIN_VALUE) yield [path(key), value, "above", { high }];
       else if (number) yield [path(key), value, "range", { low, high }];
       else yield [path(key), value, "form"];
     }

@@ -1,7 +1,8 @@
 // Which numbers of a scene can be changed on this page, what holds them now, and how far they go.
 
 import { valueAt } from "./keys.js";
-import { Fault, met, pathOf } from "./scene.js";
+import { pathOf } from "./checks.js";
+import { Fault, met } from "./scene.js";
 
 /**
  * @typedef {import("./scene.js").Scene} Scene

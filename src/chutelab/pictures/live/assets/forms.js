@@ -33,7 +33,7 @@ export function fits(value, form) {
   if (form.const !== undefined) return value === form.const;
   switch (form.type) {
     case "integer": return fitsWhole(value, form);
-    case "number": return Number.isFinite(value) && isWithin(value, form);
+    case "number": return Number.isFinite(value) && isInRange(value, form);
     case "string": return typeof value === "string" && fitsText(value, form);
     case "array": return Array.isArray(value) && fitsList(value, form);
     default: return typeof value === form.type;
@@ -50,14 +50,14 @@ function fitsWhole(value, form) {
   if (typeof value === "string" && maximum > Number.MAX_SAFE_INTEGER) {
     return /^\d{1,19}$/.test(value) && BigInt(value) < 1n << 63n;
   }
-  return Number.isSafeInteger(value) && isWithin(value, form);
+  return Number.isSafeInteger(value) && isInRange(value, form);
 }
 
 /**
  * @param {number} value
  * @param {Form} form
  */
-function isWithin(value, { minimum, maximum, exclusiveMinimum, exclusiveMaximum }) {
+function isInRange(value, { minimum, maximum, exclusiveMinimum, exclusiveMaximum }) {
   return !(value < (minimum ?? -Infinity) || value > (maximum ?? Infinity)
     || value <= (exclusiveMinimum ?? -Infinity) || value >= (exclusiveMaximum ?? Infinity));
 }

@@ -72,7 +72,7 @@ class Keep {
     const { lab } = this, { hash } = location;
     if (hash === this.hash || (hash.length < 2 && !this.hash)) return;
     this.hash = hash;
-    const given = hash.length < 2 ? lab.first : fromHash(lab.first, hash, lab.data.tables);
+    const given = hash.length < 2 ? lab.first : fromHash(lab.first, hash);
     if (given) lab.replace(given);
     else lab.refuse(new Fault("", hash, "address"));
   }

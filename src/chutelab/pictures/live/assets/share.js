@@ -23,48 +23,16 @@ function toHash(first, given) {
   return `#${btoa(text).replace(/\+/g, "-").replace(/\//g, "_").replace(/=+$/, "")}`;
 }
 
-/** Keys that may hold a word where others hold a number. */
-const WORDY = ["friction", "rate", "until", "seed"];
-
-/** @param {any} value */
-const isTable = (value) => typeof value === "object" && value !== null && !Array.isArray(value);
-
-/** Whether tables have only known keys, and numbers where those belong. Ranges, and whether keys go
- * together, are what building it shows.
- * @param {Given} changed @param {Record<string, Record<string, any>>} tables */
-function isSound(changed, tables) {
-  const simple = (/** @type {any} */ value) => ["string", "boolean"].includes(typeof value)
-    || (typeof value === "number" && isFinite(value));
-  const numbers = (/** @type {any} */ value) => [value].flat(3)
-    .every((entry) => typeof entry === "number" && isFinite(entry));
-  /** @type {(table: string, key: string, value: any) => boolean} */
-  const fits = (table, key, value) => {
-    const rule = Object.hasOwn(tables[table], key) ? tables[table][key] : undefined;
-    if (!rule) return false;
-    if (rule.low === undefined && rule.unit === undefined) {
-      return [value].flat(2).every(simple);
-    }
-    return numbers(value) || (WORDY.includes(key) && typeof value === "string");
-  };
-  return Object.entries(changed).every(([table, rows]) => {
-    if (rows === null) return true;
-    if (Object.hasOwn(tables.scene, table)) return fits("scene", table, rows);
-    if (!Object.hasOwn(tables, table)) return false;
-    return [rows].flat().every((row) => isTable(row)
-      && Object.entries(row).every(([key, value]) => fits(table, key, value)));
-  });
-}
-
-/** The scene that an address tells, or null if it tells none that there can be.
- * @param {Given} first @param {string} hash @param {Record<string, Record<string, any>>} tables
- * @returns {Given | null} */
-function fromHash(first, hash, tables) {
+/** The scene that an address tells, or null if it tells none. Whether there can be such a scene is
+ * what `resolve` finds.
+ * @param {Given} first @param {string} hash @returns {Given | null} */
+function fromHash(first, hash) {
   if (hash.length < 2) return null;
   try {
     const text = atob(hash.slice(1).replace(/-/g, "+").replace(/_/g, "/"));
     const bytes = Uint8Array.from(text, (letter) => letter.charCodeAt(0));
     const changed = JSON.parse(new TextDecoder().decode(bytes));
-    if (!isTable(changed) || !isSound(changed, tables)) return null;
+    if (typeof changed !== "object" || changed === null) return null;
     const given = { ...first, ...changed };
     for (const table of Object.keys(given)) if (given[table] === null) delete given[table];
     return given;

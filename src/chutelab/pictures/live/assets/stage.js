@@ -283,10 +283,10 @@ class Stage {
     }
   }
 
-  /** A round time, s, that gives some twenty dots. */
+  /** A round time, s, that gives a track some twenty dots. */
   get strobeStep() {
-    const { recording } = this.lab;
-    const span = recording ? recording.end - recording.begin : 1;
+    const track = this.lab.recording?.tracks[0];
+    const span = track?.count ? track.end - track.begin : 1;
     const rough = Math.max(span, 1e-6) / 20, ten = 10 ** Math.floor(Math.log10(rough));
     return [1, 2, 5, 10].map((n) => n * ten).find((step) => step >= rough) ?? 10 * ten;
   }
@@ -341,10 +341,12 @@ class Stage {
     const values = handle.says ? [handle.says]
       : handle.axes.filter(({ step }) => step).map((axis) => words.value(axis));
     grip.setAttribute("aria-label", name);
-    grip.setAttribute("aria-valuenow", String(first.value));
+    // Such an attribute has no exponent: a bound above 0 may be the least number that is.
+    const plain = (/** @type {number} */ value) => String(Math.round(1e6 * value) / 1e6);
+    grip.setAttribute("aria-valuenow", plain(first.value));
     grip.setAttribute("aria-valuetext", values.join(", "));
-    if (isFinite(first.low)) grip.setAttribute("aria-valuemin", String(first.low));
-    if (isFinite(first.high)) grip.setAttribute("aria-valuemax", String(first.high));
+    if (isFinite(first.low)) grip.setAttribute("aria-valuemin", plain(first.low));
+    if (isFinite(first.high)) grip.setAttribute("aria-valuemax", plain(first.high));
     handle.axes.forEach(({ value }, n) => { if (!isFinite(value)) handle.axes[n].value = 0; });
   }
 

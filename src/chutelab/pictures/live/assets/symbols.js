@@ -17,7 +17,7 @@ import { svg } from "./stage.js";
 const TALL = 16, WIDE = 8;
 
 /** A label's distance from its point, px, in the order in which they are tried. */
-const AWAY = [15, 24, 34];
+const AWAY = [15, 24, 34, 46, 60];
 
 /** An angle that is smaller is not drawn, rad. */
 const LEAST_ANGLE = 0.03;

@@ -294,9 +294,9 @@ class Tools {
 
   /** @param {number} t @param {import("./recording.js").State} state */
   tracerTexts(t, { x, y, vx, vy }) {
-    const { words } = this;
-    return [`t = ${words.fixed(t, 3)} s`, `x = ${words.fixed(x, 3)} m`, `y = ${words.fixed(y, 3)} m`,
-      `v = ${words.fixed(Math.hypot(vx, vy), 3)} m/s`];
+    const tell = (/** @type {number} */ value) => this.words.fixed(value, 3);
+    return [`t = ${tell(t)} s`, `x = ${tell(x)} m`, `y = ${tell(y)} m`,
+      `v = ${tell(Math.hypot(vx, vy))} m/s`];
   }
 
   draw() {

@@ -40,7 +40,7 @@ const A = [
 const HALF = [4.63647609000806093515e-1, 2.26987774529616870924e-17];
 const EIGHTH = [7.85398163397448278999e-1, 3.06161699786838301793e-17];
 const QUARTER = [0.5 * Math.PI, 6.12323399573676603587e-17];
-const STRAIGHT = [Math.PI, 1.22464679914735317723e-16];
+const STRAIGHT = [Math.PI, 1.2246467991473532e-16];
 
 /**
  * Returns sine and cosine of an angle (rad); NaN of angles beyond a million.

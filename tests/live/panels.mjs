@@ -1,0 +1,71 @@
+// What the panels and tools of the page work out, without a screen: a JSON question on stdin, the
+// answers on stdout.
+import { readFileSync } from "node:fs";
+
+const assets = "../../src/chutelab/pictures/live/assets/";
+const { startCore } = await import(`${assets}core.js`);
+const { Recording } = await import(`${assets}recording.js`);
+const { groundedLedger, stacks } = await import(`${assets}energy.js`);
+const { numbersOf } = await import(`${assets}numbers.js`);
+const { RunHistory } = await import(`${assets}stages.js`);
+const { histogram, runningMean } = await import(`${assets}landing.js`);
+const { samplesOf } = await import(`${assets}curves.js`);
+const { contactForce } = await import(`${assets}arrows.js`);
+const { ticks } = await import(`${assets}chart.js`);
+const { placed, spaceOf } = await import(`${assets}symbols.js`);
+const { StopWatch, angleBetween, nearestOn } = await import(`${assets}tools.js`);
+
+const home = new URL("../../src/chutelab/engines/contact/core/", import.meta.url);
+const layout = JSON.parse(readFileSync(new URL("layout.json", home), "utf8"));
+const core = await startCore(
+  await WebAssembly.compile(readFileSync(new URL("core.wasm", home))), layout);
+
+function recordingOf(machine) {
+  const recording = new Recording(machine);
+  core.begin(machine);
+  for (let state = "running"; state === "running";) {
+    state = core.proceed(50);
+    recording.add({ ...core.take(), now: core.get("t"), state });
+  }
+  return recording;
+}
+
+function runOf(machine) {
+  const recording = recordingOf(machine), { begin, end } = recording;
+  const { stages, landings } = new RunHistory(recording, "plate");
+  const times = Array.from({ length: 400 }, (_, n) => begin + ((end - begin) * n) / 399);
+  for (const { t } of recording.events.slice(0, 400)) times.push(t - 1e-9, t, t + 1e-9);
+  const track = recording.tracks[0];
+  return {
+    numbers: numbersOf(stages, {}, machine.pulley?.radius ?? null, machine.radius),
+    landings: landings.map(({ t, x }) => [t, x]),
+    ledgers: times.map((t) => {
+      const ledger = groundedLedger(recording, t);
+      return { t, ...ledger, ...stacks(ledger) };
+    }),
+    samples: samplesOf(recording, 0),
+    forces: times.map((t) => [t, ...contactForce(track, t, machine.mass[0], machine.gravity)]),
+    nearest: [0.1, 0.37, 0.62, 0.9].map((part) => {
+      const t = track.begin + part * (track.end - track.begin), { x, y } = track.state(t);
+      return { asked: t, ...nearestOn(track, x, y) };
+    }),
+  };
+}
+
+function watchOf(acts) {
+  const watch = new StopWatch();
+  for (const [act, t] of acts) watch[act](t);
+  return { reading: watch.reading(acts.at(-1)[1]), laps: watch.laps };
+}
+
+const revive = (_, value) => (value === "inf" ? Infinity : value === "-inf" ? -Infinity : value);
+const asked = JSON.parse(readFileSync(0, "utf8"), revive);
+process.stdout.write(JSON.stringify({
+  runs: asked.machines?.map(runOf),
+  histograms: asked.values?.map((values) => histogram(values)),
+  means: asked.values?.map(runningMean),
+  ticks: asked.ranges?.map(([low, high]) => ticks(low, high, 5)),
+  labels: asked.labels?.map((labels) => placed(labels, []).map(spaceOf)),
+  angles: asked.angles?.map((points) => angleBetween(...points)),
+  watches: asked.watches?.map(watchOf),
+}));

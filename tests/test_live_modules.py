@@ -1,0 +1,67 @@
+"""The live page's modules: joined as one script, checked for types and style where node is."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from chutelab.pictures.live.page import LANGUAGES, joined
+
+LIVE = Path(__file__).parent / "live"
+NODE = shutil.which("node")
+ASSETS = LIVE.parents[1] / "src" / "chutelab" / "pictures" / "live" / "assets"
+
+needs_node = pytest.mark.skipif(NODE is None, reason="needs node")
+needs_tools = pytest.mark.skipif(
+    NODE is None or not (LIVE / "node_modules").is_dir(), reason="needs npm ci in tests/live"
+)
+
+
+@needs_node
+@pytest.mark.parametrize("name", ["app.js", "worker.js"])
+def test_joined_the_modules_are_one_script_without_two_of_a_name(tmp_path, name):
+    script = tmp_path / "joined.mjs"
+    script.write_text(joined(name), encoding="utf-8")
+    subprocess.run([str(NODE), "--check", script], check=True, capture_output=True)
+
+
+@needs_tools
+def test_types_and_style():
+    root, config = LIVE.parents[1], "tests/live/eslint.config.js"
+    for tool, *arguments in (
+        ("typescript/bin/tsc", "-p", "tests/live"),
+        ("eslint/bin/eslint.js", "-c", config, str(ASSETS.relative_to(root)), "tests/live"),
+    ):
+        done = subprocess.run(
+            [str(NODE), LIVE / "node_modules" / tool, *arguments],
+            cwd=root, capture_output=True, text=True,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_every_language_has_every_word_and_no_other():
+    catalogues = [
+        json.loads((ASSETS / "strings" / f"{language}.json").read_text(encoding="utf-8"))
+        for language in LANGUAGES
+    ]
+    for catalogue in catalogues:
+        assert list(catalogue) == sorted(catalogues[0])
+        for id_, text in catalogue.items():
+            # What is filled in is the same.
+            assert set(re.findall(r"\{\w+\}", text)) == set(
+                re.findall(r"\{\w+\}", catalogues[0][id_])
+            ), id_
+
+
+def test_every_word_that_is_said_is_in_the_catalogue():
+    text = json.loads((ASSETS / "strings" / "en.json").read_text(encoding="utf-8"))
+    modules = [path for path in ASSETS.iterdir() if path.name.endswith(".js")]
+    assert len(modules) > 20
+    for module in modules:
+        said = re.findall(r'\bsay\("([\w-]+)"', module.read_text(encoding="utf-8"))
+        assert set(said) <= set(text), module.name

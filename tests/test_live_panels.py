@@ -1,0 +1,244 @@
+"""What the live page's panels and tools work out, against formulas and Python's own recordings."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import chutelab
+from chutelab.machine import build
+from chutelab.pictures import live
+from chutelab.results import Kind
+from chutelab.scene import load
+from live.machines import as_page_has_it, dumps
+
+HERE = Path(__file__).parent
+ASSETS = Path(live.__file__).parent / "assets"
+NODE = shutil.which("node")
+pytestmark = pytest.mark.skipif(NODE is None, reason="needs node")
+
+# A lone particle and a stream, on plates, round a pulley with slip, on a belt, on arcs; a crowd.
+SCENES = [
+    ("perpendicular",), ("inclined-40",), ("slip",), ("low-speed",), ("belt-landing",), ("spoon",),
+    ("stream-independent", "stream.count=50"), ("stream", "stream.count=40"),
+]  # fmt: skip
+
+
+def ask(**questions):
+    text = dumps(questions) if "machines" in questions else json.dumps(questions)
+    done = subprocess.run(
+        [str(NODE), HERE / "live" / "panels.mjs"],
+        input=text, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    return json.loads(done.stdout)
+
+
+@pytest.fixture(scope="module")
+def runs():
+    scenes = [load(name, overrides) for name, *overrides in SCENES]
+    answers = ask(machines=[as_page_has_it(build(scene)) for scene in scenes])["runs"]
+    names = [name for name, *_ in SCENES]
+    return dict(zip(names, zip(scenes, answers, strict=True), strict=True))
+
+
+@pytest.mark.parametrize("name", [name for name, *_ in SCENES])
+def test_both_bars_are_equally_long_at_any_time(runs, name):
+    _, answer = runs[name]
+    for at in answer["ledgers"]:
+        parts = [value for _, value in at["putIn"] + at["isNow"]]
+        put_in, is_now = (sum(value for _, value in at[side]) for side in ("putIn", "isNow"))
+        assert min(parts) >= 0.0
+        assert abs(put_in - is_now) <= 3e-12 * put_in, at
+        # Energy by its definition, whatever was put in.
+        assert at["kinetic"] >= 0.0
+        assert at["potential"] >= -1e-12
+
+
+@pytest.mark.parametrize("name", ["perpendicular", "inclined-40", "slip", "low-speed", "spoon"])
+def test_a_lone_particle_leaves_no_residual_and_none_is_shown(runs, name):
+    _, answer = runs[name]
+    for at in answer["ledgers"]:
+        assert "residual" not in dict(at["putIn"] + at["isNow"]), at
+
+
+def test_until_the_impact_what_a_particle_began_with_is_all_there_is(runs):
+    scene, answer = runs["perpendicular"]
+    ours = chutelab.simulate(scene, engine="contact")
+    hit = ours.events["t"][ours.events["kind"] == Kind.IMPACT][0]
+    m, v = scene.particle.mass, scene.incoming.speed
+    fall = scene.incoming.pulley_radius + scene.particle.radius - ours.knots["position"][:, 1].min()
+    before = [at for at in answer["ledgers"] if 0.0 <= at["t"] < hit]
+    assert len(before) > 100
+    for at in before:
+        assert at["start"] == pytest.approx(0.5 * m * v**2 + m * scene.gravity * fall, rel=1e-12)
+        assert at["kinetic"] + at["potential"] == pytest.approx(at["start"], rel=1e-12)
+
+
+def test_the_numbers_are_those_of_pythons_recordings(runs):
+    for name in ("perpendicular", "inclined-40", "slip", "low-speed"):
+        scene, answer = runs[name]
+        ours = chutelab.compare(chutelab.simulate(scene, engine="contact")).simulated
+        its = {row["id"]: row["simulated"] for row in answer["numbers"]}
+        its["phi1"] = np.radians(its["phi1"])
+        for id_ in ("phi1", "t2", "x2", "v2", "v2r", "t3", "x3", "v3", "d3"):
+            assert its[id_] == pytest.approx(ours[id_], rel=1e-13, abs=1e-15), (name, id_)
+
+
+def test_a_streams_numbers_are_means_over_its_particles(runs):
+    scene, answer = runs["stream-independent"]
+    events = chutelab.simulate(scene, engine="contact").events
+    down = events[events["kind"] == Kind.LANDING]
+    its = {row["id"]: row["simulated"] for row in answer["numbers"]}
+    assert len(down) == 50
+    assert its["x"] == pytest.approx(down["position"][:, 0].mean(), rel=1e-13)
+    speeds = np.hypot(*down["velocity_before"].T)
+    assert its["v3"] == pytest.approx(speeds.mean(), rel=1e-13)
+    landings = np.array(answer["landings"])
+    assert np.all(np.diff(landings[:, 0]) >= 0.0)
+    assert sorted(landings[:, 1]) == pytest.approx(sorted(down["position"][:, 0]), rel=1e-13)
+
+
+def test_forces_are_what_newton_says(runs):
+    """Carried by a level belt: m g up; in flight none."""
+    scene, answer = runs["perpendicular"]
+    weight = scene.particle.mass * scene.gravity
+    ours = chutelab.simulate(scene, engine="contact")
+    kinds, times = ours.events["kind"], ours.events["t"]
+    left, hit = times[kinds == Kind.SEPARATION][0], times[kinds == Kind.IMPACT][0]
+    carried = flown = 0
+    for t, x, y in answer["forces"]:
+        if 1e-6 < t < left - 1e-6:
+            assert (x, y) == pytest.approx((0.0, weight), abs=1e-9 * weight)
+            carried += 1
+        elif left + 1e-6 < t < hit - 1e-6:
+            assert (x, y) == pytest.approx((0.0, 0.0), abs=1e-9 * weight)
+            flown += 1
+    assert min(carried, flown) > 50
+
+
+def test_a_belt_that_is_faster_pulls_with_friction(runs):
+    scene, answer = runs["belt-landing"]
+    ours = chutelab.simulate(scene, engine="contact")
+    weight = scene.particle.mass * scene.gravity
+    stick = ours.events["t"][ours.events["kind"] == Kind.STICK][-1]
+    bounce = ours.events["t"][ours.events["kind"] == Kind.IMPACT][-1]
+    pulled = [force for t, *force in answer["forces"] if bounce + 0.1 < t < stick - 0.05]
+    assert len(pulled) > 20
+    wanted = [scene.outgoing.friction * weight, weight]
+    assert np.asarray(pulled) == pytest.approx(np.tile(wanted, (len(pulled), 1)), abs=1e-6 * weight)
+
+
+def test_curves_have_both_values_at_an_impact(runs):
+    scene, answer = runs["perpendicular"]
+    samples = answer["samples"]
+    times = np.array([sample["t"] for sample in samples])
+    vx = np.array([sample["vx"] for sample in samples])
+    jump = int(np.argmax(np.abs(np.diff(vx))))
+    assert times[jump + 1] - times[jump] < 1e-6
+    # The plate is upright and smooth: what comes with v goes with -e v.
+    assert vx[jump + 1] == pytest.approx(-scene.plate.restitution * vx[jump], rel=1e-9)
+    assert np.all(np.diff(times) >= 0.0)
+
+
+def test_the_tracer_finds_the_point_of_a_track(runs):
+    for name in ("perpendicular", "slip", "spoon"):
+        for found in runs[name][1]["nearest"]:
+            assert found["far"] < 1e-6
+            assert found["t"] == pytest.approx(found["asked"], abs=1e-6)
+
+
+def test_histogram_and_running_mean_are_numpys():
+    rng = np.random.default_rng(3)
+    sets = [rng.normal(0.4, 0.03, 500), rng.uniform(-2.0, 1.0, 7), np.full(30, 0.45), [1.25]]
+    answers = ask(values=[list(values) for values in sets])
+    for values, bins, means in zip(sets, answers["histograms"], answers["means"], strict=True):
+        counts, width = bins["counts"], bins["width"]
+        edges = bins["from"] + width * np.arange(len(counts) + 1)
+        inside = np.floor(np.asarray(values) / width).astype(int) - round(bins["from"] / width)
+        assert counts == np.bincount(inside, minlength=len(counts)).tolist()
+        assert sum(counts) == len(values)
+        assert edges[0] <= min(values) + 1e-12
+        assert max(values) <= edges[-1] + 1e-12
+        # A round width: one digit, 1, 2 or 5.
+        assert f"{width:.0e}"[0] in "125"
+        for n, at in enumerate(means, 1):
+            assert at["mean"] == pytest.approx(np.mean(values[:n]), rel=1e-12)
+            if n > 1:
+                error = np.std(values[:n], ddof=1) / np.sqrt(n)
+                assert at["error"] == pytest.approx(error, rel=1e-9, abs=1e-15)
+            else:
+                assert at["error"] is None
+
+
+def test_axes_have_round_numbers_within_them():
+    ranges = [(-1.06, 0.66), (0.0, 1.0), (0.448, 0.4531), (-5e-3, 7e-3), (0.0, 1083.0)]
+    for (low, high), found in zip(ranges, ask(ranges=ranges)["ticks"], strict=True):
+        assert 2 <= len(found) <= 6
+        assert low <= found[0]
+        assert found[-1] <= high
+        step = found[1] - found[0]
+        assert np.diff(found) == pytest.approx(step, rel=1e-9)
+        assert float(f"{step:.6g}") == float(f"{step:.0e}")
+        assert np.asarray(found) / step == pytest.approx(np.round(np.asarray(found) / step))
+
+
+def test_labels_do_not_lie_over_each_other():
+    rng = np.random.default_rng(5)
+    labels = [
+        [{"text": "v₂′", "x": 200 + 8 * x, "y": 200 + 8 * y} for x, y in rng.normal(size=(6, 2))]
+        for _ in range(40)
+    ]
+    for spaces in ask(labels=labels)["labels"]:
+        for a, b in combinations(spaces, 2):
+            apart = a["right"] <= b["left"] or b["right"] <= a["left"]
+            above = a["bottom"] <= b["top"] or b["bottom"] <= a["top"]
+            assert apart or above
+
+
+def test_the_angle_measure_measures_the_angle():
+    rng = np.random.default_rng(11)
+    points = rng.normal(size=(50, 3, 2))
+    for (corner, a, b), found in zip(points, ask(angles=points.tolist())["angles"], strict=True):
+        u, v = a - corner, b - corner
+        cosine = u @ v / np.linalg.norm(u) / np.linalg.norm(v)
+        assert found == pytest.approx(np.degrees(np.arccos(cosine)), abs=1e-6)
+
+
+def test_the_stop_watch_counts_simulated_time_back_too():
+    acts = [
+        ["toggle", 1.0], ["lap", 1.5], ["toggle", 2.0], ["toggle", 5.0], ["lap", 4.75],
+        ["toggle", 4.5],
+    ]  # fmt: skip
+    first, second = ask(watches=[acts, [*acts, ["reset", 9.0]]])["watches"]
+    assert first == {"reading": 0.5, "laps": [0.5, 0.75]}
+    assert second == {"reading": 0, "laps": []}
+
+
+def catalogue(language):
+    return json.loads((ASSETS / "strings" / f"{language}.json").read_text(encoding="utf-8"))
+
+
+def test_both_languages_say_the_same_with_the_same_values():
+    english, german = catalogue("en"), catalogue("de")
+    assert list(english) == sorted(english)
+    assert list(english) == list(german)
+    for id_, text in english.items():
+        assert set(re.findall(r"\{\w+\}", text)) == set(re.findall(r"\{\w+\}", german[id_])), id_
+
+
+def test_every_text_that_modules_name_is_there():
+    known, missing = set(catalogue("en")), set()
+    for path in ASSETS.glob("*.js"):
+        text = path.read_text(encoding="utf-8")
+        said = re.findall(r'\bsay\("([\w-]+)"', text)
+        reasons = re.findall(r'(?:because|meets)\([^()]*?"([\w-]+)"(?:, \{[^}]*\})?\)', text)
+        missing |= {id_ for id_ in said if id_ not in known}
+        missing |= {id_ for id_ in reasons if f"reason-{id_}" not in known}
+    assert not missing

@@ -1,0 +1,164 @@
+"""Panels and tools of the live page under a pointer and under the keyboard alone."""
+
+from __future__ import annotations
+
+import re
+import shutil
+
+import numpy as np
+import pytest
+
+from chutelab.pictures.live.page import write
+from chutelab.scene import load
+
+playwright = pytest.importorskip(
+    "playwright.sync_api", reason='needs Playwright: pip install "chutelab[test]"'
+)
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
+pytestmark = pytest.mark.skipif(
+    CHROMIUM is None, reason="needs a browser: apt-get install chromium"
+)
+
+# A page without `eval` cannot be waited for by a condition.
+READY = """() => new Promise((resolve) => {
+  const look = () => (globalThis.chutelab?.lab.recording.state === "done"
+    ? resolve() : setTimeout(look, 5));
+  look();
+})"""
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with playwright.sync_playwright() as driver:
+        opened = driver.chromium.launch(executable_path=CHROMIUM)
+        yield opened
+        opened.close()
+
+
+@pytest.fixture
+def show(browser, tmp_path):
+    """Open a scene's page; at the end it must not have complained of anything."""
+    pages, said = [], []
+
+    def opened(name, overrides=(), language="en"):
+        path = tmp_path / f"{len(pages)}.html"
+        write(load(name, overrides), path, language=language)
+        page = browser.new_page(viewport={"width": 1366, "height": 620})
+        page.on("console", lambda message: said.append(message.text))
+        page.on("pageerror", lambda error: said.append(str(error)))
+        page.goto(path.as_uri())
+        page.evaluate(READY)
+        pages.append(page)
+        return page
+
+    yield opened
+    for page in pages:
+        page.close()
+    assert not said
+
+
+def said_by(page, selector):
+    return page.get_attribute(selector, "aria-valuetext")
+
+
+def numbers_in(text):
+    plain = text.replace("\N{MINUS SIGN}", "-").replace(",", " ")
+    return [float(number) for number in re.findall(r"-?\d+\.\d+", plain)]
+
+
+def middle_of(page, selector):
+    box = page.locator(selector).bounding_box()
+    return box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+
+
+def test_tape_and_tracer_with_the_keyboard_alone(show):
+    page = show("perpendicular")
+    page.focus("#fit")
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.id") == "tool-tape"
+    page.keyboard.press("Enter")
+    assert page.get_attribute("#tool-tape", "aria-pressed") == "true"
+    end = '[data-id="tape-1"]'
+    assert page.get_attribute(end, "role") == "slider"
+    *_, x, y = numbers_in(said_by(page, end))
+    *_, x0, y0 = numbers_in(said_by(page, '[data-id="tape-0"]'))
+    page.focus(end)
+    for key in ("ArrowRight", "ArrowRight", "ArrowUp"):
+        page.keyboard.press(key)
+    assert page.evaluate("document.activeElement.dataset.id") == "tape-1"
+    now = numbers_in(said_by(page, end))
+    # Arrow keys go to whole hundredths.
+    x, y = round(x + 0.02, 2), round(y + 0.01, 2)
+    wanted = [np.hypot(x - x0, y - y0), x - x0, y - y0, x, y]
+    assert now == pytest.approx(wanted, abs=6e-4)
+
+    page.focus("#tool-tracer")
+    page.keyboard.press("Enter")
+    page.focus('[data-id="tracer"]')
+    for _ in range(13):
+        page.keyboard.press("ArrowRight")
+    t, x, y, v = numbers_in(said_by(page, '[data-id="tracer"]'))
+    # At a strobe dot, 0.05 s apart; carried for 0.5 s, then a parabola.
+    assert t == 0.65
+    fall = 0.15
+    top = 0.1 + 0.006
+    assert (x, y) == pytest.approx((2.0 * fall, top - 0.5 * 9.81 * fall**2), abs=6e-4)
+    assert v == pytest.approx(np.hypot(2.0, 9.81 * fall), abs=6e-4)
+
+
+def test_tape_and_tracer_with_a_pointer(show):
+    page = show("perpendicular")
+    page.click("#tool-tape")
+    scale = page.evaluate("chutelab.stage.view.scale")
+    before = numbers_in(said_by(page, '[data-id="tape-0"]'))
+    x, y = middle_of(page, '[data-id="tape-0"] .knob')
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x - 30, y - 40, steps=4)
+    page.mouse.up()
+    after = numbers_in(said_by(page, '[data-id="tape-0"]'))
+    assert after[3] - before[3] == pytest.approx(-30 / scale, abs=2 / scale)
+    assert after[4] - before[4] == pytest.approx(40 / scale, abs=2 / scale)
+
+    page.click("#tool-tracer")
+    home = page.locator("#stage").bounding_box()
+    place = """t => { const { x, y } = chutelab.lab.recording.tracks[0].state(t);
+      return [chutelab.stage.view.px(x), chutelab.stage.view.py(y)]; }"""
+    px, py = page.evaluate(place, 0.7)
+    page.mouse.move(home["x"] + px + 2, home["y"] + py + 2)
+    page.wait_for_timeout(120)
+    assert numbers_in(said_by(page, '[data-id="tracer"]'))[0] == 0.7
+
+
+def test_curves_are_read_off_and_set_the_time(show):
+    page = show("perpendicular")
+    page.focus(".curves")
+    page.keyboard.press("Home")
+    for _ in range(3):
+        page.keyboard.press("PageUp")
+    end = page.evaluate("chutelab.lab.end")
+    t, x, y, vx, vy, v, *_ = numbers_in(said_by(page, ".curves"))
+    assert t == pytest.approx(0.3 * end, abs=6e-4)
+    # Still carried by the belt, which begins 1 m before the pulley's axis.
+    assert (x, y, vx, vy, v) == pytest.approx((-1.0 + 2.0 * 0.3 * end, 0.106, 2, 0, 2), abs=6e-4)
+    assert page.evaluate("chutelab.lab.t") == 0.0
+    page.keyboard.press("Enter")
+    assert page.evaluate("chutelab.lab.t") == pytest.approx(0.3 * end, rel=1e-9)
+    px, py = middle_of(page, ".curves .chart >> nth=1")
+    page.mouse.click(px, py)
+    assert 0.4 * end < page.evaluate("chutelab.lab.t") < 0.55 * end
+
+
+def test_a_streams_landings_fill_up_with_time_and_a_lone_particle_has_none(show):
+    assert show("perpendicular").locator("#landing").is_hidden()
+    page = show("stream-independent", ["stream.count=60"], language="de")
+    result = page.locator("#landing .result")
+    assert result.inner_text().startswith("Mittelwert von 60: x = 0,4")
+    times = page.evaluate("chutelab.panels[2].landings.map(({ t }) => t)")
+    assert len(times) == 60
+    page.evaluate("t => chutelab.lab.seek(t)", 0.5 * (times[29] + times[30]))
+    page.wait_for_timeout(300)
+    assert result.inner_text().startswith("Mittelwert von 30:")
+    table = page.locator("#numbers").inner_text()
+    assert "Mittel von 60" in table
+    assert "φ₁ Ablösewinkel" in table

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -121,3 +122,114 @@ def test_what_is_dragged_into_place_lands_as_it_does_in_python(shown, tmp_path, 
         page = shown(name, ["stream.count=1"])
         flights += lands_as_in_python(page, tmp_path / "saved.toml", seed, each)
     assert flights > each
+
+
+AXE = Path(__file__).parent / "live" / "node_modules" / "axe-core" / "axe.min.js"
+
+
+@pytest.mark.skipif(not AXE.is_file(), reason="needs npm ci in tests/live")
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize(
+    ("name", "size"),
+    [("perpendicular", (1366, 620)), ("stream", (1366, 620)), ("spoon", (360, 740))],
+)
+def test_axe_finds_nothing(shown, name, size, scheme):
+    viewport = {"width": size[0], "height": size[1]}
+    page = shown(name, ["stream.count=5"], viewport=viewport, color_scheme=scheme)
+    page.evaluate(AXE.read_text(encoding="utf-8"))
+    found = page.evaluate("axe.run()")
+    said = [
+        (one["id"], [node["target"] for node in one["nodes"]], one["help"])
+        for one in found["violations"]
+    ]
+    assert not said
+    assert len(found["passes"]) > 20
+
+
+def test_the_whole_page_can_be_walked_through_by_keyboard(shown):
+    page = shown("perpendicular")
+    seen = []
+    for _ in range(400):
+        page.keyboard.press("Tab")
+        one = page.evaluate(
+            """() => {
+              const { activeElement: one } = document;
+              if (one === document.body) return null;
+              const box = one.getBoundingClientRect();
+              return {id: one.dataset.id ?? one.id, role: one.getAttribute("role") ?? one.tagName,
+                      name: one.getAttribute("aria-label") ?? one.textContent,
+                      size: [box.width, box.height]};
+            }"""
+        )
+        if one is None:
+            break
+        seen.append(one)
+    else:
+        raise AssertionError("the walk does not end")
+    ids = [one["id"] for one in seen]
+    handles = page.evaluate("chutelab.stage.handles.map(({ id }) => id)")
+    assert len(handles) > 8
+    assert set(handles) <= set(ids)
+    assert {"play", "restart", "time", "undo"} <= {*ids, "undo"}
+    assert all(min(one["size"]) > 0 for one in seen)
+
+
+def test_a_handle_is_turned_played_and_undone_by_keyboard_alone(shown):
+    page = shown("perpendicular")
+    grip = page.locator('.grip[data-id="plate.angle_deg"]')
+    grip.focus()
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowRight")
+    assert page.evaluate("chutelab.lab.scene.plates[0].angle_deg") == 2.0
+    assert "2.0" in grip.get_attribute("aria-valuetext")
+    assert grip.get_attribute("aria-valuenow") == "2"
+    page.keyboard.press("Control+z")
+    assert page.evaluate("chutelab.lab.scene.plates[0].angle_deg") == 1.0
+    page.locator("#play").focus()
+    page.keyboard.press("Enter")
+    page.evaluate("() => new Promise((then) => setTimeout(then, 200))")
+    assert page.evaluate("chutelab.lab.playing && chutelab.lab.t > 0")
+
+
+def test_what_cannot_be_says_why_and_holds_the_last_good_one(shown):
+    page = shown("perpendicular")
+    before = page.evaluate("JSON.stringify(chutelab.lab.machine.segments)")
+    page.evaluate('chutelab.lab.change({"plate.restitution": 2})')
+    assert page.evaluate("JSON.stringify(chutelab.lab.machine.segments)") == before
+    said = page.locator("#fault")
+    assert said.is_visible()
+    assert "1" in said.inner_text()
+    page.evaluate('chutelab.lab.change({"plate.restitution": 0.9})')
+    assert not said.is_visible()
+
+
+def test_names_from_scenes_never_become_markup(shown, tmp_path):
+    evil = "</script><img src=x onerror=alert(1)>"
+    file = tmp_path / "evil.toml"
+    file.write_text(
+        f"title = '{evil}'\n[stream]\nname = 'drops'\nat = [0.0, 0.5]\nvelocity = [0.0, 0.0]\n"
+        "[[surface]]\nname = 'floor'\nfrom = [-1.0, 0.0]\nto = [1.0, 0.0]\n",
+        encoding="utf-8",
+    )
+    page = shown(file)
+    assert page.evaluate("document.title") == evil
+    assert page.locator("img").count() == 0
+
+
+def test_in_a_frame_that_is_hidden_when_it_loads_all_is_drawn_once_it_shows(shown, tmp_path):
+    inner = tmp_path / "inner.html"
+    write(load("perpendicular"), inner)
+    page = shown("perpendicular")
+    outer = tmp_path / "outer.html"
+    outer.write_text(
+        '<div id="tab" style="display:none"><iframe src="inner.html" width="900" height="600">'
+        "</iframe></div>",
+        encoding="utf-8",
+    )
+    page.goto(outer.as_uri())
+    frame = page.frames[1]
+    frame.evaluate(READY)
+    page.evaluate('document.getElementById("tab").style.display = "block"')
+    page.evaluate("() => new Promise((then) => setTimeout(then, 300))")
+    assert frame.evaluate("document.querySelectorAll('.track').length") == 1
+    assert frame.evaluate("chutelab.stage.view.width") > 300

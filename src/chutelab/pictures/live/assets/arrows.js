@@ -45,11 +45,11 @@ class Arrows {
   constructor(stage, words) {
     this.stage = stage;
     this.words = words;
-    stage.painters.push((context, style) => this.paint(context, style));
+    stage.painters.push((context) => this.paint(context));
   }
 
-  /** @param {CanvasRenderingContext2D} context @param {CSSStyleDeclaration} style */
-  paint(context, style) {
+  /** @param {CanvasRenderingContext2D} context */
+  paint(context) {
     const { stage, words } = this, { show, view, lab } = stage, { recording, t } = lab;
     if (!recording || (!show.velocity && !show.forces)) return;
     const { machine, tracks } = recording;
@@ -75,7 +75,7 @@ class Arrows {
       // What is left over in flight is rounding.
       if (Math.hypot(fx, fy) > 1e-6 * its) contacts.push([x, y, x + perNewton * fx, y - perNewton * fy]);
     });
-    const colour = (/** @type {string} */ name) => style.getPropertyValue(`--${name}`);
+    const colour = (/** @type {string} */ name) => this.stage.colour(name);
     /** @type {[string, string, string, number][]} name, colour, unit, px of one unit */
     const bars = [];
     if (show.forces) {

@@ -232,6 +232,32 @@ class Core {
     return { knots, events };
   }
 
+  /** How far those under way have come, as rows of knots; only between steps of a run whose
+   * particles meet. */
+  tips() {
+    const { size, fields } = this.layout.structs.Disk, { Mode } = this.layout.enums;
+    /** @type {number[]} */
+    const rows = [];
+    const incline = this.get("ride_incline"), now = this.get("t");
+    for (let i = 0; i < this.get("disk_count"); i += 1) {
+      const begin = this.get("disks") + i * size;
+      const at = (/** @type {string} */ name) => this.doubles[(begin + fields[name][0]) >> 3];
+      const mode = this.ints[(begin + fields.mode[0]) >> 2];
+      if (mode === Mode.WAITING || mode === Mode.GONE) continue;
+      let state = ["t", "x", "y", "vx", "vy"].map(at);
+      if (mode === Mode.RIDING) {
+        const rho = at("ride_rho"), v = at("ride_speed");
+        const along = at("ride_x") + v * (now - at("ride_from"));
+        const turn = Math.max(along, 0) / rho - incline, [s, c] = [Math.sin(turn), Math.cos(turn)];
+        const straight = Math.min(along, 0);
+        state = [now, rho * s + straight * c, rho * c - straight * s, v * c, -v * s];
+      }
+      const entries = (begin + fields.entries[0]) >> 3;
+      rows.push(...state, at("spin"), ...this.doubles.subarray(entries, entries + 3), i);
+    }
+    return new Float64Array(rows);
+  }
+
   /** @type {{what: string, room: number} | null} */
   grow = null;
 

@@ -90,7 +90,8 @@ function without(given, name) {
     if (given[table] === undefined) continue;
     const kept = listed(given[table]).filter((row) =>
       row.name !== name && !(table === "plate" && name === "plate" && !row.pivot));
-    if (kept.length) rest[table] = table === "surface" || table === "conveyor" ? kept : either(kept);
+    const many = table === "surface" || table === "conveyor";
+    if (kept.length) rest[table] = many ? kept : either(kept);
     else if (table !== "stream") delete rest[table];
   }
   if (name === "outgoing") delete rest.outgoing;

@@ -3,8 +3,8 @@
 /**
  * @typedef {import("./machine.js").Machine} Machine
  * @typedef {import("./core.js").Event} Event
- * @typedef {{type: "chunk", id: number, knots: Float64Array, events: Event[], now: number,
- *   state: string, books: number[][] | null, reasons: number[] | null}} Chunk
+ * @typedef {{type: "chunk", id: number, knots: Float64Array, tips: Float64Array,
+ *   events: Event[], now: number, state: string, books: number[][] | null, reasons: number[] | null}} Chunk
  */
 
 class Engine {

@@ -78,7 +78,8 @@ class Handles {
       [this.axis("incoming.pulley_radius", radius, "m")], (x, y) => [Math.hypot(x, y)]);
     this.add("incoming.length", "incoming", "begin", "point",
       [end[0] - length * c, end[1] - length * s],
-      [this.axis("incoming.length", length, "m"), this.axis("incoming.incline_deg", incline, "degrees")],
+      [this.axis("incoming.length", length, "m"),
+        this.axis("incoming.incline_deg", incline, "degrees")],
       (x, y) => {
         // The tangent from the place to the pulley.
         const far = Math.hypot(x, y);
@@ -112,14 +113,16 @@ class Handles {
       const [x, y] = plate.pivot ?? [front + plate.distance, plate.pivot_height];
       const angle = plate.angle_deg * DEGREE;
       const up = /** @type {[number, number]} */ ([-Math.sin(angle), Math.cos(angle)]);
-      const own = this.machine.segments.find(({ surface }) => this.machine.surfaces[surface] === name);
+      const { segments, surfaces } = this.machine;
+      const own = segments.find(({ surface }) => surfaces[surface] === name);
       const below = own ? own.length - plate.above : plate.below ?? 0.5;
       this.add(`${table}.pivot`, name, "pivot", "point", [x, y], plate.pivot
         ? this.place(`${table}.pivot`, [x, y])
         : [this.axis(`${table}.distance`, plate.distance, "m"),
           this.axis(`${table}.pivot_height`, y, "m")],
       (px, py) => [plate.pivot ? px : px - front, py]);
-      const turned = (/** @type {number} */ px, /** @type {number} */ py, /** @type {number} */ side) => [
+      /** @type {(px: number, py: number, side: number) => number[]} */
+      const turned = (px, py, side) => [
         Math.atan2(-side * (px - x), side * (py - y)) / DEGREE, Math.hypot(px - x, py - y),
       ];
       this.add(`${table}.angle_deg`, name, "angle", "turn",
@@ -159,7 +162,8 @@ class Handles {
       const whole = Math.abs(row.to_deg - row.from_deg) >= 360;
       this.add(`${table}.center`, row.name, "center", "point", row.center,
         this.place(`${table}.center`, row.center), (px, py) => [px, py]);
-      this.add(`${table}.radius`, row.name, "radius", "point", at(0.5 * (row.from_deg + row.to_deg)),
+      const middle = at(0.5 * (row.from_deg + row.to_deg));
+      this.add(`${table}.radius`, row.name, "radius", "point", middle,
         [this.axis(`${table}.radius`, radius, "m")], (px, py) => [Math.hypot(px - x, py - y)]);
       for (const [key, what, degrees] of whole ? [] : /** @type {[string, string, number][]} */ ([
         ["from_deg", "begin", row.from_deg], ["to_deg", "end", row.to_deg],

@@ -55,7 +55,7 @@ class Lab {
     this.listeners.get(news)?.forEach((listener) => listener());
   }
 
-  /** Take over a scene that can be built, and run it; one that cannot says why, and changes nothing.
+  /** Take over a scene that can be built, and run it; one that cannot changes nothing but `fault`.
    * @param {Given} given @returns {boolean} */
   use(given) {
     try {
@@ -92,9 +92,21 @@ class Lab {
     const { recording } = this;
     this.engine.run(job, AHEAD + (from > 0 ? 0 : this.t), (chunk) => {
       recording.add(chunk);
+      this.tellSoon();
+    });
+  }
+
+  /** Tell of the run once a frame: a crowd sends more often. */
+  tellSoon() {
+    if (this.waiting) return;
+    this.waiting = true;
+    requestAnimationFrame(() => {
+      this.waiting = false;
       this.tell("run");
     });
   }
+
+  waiting = false;
 
   /** Change values of the scene, by key. While something is dragged they are no step of undo yet.
    * @param {Record<string, unknown>} values @param {{done?: boolean}} [how] */
@@ -184,14 +196,21 @@ class Lab {
   /** @param {number} t s */
   seek(t) {
     this.t = Math.max(this.start, Math.min(t, this.end));
-    this.engine.allow(this.t + AHEAD);
+    this.allow(0);
     this.tell("time");
+  }
+
+  /** Let the run go on so far that so many seconds can be shown at once.
+   * @param {number} seconds of real time */
+  allow(seconds) {
+    const since = this.t - (this.recording?.shift ?? 0);
+    this.engine.allow(since + (seconds + AHEAD) * Math.max(1, this.rate));
   }
 
   /** Go on by a frame of so many seconds of real time. @param {number} seconds */
   tick(seconds) {
     if (!this.playing) return;
-    this.engine.allow(this.t - (this.recording?.shift ?? 0) + seconds * this.rate + AHEAD * this.rate);
+    this.allow(seconds);
     this.t = Math.min(this.t + seconds * this.rate, this.end);
     this.tell("time");
     if (this.isOver) this.pause();

@@ -13,6 +13,9 @@ import { KNOT_ROW } from "./core.js";
 
 const T = 0, X = 1, Y = 2, VX = 3, VY = 4, SPIN = 5, BELT = 6, RESTITUTION = 7, FRICTION = 8;
 
+/** Of events, as in the enum Kind of the core. */
+const RELEASE = 0, SEPARATION = 1;
+
 /** Knots of one particle, `KNOT_ROW` doubles each. */
 class Track {
   rows = new Float64Array(8 * KNOT_ROW);
@@ -22,8 +25,13 @@ class Track {
   /** Where it was looked for last. */
   near = 0;
 
+  /** Whether the last knot only tells how far it has come, until there is another. */
+  tip = false;
+
   /** @param {Float64Array} row @param {number} shift s @param {number[] | null} entries */
   add(row, shift, entries) {
+    if (this.tip) this.count -= 1;
+    this.tip = false;
     if ((this.count + 1) * KNOT_ROW > this.rows.length) {
       const rows = new Float64Array(2 * this.rows.length);
       rows.set(this.rows);
@@ -32,7 +40,7 @@ class Track {
     const begin = this.count * KNOT_ROW;
     this.rows.set(row, begin);
     this.rows[begin] += shift;
-    if (entries) entries.forEach((value, n) => { this.rows[begin + BELT + n] += value; });
+    if (entries) for (let n = 0; n < 3; n += 1) this.rows[begin + BELT + n] += entries[n];
     this.count += 1;
   }
 
@@ -43,7 +51,10 @@ class Track {
 
   /** Lowest knot, m. */
   get lowest() {
-    for (; this.seen < this.count; this.seen += 1) this.low = Math.min(this.low, this.at(this.seen, Y));
+    const sure = this.count - Number(this.tip);
+    for (; this.seen < sure; this.seen += 1) {
+      this.low = Math.min(this.low, this.at(this.seen, Y));
+    }
     return this.low;
   }
 
@@ -92,6 +103,7 @@ class Track {
     this.count = this.knotBefore(t) + 1;
     this.turns.length = Math.min(this.turns.length, this.count);
     this.near = 0;
+    this.tip = false;
     this.add(new Float64Array([t, x, y, vx, vy, spin, ...entries, 0]), 0, null);
   }
 
@@ -124,7 +136,8 @@ class Track {
   curve(i, place, pace, h, s) {
     const a = this.at(i, place), va = this.at(i, pace), vb = this.at(i + 1, pace);
     const dx = this.at(i + 1, place) - a;
-    const where = a + s * (h * va + s * (3 * dx - h * (2 * va + vb) + s * (h * (va + vb) - 2 * dx)));
+    const where = a
+      + s * (h * va + s * (3 * dx - h * (2 * va + vb) + s * (h * (va + vb) - 2 * dx)));
     const slope = dx / h;
     return [where, va + s * (2 * (3 * slope - 2 * va - vb) + 3 * s * (va + vb - 2 * slope))];
   }
@@ -135,7 +148,8 @@ class Track {
     const i = t >= this.end ? this.count - 1 : this.knotBefore(t);
     for (let n = this.turns.length; n < this.count; n += 1) {
       const h = n ? this.at(n, T) - this.at(n - 1, T) : 0;
-      this.turns.push(n ? this.turns[n - 1] + 0.5 * h * (this.at(n, SPIN) + this.at(n - 1, SPIN)) : 0);
+      const mean = n ? 0.5 * (this.at(n, SPIN) + this.at(n - 1, SPIN)) : 0;
+      this.turns.push(n ? this.turns[n - 1] + h * mean : 0);
     }
     const h = Math.min(t, this.end) - this.at(i, T);
     const spin = /** @type {State} */ (this.state(Math.min(t, this.end))).spin;
@@ -170,44 +184,63 @@ class Recording {
     /** s up to which all is there. */
     this.now = 0;
     /** What a run that goes on after a change calls the particles, and what it adds to entries.
-     * @type {{index: number, entries: number[]}[] | null} */
+     * @type {{index: number, entries: number[], goesOn: boolean}[] | null} */
     this.renamed = null;
     this.shift = 0;
-    this.cuts = 0;
   }
 
-  /** @param {{knots: Float64Array, events: Event[], now: number, state: string}} chunk */
-  add({ knots, events, now, state }) {
-    for (let begin = 0; begin < knots.length; begin += KNOT_ROW) {
-      const row = knots.subarray(begin, begin + KNOT_ROW);
-      const its = this.renamed ? this.renamed[row[9]] : { index: row[9], entries: null };
-      this.tracks[its.index].add(row, this.shift, its.entries);
+  /** @param {{knots: Float64Array, tips: Float64Array, events: Event[], now: number,
+   *   state: string}} chunk */
+  add({ knots, tips, events, now, state }) {
+    const its = (/** @type {number} */ disk) =>
+      this.renamed ? this.renamed[disk] : { index: disk, entries: null, goesOn: false };
+    for (const rows of [knots, tips]) {
+      for (let begin = 0; begin < rows.length; begin += KNOT_ROW) {
+        const row = rows.subarray(begin, begin + KNOT_ROW);
+        const { index, entries } = its(row[9]);
+        const track = this.tracks[index];
+        if (rows === tips && row[0] + this.shift <= track.end) continue;
+        track.add(row, this.shift, entries);
+        track.tip = rows === tips;
+      }
     }
     for (const event of events) {
-      const index = (/** @type {number} */ disk) =>
-        this.renamed && disk >= 0 ? this.renamed[disk].index : disk;
-      this.events.push({
-        ...event, t: event.t + this.shift, disk: index(event.disk), other: index(event.other),
-      });
+      const { index, goesOn } = its(event.disk);
+      // Who goes on after a change is not released once more.
+      if (goesOn && event.kind === RELEASE && event.t === 0) continue;
+      const other = event.other >= 0 ? its(event.other).index : event.other;
+      this.events.push({ ...event, t: event.t + this.shift, disk: index, other });
     }
+    this.measure();
     this.state = state;
-    const done = state !== "running";
-    this.now = done ? Math.max(this.end, now + this.shift) : now + this.shift;
+    this.now = state === "running" ? now + this.shift : Math.max(this.end, now + this.shift);
   }
 
+  /** When the last track ends, and the first begins, s. */
   get end() {
-    return this.tracks.reduce((latest, track) => Math.max(latest, track.end), -Infinity);
+    return this.span[1];
   }
 
   get begin() {
-    return this.tracks.reduce((first, track) => Math.min(first, track.begin), Infinity);
+    return this.span[0];
   }
+
+  measure() {
+    let begin = Infinity, end = -Infinity;
+    for (const track of this.tracks) {
+      if (track.begin < begin) begin = track.begin;
+      if (track.end > end) end = track.end;
+    }
+    this.span = [begin, end];
+  }
+
+  span = [Infinity, -Infinity];
 
   /** Forget what is after t, and return the machine by which a run goes on from there, in a time
    * that begins then: with those under way, and with those still to come.
    * @param {number} t @param {Machine} machine @returns {Machine} */
   goOn(t, machine) {
-    /** @type {{index: number, entries: number[]}[]} */
+    /** @type {{index: number, entries: number[], goesOn: boolean}[]} */
     const renamed = [];
     /** @type {Machine["releases"]} */
     const releases = [];
@@ -219,16 +252,18 @@ class Recording {
       track.cut(t);
       const state = track.state(t);
       if (ended) return;
-      renamed.push({ index, entries: state ? track.entries(t) : [0, 0, 0] });
+      const entries = state ? track.entries(t) : [0, 0, 0];
+      renamed.push({ index, entries, goesOn: state !== null });
       spins.push(state ? state.spin : 0);
       if (state) {
         const { x, y, vx, vy } = state;
         // Whoever still rides the belt goes on riding.
         const carried = release.carried && x < 0 && !this.hasLeft(index, t);
         releases.push({ ...release, x, y, vx, vy, t: 0, carried });
-        track.count -= 1;
+        track.tip = true;
       } else releases.push({ ...release, t: Math.max(0, release.t - t) });
     });
+    this.measure();
     this.events = this.events.filter((event) => event.t <= t);
     this.machine = machine;
     this.renamed = renamed;
@@ -254,7 +289,7 @@ class Recording {
 
   /** @param {number} index @param {number} t */
   hasLeft(index, t) {
-    return this.events.some(({ disk, kind, t: when }) => disk === index && kind === 1 && when <= t);
+    return this.events.some(({ disk, kind, t: when }) => disk === index && kind === SEPARATION && when <= t);
   }
 
   /** The energy ledger of one particle; while it slips the balance gives the slip heat, while it is

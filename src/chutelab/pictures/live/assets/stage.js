@@ -57,6 +57,10 @@ class Stage {
     this.held = null;
     this.fitted = false;
     new ResizeObserver(() => this.resize()).observe(home);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+      this.colours.clear();
+      this.paint();
+    });
     lab.on("scene", () => this.rebuild());
     lab.on("run", () => this.traced());
     lab.on("time", () => this.paint());
@@ -72,7 +76,9 @@ class Stage {
     const dense = globalThis.devicePixelRatio || 1;
     this.canvas.width = Math.round(width * dense);
     this.canvas.height = Math.round(height * dense);
-    for (const layer of [this.back, this.front]) layer.setAttribute("viewBox", `0 0 ${width} ${height}`);
+    for (const layer of [this.back, this.front]) {
+      layer.setAttribute("viewBox", `0 0 ${width} ${height}`);
+    }
     if (!this.fitted || !this.moved) this.fit();
     else this.rebuild();
   }
@@ -218,18 +224,18 @@ class Stage {
     context.setTransform(dense, 0, 0, dense, 0, 0);
     context.clearRect(0, 0, view.width, view.height);
     for (const { element, speed, x, y, radius } of this.running) {
-      if (radius) element.setAttribute("transform", `rotate(${((speed * t) / radius) * (180 / Math.PI)} ${x} ${y})`);
+      const turned = radius ? ((speed * t) / radius) * (180 / Math.PI) : 0;
+      if (radius) element.setAttribute("transform", `rotate(${turned} ${x} ${y})`);
       else element.setAttribute("stroke-dashoffset", String(-((speed * t * view.scale) % DASH)));
     }
     for (const { element, appears, vanishes } of this.gates) {
       element.classList.toggle("absent", t < appears || t >= vanishes);
     }
-    const style = getComputedStyle(this.home);
-    const ink = style.getPropertyValue("--particle"), rim = style.getPropertyValue("--ink");
-    if (this.show.strobe && !this.blind && !machine.interact) this.strobe(context, style);
+    const ink = this.colour("particle"), rim = this.colour("ink");
+    if (this.show.strobe && !this.blind && !machine.interact) this.strobe(context);
     const spins = machine.inertia.some((value) => value > 0);
     context.lineWidth = 1;
-    const kinds = machine.radius.length > 1 && new Set(machine.releases.map(({ stream }) => stream)).size > 1;
+    const { kinds } = /** @type {import("./scene.js").Scene} */ (lab.scene);
     for (let i = 0; i < recording.tracks.length; i += 1) {
       const state = recording.tracks[i].state(t);
       if (!state || (state.ended && recording.tracks.length > 1)) continue;
@@ -238,7 +244,8 @@ class Stage {
       if (x < -r || x > view.width + r || y < -r || y > view.height + r) continue;
       context.beginPath();
       context.arc(x, y, r, 0, 2 * Math.PI);
-      context.fillStyle = kinds ? style.getPropertyValue(`--kind-${machine.releases[i]?.stream % 5}`) : ink;
+      const stream = machine.releases[i]?.stream ?? 0;
+      context.fillStyle = kinds.length > 1 ? this.colour(`kind-${stream % 5}`) : ink;
       context.fill();
       if (r > 3) {
         context.strokeStyle = rim;
@@ -246,12 +253,23 @@ class Stage {
       }
       if (spins && r > 3) this.mark(context, recording.tracks[i], t, x, y, r, rim);
     }
-    for (const draw of this.painters) draw(context, style);
+    for (const draw of this.painters) draw(context);
   }
 
   /** Further things that are painted over the particles.
-   * @type {((context: CanvasRenderingContext2D, style: CSSStyleDeclaration) => void)[]} */
+   * @type {((context: CanvasRenderingContext2D) => void)[]} */
   painters = [];
+
+  /** A colour of page.css, of the theme that is on. @param {string} name */
+  colour(name) {
+    const known = this.colours.get(name)
+      ?? getComputedStyle(this.home).getPropertyValue(`--${name}`);
+    this.colours.set(name, known);
+    return known;
+  }
+
+  /** To ask for each takes longer than to paint a particle. @type {Map<string, string>} */
+  colours = new Map();
 
   /** A radius that shows how a particle turns.
    * @param {CanvasRenderingContext2D} context @param {import("./recording.js").Track} track
@@ -266,12 +284,12 @@ class Stage {
   }
 
   /** Dots at round times on the first tracks.
-   * @param {CanvasRenderingContext2D} context @param {CSSStyleDeclaration} style */
-  strobe(context, style) {
+   * @param {CanvasRenderingContext2D} context */
+  strobe(context) {
     const { recording } = this.lab;
     if (!recording) return;
     const step = this.strobeStep;
-    context.fillStyle = style.getPropertyValue("--track");
+    context.fillStyle = this.colour("track");
     for (const track of recording.tracks.slice(0, 1)) {
       for (let n = Math.ceil(track.begin / step - 1e-9); n * step <= track.end; n += 1) {
         const state = track.state(n * step);
@@ -415,7 +433,8 @@ class Stage {
       this.held.change(this.held.drag(x, y));
       return;
     }
-    const numbers = this.held.drag(x, y).map((value, n) => roundTo(value, fine[axes[n].unit] ?? snap));
+    const numbers = this.held.drag(x, y).map((value, n) =>
+      roundTo(value, fine[axes[n].unit] ?? snap));
     this.lab.change(valuesOf(this.held, numbers), { done: false });
   }
 
@@ -444,7 +463,8 @@ class Stage {
       return true;
     }
     const axes = handle.axes.filter((axis, i) => i === n || axis.part !== undefined || !axis.step);
-    this.lab.change(valuesOf({ ...handle, axes }, axes.map((axis) => numbers[handle.axes.indexOf(axis)])));
+    const kept = axes.map((axis) => numbers[handle.axes.indexOf(axis)]);
+    this.lab.change(valuesOf({ ...handle, axes }, kept));
     return true;
   }
 }

@@ -42,7 +42,8 @@ class Transport {
       button.addEventListener("click", act);
     }
     for (const rate of RATES) {
-      this.rate.append(new Option(`${words.local(String(rate))}×`, String(rate), rate === 1, rate === 1));
+      const text = `${words.local(String(rate))}×`;
+      this.rate.append(new Option(text, String(rate), rate === 1, rate === 1));
     }
     this.rate.addEventListener("change", () => { lab.rate = Number(this.rate.value); });
     this.time.addEventListener("input", () => {

@@ -92,7 +92,8 @@ function boxOf(machine, points) {
   const ends = (/** @type {import("./machine.js").Segment} */ { x, y, tx, ty, length }) =>
     [[x, y], [x + tx * length, y + ty * length]];
   // Walls may reach far above all that ever was up there.
-  const highest = [...points, ...machine.releases].reduce((top, { y }) => Math.max(top, y), -Infinity);
+  const highest = [...points, ...machine.releases]
+    .reduce((top, { y }) => Math.max(top, y), -Infinity);
   const still = machine.segments.filter(({ speed }) => !speed);
   for (const [x, y] of still.flatMap(ends)) widen(x, Math.min(y, highest + BEYOND));
   const [left, right] = [box.left - BEYOND, box.right + BEYOND];

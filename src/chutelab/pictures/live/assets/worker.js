@@ -1,14 +1,14 @@
 // The engine's own thread: runs machines, so that the picture never waits for them.
 //
-// In:  {type: "load", wasm, layout}; {type: "run", id, machine, until} begins a run and ends the one
-//      before; {type: "until", id, until} lets it go on to a later time (s).
-// Out: {type: "chunk", id, knots, events, now, state, books, reasons}, where state
+// In:  {type: "load", wasm, layout}; {type: "run", id, machine, until} begins a run and ends the
+//      one before; {type: "until", id, until} lets it go on to a later time (s).
+// Out: {type: "chunk", id, knots, tips, events, now, state, books, reasons}, where state
 //      is "running", "done", "stalled" or "failed"; books and reasons come with the end.
 
 import { startCore } from "./core.js";
 
 /** ms between two looks at the messages. */
-const TURN = 6;
+const TURN = 10;
 
 /** Most steps of the core between two looks at the clock. */
 const MOST_STEPS = 256;
@@ -52,7 +52,8 @@ function work() {
       knots.push(taken.knots);
       events.push(...taken.events);
       const now = performance.now();
-      job.steps = now - before < 1 ? Math.min(2 * job.steps, MOST_STEPS) : Math.max(1, job.steps >> 1);
+      const quick = now - before < 1;
+      job.steps = quick ? Math.min(2 * job.steps, MOST_STEPS) : Math.max(1, job.steps >> 1);
       if (now - began > TURN) break;
     }
   } catch {
@@ -60,10 +61,11 @@ function work() {
   }
   const over = state !== "running";
   const all = joined(knots);
+  const tips = over || !core.machine?.interact ? new Float64Array() : core.tips();
   postMessage({
-    type: "chunk", id: job.id, knots: all, events, now: core.get("t"), state,
+    type: "chunk", id: job.id, knots: all, tips, events, now: core.get("t"), state,
     books: over ? core.books() : null, reasons: over ? core.reasons() : null,
-  }, { transfer: [all.buffer] });
+  }, { transfer: [all.buffer, tips.buffer] });
   if (over) job = null;
   else schedule();
 }

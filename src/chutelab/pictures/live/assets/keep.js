@@ -149,7 +149,8 @@ async function drawnSvg(whole, part, width, height) {
   root.append(...(part === whole ? copy.childNodes : [copy]));
   for (const [name, value] of Object.entries({ width, height })) root.setAttribute(name, value);
   const image = new Image();
-  image.src = `data:image/svg+xml,${encodeURIComponent(new XMLSerializer().serializeToString(root))}`;
+  const text = new XMLSerializer().serializeToString(root);
+  image.src = `data:image/svg+xml,${encodeURIComponent(text)}`;
   await image.decode();
   return image;
 }

@@ -26,8 +26,8 @@ pytestmark = pytest.mark.skipif(NODE is None, reason="needs node")
 
 # A lone particle and a stream, on plates, round a pulley with slip, on a belt, on arcs; a crowd.
 SCENES = [
-    ("perpendicular",), ("inclined-20", "plate.angle_deg=-10"), ("inclined-40",), ("slip",), ("low-speed",), ("belt-landing",), ("spoon",),
-    ("stream-independent", "stream.count=50"), ("stream", "stream.count=40"),
+    ("perpendicular",), ("inclined-20", "plate.angle_deg=-10"), ("inclined-40",), ("slip",),
+    ("low-speed",), ("belt-landing",), ("spoon",), ("stream-independent", "stream.count=50"), ("stream", "stream.count=40"),
 ]  # fmt: skip
 
 

@@ -49,7 +49,11 @@ const ASK = {
     const found = built(given);
     return places.map(([x, y]) => edit.surfaceAt(found, x, y, reach));
   },
-  hash: ({ given, hash }) => share.fromHash(given, hash),
+  hash: ({ given, hash }) => tried(() => {
+    const told = share.fromHash(given, hash);
+    if (told) built(told);
+    return told;
+  }),
   csv: ({ rows, comma }) => share.toCsv(rows, comma),
   stem: ({ title }) => share.fileStem(title),
   parse: ({ texts }) => texts.map((text) => String(say.parse(text))),

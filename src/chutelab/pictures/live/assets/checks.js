@@ -57,8 +57,8 @@ function isTable(value) {
  */
 export function* misfitsOf(given, lab) {
   for (const [table, value] of Object.entries(given)) {
-    if (FOREIGN.includes(table) || table in lab.tables.scene) continue;
-    if (!(table in lab.tables) || table === "scene") yield [table, value, "unknown-key"];
+    if (FOREIGN.includes(table) || Object.hasOwn(lab.tables.scene, table)) continue;
+    if (!Object.hasOwn(lab.tables, table) || table === "scene") yield [table, value, "unknown-key"];
     const list = LISTS.includes(table) || (EITHER.includes(table) && Array.isArray(value));
     const sound = list ? Array.isArray(value) && value.every(isTable) : isTable(value);
     if (!sound) yield [table, value, "form"];
@@ -70,7 +70,7 @@ export function* misfitsOf(given, lab) {
   for (const [table, rules] of Object.entries(lab.tables)) {
     if (table === "scene" || FOREIGN.includes(table)) continue;
     for (const [n, row] of listOf(given[table]).entries()) {
-      const unknown = Object.keys(row).find((key) => !(key in rules));
+      const unknown = Object.keys(row).find((key) => !Object.hasOwn(rules, key));
       if (unknown !== undefined) {
         yield [pathOf(given, table, n, unknown), row[unknown], "unknown-key"];
       }

@@ -23,13 +23,13 @@ import { Fault, met } from "./scene.js";
 const plainKey = (key) => key.replace(/^(\w+)\[0\]/, "$1");
 
 /** Whether a key is another one, or a part of it. @param {string} key @param {string} whole */
-const isWithin = (key, whole) =>
+const isPartOf = (key, whole) =>
   plainKey(key) === plainKey(whole) || plainKey(key).startsWith(`${plainKey(whole)}[`);
 
 /** @param {Page} page @param {string} key of a number, or of a point whole */
 function mayChange({ live }, key) {
   const controls = live?.controls ?? [];
-  return !controls.length || controls.some((one) => isWithin(key, one) || isWithin(one, key));
+  return !controls.length || controls.some((one) => isPartOf(key, one) || isPartOf(one, key));
 }
 
 /** Whether things may be drawn and deleted: where not only some keys can be changed.
@@ -63,7 +63,7 @@ function homeOf(key) {
 function boundsOf(page, key) {
   const [table, name] = homeOf(key);
   const rule = page.tables[table]?.[name] ?? {};
-  const own = Object.entries(page.live?.ranges ?? {}).find(([one]) => isWithin(key, one));
+  const own = Object.entries(page.live?.ranges ?? {}).find(([one]) => isPartOf(key, one));
   const [low, high] = own?.[1] ?? [rule.low ?? -Infinity, rule.high ?? Infinity];
   return { unit: /** @type {string} */ (rule.unit ?? ""), low, high };
 }

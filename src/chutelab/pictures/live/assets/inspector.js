@@ -66,7 +66,8 @@ class Inspector {
     choice.value = this.part;
     this.remove.hidden = !this.canDelete || !this.mayDelete;
     const fields = fieldsOf(lab.data, lab.given, lab.scene, section);
-    if (fields.map(({ key }) => key).join() !== [...this.inputs.keys()].join()) this.rebuild(fields);
+    const keys = fields.map(({ key }) => key);
+    if (keys.join() !== [...this.inputs.keys()].join()) this.rebuild(fields);
     for (const field of fields) this.fill(field);
   }
 
@@ -92,7 +93,7 @@ class Inspector {
       });
       this.inputs.set(key, { input, field });
       const owner = several && table !== "scene" ? `${words.name(table)}: ` : "";
-      const which = of > 1 ? ` ${unit === "m" && name === "radius" ? ["≥", "≤"][part] : "xy"[part]}` : "";
+      const which = of > 1 ? ` ${(name === "radius" ? "≥≤" : "xy")[part]}` : "";
       return html("label", {}, html("span", {}, `${owner}${words.key(table, name)}${which}`), input,
         html("span", { class: "unit" }, words.unit(unit)));
     }));

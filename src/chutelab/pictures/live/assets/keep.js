@@ -16,7 +16,8 @@ import { historyOf } from "./stages.js";
 
 /** What a picture of its own needs of the page's style. */
 const KEPT = ["fill", "stroke", "stroke-width", "stroke-linecap", "stroke-dasharray", "opacity",
-  "font-family", "font-size", "display"];
+  "font-family", "font-size", "font-style", "paint-order", "text-anchor", "dominant-baseline",
+  "display"];
 
 /** Pixels of a saved picture for each of the page's. */
 const DENSE = 2;
@@ -148,7 +149,8 @@ async function drawnSvg(whole, part, width, height) {
   root.append(...(part === whole ? copy.childNodes : [copy]));
   for (const [name, value] of Object.entries({ width, height })) root.setAttribute(name, value);
   const image = new Image();
-  image.src = `data:image/svg+xml,${encodeURIComponent(new XMLSerializer().serializeToString(root))}`;
+  const text = new XMLSerializer().serializeToString(root);
+  image.src = `data:image/svg+xml,${encodeURIComponent(text)}`;
   await image.decode();
   return image;
 }

@@ -116,8 +116,9 @@ class Lab {
 
   /** @param {Given} given @param {{done?: boolean}} [how] */
   replace(given, { done = true } = {}) {
-    const before = this.before ?? this.given;
-    if (this.use(given)) this.before = before;
+    const { before } = this;
+    this.before ??= this.given;
+    if (!this.use(given)) this.before = before;
     if (done) this.settle();
   }
 

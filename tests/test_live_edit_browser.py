@@ -1,0 +1,480 @@
+"""Editing, predicting, keeping and the layout of the live page, in a real browser."""
+
+from __future__ import annotations
+
+import csv
+import shutil
+from io import BytesIO, StringIO
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import chutelab
+from chutelab.pictures.live.page import html
+from chutelab.results import Kind
+from chutelab.scene import load, parse, to_toml
+
+playwright = pytest.importorskip(
+    "playwright.sync_api", reason='needs Playwright: pip install "chutelab[test]"'
+)
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
+pytestmark = pytest.mark.skipif(
+    CHROMIUM is None, reason="needs a browser: apt-get install chromium"
+)
+
+# A page without `eval` cannot be waited for by a condition; a run is done some frames after.
+DONE = """() => new Promise((resolve, reject) => {
+  const end = performance.now() + 5000;
+  const look = () => {
+    if ((globalThis.chutelab?.lab.recording.state ?? "running") !== "running") {
+      requestAnimationFrame(() => requestAnimationFrame(resolve));
+    } else if (performance.now() > end) reject(new Error("no run that ends"));
+    else setTimeout(look, 5);
+  };
+  look();
+})"""
+
+PREDICT = """
+[live]
+predict = true
+[[live.presets]]
+name = "Moon"
+set = { gravity = 1.62 }
+"""
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with playwright.sync_playwright() as driver:
+        opened = driver.chromium.launch(executable_path=CHROMIUM)
+        yield opened
+        opened.close()
+
+
+@pytest.fixture
+def shown(browser, tmp_path):
+    """Open a scene; at the end nothing must have been said, and nothing asked for."""
+    said, contexts = [], []
+
+    def show(name="perpendicular", more="", *, language="en", address="", **options):
+        path = tmp_path / f"{len(contexts)}.html"
+        path.write_text(html(parse(to_toml(load(name)) + more), language=language), "utf-8")
+        context = browser.new_context(**{"viewport": {"width": 1366, "height": 620}, **options})
+        contexts.append(context)
+        page = context.new_page()
+        page.set_default_timeout(10_000)
+        page.on("console", lambda message: said.append(message.text))
+        page.on("pageerror", lambda error: said.append(str(error)))
+        page.on("request", lambda request: asked(request.url))
+        page.goto(path.as_uri() + address)
+        page.evaluate(DONE)
+        return page
+
+    def asked(url):
+        if not url.startswith(("file:", "blob:", "data:")):
+            said.append(url)
+
+    yield show
+    for context in contexts:
+        context.close()
+    assert said == []
+
+
+def value(page, key):
+    parts = "".join(f"?.[{part}]" if part.isdigit() else f"?.{part}" for part in key.split("."))
+    return page.evaluate(f"chutelab.lab.given{parts}")
+
+
+def field(page, label):
+    return page.get_by_label(label, exact=False).and_(page.locator("#edit input"))
+
+
+def spot(page, u, v):
+    """Where a share of the picture is on the screen, in whole pixels."""
+    box = page.locator("#stage").bounding_box()
+    return round(box["x"] + u * box["width"]), round(box["y"] + v * box["height"])
+
+
+def world(page, x, y):
+    return page.evaluate(
+        """([x, y]) => {
+          const { view, front } = chutelab.stage, box = front.getBoundingClientRect();
+          return [view.worldX(x - box.left), view.worldY(y - box.top)];
+        }""",
+        [x, y],
+    )
+
+
+def test_numbers_are_typed_and_a_wrong_one_says_why(shown):
+    page = shown(language="de")
+    angle = field(page, "Prallplatte: Winkel")
+    angle.fill("12,5")
+    angle.press("Enter")
+    assert value(page, "plate.angle_deg") == 12.5
+    assert page.locator("#fault").is_hidden()
+    for typed, why in (("95", "zwischen −90 und 90"), ("steil", "eine Zahl")):
+        angle.fill(typed)
+        angle.press("Enter")
+        assert why in page.inner_text("#fault")
+        assert angle.get_attribute("aria-invalid") == "true"
+        assert value(page, "plate.angle_deg") == 12.5
+    distance = field(page, "Prallplatte: Abstand")
+    distance.fill("-0,2")
+    distance.press("Enter")
+    assert "mehr als 0" in page.inner_text("#fault")
+    distance.fill("0,4")
+    distance.press("Enter")
+    assert page.locator("#fault").is_hidden()
+    assert value(page, "plate.distance") == 0.4
+    page.locator("h1").click()
+    page.keyboard.press("Control+z")
+    assert value(page, "plate.distance") == 0.5
+    page.keyboard.press("Control+z")
+    assert value(page, "plate.angle_deg") is None
+    assert angle.input_value() == "0"
+    page.keyboard.press("Control+Shift+z")
+    assert value(page, "plate.angle_deg") == 12.5
+
+
+def test_a_line_an_arc_and_a_particle_are_drawn_chosen_and_deleted(shown):
+    page = shown()
+    page.click("#tool-line")
+    a, b = spot(page, 0.1, 0.3), spot(page, 0.25, 0.5)
+    page.mouse.move(*a)
+    page.mouse.down()
+    page.mouse.move(*b, steps=3)
+    page.mouse.up()
+    line = value(page, "surface.0")
+    near = 2.0 / page.evaluate("chutelab.stage.view.scale")
+    assert line["from"] == pytest.approx(world(page, *a), abs=near)
+    assert line["to"] == pytest.approx(world(page, *b), abs=near)
+    page.click("#tool-arc")
+    corners = [spot(page, u, v) for u, v in ((0.75, 0.6), (0.8, 0.7), (0.85, 0.6))]
+    for corner in corners:
+        page.mouse.click(*corner)
+    arc = value(page, "surface.1")
+    for corner in corners:
+        far = np.hypot(*(np.array(world(page, *corner)) - arc["center"]))
+        assert far == pytest.approx(arc["radius"], abs=near)
+    page.click("#tool-drop")
+    above = spot(page, 0.8, 0.2)
+    page.mouse.click(*above)
+    assert value(page, "stream.1.at") == pytest.approx(world(page, *above), abs=near)
+    page.evaluate(DONE)
+    assert page.evaluate("chutelab.lab.recording.tracks.length") == 2
+    # Its middle is clicked to choose the line, and a key deletes it.
+    page.mouse.click((a[0] + b[0]) / 2, (a[1] + b[1]) / 2)
+    assert page.locator("#edit select").input_value() == "line1"
+    page.keyboard.press("Delete")
+    assert [one["name"] for one in value(page, "surface")] == ["arc1"]
+    page.click("#undo")
+    assert [one["name"] for one in value(page, "surface")] == ["line1", "arc1"]
+    page.click("#reset")
+    assert value(page, "surface") is None
+
+
+def test_all_of_that_goes_with_the_keyboard_alone(shown):
+    page = shown()
+    for _ in range(80):
+        page.keyboard.press("Tab")
+        if page.evaluate("document.activeElement.id") == "tool-line":
+            break
+    page.keyboard.press("Enter")
+    before = value(page, "surface.0.to")
+    assert page.evaluate("document.activeElement.getAttribute('data-id')") == "surface[0].to"
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowUp")
+    page.keyboard.press("ArrowUp")
+    moved = value(page, "surface.0.to")
+    assert moved == pytest.approx([before[0] + 0.01, before[1] + 0.02], abs=0.0051)
+    page.keyboard.press("Space")
+    assert page.evaluate("chutelab.lab.playing")
+    page.keyboard.press("Space")
+    assert not page.evaluate("chutelab.lab.playing")
+    page.keyboard.press("?")
+    assert page.locator("#help").is_visible()
+    page.keyboard.press("Escape")
+    assert page.locator("#help").is_hidden()
+    page.keyboard.press("Delete")
+    assert value(page, "surface") is None
+    page.evaluate("document.activeElement.blur()")
+    page.keyboard.press("End")
+    end = page.evaluate("chutelab.lab.end")
+    assert page.evaluate("chutelab.lab.t") == end
+    page.keyboard.press("ArrowLeft")
+    assert page.evaluate("chutelab.lab.t") == pytest.approx(end - 1 / 60)
+    page.keyboard.press("Home")
+    assert page.evaluate("chutelab.lab.t") == 0.0
+
+
+def test_the_picture_is_moved_and_zoomed_about_the_place_that_is_held(shown):
+    page = shown(has_touch=True)
+    here = spot(page, 0.15, 0.25)
+    held = world(page, *here)
+    page.mouse.move(*here)
+    page.mouse.wheel(0, -400)
+    page.evaluate(DONE)
+    assert world(page, *here) == pytest.approx(held, abs=1e-9)
+    scale = page.evaluate("chutelab.stage.view.scale")
+    page.mouse.down()
+    there = here[0] + 60, here[1] + 30
+    page.mouse.move(*there, steps=3)
+    page.mouse.up()
+    assert world(page, *there) == pytest.approx(held, abs=1e-9)
+    assert page.evaluate("chutelab.stage.view.scale") == scale
+    # Two fingers twice as far apart show all twice as large.
+    session = page.context.new_cdp_session(page)
+    for kind, half in (("touchStart", 30), ("touchMove", 45), ("touchMove", 60)):
+        points = [{"x": there[0] + s * half, "y": there[1], "id": (s + 1) // 2} for s in (-1, 1)]
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+    session.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    assert page.evaluate("chutelab.stage.view.scale") == pytest.approx(2 * scale, rel=0.02)
+    page.click("#fit")
+    assert page.evaluate("chutelab.stage.view.scale") < 2 * scale
+
+
+def landing_of(scene):
+    return chutelab.simulate(scene).select(Kind.LANDING)[0]["position"][0]
+
+
+def test_path_and_numbers_are_hidden_until_there_is_a_mark_and_play_was_pressed(shown):
+    page = shown("inclined-40", PREDICT)
+    hidden = ("#numbers", "#energy", "#curves", ".tools", ".symbols")
+    dots = "chutelab.stage.paths.childElementCount"
+
+    def is_hidden():
+        assert all(page.locator(one).is_hidden() for one in hidden)
+        assert page.evaluate(dots) == 0
+        assert page.locator("#time").is_disabled()
+        assert page.get_by_text("Table of the run").is_hidden()
+
+    is_hidden()
+    page.click("#play")
+    assert not page.evaluate("chutelab.lab.playing")
+    is_hidden()
+    # The mark has the focus now.
+    for _ in range(3):
+        page.keyboard.press("PageUp")
+    x = float(page.locator(".guess").get_attribute("aria-valuenow"))
+    page.click("#play")
+    assert page.evaluate("chutelab.lab.playing")
+    assert page.evaluate(dots) > 0
+    assert all(page.locator(one).is_visible() for one in ("#numbers", "#energy", ".tools"))
+    off = abs(landing_of(load("inclined-40")) - x) * 100
+    said = page.inner_text("#guess")
+    assert float(said.split(" by ")[1].split(" cm")[0]) == pytest.approx(off, rel=6e-3)
+    page.select_option("#presets", label="Moon")
+    assert value(page, "gravity") == 1.62
+    page.evaluate(DONE)
+    is_hidden()
+    # With a finger, too: the mark is dragged to where it lands.
+    x = landing_of(load("inclined-40", ["gravity=1.62"]))
+    mark = page.locator(".guess .room").bounding_box()
+    at = mark["x"] + mark["width"] / 2, mark["y"] + mark["height"] / 2
+    scale = page.evaluate("chutelab.stage.view.scale")
+    now = float(page.locator(".guess").get_attribute("aria-valuenow"))
+    page.mouse.move(*at)
+    page.mouse.down()
+    page.mouse.move(at[0] + (x - now) * scale, at[1] - 30, steps=3)
+    page.mouse.up()
+    page.click("#play")
+    said = page.inner_text("#guess")
+    assert float(said.split(" by ")[1].split(" cm")[0]) < 200 / scale
+    page.click("#show-all")
+    page.select_option("#presets", label="Moon")
+    assert page.locator("#numbers").is_visible()
+    assert page.locator("#guess").is_hidden()
+
+
+def test_where_there_is_no_belt_the_mark_goes_anywhere(shown):
+    page = shown("free-fall", "[live]\npredict = true\n")
+    page.click("#play")
+    page.keyboard.press("ArrowUp")
+    page.keyboard.press("ArrowRight")
+    state = page.evaluate("""() => {
+      const { tracks: [track] } = chutelab.lab.recording, { x, y } = track.state(track.end);
+      const [, a, b] = /translate\\(([-\\d.e]+) ([-\\d.e]+)\\)/.exec(
+        document.querySelector(".guess").getAttribute("transform"));
+      const { view } = chutelab.stage;
+      return Math.hypot(view.worldX(Number(a)) - x, view.worldY(Number(b)) - y);
+    }""")
+    page.click("#play")
+    said = page.inner_text("#guess")
+    assert float(said.split(" by ")[1].split(" cm")[0]) == pytest.approx(100 * state, rel=6e-3)
+
+
+def test_a_scene_says_what_can_be_changed(shown):
+    live = """
+[live]
+controls = ["plate.angle_deg"]
+panels = ["numbers", "edit"]
+ranges = { "plate.angle_deg" = [20, 60] }
+"""
+    page = shown("inclined-40", live)
+    grips = page.evaluate("chutelab.stage.handles.flatMap(({ axes }) => axes.map((a) => a.key))")
+    assert set(grips) == {"plate.angle_deg"}
+    assert page.locator("#tool-line").count() == 0
+    panels = page.evaluate(
+        "[...document.querySelectorAll('#panels > .card')].filter((e) => e.offsetHeight)"
+        ".map((e) => e.id)"
+    )
+    assert panels == ["numbers", "edit"]
+    assert page.locator(".tools").is_hidden()
+    assert page.locator("#edit input").count() == 1
+    angle = page.locator("#edit input")
+    angle.fill("61")
+    angle.press("Enter")
+    assert "from 20 to 60" in page.inner_text("#fault")
+    assert value(page, "plate.angle_deg") == 40.0
+    page.focus("[data-id='plate.angle_deg']")
+    for _ in range(4):
+        page.keyboard.press("PageUp")
+    assert value(page, "plate.angle_deg") == 60.0
+
+
+def test_the_address_holds_the_scene_and_one_that_does_not_is_said(shown):
+    page = shown()
+    assert page.evaluate("location.hash") == ""
+    page.evaluate("chutelab.lab.change({ 'plate.angle_deg': 33.5, 'incoming.speed': 1.75 })")
+    address = page.evaluate("location.hash")
+    given = page.evaluate("chutelab.lab.given")
+    again = shown(address=address)
+    assert again.evaluate("chutelab.lab.given") == given
+    assert again.evaluate("location.hash") == address
+    again.evaluate("location.hash = ''")
+    again.wait_for_timeout(50)
+    assert value(again, "plate.angle_deg") is None
+    again.evaluate("location.hash = '#nonsense'")
+    again.wait_for_timeout(50)
+    assert "address" in again.inner_text("#fault")
+    assert value(again, "plate.distance") == 0.5
+    again.click("#undo")
+    assert again.evaluate("chutelab.lab.given") == given
+    # One that has numbers, but cannot be built.
+    page.evaluate("chutelab.lab.reset()")
+    assert page.evaluate("location.hash") == ""
+
+
+def saved(page, name):
+    with page.expect_download() as waiting:
+        page.get_by_role("button", name=name, exact=True).click()
+    return waiting.value.suggested_filename, waiting.value.path().read_bytes()
+
+
+def test_scene_tables_and_picture_are_saved(shown):
+    page = shown(language="de")
+    page.evaluate("chutelab.lab.change({ 'plate.angle_deg': 33.5, 'incoming.speed': 1.75 })")
+    page.evaluate(DONE)
+    name, text = saved(page, "Als Szene speichern")
+    assert name == "Perpendicular-damping-plate-2-m-s.toml"
+    recording = chutelab.simulate(parse(text.decode()), engine="contact")
+    _, table = saved(page, "Tabelle des Laufs")
+    rows = list(csv.reader(StringIO(table.decode("utf-8-sig")), delimiter=";"))
+    found = np.array([[float(cell.replace(",", ".")) for cell in row] for row in rows[1:]])
+    knots = recording.knots
+    expected = np.column_stack([knots["t"], knots["position"], knots["velocity"]])
+    assert np.array_equal(found[:, 1:6], expected)
+    page.uncheck("#comma")
+    _, table = saved(page, "Tabelle der Zahlen")
+    numbers = {row[0]: row[1:] for row in csv.reader(StringIO(table.decode("utf-8-sig")))}
+    landing = recording.select(Kind.LANDING)[0]
+    assert float(numbers["x"][0]) == pytest.approx(landing["position"][0], abs=1e-12)
+    assert numbers["v₃"][2] == "m/s"
+    name, data = saved(page, "Bild speichern")
+    image = np.asarray(Image.open(BytesIO(data)).convert("RGB")).astype(int)
+    box = page.locator("#stage").bounding_box()
+    assert image.shape[:2] == (round(2 * box["height"]), round(2 * box["width"]))
+    for colour in ((213, 94, 0), (0, 158, 115), (0, 114, 178)):
+        assert np.mean(np.abs(image - np.array(colour)).max(axis=-1) < 30) > 5e-4
+
+
+def test_in_a_frame_that_is_hidden_at_first_it_draws_once_it_is_seen_and_tells_changes(
+    browser, tmp_path
+):
+    outer = tmp_path / "outer.html"
+    # As the notebook's widget has it: a text of its own, without an origin.
+    inner = html(load("perpendicular")).replace("&", "&amp;").replace('"', "&quot;")
+    outer.write_text(
+        "<!doctype html><script>addEventListener('message', ({data}) => (window.heard = data))"
+        "</script><div id='tab' style='display: none'><iframe style='width: 700px; height: 560px' "
+        f'sandbox="allow-scripts allow-downloads" srcdoc="{inner}"></iframe></div>',
+        "utf-8",
+    )
+    page = browser.new_page()
+    said = []
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.goto(outer.as_uri())
+    page.wait_for_timeout(300)
+    page.evaluate("document.getElementById('tab').style.display = 'block'")
+    frame = page.frames[1]
+    frame.evaluate(DONE)
+    frame.wait_for_selector(".surfaces path", state="attached")
+    size = frame.evaluate("[chutelab.stage.view.width, chutelab.stage.canvas.width]")
+    assert min(size) > 300
+    assert frame.evaluate("chutelab.stage.paths.childElementCount") == 1
+    assert page.evaluate("window.heard") is None
+    frame.evaluate("chutelab.lab.change({ 'plate.angle_deg': 20 }, { done: false })")
+    page.wait_for_timeout(50)
+    assert page.evaluate("window.heard") is None
+    frame.evaluate("chutelab.lab.settle()")
+    page.wait_for_timeout(50)
+    heard = page.evaluate("window.heard")
+    assert heard["chutelab"] == "scene"
+    assert parse(heard["toml"]).plates[0].angle_deg == 20.0
+    assert said == []
+    page.close()
+
+
+@pytest.mark.parametrize("size", [(1366, 620), (360, 740), (740, 360)])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_picture_and_play_are_seen_together_and_fingers_hit(shown, size, scheme):
+    width, height = size
+    page = shown(
+        "inclined-40", PREDICT, viewport={"width": width, "height": height}, color_scheme=scheme,
+        has_touch=True, reduced_motion="reduce",
+    )  # fmt: skip
+    page.click("#show-all")
+    page.evaluate("scrollTo(0, 0)")
+    assert page.evaluate("document.documentElement.scrollWidth") == width
+    for one in ("#stage", "#play"):
+        box = page.locator(one).bounding_box()
+        assert box["y"] >= 0.0
+        assert box["y"] + box["height"] <= height
+    assert page.locator("#stage").bounding_box()["height"] >= 180.0
+    assert not page.evaluate("chutelab.lab.playing")
+    small = page.evaluate("""() => [...document.querySelectorAll("button, select, .grip .room")]
+      .filter((e) => e.getBoundingClientRect().width)
+      .map((e) => [e.id, e.getBoundingClientRect()])
+      .map(([id, { width, height }]) => [id, Math.min(width, height)])
+      .filter(([, size]) => size < 39.9)""")
+    assert small == []
+    image = np.asarray(Image.open(BytesIO(page.screenshot())).convert("RGB")).astype(int)
+    assert (image[2, 2].mean() > 200.0) == (scheme == "light")
+
+
+def test_it_is_printed_on_one_sheet_dark_or_not(shown):
+    page = shown(color_scheme="dark")
+    pdf = page.pdf(format="A4")
+    assert pdf.count(b"/Type /Page\n") + pdf.count(b"/Type /Page ") == 1
+    page.emulate_media(media="print")
+    assert page.locator("#numbers").is_visible()
+    for one in (".transport", ".bench", ".grips", "#edit", "#share"):
+        assert page.locator(one).is_hidden()
+    image = np.asarray(Image.open(BytesIO(page.screenshot())).convert("L")).astype(int)
+    assert np.median(image) > 250
+
+
+def test_titles_and_names_are_never_markup(shown, tmp_path):
+    title, name = '<img src="x"> </script><b>bold</b>', "<b>bold</b>"
+    more = f'[[surface]]\nname = "{name}"\nfrom = [-1, -1]\nto = [1, -1.5]\n'
+    own = tmp_path / "own.toml"
+    scene = to_toml(load("free-fall"))
+    old = scene.splitlines()[0]
+    assert old.startswith("title = ")
+    own.write_text(scene.replace(old, f"title = '{title}'"), "utf-8")
+    page = shown(own, more)
+    page.locator("#edit select").select_option(name)
+    assert page.locator("img, b:text('bold')").count() == 0
+    assert name in page.locator("#edit select").inner_text()
+    assert page.inner_text("h1") == title

@@ -25,8 +25,8 @@ const DIAGRAMS = /** @type {{id: string, unit: string, lines: Line[]}[]} */ ([
 /** Times between the first and the last at which curves are drawn. */
 const MANY = 160;
 
-/** Events of a particle at which curves are drawn exactly; of more, nobody sees one. */
-const MOST_BENDS = 60;
+/** Knots of a track at which curves are drawn exactly; of more, nobody sees one. */
+const MOST_KNOTS = 300;
 
 /** Of a time, just before it: what an impact changes has two values then. */
 const JUST = 1e-9;
@@ -42,18 +42,17 @@ function sampleAt(recording, index, t) {
   return { ...ledger, potential: ledger.potential - low, t, x, y, vx, vy, v: Math.hypot(vx, vy) };
 }
 
-/** Samples of a particle over all its time, with the values before and after each of its events.
+/** Samples of a particle over all its time, with the values before and after each of its knots.
  * @param {Recording} recording @param {number} index @returns {Sample[]} */
 function samplesOf(recording, index) {
-  const { begin, end } = recording.tracks[index];
+  const track = recording.tracks[index], { begin, end } = track;
   if (!(end >= begin)) return [];
   const span = end - begin;
-  const bends = recording.events.filter(({ disk, other, t }) =>
-    (disk === index || other === index) && t > begin && t <= end);
   const times = Array.from({ length: MANY + 1 }, (_, n) => begin + (span * n) / MANY);
   times[MANY] = end;
-  if (bends.length <= MOST_BENDS) {
-    for (const { t } of bends) times.push(Math.max(begin, t - JUST * span), t);
+  for (let i = 0; i < track.count && track.count <= MOST_KNOTS; i += 1) {
+    const t = track.at(i, 0);
+    times.push(Math.max(begin, t - JUST * span), t);
   }
   return times.sort((a, b) => a - b)
     .map((t) => /** @type {Sample} */ (sampleAt(recording, index, t)));

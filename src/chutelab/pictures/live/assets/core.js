@@ -282,7 +282,7 @@ class Core {
       this.ints[(this.get("disks") + i * size + fields.reason[0]) >> 2]);
   }
 
-  /** Belt work, restitution loss and friction loss by surface, J; the last row is the disks' own. */
+  /** Belt work, restitution and friction loss by surface, J; the last row is the disks' own. */
   books() {
     const first = this.get("books") >> 3;
     return Array.from({ length: this.get("owner_count") + 1 }, (_, row) =>

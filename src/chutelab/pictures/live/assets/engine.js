@@ -4,7 +4,8 @@
  * @typedef {import("./machine.js").Machine} Machine
  * @typedef {import("./core.js").Event} Event
  * @typedef {{type: "chunk", id: number, knots: Float64Array, tips: Float64Array,
- *   events: Event[], now: number, state: string, books: number[][] | null, reasons: number[] | null}} Chunk
+ *   events: Event[], now: number, state: string, books: number[][] | null,
+ *   reasons: number[] | null}} Chunk
  */
 
 class Engine {

@@ -289,7 +289,8 @@ class Recording {
 
   /** @param {number} index @param {number} t */
   hasLeft(index, t) {
-    return this.events.some(({ disk, kind, t: when }) => disk === index && kind === SEPARATION && when <= t);
+    return this.events.some((event) =>
+      event.disk === index && event.kind === SEPARATION && event.t <= t);
   }
 
   /** The energy ledger of one particle; while it slips the balance gives the slip heat, while it is

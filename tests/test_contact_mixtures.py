@@ -8,9 +8,11 @@ from math import cos, inf, pi, sin
 import numpy as np
 import pytest
 
+import chutelab
 from chutelab.engines.contact import run
-from chutelab.results import REASONS
+from chutelab.results import REASONS, Kind
 from chutelab.results.ledger import ledger
+from chutelab.scene import load
 from machines import bent, face, gated, of_sizes, scene_of, thrown
 
 INSIDE = 0.03
@@ -201,3 +203,13 @@ def test_mixtures_obey_the_laws_of_contact(seed):
 @pytest.mark.parametrize("seed", [*range(3, 16), *range(17, 63), 182, 371])
 def test_sixty_mixtures_obey_the_laws_of_contact(seed):
     check(seed)
+
+
+@pytest.mark.parametrize("name", ["galton", "rock-box"])
+def test_in_a_crowd_who_parts_from_a_surface_does_so_on_its_track(name):
+    recording = chutelab.simulate(load(name, ["stream.count=40"]))
+    events = recording.events[recording.events["kind"] == Kind.SEPARATION]
+    assert len(events) > 40
+    places = np.stack([recording.at([e["t"]])[0][0, e["particle"]] for e in events])
+    # NaN, before the release, is no place.
+    assert np.hypot(*(places - events["position"]).T).max() < 1e-3 * 0.003

@@ -1,6 +1,8 @@
-// What JavaScript says of scenes: `node bits.mjs ASSETS < {lab, scenes, transfers} > {scenes, transfers}`.
+// What JavaScript says of scenes and transfers: `node bits.mjs ASSETS < {lab, scenes, transfers}`.
 //
-// Of each scene {toml, machine, prediction} or {toml, fault}; of parameters what `transfer` returns.
+// Of each scene {toml, machine, prediction} or {toml, fault}, of parameters what `transfer`
+// returns; of an edit [keys, values by path] the keys after it, as TOML, and what they have there.
+//
 // JSON has no Infinity and no NaN: they come as text.
 import { readFileSync } from "node:fs";
 import { join } from "node:path";
@@ -9,11 +11,11 @@ import { pathToFileURL } from "node:url";
 const load = (name) => import(pathToFileURL(join(process.argv[2], name)).href);
 const { build } = await load("machine.js");
 const { Fault, resolve } = await load("scene.js");
-const { toToml } = await load("keys.js");
+const { toToml, valueAt, withValues } = await load("keys.js");
 const { predict } = await load("prediction.js");
 const { transfer } = await load("transfer.js");
 
-const { lab, scenes = [], transfers = [] } = JSON.parse(readFileSync(0, "utf8"));
+const { lab, scenes = [], transfers = [], edits = [] } = JSON.parse(readFileSync(0, "utf8"));
 const told = scenes.map((given) => {
   const toml = toToml(given);
   try {
@@ -27,4 +29,12 @@ const told = scenes.map((given) => {
 const bare = (_, value) => {
   return typeof value === "number" && !Number.isFinite(value) ? String(value) : value;
 };
-process.stdout.write(JSON.stringify({ scenes: told, transfers: transfers.map(transfer) }, bare));
+const edited = edits.map(([given, values]) => {
+  // What JSON cannot say takes a key away.
+  const changes = Object.entries(values).map(([key, value]) => [key, value ?? undefined]);
+  const after = withValues(given, Object.fromEntries(changes));
+  const there = Object.keys(values).map((key) => valueAt(after, key) ?? null);
+  return { toml: toToml(after), there, kept: toToml(given) };
+});
+const answers = { scenes: told, transfers: transfers.map(transfer), edits: edited };
+process.stdout.write(JSON.stringify(answers, bare));

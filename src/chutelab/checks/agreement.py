@@ -46,6 +46,9 @@ ORDERS: Final = {"contact": 2.0, "pymunk": 1.0}
 REFINED: Final = 4.0
 """Ratio of one step to the next of the three that show an order."""
 
+NEARBY: Final = (1.0, 0.85, 0.7)
+"""Shares of a step, the worst of which counts: what an error is may be luck, see `CHANCE`."""
+
 CHANCE: Final = {"contact": 0.5, "pymunk": 0.5}
 """By how much the observed order may fall short of `ORDERS`: an error depends on where within a
 step things happen. Over two ratios of 4, half an order is a factor of 4 between the errors."""
@@ -155,14 +158,15 @@ def _with_base(
     if allowed is not None or name not in ORDERS:
         what = "largest relative difference" if isfinite(error) else f"they differ in {which}"
         return Agreement(pair, what, error if isfinite(error) else None, allowed)
-    errors = [error]
-    for n in (1, 2):
-        finer = scene.with_values({"run.dt": scene.run.dt / REFINED**n, "expect": None})
+    errors = []
+    for n in range(3):
+        steps = [scene.run.dt / REFINED**n * share for share in NEARBY]
+        scenes = [scene.with_values({"run.dt": step, "expect": None}) for step in steps]
         try:
-            found = answer(finer, name, max_seconds=max_seconds)
-        except UNABLE as error:
-            return Agreement(pair, f"no order, at {finer.run.dt:g} s a step: {because(error)}")
-        errors.append(distance(found, base)[0])
+            found = [answer(each, name, max_seconds=max_seconds) for each in scenes]
+        except UNABLE as why:
+            return Agreement(pair, f"no order, with steps of {steps[0]:.2g} s: {because(why)}")
+        errors.append(max(distance(each, base)[0] for each in found))
     seen = ", ".join(f"{error:.0e}" for error in errors)
     least = ORDERS[name] - CHANCE[name]
     return Agreement(pair, f"order ({seen})", order(errors, REFINED, BLOWS[name]), least, True)

@@ -34,7 +34,8 @@ def describe(scene: Scene) -> dict[str, Any]:
     dict
         ``scene``: its keys as its file has them, with a seed beyond 2**53 as text. ``tables``: of
         each key of each table (those outside of tables under ``scene``) default, unit, low and
-        high, or that it is required. ``presets``: the numbers of each material.
+        high, its form as JSON Schema, and whether it is required. ``presets``: the numbers of each
+        material.
 
     Raises
     ------
@@ -97,9 +98,17 @@ def _rules() -> dict[str, dict[str, dict[str, Any]]]:
             rule = _rule([table, 0, key] if several else [table, key])
             if field.is_required():
                 rule["required"] = True
+            if table == "particle" and key in ("size", "points"):
+                continue
             rules[table][key] = rule
-    # Mass points are for the exact engine alone.
-    rules["particle"]["radius"]["low"] = nextafter(0.0, 1.0)
+    # Mass points, boxes and polygons are for other engines.
+    particle = rules["particle"]
+    particle["shape"]["form"] = {"enum": ["disk", "sphere"]}
+    particle["radius"]["low"] = nextafter(0.0, 1.0)
+    number, span = particle["radius"]["form"]["anyOf"]
+    del number["minimum"]
+    number["exclusiveMinimum"] = 0.0
+    particle["radius"]["form"] = {"anyOf": [number, span]}
     return rules
 
 
@@ -113,4 +122,17 @@ def _rule(path: list[str | int]) -> dict[str, Any]:
         limits = rule["minimum"], rule["maximum"]
     if limits is not None:
         found["low"], found["high"] = limits
+    found["form"] = _form(rule)
     return found
+
+
+SAID: Final = ("default", "description", "title", "x-unit", "x-words")
+
+
+def _form(rule: Any) -> Any:
+    """Return a JSON Schema without its words."""
+    if isinstance(rule, list):
+        return [_form(part) for part in rule]
+    if not isinstance(rule, dict):
+        return rule
+    return {key: _form(part) for key, part in rule.items() if key not in SAID}

@@ -26,6 +26,8 @@ static void note_grip(Disk *d, const Contact *c, const double *u, const double *
     }
     track->load[0] = c->impulse[0] / span;
     track->load_t[0] = d->t;
+    /* A smooth way may go on as another surface. */
+    if (d->on >= 0 && d->on == c->was) d->on = c->owner;
     if (d->on != c->owner) {
         /* It came to lie there without an impact that was told. */
         write_event(IMPACT, i, -1, c->owner, d->t, &d->x, &d->ux, &d->vx, c->impulse[0], c->impulse[1]);
@@ -95,7 +97,8 @@ static void settle(int i, const Contact *last, double h) {
 static void tell_separation(int i) {
     const Disk *d = W.disks + i;
     const Track *track = W.tracks + i;
-    if (track->lasted < 3) {
+    /* In a crowd the loads may be of long ago: they are noted where it lies on one surface only. */
+    if (track->lasted < 3 || d->t - track->load_t[2] > 4 * W.dt) {
         event_here(SEPARATION, i, track->ground);
         return;
     }

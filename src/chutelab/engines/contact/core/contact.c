@@ -104,15 +104,15 @@ void share_out(const Contact *c, const double *u, const double *v, double f, dou
     given[1] = given[2] = 0;
 }
 
-/* By how much more than gravity the way inside an arc presses a disk that lies there on a surface,
-   that arc or what goes on from it, m/s2. */
+/* By how much more than gravity the way inside an arc presses a disk on a surface, m/s2: that arc, or
+   the one before or after a joint that the disk passes. */
 double pressed_inside(const Disk *d, int surface) {
     double most = 0;
-    for (int n = 0; n < d->held_count; n++) {
-        const Surface *s = W.surfaces + d->held[n];
+    for (int n = 0; n < 2 * d->held_count; n++) {
+        const Surface *s = W.surfaces + (n % 2 ? surface : d->held[n / 2]);
         if (s->shape == SEGMENT || s->radius <= d->radius) continue;
         if (square(d->x - s->x) + square(d->y - s->y) >= s->radius * s->radius) continue;
-        if (!goes_on(-1 - d->held[n], -1 - surface)) continue;
+        if (!goes_on(-1 - d->held[n / 2], -1 - surface)) continue;
         most = MAX(most, (d->vx * d->vx + d->vy * d->vy) / (s->radius - d->radius));
     }
     return most;

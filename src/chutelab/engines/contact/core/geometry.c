@@ -21,10 +21,25 @@ static int beyond(const Surface *s, double dx, double dy) {
     return in_angle(s, dx, dy) ? 0 : s->tx * dy - s->ty * dx < 0 ? -1 : 1;
 }
 
-/* The piece whose face a disk at (x, y) is on: beyond a smooth end of `s` the one that goes on there.
-   So the end between two such pieces is not felt, even by a disk that has sunk in a little. */
+/* Whether a piece that is tangent to a circle hides it from a disk at (x, y): that is before the piece,
+   and all of the circle behind it. */
+static int hides(const Surface *s, const Surface *circle, double x, double y) {
+    if (s->shape != SEGMENT || !s->there || beyond(s, x - s->x, y - s->y)) return 0;
+    double off = (y - s->y) * s->tx - (x - s->x) * s->ty;
+    return off * ((circle->y - s->y) * s->tx - (circle->x - s->x) * s->ty) < 0;
+}
+
+/* The piece whose face a disk at (x, y) is on: beyond a smooth end of `s` the one that goes on there,
+   and of a circle the one that hides it. So the end between two such pieces is not felt, even by a
+   disk that has sunk in a little. */
 const Surface *face_at(const Surface *s, double x, double y) {
     if (s->mates[0] < 0 && s->mates[1] < 0) return s;
+    if (s->shape == CIRCLE) {
+        for (int n = 0; n < 2; n++)
+            if (s->mates[n] >= 0 && hides(W.surfaces + s->mates[n], s, x, y))
+                return W.surfaces + s->mates[n];
+        return s;
+    }
     int end = beyond(s, x - s->x, y - s->y), mate = end ? s->mates[end > 0] : -1;
     const Surface *next = W.surfaces + MAX(mate, 0);
     return mate >= 0 && next->there && !beyond(next, x - next->x, y - next->y) ? next : s;

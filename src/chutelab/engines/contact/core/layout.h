@@ -115,7 +115,8 @@ typedef struct {
     int shape;              /* [in] an arc all round becomes a circle */
     int material;           /* column of the table of pairs, behind the kinds of disks */
     int owner;              /* [in] number of the surface it is part of */
-    int mates[2];           /* pieces that go on smoothly beyond its ends, or -1 */
+    int mates[2];           /* pieces that go on smoothly beyond its ends, of a circle that lead to it;
+                               or -1 */
     int gate;               /* column of `spared` if it comes and goes, else -1 */
     int there;              /* whether it is there in this step; LEAVING: until just now */
     double box[4];          /* m; left, bottom, right, top */
@@ -146,6 +147,7 @@ typedef struct {
     int island;             /* a disk by which it is known */
     int next;               /* of the contacts of disk i in the step before */
     int leaves;             /* it parts in this step */
+    int was;                /* owner of the one of the step before that it goes on from, or -1 */
 } Contact;
 
 typedef struct { double t, x, y, vx, vy, spin, entries[3]; int disk, pad; } Knot;       /* [out] */

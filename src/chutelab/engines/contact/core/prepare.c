@@ -142,6 +142,11 @@ __attribute__((visibility("default"))) void prepare(void) {
     for (int k = 0; k < W.surface_count; k++)
         for (int end = 0; end < 2; end++)
             W.surfaces[k].mates[end] = W.surfaces[k].shape == CIRCLE ? -1 : mate_of(k, end, least);
+    for (int k = 0; k < 2 * W.surface_count; k++) {
+        int mate = W.surfaces[k / 2].mates[k % 2], *of = W.surfaces[MAX(mate, 0)].mates;
+        if (W.surfaces[k / 2].shape == CIRCLE || mate < 0 || W.surfaces[mate].shape != CIRCLE) continue;
+        of[of[0] >= 0] = k / 2;
+    }
     W.gx = 0;
     W.gy = -W.g;
     W.sweeps = alone ? SWEEPS_ALONE : SWEEPS;

@@ -80,9 +80,12 @@ static int add(int i, int j, double least, double bound, double h) {
     c->need = (aim - later) / h;
     c->drift = 0.5 * h * c->pull;
     c->impulse[0] = c->impulse[1] = c->impulse[2] = 0;
+    c->was = -1;
     for (int k = d->before; k >= 0; k = W.earlier[k].next)
-        if (goes_on(W.earlier[k].j, j))
+        if (goes_on(W.earlier[k].j, j)) {
             for (int n = 0; n < 3; n++) c->impulse[n] = W.again * W.earlier[k].impulse[n];
+            c->was = W.earlier[k].owner;
+        }
     int pressed = c->impulse[0] > 0;
     for (int n = 0; n < d->held_count; n++) pressed |= goes_on(-1 - d->held[n], j);
     /* What was pressed came down from its last hop: it may leave along the surface, not into it, and
@@ -111,6 +114,25 @@ static int add(int i, int j, double least, double bound, double h) {
     return 1;
 }
 
+/* Put a disk where it is when its foot comes to the end of the face that it slides along. Straight on
+   it would be inside a hollow face by then, and far above a round one. */
+static void at_the_end(const Contact *c, Disk *d) {
+    const Surface *s = W.surfaces + (-1 - c->j);
+    double nx = c->nx, ny = c->ny, along = d->vx * ny - d->vy * nx;
+    double way = s->shape == SEGMENT ? ny * s->tx - nx * s->ty : nx * (d->x - s->x) + ny * (d->y - s->y);
+    int last = s->shape == SEGMENT ? along * way > 0 : along * way < 0;
+    const double *end = s->end + 2 * last;
+    if (s->shape == ARC) {
+        double side = way > 0 ? 1 / s->radius : -1 / s->radius;
+        nx = side * (end[0] - s->x);
+        ny = side * (end[1] - s->y);
+    }
+    d->x = end[0] + d->radius * nx;
+    d->y = end[1] + d->radius * ny;
+    d->vx = along * ny;
+    d->vy = -along * nx;
+}
+
 /* A disk that leaves all surfaces in this step, over the end of a face, is carried until then: it
    gets what gravity takes from it up to there. */
 static void carry_to_end(int i, int first, double h) {
@@ -126,16 +148,15 @@ static void carry_to_end(int i, int first, double h) {
         }
     }
     if (!last) return;
-    /* Without a hop it would fall from the end on; whatever it would fall into carries it on. */
-    double u[3], fall = 0.5 * square(h - until);
-    relative(last, 0, u);
-    double x = d->x + (d->vx - u[0] * last->nx) * h + fall * W.gx;
-    double y = d->y + (d->vy - u[0] * last->ny) * h + fall * W.gy;
+    /* From the end on it falls; whatever it would fall into in as long as a step carries it on. */
+    Disk then = *d;
+    at_the_end(last, &then);
+    advance(&then, then.t + h);
     const int *list;
     int count = surfaces_near(i, &list);
     for (int n = 0; n < count; n++) {
         const Surface *s = W.surfaces + list[n];
-        if (is_near(s, d) && gap_to(s, x, y, d->radius, &nx, &ny)
+        if (is_near(s, d) && gap_to(s, then.x, then.y, d->radius, &nx, &ny)
                 < MIN(0, gap_to(s, d->x, d->y, d->radius, &nx, &ny)))
             return;
     }

@@ -1,6 +1,7 @@
 // `build`: what the keys of a scene mean as surfaces and releases, the same numbers as those of
 // Python's `chutelab.machine`, to the last bit: the same operations in the same order.
-import { draw, upBelt } from "./releases.js";
+import { upBelt } from "./belt.js";
+import { draw } from "./releases.js";
 import { clearOf, movedOut } from "./room.js";
 import { Fault, met } from "./scene.js";
 import { RADIANS, lengthOf, modulo, sinCos } from "./trig.js";
@@ -133,7 +134,7 @@ export function build(scene) {
     }
   });
   const room = { segments, arcs, names };
-  const drawn = draw(scene, (places, radius) => clearOf(room, places, radius));
+  const drawn = draw(scene, (places, radius) => clearOf(scene, room, places, radius));
   const releases = movedOut(scene, room, drawn.releases, drawn.radius);
   const { incoming: belt, run, particles } = scene;
   let last = -Infinity;

@@ -205,8 +205,8 @@ class Course {
     const hit = low <= foot && foot <= high;
     const plate = { lines: lines.slice(0, 1), bends: [] };
     const horizon = hit ? t2 : horizonOf(separation, plate, radius);
-    // Thrown up slowly, it may come down on the pulley again. Faster, it would only seem to at once,
-    // by rounding: it starts on the circle.
+    // Thrown up slowly, it may come down on the pulley again. Faster, it would only seem to at
+    // once, by rounding: it starts on the circle.
     const slow = v1 * v1 * sinCos(phi1)[1] < separation.gravity * rideRadius;
     const [again = Infinity] = phi1 < 0.0 && slow
       ? ringTimes(separation, [0.0, 0.0], rideRadius, horizon) : [];

@@ -1,7 +1,8 @@
 // Where, when and how fast each particle starts: drawn as Python's `machine/releases.py` does.
+import { onBelt, upBelt } from "./belt.js";
 import { generator } from "./random.js";
-import { Fault, onBelt } from "./scene.js";
-import { RADIANS, lengthOf, sinCos } from "./trig.js";
+import { Fault } from "./scene.js";
+import { lengthOf } from "./trig.js";
 
 /** @typedef {import("./random.js").Generator} Generator */
 /** @typedef {import("./scene.js").Scene} Scene */
@@ -30,16 +31,8 @@ const PITCH = 2.04;
 /** How far a place in it is moved at random each way, in the same unit. */
 const JITTER = 0.01;
 
-/**
- * Returns the direction in which the incoming belt runs, cosine and sine.
- * @param {Scene} scene
- * @returns {[number, number]}
- */
-export function upBelt(scene) {
-  if (!scene.incoming?.incline_deg) return [1.0, 0.0];
-  const [sine, cosine] = sinCos(scene.incoming.incline_deg * RADIANS);
-  return [cosine, sine];
-}
+/** Places of a box that are looked at together; what is above the particles never is. */
+const HANDFUL = 1000;
 
 /**
  * Returns where the lowest layer of a stream is released, m.
@@ -236,7 +229,27 @@ function spreadApart(bed, t, height, velocity, radius, fall, lowest, dice) {
 }
 
 /**
- * Packs a stream's box from below: rows of places, every other one shifted by half a pitch.
+ * Yields the places of a packed box from below: rows, every other one shifted by half a pitch.
+ * @param {[Point, Point]} box
+ * @param {number} largest radius
+ * @returns {IterableIterator<Point>}
+ */
+function* packedPlaces([[left, bottom], [right, top]], largest) {
+  const pitch = PITCH * largest;
+  const room = largest * (1.0 + JITTER);
+  const rise = pitch * Math.sqrt(0.75);
+  const rows = Math.max(0, Math.floor((top - bottom - 2.0 * room) / rise) + 1);
+  const across = Math.max(0, Math.floor((right - left - 2.0 * room) / pitch) + 1);
+  for (let row = 0; row < rows; row++) {
+    for (let column = 0; column < across; column++) {
+      const x = left + room + (column * pitch + 0.5 * pitch * (row % 2));
+      if (x <= right - room) yield [x, bottom + room + row * rise];
+    }
+  }
+}
+
+/**
+ * Packs a stream's box, as far up as it takes.
  * @param {Scene} scene
  * @param {number} n
  * @param {Release[]} before of the streams before it
@@ -248,39 +261,35 @@ function pour(scene, n, before, their, clear) {
   const kind = scene.kinds[n];
   const particle = scene.particles[kind];
   const box = /** @type {[Point, Point]} */ (stream.fill);
-  const [[left, bottom], [right, top]] = box;
   const dice = diceOf(scene, n);
   const radius = drawRadii(scene, n, dice);
   const largest = particle.span === undefined ? particle.radius : particle.span[1];
-  const pitch = PITCH * largest;
-  const room = largest * (1.0 + JITTER);
-  const rise = pitch * Math.sqrt(0.75);
-  const rows = Math.max(0, Math.floor((top - bottom - 2.0 * room) / rise) + 1);
-  const across = Math.max(0, Math.floor((right - left - 2.0 * room) / pitch) + 1);
+  const source = packedPlaces(box, largest);
   /** @type {Point[]} */
-  let places = [];
-  for (let row = 0; row < rows; row++) {
-    for (let column = 0; column < across; column++) {
-      const x = left + room + (column * pitch + 0.5 * pitch * (row % 2));
-      if (x <= right - room) places.push([x, bottom + room + row * rise]);
+  const found = [];
+  for (let more = true; more && found.length < stream.count;) {
+    /** @type {Point[]} */
+    const places = [];
+    while (more && places.length < HANDFUL) {
+      const { value, done } = source.next();
+      more = !done;
+      if (done) break;
+      const x = value[0] + JITTER * largest * dice.uniform(-1.0, 1.0);
+      places.push([x, value[1] + JITTER * largest * dice.uniform(-1.0, 1.0)]);
     }
+    const free = clear(places, largest);
+    found.push(...places.filter(([x, y], i) => {
+      return free[i] && before.every((other, j) => {
+        return lengthOf(x - other.x, y - other.y) >= largest + their[j];
+      });
+    }));
   }
-  for (const place of places) {
-    place[0] += JITTER * largest * dice.uniform(-1.0, 1.0);
-    place[1] += JITTER * largest * dice.uniform(-1.0, 1.0);
-  }
-  const free = clear(places, largest);
-  places = places.filter(([x, y], i) => {
-    return free[i] && before.every((other, j) => {
-      return lengthOf(x - other.x, y - other.y) >= largest + their[j];
-    });
-  });
-  if (places.length < stream.count) {
+  if (found.length < stream.count) {
     const key = scene.streams.length > 1 ? `stream[${n}].fill` : "stream.fill";
-    throw new Fault(key, box, "box-full", { count: places.length, radius: largest });
+    throw new Fault(key, box, "box-full", { count: found.length, radius: largest });
   }
   const [vx, vy] = releaseVelocity(scene, n);
-  const releases = places.slice(0, stream.count).map(([x, y]) => ({
+  const releases = found.slice(0, stream.count).map(([x, y]) => ({
     t: stream.start, x, y, vx, vy, carried: false, stream: n, kind,
   }));
   return { releases, radius };

@@ -1,5 +1,6 @@
 // Where disks may be released: not in a surface that is there then.
-import { Fault, ON_BELT } from "./scene.js";
+import { ON_BELT } from "./belt.js";
+import { Fault } from "./scene.js";
 import { atan2, lengthOf, modulo, sinCos } from "./trig.js";
 
 /** @typedef {import("./machine.js").Segment} Segment */
@@ -78,19 +79,37 @@ function* surfacesNear({ segments, arcs }, places, reach) {
 }
 
 /**
+ * Returns the pulleys, which are solid: whose, axis and radius, m.
+ * @param {Scene} scene
+ */
+function wheelsOf({ incoming, conveyor }) {
+  const wheels = conveyor.flatMap(({ name, from, to, pulley_radius: size }) => {
+    return [from, to].map(([x, y]) => ({ name, x, y, size }));
+  });
+  const own = { name: "incoming", x: 0.0, y: 0.0, size: incoming?.pulley_radius ?? 0.0 };
+  return incoming === null ? wheels : [own, ...wheels];
+}
+
+/**
  * Tells which places a disk of a radius (m) can be in.
+ * @param {Scene} scene
  * @param {Room} room
  * @param {Point[]} places
  * @param {number} radius
  * @returns {boolean[]}
  */
-export function clearOf(room, places, radius) {
+export function clearOf(scene, room, places, radius) {
   const free = places.map(() => true);
   if (!places.length) return free;
   for (const { nearest } of surfacesNear(room, places, () => radius)) {
     places.forEach(([x, y], i) => {
       const [px, py] = nearest(x, y);
       free[i] = free[i] && lengthOf(x - px, y - py) >= radius;
+    });
+  }
+  for (const wheel of wheelsOf(scene)) {
+    places.forEach(([x, y], i) => {
+      free[i] = free[i] && lengthOf(x - wheel.x, y - wheel.y) >= wheel.size + radius;
     });
   }
   return free;
@@ -116,9 +135,12 @@ export function movedOut(scene, room, releases, radius) {
     };
     out = pushedOut(scene, out, nearest, radius, there, room.names[piece.surface]);
   }
-  if (belt === null) return out;
-  const reach = radius.map((r) => belt.pulley_radius + r);
-  return pushedOut(scene, out, () => [0.0, 0.0], reach, ({ carried }) => !carried, "incoming");
+  for (const { name, x, y, size } of wheelsOf(scene)) {
+    const reach = radius.map((r) => size + r);
+    const who = (/** @type {Release} */ { carried }) => name !== "incoming" || !carried;
+    out = pushedOut(scene, out, () => [x, y], reach, who, name);
+  }
+  return out;
 }
 
 /**

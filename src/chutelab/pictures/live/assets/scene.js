@@ -1,6 +1,6 @@
 // A scene as its file has it, and with all defaults: `resolve`. The same rules as in Python's
 // `chutelab.scene`, of which a page needs those about what can be edited. `keys.js` changes keys.
-import { RADIANS, sinCos } from "./trig.js";
+import { conflictsOf, listOf, misfitsOf, straysOf } from "./checks.js";
 
 /** @typedef {[number, number]} Point */
 /** @typedef {Record<string, any>} Given keys as a scene file has them */
@@ -12,6 +12,7 @@ import { RADIANS, sinCos } from "./trig.js";
  * @property {string} [unit]
  * @property {number} [low]
  * @property {number} [high]
+ * @property {import("./forms.js").Form} form
  */
 
 /**
@@ -157,26 +158,6 @@ export class Fault extends Error {
 }
 
 /**
- * Returns a table of which there may be one or several as a list.
- * @param {any} rows
- * @returns {Given[]}
- */
-function listOf(rows) {
-  return rows === undefined ? [] : Array.isArray(rows) ? rows : [rows];
-}
-
-/**
- * Returns the full path of a key of a table of which there may be one or several.
- * @param {Given} given
- * @param {string} table
- * @param {number} row
- * @param {string} key
- */
-export function pathOf(given, table, row, key) {
-  return Array.isArray(given[table]) ? `${table}[${row}].${key}` : `${table}.${key}`;
-}
-
-/**
  * Fills in all defaults.
  * @param {Given} given
  * @param {Lab} lab
@@ -184,7 +165,7 @@ export function pathOf(given, table, row, key) {
  * @throws {Fault} if a value is out of its range, or keys contradict each other
  */
 export function resolve(given, lab) {
-  checkRanges(given, lab);
+  for (const wrong of misfitsOf(given, lab)) throw new Fault(...wrong);
   const filled = (/** @type {string} */ table, /** @type {Given} */ row) => {
     /** @type {Given} */
     const values = {};
@@ -213,11 +194,7 @@ export function resolve(given, lab) {
     return particles.length === 1 || stream.particle === undefined
       ? 0 : names.indexOf(stream.particle);
   });
-  const unknown = kinds.indexOf(-1);
-  if (unknown >= 0) {
-    const name = streams[unknown].particle;
-    throw new Fault(pathOf(given, "stream", unknown, "particle"), name, "no-such-kind");
-  }
+  for (const wrong of straysOf(given, names, Object.keys(materials))) throw new Fault(...wrong);
   particles.forEach((kind) => fillMass(kind, materials));
   streams.forEach((stream, n) => fillRate(stream, n, particles[kinds[n]]));
   const incoming = given.incoming === undefined ? null : filled("incoming", given.incoming);
@@ -244,8 +221,7 @@ export function resolve(given, lab) {
     conveyor: rows("conveyor"), surface, streams, run, kinds,
     crowded: count > 1 && streams.some((stream) => stream.interact),
   };
-  checkSurfaces(scene, given);
-  checkBelts(scene, given);
+  for (const wrong of conflictsOf(scene, given)) throw new Fault(...wrong);
   return scene;
 }
 
@@ -286,143 +262,6 @@ function fillRate(stream, number, kind) {
     mass = kind.mass * 0.25 * (low + high) * (low * low + high * high) / cube;
   }
   stream.rate = Number(found?.[1]) / 3.6 / mass;
-}
-
-/**
- * Refuses numbers out of the range of their key.
- * @param {Given} given
- * @param {Lab} lab
- */
-function checkRanges(given, lab) {
-  const check = (/** @type {string} */ key, /** @type {any} */ value, /** @type {Rule} */ rule) => {
-    if (Array.isArray(value)) {
-      value.forEach((entry, n) => check(`${key}[${n}]`, entry, rule));
-    } else if (typeof value === "number" && rule.low !== undefined && rule.high !== undefined) {
-      if (!(value >= rule.low && value <= rule.high)) {
-        throw new Fault(key, value, "range", { low: rule.low, high: rule.high });
-      }
-    }
-  };
-  for (const [table, rules] of Object.entries(lab.tables)) {
-    listOf(table === "scene" ? given : given[table]).forEach((row, n) => {
-      for (const [key, rule] of Object.entries(rules)) {
-        check(table === "scene" ? key : pathOf(given, table, n, key), row[key], rule);
-        if (row[key] === undefined && rule.required) {
-          throw new Fault(pathOf(given, table, n, key), undefined, "missing");
-        }
-      }
-    });
-  }
-}
-
-/** @param {Point | undefined} a @param {Point | undefined} b */
-function samePoint(a, b) {
-  return a !== undefined && b !== undefined && a[0] === b[0] && a[1] === b[1];
-}
-
-/**
- * Refuses surfaces without a length, and names that are there twice.
- * @param {Scene} scene
- * @param {Given} given
- */
-function checkSurfaces(scene, given) {
-  const names = new Set();
-  for (const table of ["plate", "conveyor", "surface"]) {
-    listOf(given[table]).forEach(({ name }, n) => {
-      if (name !== undefined && names.has(name)) {
-        throw new Fault(pathOf(given, table, n, "name"), name, "same-name");
-      }
-      names.add(name);
-    });
-  }
-  scene.plates.forEach((plate, n) => {
-    if (plate.above === 0.0 && plate.below === 0.0) {
-      throw new Fault(pathOf(given, "plate", n, "above"), 0.0, "no-length");
-    }
-  });
-  scene.conveyor.forEach((belt, n) => {
-    if (samePoint(belt.from, belt.to)) throw new Fault(`conveyor[${n}].to`, belt.to, "same-points");
-  });
-  scene.surface.forEach((one, n) => {
-    const key = `surface[${n}]`;
-    if (one.opens_at !== undefined && one.opens_at === one.closes_at) {
-      throw new Fault(`${key}.opens_at`, one.opens_at, "same-times");
-    }
-    if (one.center !== undefined) {
-      const extent = Math.abs(one.to_deg - one.from_deg);
-      if (extent === 0.0 || extent > 360.0) {
-        throw new Fault(`${key}.to_deg`, one.to_deg, "arc-angles");
-      }
-    }
-    const { points } = one;
-    if (points?.some((point, place) => samePoint(point, points[place + 1]))) {
-      throw "from" in one.given
-        ? new Fault(`${key}.to`, one.given.to, "same-points")
-        : new Fault(`${key}.points`, points, "same-points");
-    }
-  });
-}
-
-/**
- * Refuses what needs a belt that is not there, and what adhesion does not allow.
- * @param {Scene} scene
- * @param {Given} given
- */
-function checkBelts(scene, given) {
-  const { incoming, outgoing } = scene;
-  const damps = scene.plates.some((plate) => plate.pivot === undefined);
-  if (incoming === null && (damps || outgoing !== null)) {
-    throw new Fault("incoming", undefined, "needs-incoming");
-  }
-  if (outgoing?.drop_from === "impact") {
-    throw new Fault("outgoing.drop_from", "impact", "drop-from-impact");
-  }
-  if (outgoing === null && scene.run.until === "landed") {
-    throw new Fault("run.until", "landed", "needs-outgoing");
-  }
-  scene.streams.forEach((stream, n) => {
-    const path = (/** @type {string} */ key) => pathOf(given, "stream", n, key);
-    if (incoming === null) {
-      if (stream.fill !== undefined) return;
-      if (stream.at === undefined) throw new Fault(path("at"), undefined, "missing");
-      if (stream.velocity === undefined) throw new Fault(path("velocity"), undefined, "missing");
-      return;
-    }
-    if (incoming.friction !== "adhesion" || !onBelt(scene, n)) return;
-    if (stream.speed_spread > 0.0) {
-      throw new Fault(path("speed_spread"), stream.speed_spread, "adhesion-speed");
-    }
-    if (stream.velocity !== undefined) {
-      const [sine, cosine] = sinCos(incoming.incline_deg * RADIANS);
-      const [vx, vy] = stream.velocity;
-      const near = 1e-12 * Math.abs(incoming.speed);
-      const off = Math.abs(vx - incoming.speed * cosine) > near;
-      if (off || Math.abs(vy - incoming.speed * sine) > near) {
-        throw new Fault(path("velocity"), stream.velocity, "adhesion-speed");
-      }
-    }
-  });
-}
-
-/** How near to the belt's height a release counts as lying on the belt, m. */
-export const ON_BELT = 1e-9;
-
-/**
- * Tells whether a stream is released on the incoming belt.
- * @param {Scene} scene
- * @param {number} number of the stream
- */
-export function onBelt(scene, number) {
-  const stream = scene.streams[number];
-  const belt = scene.incoming;
-  if (belt === null || stream.fill !== undefined || stream.to !== undefined) return false;
-  if (stream.at === undefined) return true;
-  const riding = belt.pulley_radius + scene.particles[scene.kinds[number]].radius;
-  const [x, y] = stream.at;
-  const [sine, cosine] = sinCos(belt.incline_deg * RADIANS);
-  const along = x * cosine + y * sine;
-  const above = y * cosine - x * sine;
-  return -belt.length <= along && along <= 0.0 && Math.abs(above - riding) <= ON_BELT;
 }
 
 /**

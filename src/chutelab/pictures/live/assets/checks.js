@@ -1,0 +1,316 @@
+// What no scene may say: values that do not have the form of their key, keys that contradict each
+// other, names that lead nowhere. The rules are Python's, of `chutelab.scene`.
+import { onBelt } from "./belt.js";
+import { fits } from "./forms.js";
+import { RADIANS, sinCos } from "./trig.js";
+
+/** @typedef {import("./scene.js").Given} Given */
+/** @typedef {import("./scene.js").Lab} Lab */
+/** @typedef {import("./scene.js").Point} Point */
+/** @typedef {import("./scene.js").Scene} Scene */
+
+/**
+ * What a `Fault` says: key, value, id of a text, and its words.
+ * @typedef {[string, unknown, string, Record<string, number | string>?]} Wrong
+ */
+
+/** Tables that are always lists, and those that may be one. */
+const LISTS = ["material", "pair", "conveyor", "surface"];
+const EITHER = ["particle", "plate", "stream"];
+
+/** Names of surfaces that no free one may take. */
+const RESERVED = ["incoming", "plate", "outgoing", "particles"];
+
+/** Tables that are for other programs. */
+const FOREIGN = ["expect", "live"];
+
+/**
+ * Returns a table of which there may be one or several as a list.
+ * @param {any} rows
+ * @returns {Given[]}
+ */
+export function listOf(rows) {
+  return rows === undefined ? [] : Array.isArray(rows) ? rows : [rows];
+}
+
+/**
+ * Returns the full path of a key of a table of which there may be one or several.
+ * @param {Given} given
+ * @param {string} table
+ * @param {number} row
+ * @param {string} key
+ */
+export function pathOf(given, table, row, key) {
+  return Array.isArray(given[table]) ? `${table}[${row}].${key}` : `${table}.${key}`;
+}
+
+/** @param {any} value */
+function isTable(value) {
+  return typeof value === "object" && value !== null && !Array.isArray(value);
+}
+
+/**
+ * Yields values that do not have the form of their key, and keys that are missing or unknown.
+ * @param {Given} given
+ * @param {Lab} lab
+ * @returns {Generator<Wrong>}
+ */
+export function* misfitsOf(given, lab) {
+  for (const [table, value] of Object.entries(given)) {
+    if (FOREIGN.includes(table) || table in lab.tables.scene) continue;
+    if (!(table in lab.tables) || table === "scene") yield [table, value, "unknown-key"];
+    const list = LISTS.includes(table) || (EITHER.includes(table) && Array.isArray(value));
+    const sound = list ? Array.isArray(value) && value.every(isTable) : isTable(value);
+    if (!sound) yield [table, value, "form"];
+    if (EITHER.includes(table) && list && table !== "plate" && !value.length) {
+      yield [table, value, "form"];
+    }
+  }
+  yield* misfitsOfTable(given, lab.tables.scene, (key) => key);
+  for (const [table, rules] of Object.entries(lab.tables)) {
+    if (table === "scene" || FOREIGN.includes(table)) continue;
+    for (const [n, row] of listOf(given[table]).entries()) {
+      const unknown = Object.keys(row).find((key) => !(key in rules));
+      if (unknown !== undefined) {
+        yield [pathOf(given, table, n, unknown), row[unknown], "unknown-key"];
+      }
+      yield* misfitsOfTable(row, rules, (key) => pathOf(given, table, n, key));
+    }
+  }
+}
+
+/**
+ * @param {Given} row
+ * @param {Record<string, import("./scene.js").Rule>} rules
+ * @param {(key: string) => string} path
+ * @returns {Generator<Wrong>}
+ */
+function* misfitsOfTable(row, rules, path) {
+  for (const [key, { form, low, high, required }] of Object.entries(rules)) {
+    const value = row[key];
+    if (value === undefined) {
+      if (required) yield [path(key), value, "missing"];
+    } else if (!fits(value, form)) {
+      const number = typeof value === "number" && low !== undefined && high !== undefined;
+      if (number && low === Number.MIN_VALUE) yield [path(key), value, "above", { high }];
+      else if (number) yield [path(key), value, "range", { low, high }];
+      else yield [path(key), value, "form"];
+    }
+  }
+}
+
+/**
+ * Yields names that are there twice, are missing, or lead nowhere.
+ * @param {Given} given
+ * @param {(string | undefined)[]} kinds names of the kinds of particles
+ * @param {string[]} materials names
+ * @returns {Generator<Wrong>}
+ */
+export function* straysOf(given, kinds, materials) {
+  const surfaces = ["incoming", "plate", "outgoing"].filter((table) => given[table] !== undefined);
+  const taken = new Set();
+  for (const table of ["plate", "conveyor", "surface", "particle", "stream", "material"]) {
+    const free = ["plate", "conveyor", "surface"].includes(table);
+    const own = free ? taken : new Set(table === "particle" ? taken : []);
+    const rows = listOf(given[table]);
+    for (const [n, { name }] of rows.entries()) {
+      const path = pathOf(given, table, n, "name");
+      if (name === undefined) {
+        if (table === "particle" && rows.length > 1) yield [path, name, "missing"];
+        continue;
+      }
+      if (own.has(name)) yield [path, name, "same-name"];
+      if (RESERVED.includes(name)) yield [path, name, "reserved-name"];
+      own.add(name);
+      if (free) surfaces.push(name);
+    }
+  }
+  for (const [n, { particle }] of listOf(given.stream).entries()) {
+    if (particle !== undefined && !kinds.includes(particle)) {
+      yield [pathOf(given, "stream", n, "particle"), particle, "no-such-kind"];
+    }
+  }
+  for (const [n, { material }] of listOf(given.particle).entries()) {
+    if (material !== undefined && !materials.includes(material)) {
+      yield [pathOf(given, "particle", n, "material"), material, "no-such-material"];
+    }
+  }
+  for (const [n, { between }] of listOf(given.pair).entries()) {
+    const key = `pair[${n}].between`;
+    if (!between.some((/** @type {string} */ name) => kinds.includes(name))) {
+      yield [key, between, "no-such-kind"];
+    }
+    for (const [place, name] of between.entries()) {
+      if (![...kinds, ...surfaces].includes(name)) yield [`${key}[${place}]`, name, "no-such-name"];
+    }
+  }
+}
+
+/**
+ * Yields what contradicts each other.
+ * @param {Scene} scene
+ * @param {Given} given
+ * @returns {Generator<Wrong>}
+ */
+export function* conflictsOf(scene, given) {
+  yield* beltConflicts(scene);
+  yield* kindConflicts(scene, given);
+  yield* plateConflicts(scene, given);
+  for (const [n, one] of scene.surface.entries()) yield* layoutConflicts(one, `surface[${n}]`);
+  for (const [n, { from, to }] of scene.conveyor.entries()) {
+    if (samePoint(from, to)) yield [`conveyor[${n}].to`, to, "same-points"];
+  }
+  for (const n of scene.streams.keys()) yield* releaseConflicts(scene, given, n);
+}
+
+/** @param {Point | undefined} a @param {Point | undefined} b */
+function samePoint(a, b) {
+  return a !== undefined && b !== undefined && a[0] === b[0] && a[1] === b[1];
+}
+
+/**
+ * @param {Scene} scene
+ * @returns {Generator<Wrong>}
+ */
+function* beltConflicts(scene) {
+  const { incoming, outgoing } = scene;
+  const damps = scene.plates.some((plate) => plate.pivot === undefined);
+  if (incoming === null && (damps || outgoing !== null)) {
+    yield ["incoming", undefined, "needs-incoming"];
+  }
+  if (outgoing?.drop_from === "impact") yield ["outgoing.drop_from", "impact", "drop-from-impact"];
+  if (outgoing === null && scene.run.until === "landed") {
+    yield ["run.until", "landed", "needs-outgoing"];
+  }
+}
+
+/**
+ * @param {Scene} scene
+ * @param {Given} given
+ * @returns {Generator<Wrong>}
+ */
+function* kindConflicts(scene, given) {
+  for (const [n, kind] of scene.particles.entries()) {
+    const path = (/** @type {string} */ key) => pathOf(given, "particle", n, key);
+    if ("mass" in kind.given && "density" in kind.given) {
+      yield [path("density"), kind.density, "mass-and-density"];
+    }
+    if (kind.span !== undefined && kind.span[0] >= kind.span[1]) {
+      yield [path("radius"), kind.span, "not-ascending"];
+    }
+    if (kind.rolling_friction > 0.0 && !kind.spin) {
+      yield [path("rolling_friction"), kind.rolling_friction, "needs-spin"];
+    }
+  }
+}
+
+/**
+ * @param {Scene} scene
+ * @param {Given} given
+ * @returns {Generator<Wrong>}
+ */
+function* plateConflicts(scene, given) {
+  let damping = 0;
+  for (const [n, plate] of scene.plates.entries()) {
+    const path = (/** @type {string} */ key) => pathOf(given, "plate", n, key);
+    if (plate.above === 0.0 && plate.below === 0.0) yield [path("above"), 0.0, "no-length"];
+    const { pivot, distance, name } = plate;
+    if (pivot !== undefined) {
+      if (distance !== undefined) yield [path("pivot"), pivot, "not-both", { other: "distance" }];
+      if (name === undefined) yield [path("name"), name, "missing"];
+      if ("pivot_height" in plate.given) {
+        yield [path("pivot_height"), plate.pivot_height, "not-both", { other: "pivot" }];
+      }
+    } else {
+      if (distance === undefined) yield [path("distance"), distance, "missing"];
+      if (name !== undefined) yield [path("name"), name, "not-both", { other: "distance" }];
+      damping += 1;
+      if (damping > 1) yield [path("distance"), distance, "one-plate"];
+    }
+  }
+}
+
+/**
+ * @param {import("./scene.js").Surface} one
+ * @param {string} key
+ * @returns {Generator<Wrong>}
+ */
+function* layoutConflicts(one, key) {
+  const { given, center, points, opens_at: opens } = one;
+  const { from, to } = given;
+  if (opens !== undefined && opens === one.closes_at) {
+    yield [`${key}.opens_at`, opens, "same-times"];
+  }
+  if (center !== undefined) {
+    for (const other of ["from", "to", "points"]) {
+      if (given[other] !== undefined) {
+        yield [`${key}.${other}`, given[other], "not-both", { other: "center" }];
+      }
+    }
+    if (one.radius === undefined) yield [`${key}.radius`, undefined, "missing"];
+    const extent = Math.abs(one.to_deg - one.from_deg);
+    if (extent === 0.0 || extent > 360.0) yield [`${key}.to_deg`, one.to_deg, "arc-angles"];
+    return;
+  }
+  // Of what belongs to an arc, the angles of a whole one do no harm.
+  const angles = [one.from_deg, one.to_deg].every((angle) => angle === 0.0 || angle === 360.0);
+  if (one.radius !== undefined || !angles) yield [`${key}.center`, undefined, "missing"];
+  if (given.points !== undefined) {
+    for (const other of ["from", "to"]) {
+      if (given[other] !== undefined) {
+        yield [`${key}.${other}`, given[other], "not-both", { other: "points" }];
+      }
+    }
+  } else if (from === undefined && to === undefined) {
+    yield [`${key}.points`, undefined, "missing"];
+  } else if (from === undefined || to === undefined) {
+    yield [`${key}.${from === undefined ? "from" : "to"}`, undefined, "missing"];
+  }
+  if (points?.some((point, place) => samePoint(point, points[place + 1]))) {
+    const last = given.points === undefined ? "to" : "points";
+    yield [`${key}.${last}`, given[last], "same-points"];
+  }
+}
+
+/**
+ * @param {Scene} scene
+ * @param {Given} given
+ * @param {number} n of the stream
+ * @returns {Generator<Wrong>}
+ */
+function* releaseConflicts(scene, given, n) {
+  const { incoming } = scene;
+  const stream = scene.streams[n];
+  const path = (/** @type {string} */ key) => pathOf(given, "stream", n, key);
+  if (!Number.isFinite(stream.rate)) yield [path("rate"), stream.given.rate, "form"];
+  for (const key of ["at", "to", "rate", "bed_height", "speed_spread"]) {
+    if (stream.fill !== undefined && key in stream.given) {
+      yield [path(key), stream.given[key], "not-both", { other: "fill" }];
+    }
+  }
+  if (stream.to !== undefined) {
+    if (stream.at === undefined) yield [path("at"), undefined, "missing"];
+    if ("bed_height" in stream.given) {
+      yield [path("bed_height"), stream.bed_height, "not-both", { other: "to" }];
+    }
+  }
+  if (incoming === null) {
+    if (stream.fill !== undefined) return;
+    if (stream.at === undefined) yield [path("at"), undefined, "missing"];
+    if (stream.velocity === undefined) yield [path("velocity"), undefined, "missing"];
+    return;
+  }
+  if (incoming.friction !== "adhesion" || !onBelt(scene, n)) return;
+  if (stream.speed_spread > 0.0) {
+    yield [path("speed_spread"), stream.speed_spread, "adhesion-speed"];
+  }
+  if (stream.velocity !== undefined) {
+    const [sine, cosine] = sinCos(incoming.incline_deg * RADIANS);
+    const [vx, vy] = stream.velocity;
+    const near = 1e-12 * Math.abs(incoming.speed);
+    const off = Math.abs(vx - incoming.speed * cosine) > near;
+    if (off || Math.abs(vy - incoming.speed * sine) > near) {
+      yield [path("velocity"), stream.velocity, "adhesion-speed"];
+    }
+  }
+}

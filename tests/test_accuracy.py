@@ -191,7 +191,7 @@ def test_without_another_answer_nothing_is_promised(monkeypatch):
     scene = sc.from_dict(fall)
     assert reach(scene, 1e-9)[1].against == "dop853"
 
-    def missing(_machine):
+    def missing(_machine, _progress):
         raise UnableError("SciPy is missing")
 
     monkeypatch.setattr("chutelab.engines.reference.run", missing)
@@ -203,9 +203,8 @@ def test_without_another_answer_nothing_is_promised(monkeypatch):
 def test_what_happens_in_one_answer_only_is_not_met(monkeypatch):
     scene = sc.load("perpendicular", ["run.until=settled"])
     other = simulate(sc.load("perpendicular", ["outgoing.length=0.1", "run.until=settled"]))
-    monkeypatch.setattr(
-        "chutelab.engines.reference.run", lambda _machine: replace(other, engine="dop853")
-    )
+    other = replace(other, engine="dop853")
+    monkeypatch.setattr("chutelab.engines.reference.run", lambda _machine, _progress: other)
     _, found = reach(scene, 1e-3)
     assert (found.reached, found.met) == (None, False)
     assert found.method.startswith("none: exact and dop853 differ in")

@@ -158,6 +158,20 @@ def test_who_cannot_run_a_scene_is_named_with_the_reason():
     assert rows["dop853, exact"].holds
 
 
+def test_an_answer_that_takes_too_long_is_left_out_and_what_none_shows_fails():
+    told = verify(scene.load("perpendicular"), max_seconds=1e-9)
+    late = "it takes longer than 1e-09 s"
+    assert told.skipped == dict.fromkeys(("exact", "contact", "pymunk"), late)
+    assert {row.pair: row.quantity for row in told.agreements} == dict.fromkeys(
+        ("exact", "dop853", "contact", "pymunk"), f"left out: {late}"
+    )
+    promised = [row for row in told.findings if row.engine != "theory"]
+    assert promised
+    assert all(np.isnan(row.simulated) for row in promised)
+    assert told.failures == sum(row.tolerance is not None for row in promised) > 0
+    assert f"pymunk is left out: {late}" in told.sheets("")[0].notes
+
+
 @pytest.mark.parametrize(
     ("errors", "found"),
     [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import acos, atan2, cos, hypot, inf, pi, radians, sin, sqrt, tan
+from math import acos, atan2, cos, degrees, exp, hypot, inf, pi, radians, sin, sqrt, tan
 
 import numpy as np
 import pytest
@@ -184,6 +184,78 @@ def test_a_slide_down_a_hollow_arc_is_of_order_two(friction):
     assert abs(left["position"][0]) < 1e-12
     assert errors[-1] < 4e-6
     assert errors[0] / errors[-1] > 3.9
+
+
+@pytest.mark.parametrize("slope", [radians(45.0), radians(60.0)])
+def test_from_a_straight_chute_it_slides_on_in_a_tangential_arc(slope):
+    # From rest v² = 2 g L (sin s - µ cos s); in the hollow, φ its slope, dv²/dφ = 2 µ v²
+    # - 2 g ρ (sin φ - µ cos φ), v² = A sin φ + B cos φ + C exp(2 µ φ), with A = 6 µ k, B = 2 k
+    # (1 - 2 µ²), k = g ρ/(1 + 4 µ²), and C from where the arc begins.
+    mu, radius, r, length, end = 0.2, 0.4, 0.0063, 0.3, radians(-5.0)
+    k = G * (radius - r) / (1.0 + 4.0 * mu**2)
+
+    def steady(phi):
+        return 6.0 * mu * k * sin(phi) + 2.0 * k * (1.0 - 2.0 * mu**2) * cos(phi)
+
+    square = 2.0 * G * length * (sin(slope) - mu * cos(slope))
+    square = steady(end) + (square - steady(slope)) * exp(2.0 * mu * (end - slope))
+    along, joint = (
+        np.array([cos(slope), -sin(slope)]),
+        radius * np.array([-sin(slope), -cos(slope)]),
+    )
+    top = joint - length * along
+    chute = {"name": "chute", "from": top.tolist(), "to": joint.tolist(), "friction": mu}
+    spoon = {
+        "name": "spoon", "center": [0.0, 0.0], "radius": radius, "friction": mu,
+        "from_deg": 270.0 - degrees(slope), "to_deg": 270.0 - degrees(end), "restitution": 0.5,
+    }  # fmt: skip
+    errors = []
+    for dt in (1e-3, 2.5e-4):
+        m = lone(
+            top + r * np.array([sin(slope), cos(slope)]), until=0.6, dt=dt,
+            surface=[chute, spoon], particle={"radius": r},
+        )  # fmt: skip
+        got = run(m)
+        assert not len(got.select(Kind.IMPACT))
+        (left,) = got.select(Kind.SEPARATION)
+        assert got.surfaces[left["surface"]] == "spoon"
+        errors.append(abs(float((left["velocity_after"] ** 2).sum()) - square))
+    assert errors[0] < 2e-5
+    assert errors[1] < errors[0] / 4.0
+
+
+@pytest.mark.parametrize(
+    ("side", "radii"),
+    [("hollow", (0.05, 1.0, 0.3)), ("hollow", (1.0, 0.05, 0.3)), ("hollow", (0.3, 0.3, 0.3)),
+     ("S", (0.05, 1.0, 0.3)), ("S", (0.3, 1.0, 0.05)), ("S", (1.0, 1.0, 1.0))],
+)  # fmt: skip
+def test_arcs_joined_without_a_corner_are_not_felt(side, radii):
+    # A smooth way down: three hollow arcs, or a hollow one, a round one and a hollow one, turn by
+    # turn tangential, then a straight end; without friction ½ v² = g times the fall of the centre.
+    r, heading, place = 0.01, radians(-40.0), np.zeros(2)
+    start = r * np.array([-sin(heading), cos(heading)])
+    arcs = []
+    for n, radius in enumerate(radii):
+        way = -1.0 if side == "S" and n == 1 else 1.0
+        turn = radians(4.0 if side == "S" and n == 1 else 12.0)
+        normal = way * np.array([-sin(heading), cos(heading)])
+        center, begin = place + radius * normal, atan2(-normal[1], -normal[0])
+        arcs.append((center, radius, begin if way > 0.0 else begin - turn, turn, {}))
+        heading += way * turn
+        place = center + radius * np.array([cos(begin + way * turn), sin(begin + way * turn)])
+    end = place + 0.1 * np.array([cos(heading), sin(heading)])
+    m = lone(
+        start, (0.6 * cos(radians(40.0)), -0.6 * sin(radians(40.0))), until=1.0, dt=1e-3,
+        surface=[face("end", tuple(place), tuple(end), friction=0.0)],
+    )  # fmt: skip
+    got = run(with_arcs(m, *arcs))
+    assert not len(got.select(Kind.IMPACT))
+    left = got.select(Kind.SEPARATION)[0]
+    assert got.surfaces[left["surface"]] == "end"
+    speed = sqrt(0.36 + 2.0 * G * (start[1] - left["position"][1]))
+    assert hypot(*left["velocity_after"]) == pytest.approx(speed, rel=1e-5)
+    above = end + r * np.array([-sin(heading), cos(heading)])
+    assert left["position"] == pytest.approx(above, abs=1e-5)
 
 
 def test_a_ball_leaves_a_round_top_where_it_presses_no_more():

@@ -15,7 +15,6 @@ from typing import Final
 
 import numpy as np
 
-from chutelab.engines.simulation import simulate
 from chutelab.machine import build
 from chutelab.results import Recording
 from chutelab.results.comparison import compare, relative_error, scales
@@ -88,8 +87,14 @@ class Agreement:
         return beyond >= 0.0 if self.least else beyond <= 0.0
 
 
-def agreement(scene: Scene) -> tuple[Agreement, ...]:
+PATIENCE: Final = 300.0
+"""s of wall time that one answer may take: whatever an engine does, `verify` ends."""
+
+
+def agreement(scene: Scene, max_seconds: float = PATIENCE) -> tuple[Agreement, ...]:
     """Run particle 0 of a scene, alone, with every engine and SciPy; compare all answers.
+
+    An answer that takes longer than `max_seconds`, wall time, is left out.
 
     Raises
     ------
@@ -102,15 +107,18 @@ def agreement(scene: Scene) -> tuple[Agreement, ...]:
     rows: list[Agreement] = []
     for name in ("exact", "dop853", "contact", "pymunk"):
         try:
-            found[name] = answer(alone, name)
+            found[name] = answer(alone, name, max_seconds=max_seconds)
         except UNABLE as error:
             rows.append(Agreement(name, f"left out: {because(error)}"))
     if not found:
         return tuple(rows)
     base = next(iter(found))
     # By how much the scene magnifies a change of its inputs; inf if it does something else then.
-    moved = answer(stirred(alone, STIR), base)
-    growth = max(1.0, distance(moved, found[base])[0] / STIR)
+    try:
+        moved = answer(stirred(alone, STIR), base, max_seconds=max_seconds)
+        growth = max(1.0, distance(moved, found[base])[0] / STIR)
+    except UNABLE:
+        growth = inf
     blows = not _lasts(found[base])
     for name, recording in found.items():
         even = name not in ORDERS or (blows and (alone.run.align or name == "contact"))
@@ -122,7 +130,7 @@ def agreement(scene: Scene) -> tuple[Agreement, ...]:
         elif name == base:
             rows.append(Agreement(f"{name}, theory", compared.reason))
         if name != base:
-            rows.append(_with_base(alone, name, recording, found[base], allowed))
+            rows.append(_with_base(alone, name, recording, found[base], allowed, max_seconds))
     if not isfinite(growth):
         rows.append(Agreement(base, f"a change of the inputs by {STIR:g} changes what happens"))
     return tuple(rows)
@@ -140,8 +148,9 @@ def _lasts(found: Recording) -> bool:
 
 
 def _with_base(
-    scene: Scene, name: str, recording: Recording, base: Recording, allowed: float | None
-) -> Agreement:
+    scene: Scene, name: str, recording: Recording, base: Recording, allowed: float | None,
+    max_seconds: float,
+) -> Agreement:  # fmt: skip
     pair = f"{name}, {base.engine}"
     error, which = distance(recording, base)
     if allowed is None and error <= BLOWS.get(name, 0.0):
@@ -153,7 +162,11 @@ def _with_base(
     for n in range(3):
         steps = [scene.run.dt / REFINED**n * share for share in NEARBY]
         scenes = [scene.with_values({"run.dt": step, "expect": None}) for step in steps]
-        errors.append(max(distance(answer(each, name), base)[0] for each in scenes))
+        try:
+            found = [answer(each, name, max_seconds=max_seconds) for each in scenes]
+        except UNABLE as why:
+            return Agreement(pair, f"no order, with steps of {steps[0]:.2g} s: {because(why)}")
+        errors.append(max(distance(each, base)[0] for each in found))
     seen = ", ".join(f"{error:.0e}" for error in errors)
     least = ORDERS[name] - CHANCE[name]
     return Agreement(pair, f"order ({seen})", order(errors, REFINED, BLOWS[name]), least, True)
@@ -283,8 +296,16 @@ def _verdict(row: Finding | Agreement) -> str:
     return "" if row.tolerance is None else "ok" if row.holds else "FAILED"
 
 
-def verify(scene: Scene, progress: Callable[[float], None] | None = None) -> Verification:
+def verify(
+    scene: Scene,
+    progress: Callable[[float], None] | None = None,
+    *,
+    max_seconds: float = PATIENCE,
+) -> Verification:
     """Run a scene on every engine that applies; look at what it is expected to show.
+
+    An engine that gets stuck, or takes longer than `max_seconds`, wall time, is left out. Where
+    none is left, what is expected is not shown: all of it fails.
 
     Raises
     ------
@@ -296,9 +317,9 @@ def verify(scene: Scene, progress: Callable[[float], None] | None = None) -> Ver
     for engine in ENGINES:
         if scene.expect and engine not in skipped:
             try:
-                recordings[engine] = simulate(scene, engine, progress)
-            except SceneError as error:
-                if error.faults[0].key != "run.engine":
+                recordings[engine] = answer(scene, engine, progress, max_seconds=max_seconds)
+            except UNABLE as error:
+                if isinstance(error, SceneError) and error.faults[0].key != "run.engine":
                     raise
                 skipped[engine] = because(error)
     prediction = predict(scene)
@@ -312,6 +333,8 @@ def verify(scene: Scene, progress: Callable[[float], None] | None = None) -> Ver
             predicted = float(getattr(prediction, quantity.removesuffix("_deg")))
             predicted = degrees(predicted) if quantity.endswith("_deg") else predicted
         values = {engine: measure(recordings[engine], quantity) for engine in recordings}
+        if not values:
+            values = dict.fromkeys(skipped, nan)
         expected = predicted
         if not isinstance(expect.value, str):
             expected = float(expect.value)
@@ -323,7 +346,7 @@ def verify(scene: Scene, progress: Callable[[float], None] | None = None) -> Ver
             # An entry is measured by itself, but what should be nothing by what was turned over.
             scale = 0.0
             if quantity == "ledger.residual":
-                scale = ledger(recordings[engine]).turned_over
+                scale = ledger(recordings[engine]).turned_over if recordings else nan
             elif unit and not quantity.startswith("ledger."):
                 scale = scales(scene, prediction)[KINDS[unit]]
             off = abs(simulated - expected)
@@ -338,7 +361,7 @@ def verify(scene: Scene, progress: Callable[[float], None] | None = None) -> Ver
                     tolerance, relative=size == "%",
                 )
             )  # fmt: skip
-    return Verification(tuple(findings), agreement(scene), skipped)
+    return Verification(tuple(findings), agreement(scene, max_seconds), skipped)
 
 
 def _skipped(scene: Scene) -> dict[str, str]:

@@ -9,6 +9,7 @@ import click
 
 from chutelab.cli.console import progress, say, tell
 from chutelab.cli.parameters import (
+    Number,
     complete_scene,
     dt_option,
     engine_option,
@@ -54,8 +55,16 @@ def check(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool) ->
 
 @click.command(short_help="Check what scenes promise; compare independent answers.")
 @click.argument("scenes", metavar="[SCENE]...", nargs=-1, shell_complete=complete_scene)
+@click.option(
+    "--max-seconds",
+    metavar="S",
+    type=Number(min=0.0, min_open=True),
+    default=300.0,
+    show_default=True,
+    help="Leave out an answer that takes longer than S seconds.",
+)
 @json_option()
-def verify(scenes: tuple[str, ...], as_json: bool) -> None:
+def verify(scenes: tuple[str, ...], max_seconds: float, as_json: bool) -> None:
     """Check what each SCENE is expected to show (default: all shipped ones).
 
     Every [[expect]] of a scene is looked at on each engine that can run it, and in the theory.
@@ -72,7 +81,7 @@ def verify(scenes: tuple[str, ...], as_json: bool) -> None:
         for done, (name, scene) in enumerate(loaded.items()):
             if update is not None:
                 update(done / len(loaded))
-            found[name] = agreement.verify(scene)
+            found[name] = agreement.verify(scene, max_seconds=max_seconds)
     failures = sum(answer.failures for answer in found.values())
     answers = [
         {

@@ -22,7 +22,7 @@ import numpy as np
 from chutelab.machine import Machine
 from chutelab.results import Kind, Recording
 from chutelab.results.recorder import Recorder
-from chutelab.util.arrays import Floats
+from chutelab.util.arrays import Floats, Progress
 
 Guard = Callable[[Floats], Floats]
 
@@ -107,8 +107,8 @@ class _Lasting:
     carried: bool = False
 
 
-def run(machine: Machine) -> Recording:
-    """Integrate the only particle of a machine.
+def run(machine: Machine, progress: Progress | None = None) -> Recording:
+    """Integrate the only particle of a machine; `progress`, told the share done, may end it.
 
     Returns
     -------
@@ -126,7 +126,7 @@ def run(machine: Machine) -> Recording:
         from scipy.optimize import brentq
     except ImportError:
         raise UnableError('SciPy is missing: pip install "chutelab[bench]"') from None
-    return _Run(machine, DOP853, brentq).result()
+    return _Run(machine, DOP853, brentq, progress).result()
 
 
 def _plain(machine: Machine) -> Machine:
@@ -159,8 +159,8 @@ def _plain(machine: Machine) -> Machine:
 class _Run:
     """One particle on its way; `base` is where the phase began, `t0` when."""
 
-    def __init__(self, machine: Machine, solver: Any, root: Any) -> None:
-        self.machine, self.solver, self.root = machine, solver, root
+    def __init__(self, machine: Machine, solver: Any, root: Any, progress: Progress | None) -> None:
+        self.machine, self.solver, self.root, self.progress = machine, solver, root, progress
         p, releases = machine.particle, machine.releases
         self.r, self.g = p.radius, np.array([0.0, -machine.gravity])
         # Spin that a tangential impulse gives at the rim, and its way back on the slip.
@@ -388,6 +388,8 @@ class _Run:
             with np.errstate(over="ignore", invalid="ignore"):
                 step.step()  # which may try a step that is far too long, and take it back
             self.steps += 1
+            if self.progress is not None:
+                self.progress(min(1.0, (self.t0 + step.t) / self.machine.end_time))
             if step.status == "failed":
                 raise UnableError("DOP853 needs a step shorter than rounding")
             dense = step.dense_output()

@@ -14,6 +14,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
 from math import inf, isfinite
+from time import perf_counter
 from typing import Literal
 
 import numpy as np
@@ -206,15 +207,36 @@ def distance(one: Recording, other: Recording, unit: str = "relative") -> tuple[
     return apart(list(each(one)), list(each(other)), sizes(other), unit)
 
 
-UNABLE = (SceneError, StalledError, reference.UnableError)
-"""What an engine, or SciPy, raises that cannot run a scene."""
+class LateError(RuntimeError):
+    """An answer takes longer than it may."""
 
 
-def answer(scene: Scene, engine: str | None, progress: Progress | None = None) -> Recording:
-    """Run a scene with an engine, or with "dop853"; one of `UNABLE` if it cannot."""
+UNABLE = (SceneError, StalledError, reference.UnableError, LateError)
+"""What `answer` raises of an engine, or of SciPy, that cannot run a scene, or not in time."""
+
+
+def answer(
+    scene: Scene,
+    engine: str | None,
+    progress: Progress | None = None,
+    *,
+    max_seconds: float | None = None,
+) -> Recording:
+    """Run a scene with an engine, or with "dop853"; one of `UNABLE` if it cannot.
+
+    An answer that takes more than `max_seconds` of wall time is none.
+    """
+    begin = perf_counter()
+
+    def bounded(share: float) -> None:
+        if progress is not None:
+            progress(share)
+        if max_seconds is not None and perf_counter() - begin > max_seconds:
+            raise LateError(f"it takes longer than {max_seconds:g} s")
+
     if engine == "dop853":
-        return reference.run(build(scene))
-    return simulate(scene, engine, progress)
+        return reference.run(build(scene), bounded)
+    return simulate(scene, engine, progress if max_seconds is None else bounded)
 
 
 def because(error: Exception) -> str:

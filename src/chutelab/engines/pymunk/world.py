@@ -46,9 +46,10 @@ ROUGH = 1e-4
 CREEP = 1e-7
 """Share of the radius; how finely the ends of an arc are told from what is between them."""
 
-JOINT = 4.0
-"""Where another piece goes on from its end, an arc reaches past it by the angle at which a tangent
-is this many times a hair away: what slides on to it meets it before that other piece ends."""
+JOINT = 0.0625
+"""Hairs. Where another piece goes on from its end, an arc reaches past it, and what slides on to it
+touches both; by so little that its way there is, whichever way both bend, never deeper in the arc
+than 4 times this: less than the depth at which a step ends because a surface is met."""
 
 ARC = 0.025
 """rad between knots round the pulley: ρ Δφ⁴/384, the curve's error, is 1e-9 of the radius."""
@@ -330,7 +331,8 @@ class World:
             way * Vec2d(sin(angle), -cos(angle))
             for way, angle in ((1.0, begin), (-1.0, begin + extent))
         ]
-        more = sqrt(2.0 * JOINT * self.hair / radius)
+        # Of the centre's way there, which bends no more than the sharpest arc.
+        more = sqrt(2.0 * JOINT * self.hair * float(arcs.radius.min())) / (radius + self.radius)
         before, after = (
             more if self._goes_on(end[n], out, more) else 0.0
             for end, out in zip(arcs.ends, outs, strict=True)

@@ -27,7 +27,10 @@ from hostile import inputs
 PATIENCE = 20.0
 """s that a case may take."""
 
-PROMISED = ("got stuck", "was not reached", "no solution", "outside the tolerance", "broken")
+PROMISED = (
+    "got stuck", "was not reached", "no solution", "outside the tolerance", "broken",
+    "no browser could be opened",
+)  # fmt: skip
 """What an exit code of 1 says, where help promises it."""
 
 

@@ -173,7 +173,8 @@ def live(
 
     It is one HTML file with the contact engine in it, the same as in `chutelab run --engine
     contact`: any browser opens it, from a memory stick or on a phone, without installation or
-    network. A file that is there is replaced.
+    network. A file that is there is replaced. Without -o it opens in your browser; where there is
+    none, it says where the page is, with exit code 1.
 
     What the page offers is the [live] table of the scene: predict = true hides path and numbers
     until the learner has set a mark; controls, panels, ranges and presets say what can be changed

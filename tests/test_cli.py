@@ -242,6 +242,13 @@ def test_a_decimal_comma_is_answered_with_the_point(arguments):
     assert "write 2.5, with a decimal point" in refused(*arguments)
 
 
+def test_a_run_without_a_plate_tells_the_time_of_flight():
+    throw = Path(__file__).parent.parent / "lessons" / "01-the-parabola" / "throw.toml"
+    for speed in (2, 4):
+        said = call("run", throw, "--set", f"incoming.speed={speed}", "--set", "outgoing.drop=0.7")
+        assert f"from the first to the second: {(2 * 0.7 / 9.81) ** 0.5:.6g} s" in said.output
+
+
 def test_a_run_says_that_a_disk_rolls_instead_of_being_carried():
     settings = ("--set", "particle.spin=true", "--set", "outgoing.length=8")
     text = " ".join(call("run", "belt-landing", *settings).stdout.split())

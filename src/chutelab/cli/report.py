@@ -67,4 +67,8 @@ def _way(recording: Recording) -> Sheet:
         numbers = (event["t"], *event["position"], *event["velocity_before"])
         rows.append((f"{what} {name}", *(number(float(value)) for value in numbers)))
     heads = ("", "t, s", "x, m", "y, m", "vx, m/s", "vy, m/s")
-    return Sheet("Particle 0, its first contacts", heads, tuple(rows))
+    notes: tuple[str, ...] = ()
+    if len(own) > 1 and own["kind"][0] == Kind.SEPARATION:
+        flown = float(own["t"][1] - own["t"][0])
+        notes = (f"time of flight, from the first to the second: {number(flown)} s",)
+    return Sheet("Particle 0, its first contacts", heads, tuple(rows), notes=notes)

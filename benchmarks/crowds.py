@@ -9,7 +9,7 @@ ENGINE is contact or pymunk, by default what `auto` takes. The cases, all by def
     long    3,200 in a stream of 16 s
     box     2,000 poured into a box 0.5 m wide, until they sleep
     hopper  1,000 grains of the scene `hopper`, of several sizes, run out through its gate
-    board   500 balls fall through 12 rows of pegs, a Galton board
+    board   the scene `galton`: 500 balls fall through 12 rows of pegs
 
 `stream` and `bed` run in turns with the bare loop, three times each; medians are told. The loop has
 the same solids and disks, each from its release on, carried by a belt that holds it, then free; it
@@ -62,24 +62,6 @@ BOX = {
     "run": {"until": "settled", "max_time": 60.0},
 }  # fmt: skip
 
-BOARD = {
-    "title": "500 balls on a Galton board",
-    "particle": {"radius": 0.003, "mass": 0.00088},
-    "surface": [
-        {"name": "odd", "center": [-0.144, 0.0], "radius": 0.0081, "restitution": 0.4,
-         "friction": 0.0, "repeat": [[13, 0.024, 0.0], [6, 0.0, -0.048]]},
-        {"name": "even", "center": [-0.156, -0.024], "radius": 0.0081, "restitution": 0.4,
-         "friction": 0.0, "repeat": [[14, 0.024, 0.0], [6, 0.0, -0.048]]},
-        {"name": "walls", "from": [-0.156, -0.2721], "to": [-0.156, -0.4721],
-         "restitution": 0.2, "friction": 0.3, "repeat": [[14, 0.024, 0.0]]},
-        {"name": "floor", "from": [-0.156, -0.4721], "to": [0.156, -0.4721],
-         "restitution": 0.2, "friction": 0.5},
-    ],
-    "stream": {"count": 500, "rate": 40.0, "at": [-0.009, 0.0311], "to": [0.009, 0.0311],
-               "velocity": [0.0, 0.0], "interact": True, "restitution": 0.3, "friction": 0.2},
-    "run": {"until": "settled", "max_time": 2.5},
-}  # fmt: skip
-
 LONG = ["stream.count=3200", "run.max_time=30"]
 BED = ["stream.count=1000", "particle.spin=true"]
 
@@ -89,7 +71,7 @@ CASES = {
     "long": lambda: load("stream", LONG),
     "box": lambda: scene.from_dict(BOX),
     "hopper": lambda: load("hopper", HOPPER),
-    "board": lambda: scene.from_dict(BOARD),
+    "board": lambda: load("galton"),
 }
 HOPPER = ["stream.count=1000", "stream.fill=[[-0.095, 0.08], [0.095, 1.19]]"]
 COMPARED = ("stream", "bed")

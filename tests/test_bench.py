@@ -14,7 +14,7 @@ from click.testing import CliRunner
 from PIL import Image
 
 from chutelab.checks import workprecision as bench
-from chutelab.checks.workprecision import METHODS, Stopwatch, Timing, clocked, measure
+from chutelab.checks.workprecision import MANY_STEPS, METHODS, Stopwatch, Timing, clocked, measure
 from chutelab.cli import benching, main
 from chutelab.engines.simulation import simulate
 from chutelab.machine import build
@@ -119,6 +119,16 @@ def test_without_the_theory_another_engine_is_the_witness():
     for one in rows:
         assert one.against in {"exact", "dop853", "contact", "pymunk"} - {one.method}
         assert one.error < 1e-6
+
+
+def test_what_there_is_no_time_for_is_left_out():
+    rows = measure(load("stream"), repeats=0, max_seconds=1e-9)
+    assert [(row.method, row.value) for row in rows] == [
+        ("exact", None), *((name, dt) for name in ("contact", "pymunk") for dt in MANY_STEPS)
+    ]  # fmt: skip
+    late = "no time is left of the 1e-09 s for all (--max-seconds)"
+    assert {row.failed for row in rows} == {late}
+    assert all(row.error is row.first is row.median is None for row in rows)
 
 
 def test_a_crowd_is_judged_as_a_whole_and_exact_cannot_run_it():

@@ -342,6 +342,19 @@ def test_a_run_works_everything_out_once():
     assert found == {"model_validate": 1, "build": 1, "predict": 2}
 
 
+def test_a_table_of_very_many_events_is_written_if_it_is_asked_for(monkeypatch):
+    monkeypatch.setattr("chutelab.cli.output.MOST_EVENTS", 3)  # it has 4
+    result = call("run", "perpendicular", "--out", "out")
+    assert "lesson.gif, trajectory.csv, recording.npz, summary.json\n" in result.stdout
+    said = "events.csv is left out: 4 events, about 0 MB; chutelab "
+    asked = "show out/recording.npz --out out --only csv"
+    assert f"{said}{asked} writes it\n" in result.stdout
+    assert not Path("out/events.csv").exists()
+    result = call(*asked.split())
+    assert "wrote into out: events.csv, trajectory.csv\n" in result.stdout
+    assert len(Path("out/events.csv").read_text(encoding="utf-8").splitlines()) == 5
+
+
 def test_a_run_says_what_it_wrote_and_only_chooses():
     result = call("run", "perpendicular", "--out", "out", "--only", "json,csv")
     assert "wrote into out: events.csv, trajectory.csv, summary.json\n" in result.stdout

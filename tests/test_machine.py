@@ -254,6 +254,24 @@ def test_crossing_surfaces_are_warned_of():
     assert built(surface=[{**hood, "points": [[-0.5, R], [-0.5, 1.0]]}]).warnings == ()
 
 
+@pytest.mark.parametrize("bent", [False, True])
+def test_gates_cross_only_what_is_there_while_they_are(bent):
+    flat = {"name": "flat", "from": [2.0, 2.0], "to": [3.0, 2.0]}
+    upright = {"name": "upright", "from": [2.5, 1.5], "to": [2.5, 2.5]}
+    if bent:
+        upright = {"name": "upright", "center": [2.5, 2.0], "radius": 0.3, "to_deg": 180.0,
+                   "from_deg": -180.0}  # fmt: skip
+    said = (machine.Caution("upright", crosses="flat"),)
+    for times, warnings in [
+        (({}, {}), said),
+        (({"opens_at": 1.0}, {"closes_at": 0.9}), said),
+        (({"opens_at": 1.0}, {"closes_at": 1.0}), ()),
+        (({"closes_at": 2.0}, {"opens_at": 1.0}), ()),
+        (({"closes_at": 2.0}, {}), said),
+    ]:
+        assert built(surface=[flat | times[0], upright | times[1]]).warnings == warnings
+
+
 @pytest.mark.parametrize(("below", "hit"), [(0.1, -0.4259), (None, None)])
 def test_a_flight_off_the_finite_plate_is_told_with_its_place(below, hit):
     # the impact lies g (0.5937 / 2)²/2 - r = 0.4259 m below the pulley's top

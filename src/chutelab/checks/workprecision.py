@@ -12,14 +12,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
-from math import ceil
+from math import ceil, inf
 from statistics import median
 from time import perf_counter
 from typing import TypeVar
 
 from chutelab.engines.simulation import simulate
 from chutelab.scene import Scene
-from chutelab.studies.accuracy import SMALLEST, STIR, UNABLE, Search, Wanted, because
+from chutelab.studies.accuracy import SMALLEST, STIR, UNABLE, LateError, Search, Wanted, because
 from chutelab.util.arrays import Progress
 
 T = TypeVar("T")
@@ -41,6 +41,9 @@ CROWD = (
 """How the error is known where particles meet."""
 
 REPEATS = 9
+
+BUDGET = 60.0
+"""s of wall time for all rows together, unless more is asked for: a lesson does not wait longer."""
 
 PATIENCE = 0.5
 """s of repeats of one row, after which no further one is begun."""
@@ -108,9 +111,10 @@ def measure(
     steps: Sequence[float] = (),
     *,
     repeats: int = REPEATS,
+    max_seconds: float = BUDGET,
     progress: Progress | None = None,
 ) -> list[Timing]:
-    """Measure engines on a scene; nothing is left out, what failed says why.
+    """Measure engines on a scene, long steps first; what failed or was left out says why.
 
     Parameters
     ----------
@@ -120,25 +124,38 @@ def measure(
         ``run.dt``, s; by default `STEPS` or `MANY_STEPS`. A witness that steps takes the shortest.
     repeats : int
         Timed runs after the first, at most; fewer where they take longer than `PATIENCE`.
+    max_seconds : float
+        Wall time of all first runs and of those that tell their errors; what then is not done is
+        left out.
+    progress : callable, optional
+        Called now and then with the share that is done.
     """
+    begin = perf_counter()
+
+    def bounded(_: float) -> None:
+        spent = (perf_counter() - begin) / max_seconds
+        if spent > 1.0:
+            raise LateError(f"no time is left of the {max_seconds:g} s for all (--max-seconds)")
+        if progress is not None:
+            progress(max(len(rows) / len(tasks), spent))
+
     many = scene.count > 1
     steps = sorted(set(steps or (MANY_STEPS if many else STEPS)), reverse=True)
     methods = methods or (METHODS[:-1] if many else METHODS)
     finest = scene.with_values({"run.dt": steps[-1], "expect": None})
-    search = Search(finest, Wanted(SMALLEST, "relative"))
+    search = Search(finest, Wanted(SMALLEST, "relative"), bounded)
     tasks = [
         (method, step)
         for method in METHODS
         if method in methods
         for step in ([None] if method == "exact" else steps)
     ]
-    rows: list[tuple[Timing, Stopwatch | None]] = []
-    for method, step in tasks:
-        if progress is not None:
-            progress(len(rows) / len(tasks))
-        rows.append(_judged(scene, method, step, search))
+    rows: dict[tuple[str, float | None], tuple[Timing, Stopwatch | None]] = {}
+    # All engines with the longest step first: it takes the least, if there is not the time for all.
+    for method, step in sorted(tasks, key=lambda task: -(task[1] or inf)):
+        rows[method, step] = _judged(scene, method, step, search, bounded)
     # In turn, so that a machine that gets busy is busy for all.
-    watches = [watch for _, watch in rows if watch is not None]
+    watches = [watch for _, watch in rows.values() if watch is not None]
     for _ in range(repeats):
         for watch in watches:
             watch.repeat()
@@ -146,12 +163,12 @@ def measure(
         row
         if watch is None
         else replace(row, first=watch.first, repeats=len(watch.times), median=watch.median)
-        for row, watch in rows
+        for row, watch in map(rows.__getitem__, tasks)
     ]
 
 
 def _judged(
-    scene: Scene, method: str, step: float | None, search: Search
+    scene: Scene, method: str, step: float | None, search: Search, bounded: Progress
 ) -> tuple[Timing, Stopwatch | None]:
     """Run once and tell the error, before any repeat: who fails is not worth the time."""
     blank = Timing(method, "" if step is None else "dt", step)
@@ -162,7 +179,8 @@ def _judged(
     import_module(f"chutelab.engines.{engine}")  # or its import would be timed
     run = partial(simulate, scene, engine)
     try:
-        first, found = clocked(run)
+        bounded(0.0)
+        first, found = clocked(partial(run, progress=bounded))
         known = search.judged(found)
     except UNABLE as error:
         return replace(blank, failed=because(error)), None

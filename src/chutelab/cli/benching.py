@@ -53,6 +53,14 @@ REPEATS = 9
     show_default=True,
     help="Timed runs after the first, at most; fewer of what takes long.",
 )
+@click.option(
+    "--max-seconds",
+    metavar="S",
+    type=Number(min=0.0, min_open=True),
+    default=60.0,
+    show_default=True,
+    help="Leave out what is not measured after S seconds, repeats aside: short steps of crowds.",
+)
 @set_option
 @out_option("Write work-precision.tsv and work-precision.png into this folder.")
 @json_option("Print one JSON object instead of a table.")
@@ -61,6 +69,7 @@ def bench(
     engines: tuple[str, ...],
     steps: tuple[float, ...],
     repeats: int,
+    max_seconds: float,
     overrides: tuple[str, ...],
     out: Path | None,
     as_json: bool,
@@ -74,7 +83,8 @@ def bench(
     part in, as with `run --accuracy`: the closed form where it speaks of the whole run, else an
     engine that shares no formula with the first. Of particles that meet, only totals are compared.
     A step may be right by luck, where it happens to end at a contact: look at several. Of many
-    particles there are fewer steps, and fixed is left out unless it is asked for.
+    particles there are fewer steps, and fixed is left out unless it is asked for. Long steps come
+    first; what there is no time for is told.
 
     The first run is told apart from the median of the repeats (what is over in less than 20 ms
     runs several times in a row); imports are never timed.
@@ -92,7 +102,9 @@ def bench(
     files = ["work-precision.tsv", "work-precision.png"]
     with destination(out, files) as into:
         with progress("measuring") as update:
-            timings = measure(loaded, engines, steps, repeats=repeats, progress=update)
+            timings = measure(
+                loaded, engines, steps, repeats=repeats, max_seconds=max_seconds, progress=update
+            )
         if into is not None:
             from chutelab.pictures.plots.workprecision import workprecision
 

@@ -44,6 +44,9 @@ FILMS = ("gif", "mp4", "webm")
 USUAL = ("png", "gif", "csv", "npz", "json")
 """Those that are written unless ``--only`` chooses."""
 
+MOST_EVENTS, EVENT = 100_000, 240
+"""Rows and bytes a row, about: of more events.csv is left out unless ``--only`` asks for it."""
+
 
 @contextmanager
 def destination(folder: Path | None, names: Iterable[str] = ()) -> Iterator[Path | None]:
@@ -87,6 +90,7 @@ class Output:
 
     out: Path | None  # folder of the files; None writes nothing
     kinds: tuple[str, ...]  # which of `KINDS`
+    chosen: bool  # by ``--only``
     as_json: bool
     quiet: bool  # no bar, and no summary but as JSON
 
@@ -94,6 +98,10 @@ class Output:
     def files(self) -> list[str]:
         """Names of the files."""
         return [name for kind in self.kinds for name in KINDS[kind]]
+
+    def leaves_out(self, recording: Recording) -> bool:
+        """Tell whether there are so many events that events.csv is not written unasked."""
+        return "csv" in self.kinds and not self.chosen and len(recording.events) > MOST_EVENTS
 
     def write(self, recording: Recording, folder: Path, accuracy: Accuracy | None = None) -> None:
         """Write the files into an existing folder."""
@@ -110,7 +118,8 @@ class Output:
                     draw = plots.overlay if kind == "png" else plots.strobe
                     draw(recording, path=path)
                 elif kind == "csv":
-                    recording.to_csv(folder)
+                    tables = ("events", "trajectory")[self.leaves_out(recording) :]
+                    recording.to_csv(folder, only=tables)
                 elif kind == "npz":
                     recording.save(path)
                 else:
@@ -118,7 +127,8 @@ class Output:
                     write_json({**_summary(recording, accuracy), "seconds": None}, path)
 
     def tell(self, recording: Recording, accuracy: Accuracy | None = None) -> None:
-        """Print the summary and what was written."""
+        """Print the summary, what was written, and what was left out."""
+        left_out = self.leaves_out(recording)
         if self.as_json:
             show_json(_summary(recording, accuracy))
         elif not self.quiet:
@@ -126,7 +136,15 @@ class Output:
 
             show(*report(recording, accuracy))
             if self.out is not None:
-                say(f"wrote into {self.out}: {', '.join(self.files)}")
+                files = [name for name in self.files if name != "events.csv" or not left_out]
+                say(f"wrote into {self.out}: {', '.join(files)}")
+        if self.out is not None and left_out and not self.quiet:
+            many, kept = len(recording.events), self.out / "recording.npz"
+            say(
+                f"events.csv is left out: {many:,} events, about {many * EVENT / 1e6:.0f} MB;"
+                f" chutelab show {kept} --out {self.out} --only csv writes it",
+                err=self.as_json,
+            )
         if self.out is not None and "csv" in self.kinds and not self.quiet:
             from chutelab.results import storage
 
@@ -178,7 +196,7 @@ def output_options(command: Callable[..., None]) -> Callable[..., None]:
         callback=_kinds,
         shell_complete=_complete_kinds,
         help=f"With --out: only some of {','.join(KINDS)}; without, the first"
-        f" {len(USUAL)}. May be repeated.",
+        f" {len(USUAL)}, but no events.csv of more than {MOST_EVENTS:,} events. May be repeated.",
     )
     @click.option(
         "--format",
@@ -214,7 +232,7 @@ def output_options(command: Callable[..., None]) -> Callable[..., None]:
             from chutelab.pictures.animation import need_video
 
             need_video(kind)
-        command(**others, output=Output(out, kinds, as_json, quiet))
+        command(**others, output=Output(out, kinds, only is not None, as_json, quiet))
 
     return told
 

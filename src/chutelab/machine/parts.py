@@ -58,14 +58,17 @@ def crossings(
 ) -> list[Caution]:
     """Return every two surfaces that cross; those that only touch, as at a shared end, do not.
 
+    Nor do gates cross what is never there while they are.
+
     `pulley` is the radius of the drive pulley about the origin, m, if there is one. The incoming
     belt, which lies on it, is surface 0 then.
     """
     rows = np.concatenate([segments.start, segments.end], axis=1)
     owner = segments.surface.tolist()
     found: dict[tuple[int, int], None] = {}
+    met = _together(segments, segments)
     for s, other in combinations(range(len(rows)), 2):
-        if owner[s] == owner[other]:
+        if owner[s] == owner[other] or not met[s, other]:
             continue
         if _parts(rows[s], rows[other]) and _parts(rows[other], rows[s]):
             found[owner[s], owner[other]] = None
@@ -74,7 +77,7 @@ def crossings(
         for pieces, crossed in (
             (segments, _chords(segments, arcs, near)), (arcs, _lenses(arcs, near))
         ):  # fmt: skip
-            for s, n in np.argwhere(crossed).tolist():
+            for s, n in np.argwhere(crossed & _together(pieces, arcs)).tolist():
                 pair = sorted((pieces.surface[s].item(), arcs.surface[n].item()))
                 if pair[0] != pair[1]:
                     found[pair[0], pair[1]] = None
@@ -89,6 +92,12 @@ def crossings(
         into = {o for o, far in zip(owner, distance, strict=True) if o != 0 and far < pulley}
         said += [Caution(names[o], DRIVE_PULLEY) for o in sorted(into)]
     return said
+
+
+def _together(one: Segments | Arcs, other: Segments | Arcs) -> Bools:
+    """Tell which pieces are there at the same time as which others, (S, A)."""
+    begin = np.maximum(one.appears[:, None], other.appears)
+    return begin < np.minimum(one.vanishes[:, None], other.vanishes)
 
 
 def _chords(segments: Segments, arcs: Arcs, near: float) -> Bools:

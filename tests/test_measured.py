@@ -221,7 +221,8 @@ FILMED = [[0.0, 1.0, -2.0], [0.25, 1.5, -2.5], [0.5, 2.0, -3.5]]
     ],
     ids=[
         "no names", "no names, spaces", "no names, decimal commas", "numbers",
-        "numbers below names", "names and units", "numbers and units", "frames", "frames, no names", "times not believed",
+        "numbers below names", "names and units", "numbers and units", "frames",
+        "frames, no names", "times not believed",
         "numbers of frames", "a comma in a name",
     ],
 )  # fmt: skip

@@ -228,6 +228,20 @@ def test_settings_change_the_run():
 # run: an accuracy that is asked for
 
 
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("run", "perpendicular", "--set", "incoming.speed=2,5"),
+        ("sweep", "perpendicular", "--vary", "incoming.speed=2,5:3:2"),
+        ("sweep", "perpendicular", "--uncertainty", "incoming.speed=2,5±0.1"),
+        ("solve", "perpendicular", "--vary", "incoming.speed=2,5:3", "--target", "x3=1"),
+        ("solve", "perpendicular", "--vary", "incoming.speed=1:3", "--target", "x3=2,5"),
+    ],
+)
+def test_a_decimal_comma_is_answered_with_the_point(arguments):
+    assert "write 2.5, with a decimal point" in refused(*arguments)
+
+
 def test_a_run_says_that_a_disk_rolls_instead_of_being_carried():
     settings = ("--set", "particle.spin=true", "--set", "outgoing.length=8")
     text = " ".join(call("run", "belt-landing", *settings).stdout.split())

@@ -146,7 +146,7 @@ def test_formulas_written_out_by_hand_are_right(name):
 def test_answers_are_exact_and_the_tolerance_is_the_one_stated(name):
     task = lesson(name, "tolerance")
     for number, answer in enumerate(solution(name, task.given), start=1):
-        assert "to within 1 %" in task.question(number).text
+        assert "rounded to 3 digits (right to within 1 %)" in task.question(number).text
         case = draw(EXERCISES[name], "tolerance")[1][number - 1]
         assert case.right == pytest.approx(answer, rel=1e-4)  # told numbers have four digits
         assert task.check(number, case.right * 1.0099).right
@@ -316,7 +316,7 @@ def test_what_is_no_known_mistake_is_told_how_far_off_it_is():
     task = lesson("the-parabola", "x")
     right = solution("the-parabola", task.given)[0]
     replies = {
-        1.03: "about 3 % too large. Were numbers rounded",
+        1.03: "about 3 % too large. Were numbers rounded on the way, or is g not 9.81 m/s²?",
         0.97: "about 3 % too small",
         1.23: "about 23 % too large",
         3.3: "a factor of 3.3 too large",
@@ -330,6 +330,74 @@ def test_what_is_no_known_mistake_is_told_how_far_off_it_is():
         reply = task.check(1, ratio * right)
         assert reply.verdict is Verdict.OFF
         assert text in reply.text, (ratio, reply)
+
+
+# Questions whose answers have no g in their formula, by lesson; all others have.
+WITHOUT_GRAVITY = {
+    "the-bounce": {1, 4},
+    "turning-the-plate": {1, 2, 3},
+    "landing": {1, 2, 4},
+    "a-stream": {1, 2, 4},
+    "trust": {1, 2, 3, 4},
+}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_another_g_is_suspected_where_there_is_one(name):
+    task = lesson(name, "gravity")
+    for number, right in enumerate(solution(name, task.given), start=1):
+        reply = task.check(number, 1.03 * right)
+        assert "Were numbers rounded on the way" in reply.text
+        assert ("g not 9.81" in reply.text) == (number not in WITHOUT_GRAVITY.get(name, ()))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_two_mistakes_at_once_are_both_named(name):
+    found = {-1.0: 0, 1e3: 0, 1e-3: 0}
+    for student in FEW[:3]:
+        task = lesson(name, student)
+        for number in (1, 2, 3, 4):
+            for mistake, formula in MISTAKES[name, number].items():
+                for factor in found:
+                    reply = task.check(number, factor * formula(task.given))
+                    besides = "sign or direction" if factor < 0.0 else "power of ten"
+                    if reply.mistake == f"{mistake}, and {besides}":
+                        found[factor] += 1
+                        assert (
+                            "large" if factor > 1.0 else "small" if factor > 0.0 else "sign"
+                        ) in reply.text.partition("Besides, ")[2]
+    # Some pairs are another mistake by itself, or one of two pairs: those are not named so.
+    made = 3 * sum(len(MISTAKES[name, number]) for number in (1, 2, 3, 4))
+    assert min(found.values()) > 0.65 * made
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_random_answer_is_named_for_a_mistake_that_leads_elsewhere(name):
+    task = lesson(name, "random")
+    cases = draw(EXERCISES[name], "random")[1]
+    for i, (times, power) in enumerate(np.random.default_rng(3).normal(size=(1000, 2)).tolist()):
+        number = 1 + i % 4
+        answer = cases[number - 1].right * times * 10.0**power
+        reply = judge(cases[number - 1], answer)
+        first, _, besides = reply.mistake.partition(", and ")
+        if first in MISTAKES[name, number]:
+            leads = MISTAKES[name, number][first](task.given)
+            factors = [1.0] if not besides else [-1.0] if "sign" in besides else [1e3, 1e-3]
+            assert any(answer == pytest.approx(leads * one, rel=0.0101) for one in factors)
+
+
+def test_somebody_elses_right_answer_is_recognised():
+    mine, neighbour = lesson("the-parabola", "Ada"), lesson("the-parabola", "Bea")
+    theirs = solution("the-parabola", neighbour.given)[1]
+    for answer in (theirs, float(f"{theirs:.3g}")):
+        reply = mine.check(2, answer)
+        assert (reply.verdict, reply.mistake) == (Verdict.MISTAKE, "somebody else's numbers")
+        assert "the numbers of “Bea”" in reply.text
+    assert mine.check(2, 1.004 * theirs).mistake != "somebody else's numbers"
+    assert neighbour.check(2, theirs).right
+    unnamed = lesson("trust", "your name").given
+    reply = lesson("trust", "Ada").check(1, solution("trust", unnamed)[0])
+    assert "the numbers of “your name”" in reply.text
 
 
 def exchange(name):
@@ -373,7 +441,9 @@ class Rude:
 
 NOTHING = [None, ..., "", "  ", "...", "?", [], (), np.array([])]
 NO_NUMBER = [
-    ("2 m/s", "unit"), ("2,5", "2.5"), ("-1.5", "-1.5"), ("two", "text"), (b"2", "quotes"),
+    ((0, 35), "a point: 0.35"), ([0, 35], "2 values"), ((0, 3, 5), "3 values"),
+    ("0,35", "0.35"), ("2 m/s", "unit"), ("2,5", "2.5"), ("-1.5", "-1.5"), ("two", "text"),
+    (b"2", "quotes"),
     (True, "comparison"), (np.True_, "comparison"), (nan, "NaN"), (np.float64("nan"), "NaN"),
     (float("inf"), "infinite"), (10**400, "infinite"), (1 + 2j, "complex"),
     (np.complex128(1), "complex"), ([1.0, 2.0], "2 values"), (np.zeros((2, 2)), "4 values"),

@@ -192,6 +192,24 @@ def test_a_class_is_graded_whatever_comes_back(tmp_path, in_own_tmp):
         assert (rows[name].marks, rows[name].out_of) == ((), 0)
 
 
+def test_the_table_marks_working_that_was_shown_and_others_right_answers(tmp_path):
+    cells = [OPEN.format("Ada"), first_of("Ada"), "task.reveal(2)"]
+    saved(tmp_path, "ada.ipynb", *cells)
+    saved(tmp_path, "ben.ipynb", OPEN.format("Ben"), first_of("Ada"))
+    saved(tmp_path, "cleo.ipynb", OPEN.format("Cleo"), first_of("Dan"))
+    saved(tmp_path, "dan.ipynb", OPEN.format("Dan"), first_of("Dan"))
+    reasons = [row.reason for row in grade(sorted(tmp_path.glob("*.ipynb")))]
+    assert reasons == [
+        "",
+        "answers 1 are right for the numbers of Ada",
+        "",
+        f"answers 1 of {tmp_path / 'cleo.ipynb'} are right for these numbers",
+    ]
+    shown = CliRunner().invoke(main, ["lesson", "grade", str(tmp_path / "ada.ipynb")])
+    assert "*: working shown" in shown.output
+    assert "1 of 4 (1 0* 0 0)" in shown.output
+
+
 def test_what_hangs_and_prints_is_stopped_and_marked_for_what_it_had(tmp_path, in_own_tmp):
     flood = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"
     flood += f"{first_of('Di')}\nwhile True: print('x' * 1_000_000)"

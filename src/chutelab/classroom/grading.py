@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import os
 import stat
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from math import isfinite
@@ -21,7 +21,7 @@ from typing import Any, Final
 from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises.catalogue import LONGEST_NAME, OPENED, UNNAMED
 from chutelab.classroom.exercises.exercise import draw, plain
-from chutelab.classroom.exercises.judging import judge
+from chutelab.classroom.exercises.judging import is_rounded, judge
 from chutelab.classroom.kernel import ForgedError, run
 from chutelab.util.errors import InputError, MissingLibraryError, printable
 from chutelab.util.files import csv_lines
@@ -93,6 +93,7 @@ class Grade:
     out_of: int = 0  # number of questions
     revealed: tuple[int, ...] = ()  # questions whose working was shown; they count all the same
     reason: str = ""  # what to know about this row
+    answers: Mapping[int, float] = field(default_factory=dict, compare=False)  # by question
 
     @property
     def total(self) -> int:
@@ -130,6 +131,7 @@ def grade(paths: Iterable[str | Path], time_limit: float = 60.0) -> Iterator[Gra
 
 def _each(files: list[str], time_limit: float) -> Iterator[Grade]:
     first: dict[tuple[str, str], str] = {}
+    rows: list[Grade] = []
     for file in files:
         try:
             row = _grade(file, time_limit)
@@ -144,8 +146,28 @@ def _each(files: list[str], time_limit: float) -> Iterator[Grade]:
         if row.lesson and who in first:
             same = printable(f"same lesson and student as {first[who]}")
             row = replace(row, reason="; ".join(filter(None, [row.reason, same])))
+        elif row.lesson:
+            row = replace(row, reason="; ".join(filter(None, [row.reason, *_copied(row, rows)])))
+            rows.append(row)
         first.setdefault(who, file)
         yield row
+
+
+def _copied(row: Grade, before: Iterable[Grade]) -> Iterator[str]:
+    """Say which wrong answers are right for the numbers of somebody before, or the other way."""
+    for other in before:
+        if other.lesson == row.lesson:
+            if found := _right_for(row, other):
+                yield printable(f"answers {found} are right for the numbers of {other.student}")
+            if found := _right_for(other, row):
+                yield printable(f"answers {found} of {other.file} are right for these numbers")
+
+
+def _right_for(row: Grade, other: Grade) -> str:
+    """Return the questions whose answers are wrong, and right for the numbers of another."""
+    _, cases = draw(EXERCISES[row.lesson], other.student)
+    wrong = [n for n, mark in enumerate(row.marks, 1) if not mark and n in row.answers]
+    return ", ".join(str(n) for n in wrong if is_rounded(row.answers[n], cases[n - 1].right))
 
 
 def write_csv(grades: Iterable[Grade], path: str | Path) -> Path:
@@ -228,6 +250,7 @@ def _grade(file: str, time_limit: float) -> Grade:
         out_of=len(right),
         revealed=tuple(sorted(work.revealed)),
         reason="; ".join(filter(None, reasons)),
+        answers=work.answers,
     )
 
 

@@ -247,7 +247,8 @@ def grade(files: tuple[Path, ...], out: Path | None, time_limit: float, quiet: b
 
     Marks say which numbers were handed in, not how they were found: whoever looks for the right
     ones finds them, by trying until the replies say so, with chutelab's own theory, or in the
-    exercises' source. Working that was shown in the notebook is in the column "revealed".
+    exercises' source. Working that was shown in the notebook is in the column "revealed", and has
+    a * in the table.
 
     Ctrl-C, or a crash, keeps the marks so far, in FILE.part.
 
@@ -306,10 +307,11 @@ def grade(files: tuple[Path, ...], out: Path | None, time_limit: float, quiet: b
         console.say(f"wrote {out}")
 
 
-HEADS = ("file", "student", "lesson", "marks", "remarks")
+HEADS = ("file", "student", "lesson", "marks (*: working shown)", "remarks")
 
 
 def _cells(one: Grade) -> tuple[str, ...]:
     """Return the cells of a notebook's row in the table, see `HEADS`."""
-    marks = f"{one.total} of {one.out_of} ({' '.join(map(str, one.marks))})"
+    shown = (f"{mark}*" if n in one.revealed else str(mark) for n, mark in enumerate(one.marks, 1))
+    marks = f"{one.total} of {one.out_of} ({' '.join(shown)})"
     return (one.file, one.student, one.lesson, marks if one.marks else "-", one.reason)

@@ -22,6 +22,8 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema
 
+from chutelab.util.errors import about_comma
+
 
 class Table(BaseModel):
     """What all tables share: frozen, and strangers refused."""
@@ -64,7 +66,7 @@ UNITS: Final = {
 """Units that are understood, each as an SI unit (degrees for angles) and how many of those it is;
 % is a share, and "" what is only counted."""
 
-SIZE: Final = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) *([^\s\d].*)?")
+SIZE: Final = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?) *([^\s\d,].*)?")
 """A number and its unit, if there is one."""
 
 
@@ -84,7 +86,7 @@ def read_size(text: str) -> tuple[float, str]:
     # Both signs of micro are on keyboards; they look alike.
     match = SIZE.fullmatch(text.strip().replace("\N{GREEK SMALL LETTER MU}", "\N{MICRO SIGN}"))
     if match is None:
-        raise ValueError("no number with a unit")
+        raise ValueError(f"no number with a unit{about_comma(text)}")
     written = match[2] or ""
     if written not in UNITS:
         raise ValueError(f"unknown unit {written}")

@@ -27,7 +27,7 @@ from chutelab.scene.overrides import (
 from chutelab.scene.schema import DEFAULTS, Scene, plain_number
 from chutelab.scene.units import SIZE, read_size
 from chutelab.util.arrays import Bools, Floats
-from chutelab.util.errors import MISSING, InputError
+from chutelab.util.errors import MISSING, InputError, about_comma
 
 MOST_VALUES: Final = 10_000
 """Values of one key; more would be a slip of the keyboard."""
@@ -140,7 +140,8 @@ def _numbers(typed: str, parts: Sequence[str], form: str) -> tuple[tuple[float, 
             match = SIZE.fullmatch(part.strip())
             value, unit = (float(match[1]), match[2]) if match else (nan, "")
         if not isfinite(value):
-            raise InputError(f"{part.strip() or 'nothing'} is not a number; it {form}", typed)
+            found = part.strip() or "nothing"
+            raise InputError(f"{found} is not a number; it {form}{about_comma(found)}", typed)
         values.append(value)
         if unit or value != 0.0:
             units.add(unit)

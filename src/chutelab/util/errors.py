@@ -35,6 +35,16 @@ _LISTED: Final = 40
 _DECIMAL_COMMA: Final = re.compile(r"(?:^|=\s*)([-+]?\d+),(\d+)\s*\S*$")
 
 
+def about_comma(text: str) -> str:
+    """Return what to add to a message if a text ends with a decimal comma, else "".
+
+    >>> about_comma("speed=2,5 m/s")
+    '; write 2.5, with a decimal point'
+    """
+    comma = _DECIMAL_COMMA.search(text)
+    return f"; write {comma[1]}.{comma[2]}, with a decimal point" if comma else ""
+
+
 class _Missing:
     def __repr__(self) -> str:
         return "missing"
@@ -77,10 +87,8 @@ class Fault:
             return f"{key} is missing: {allowed}"
         if self.value is None:
             return f"{key}: {allowed}"
-        comma = _DECIMAL_COMMA.search(self.value) if isinstance(self.value, str) else None
-        if comma:
-            allowed += f"; write {comma[1]}.{comma[2]}, with a decimal point"
-        return f"{key} = {shown(self.value)}: {allowed}"
+        comma = about_comma(self.value) if isinstance(self.value, str) else ""
+        return f"{key} = {shown(self.value)}: {allowed}{comma}"
 
 
 class InputError(ValueError):

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import difflib
 from collections import deque
+from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Final
 
 from chutelab.classroom.exercises import judging
 from chutelab.classroom.exercises.exercise import (
+    ROUNDED,
     TOLERANCE,
     Case,
     Exercise,
     Numbers,
+    Values,
     draw,
+    plain,
     read,
     shown,
 )
@@ -105,7 +110,8 @@ class Task:
             reply = Reply(standing.number, Verdict.UNREAD, value)
         else:
             standing.answer = value
-            reply = judging.judge(_case(self, standing.number), value)
+            n = standing.number
+            reply = judging.judge(_case(self, n), value, _of_others(self, n))
         standing.tries += 1
         standing.verdict = reply.verdict
         return reply
@@ -183,9 +189,30 @@ class Task:
 
 def _case(task: Task, number: int) -> Case:
     """Return a question with a student's numbers, and all that follows from them."""
+    return _case_of(EXERCISES[task.lesson], task.given, number)
+
+
+def _case_of(exercise: Exercise, given: Values, number: int) -> Case:
+    drawn = {name: given[name] for name in given}
+    return Case(number, exercise.questions[number - 1], Numbers(drawn, exercise.formulas))
+
+
+def _of_others(task: Task, number: int) -> Iterator[tuple[str, float]]:
+    """Yield the right answers for the other names of this process's tasks, and for no name."""
     exercise = EXERCISES[task.lesson]
-    given = {name: task.given[name] for name in task.given}
-    return Case(number, exercise.questions[number - 1], Numbers(given, exercise.formulas))
+    given = {plain(UNNAMED): (UNNAMED, _of_nobody(exercise.name))}
+    for one in list(OPENED):  # another thread may be opening one
+        if one.lesson == task.lesson:
+            given.setdefault(plain(one.student), (one.student, one.given))
+    given.pop(plain(task.student), None)
+    for name, values in given.values():
+        yield f"“{name}”", _case_of(exercise, values, number).right
+
+
+@cache
+def _of_nobody(name: str) -> Values:
+    """Return the parameters that belong to no name."""
+    return draw(EXERCISES[name], UNNAMED)[0]
 
 
 def _story(task: Task) -> str:
@@ -194,7 +221,10 @@ def _story(task: Task) -> str:
 
 def _asked(case: Case) -> Passage:
     asked = case.question
-    needed = f"Answer in: {asked.unit or 'a pure number'}, to within {100 * TOLERANCE:g} %."
+    needed = (
+        f"Answer in: {asked.unit or 'a pure number'}, rounded to {ROUNDED} digits (right to within"
+        f" {100 * TOLERANCE:g} %)."
+    )
     text = f"{case.numbers.text(asked.text)}\n{needed}"
     return Passage(case.number, f"Question {case.number}: {asked.title}", text, asked.unit)
 

@@ -18,10 +18,10 @@ import tomllib
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from hashlib import sha256
 from itertools import combinations
-from math import degrees, isfinite, radians
+from math import degrees, isclose, isfinite, radians
 from pathlib import Path
 from types import CodeType, SimpleNamespace
 from typing import Any, Final
@@ -33,6 +33,9 @@ DIGITS: Final = 4
 
 TOLERANCE: Final = 0.01
 """Relative difference within which an answer counts as right."""
+
+ROUNDED: Final = 3
+"""Significant digits that are asked for: rounding to them costs at most half the tolerance."""
 
 
 class Values:
@@ -79,9 +82,9 @@ def shown(number: float) -> str:
     return f"{mantissa}e{int(power)}" if power else mantissa
 
 
-def _carried(**arguments: Any) -> SimpleNamespace:
+def _carried(gravity: float, **arguments: Any) -> SimpleNamespace:
     """Return what `chutelab.theory.transfer` finds, as numbers and lists of numbers."""
-    found = transfer(**arguments)
+    found = transfer(**arguments, gravity=gravity)
     return SimpleNamespace(**{f.name: getattr(found, f.name).tolist() for f in fields(found)})
 
 
@@ -89,14 +92,15 @@ _OF_MATH: Final = (
     "acos", "asin", "atan", "atan2", "cos", "degrees", "hypot", "inf", "log", "log10", "radians",
     "sin", "sqrt",
 )  # fmt: skip
+GRAVITY: Final = 9.81
+"""m/s²."""
+
 FUNCTIONS: Final[dict[str, Any]] = {
     "__builtins__": {},
-    "g": 9.81,
-    "transfer": _carried,
     **{one.__name__: one for one in (abs, dict, round)},
     **{name: getattr(math, name) for name in _OF_MATH},
 }
-"""What formulas know besides the exercise's own names; g in m/s²."""
+"""What formulas know besides the exercise's own names, g and `chutelab.theory.transfer`."""
 
 
 @cache
@@ -107,12 +111,16 @@ def _compiled(formula: str) -> CodeType:
 class Numbers(dict[str, Any]):
     """The parameters of one draw and all that follows from them, by name.
 
-    A formula is computed when its number is first asked for.
+    A formula is computed when its number is first asked for; g is `gravity`, m/s².
     """
 
-    def __init__(self, drawn: Mapping[str, float], formulas: Mapping[str, str]) -> None:
+    def __init__(
+        self, drawn: Mapping[str, float], formulas: Mapping[str, str], gravity: float = GRAVITY
+    ) -> None:
         super().__init__(drawn)
+        self.drawn = tuple(drawn)
         self.formulas = formulas
+        self.known = {**FUNCTIONS, "g": gravity, "transfer": partial(_carried, gravity)}
 
     def __missing__(self, name: str) -> Any:
         # A KeyError sends `eval` on to FUNCTIONS.
@@ -121,7 +129,7 @@ class Numbers(dict[str, Any]):
 
     def of(self, formula: str) -> Any:
         """Return the value of a formula."""
-        return eval(_compiled(formula), FUNCTIONS, self)
+        return eval(_compiled(formula), self.known, self)
 
     def text(self, template: str) -> str:
         """Return a template on one line, with every ``{name}`` replaced by its number."""
@@ -261,6 +269,13 @@ OF_ANGLES: Final = (
 )
 """Those of answers in degrees besides."""
 
+BESIDES: Final = (
+    ("sign or direction", "Besides, the sign is the other way round.", -1.0),
+    ("power of ten", "Besides, it is 1000 times too large: kg for g, m for mm?", 1e3),
+    ("power of ten", "Besides, it is 1000 times too small: kg for g, m for mm?", 1e-3),
+)
+"""What is common on top of a question's own mistake, and its factor."""
+
 LEAST: Final = 1e-9
 """An answer smaller than that in its unit has no digits to judge."""
 
@@ -289,6 +304,23 @@ class Case:
         general = GENERAL + OF_ANGLES if self.question.unit == "degrees" else GENERAL
         kept = [trace for trace in general if trace.name not in replaced]
         return (*own, *(replace(trace, number=self.right * trace.number) for trace in kept))
+
+    @property
+    def pairs(self) -> Iterator[Trace]:
+        """A mistake of the question's own, and a general one of `BESIDES` on top of it."""
+        own = {known.name for known in self.question.mistakes}
+        for first in self.mistakes[: len(own)]:
+            for name, says, factor in BESIDES:
+                if name not in own:
+                    both = f"{first.name}, and {name}"
+                    yield Trace(both, f"{first.says} {says}", factor * first.number)
+
+    @cached_property
+    def feels_gravity(self) -> bool:
+        """Whether the right answer is another one where g is."""
+        given = {name: self.numbers[name] for name in self.numbers.drawn}
+        other = Numbers(given, self.numbers.formulas, 1.001 * GRAVITY)
+        return not isclose(float(other.of(self.question.answer)), self.right, rel_tol=1e-9)
 
     @property
     def clear(self) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from html import escape
@@ -17,7 +17,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from chutelab.classroom.exercises.exercise import TOLERANCE, Case, shown
+from chutelab.classroom.exercises.exercise import DIGITS, GRAVITY, ROUNDED, TOLERANCE, Case, shown
 from chutelab.pictures import GREEN, GREY, ORANGE, SKY, VERMILION
 from chutelab.util.tables import Sheet
 
@@ -234,10 +234,7 @@ def _read(answer: Any) -> float | str | None:
     if isinstance(answer, (list, tuple, np.ndarray)):
         items = answer.ravel().tolist() if isinstance(answer, np.ndarray) else answer
         if len(items) > 1:
-            return (
-                f"Those are {len(items)} values, and one number is asked for. Pick it, with [0]"
-                " say."
-            )
+            return _of_several(answer, items)
         return _read(items[0]) if items else None
     if callable(answer):
         return "That is a function, not its result. Call it, with its numbers in parentheses."
@@ -248,6 +245,17 @@ def _read(answer: Any) -> float | str | None:
             " arccos of more than 1 or 0 / 0. Print the steps one by one."
         )
     return "That is infinite. Was something divided by zero?" if isinf(value) else value
+
+
+def _of_several(answer: object, items: Sequence[Any]) -> str:
+    """Say what to do about several values: one to pick, or a decimal comma, which makes two."""
+    match answer:
+        case (int(whole), int(digits)) if type(answer) is tuple and digits >= 0:
+            return (
+                f"Python takes {whole},{digits} for two numbers. Write the decimal comma as a"
+                f" point: {whole}.{digits}."
+            )
+    return f"Those are {len(items)} values, and one number is asked for. Pick it, with [0] say."
 
 
 def _of_text(text: str) -> str | None:
@@ -266,20 +274,55 @@ def _of_text(text: str) -> str | None:
     return f"That is text. Give the number without quotes: {bare}."
 
 
-def judge(case: Case, answer: float) -> Reply:
-    """Judge a finite answer: the right number first, then the known mistakes, then how far off."""
-    if abs(answer - case.right) <= TOLERANCE * abs(case.right):
+CLOSE: Final = 0.05
+"""Relative difference up to which rounding, or another g, is the likely reason."""
+
+
+def is_close(answer: float, number: float) -> bool:
+    """Tell whether an answer stands for a number: whether it is within the tolerance."""
+    return abs(answer - number) <= TOLERANCE * abs(number)
+
+
+def is_rounded(answer: float, number: float) -> bool:
+    """Tell whether an answer is a number, rounded to three digits or more.
+
+    >>> is_rounded(0.452, 0.45189), is_rounded(0.4519, 0.45189), is_rounded(0.4512, 0.45189)
+    (True, True, False)
+    """
+    digits = f"{answer:.15e}".partition("e")[0].rstrip("0")
+    kept = min(max(sum(map(str.isdigit, digits)), ROUNDED), DIGITS)
+    return f"{answer:.{kept - 1}e}" == f"{number:.{kept - 1}e}"
+
+
+def judge(case: Case, answer: float, others: Iterable[tuple[str, float]] = ()) -> Reply:
+    """Judge a finite answer.
+
+    It is the right one, or a known mistake, or the right one of somebody else, or two mistakes at
+    once, or off.
+
+    Parameters
+    ----------
+    others
+        Name and right answer to the same question of others; looked at only if need be.
+    """
+    if is_close(answer, case.right):
         found = f"{shown(answer)} {case.question.unit}".strip()
         text = f"{found} is within {100 * TOLERANCE:g} % of what the theory gives."
         return Reply(case.number, Verdict.RIGHT, text)
     for trace in case.mistakes:
-        if abs(answer - trace.number) <= TOLERANCE * abs(trace.number):
+        if is_close(answer, trace.number):
             return Reply(case.number, Verdict.MISTAKE, trace.says, trace.name)
+    for name, number in others:
+        if is_rounded(answer, number):
+            says = f"That is right for the numbers of {name}, and yours are different ones."
+            return Reply(case.number, Verdict.MISTAKE, says, "somebody else's numbers")
+    # What is close has hardly two mistakes in it, and what two pairs lead to tells of neither.
+    near = abs(answer / case.right - 1.0) <= CLOSE
+    pairs = [trace for trace in case.pairs if is_close(answer, trace.number)]
+    if len(pairs) == 1 and not near:
+        return Reply(case.number, Verdict.MISTAKE, pairs[0].says, pairs[0].name)
     return Reply(case.number, Verdict.OFF, _distance(case, answer))
 
-
-CLOSE: Final = 0.05
-"""Relative difference up to which rounding, or another g, is the likely reason."""
 
 FAR: Final = 10.0
 """Ratio from which on a percentage says less than a factor."""
@@ -296,9 +339,9 @@ def _distance(case: Case, answer: float) -> str:
     off = abs(ratio - 1.0)
     way = "large" if ratio > 1.0 else "small"
     if off <= CLOSE:
+        gravity = f", or is g not {GRAVITY} m/s²" if case.feels_gravity else ""
         return (
-            f"Close: about {100 * off:.0f} % too {way}. Were numbers rounded on the way, or is g"
-            " not 9.81 m/s²?"
+            f"Close: about {100 * off:.0f} % too {way}. Were numbers rounded on the way{gravity}?"
         )
     if 1.0 / FAR < ratio < FAR:
         factor = max(ratio, 1.0 / ratio)

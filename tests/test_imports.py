@@ -103,7 +103,7 @@ def test_importing_the_package_loads_nothing():
 def test_the_package_offers_what_it_promises():
     for name in chutelab.__all__:
         assert getattr(chutelab, name) is not None
-        assert name in dir(chutelab)
+    assert dir(chutelab) == sorted(chutelab.__all__)
     with pytest.raises(AttributeError, match="no attribute 'belt'"):
         chutelab.belt  # noqa: B018
 

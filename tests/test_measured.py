@@ -160,7 +160,7 @@ HEAD = "A\nt,x,y\n"
     ("text", "said"),
     [
         ("", "empty; no line names the columns t, x, y"),
-        ("0,1,2\n1,2,3\n2,3,4\n", 'line 1 = "0,1,2": no line names the columns t, x, y'),
+        ("0,1,2,3\n1,2,3,4\n", 'line 1 = "0,1,2,3": no line names the columns t, x, y'),
         ("A\nt,x,z\n0,1,2\n", "line 2: no column y; t, x, y are needed"),
         (HEAD + "0,1,2\n1,two,3\n", 'line 4, column x = "two": must be a number from'),
         (HEAD + "0,1,2\n1,inf,3\n", 'line 4, column x = "inf": must be a number from'),
@@ -196,6 +196,68 @@ def test_any_text_is_a_track_or_refused_with_words(tmp_path_factory, lines):
         assert (np.diff(track.t) > 0.0).all()
         assert np.isfinite(track.position).all()
     assert refused is None or str(path) in str(refused)
+
+
+FILMED = [[0.0, 1.0, -2.0], [0.25, 1.5, -2.5], [0.5, 2.0, -3.5]]
+
+
+@pytest.mark.parametrize(
+    ("text", "given"),
+    [
+        ("0,1,-2\n.25,1.5,-2.5\n.5,2,-3.5\n", {}),
+        ("# mine\n\n0 1 -2\n.25 1.5 -2.5\n.5 2 -3.5\n", {}),
+        ("0,0;1,0;-2\n,25;1,5;-2,5\n,5;2,0;-3,5\n", {}),
+        ("7;-2;1;0\n7;-2,5;1,5;,25\n7;-3,5;2;,5\n", {"columns": (4, 3, 2)}),
+        ("Zeit;hoch;weit\n0;-2;1\n,25;-2,5;1,5\n,5;-3,5;2\n", {"columns": ("1", "3", "2")}),
+        ("A\nZeit (ms);hoch [cm];weit [cm]\n0;-200;100\n250;-250;150\n500;-350;200\n",
+         {"columns": ("zeit", "Weit", "hoch [cm]")}),
+        ("s,up (mm),far (mm)\n0,-2000,1000\n.25,-2500,1500\n.5,-3500,2000\n",
+         {"columns": (1, 3, 2)}),
+        ("x,y\n1,-2\n1.5,-2.5\n2,-3.5\n", {"fps": 4}),
+        ("1,-2\n1.5,-2.5\n2,-3.5\n", {"fps": 4}),
+        ("t,x,y\n9,1,-2\n9,1.5,-2.5\n9,2,-3.5\n", {"fps": 4, "columns": ("x", "y")}),
+        ("n,x,y\n0,1,-2\n60,1.5,-2.5\n120,2,-3.5\n", {"fps": 240, "columns": ("n", "x", "y")}),
+        ('"a, b",x,y\n0,1,-2\n.25,1.5,-2.5\n.5,2,-3.5\n', {"columns": ("a, b", "x", "y")}),
+    ],
+    ids=[
+        "no names", "no names, spaces", "no names, decimal commas", "numbers",
+        "numbers below names", "names and units", "numbers and units", "frames",
+        "frames, no names", "times not believed",
+        "numbers of frames", "a comma in a name",
+    ],
+)  # fmt: skip
+def test_reads_columns_that_are_chosen_or_alone(tmp_path, text, given):
+    track = measured.read(written(tmp_path, text), **given)
+    assert np.column_stack([track.t, track.position]) == pytest.approx(np.array(FILMED), abs=1e-15)
+
+
+def test_a_frame_without_a_mark_takes_its_time(tmp_path):
+    path = written(tmp_path, "x,y\n,\n1,2\n,\n\n2,3\n3,4\n")
+    for columns in ((), (1, 2), ("x", "y")):
+        track = measured.read(path, fps=10.0, columns=columns)
+        assert track.t.tolist() == [0.1, 0.3, 0.4]
+        assert track.skipped == 2
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"fps": 0.0}, "fps = 0.0: must be a number > 0"),
+        ({"fps": float("nan")}, "fps = nan: must be"),
+        ({"fps": 25.0}, "line 1: has a column t, so no frames per second are needed"),
+        ({"columns": ("t", "x")}, 'columns = "t,x": must be 3 different ones, for t,x,y'),
+        ({"columns": ("t", "x", "X")}, "must be 3 different ones"),
+        ({"columns": ("t", "x", "z")}, 'columns = "t,x,z": no line has these columns'),
+        ({"columns": (1, 2, 9)}, 'columns = "1,2,9": no line has these columns'),
+        ({"columns": (0, 1, 2)}, "numbers from 1"),
+        ({"columns": (1, 2, 3), "track": "A"}, "give one of them"),
+    ],
+)
+def test_says_which_columns_cannot_be_had(tmp_path, given, said):
+    path = written(tmp_path, "t,x,y\n0,1,2\n1,2,3\n2,3,4\n")
+    with pytest.raises(MeasuredError) as error:
+        measured.read(path, **given)
+    assert said in str(error.value)
 
 
 def test_says_which_shipped_track_may_have_been_meant(tmp_path):

@@ -440,6 +440,19 @@ def test_overlay_holds_all_its_parts(tmp_path: Path) -> None:
         assert image.size == (1560, 912)
 
 
+def test_given_axes_get_the_scene_and_keep_what_is_theirs(tmp_path: Path) -> None:
+    figure = Figure()
+    mine, other = figure.subplots(1, 2)
+    mine.set_title("A", loc="left")
+    assert plots.overlay(by_hand(), ax=mine) is figure
+    assert {one.get_gid() for one in mine.lines} >= {"track", "analytic", "strobe", "impacts"}
+    assert mine.get_title("left") == "A"
+    assert figure.axes == [mine, other]
+    assert not other.has_data()
+    with pytest.raises(ValueError, match="path and ax"):
+        plots.overlay(by_hand(), ax=mine, path=tmp_path / "overlay.png")
+
+
 def test_given_prediction_is_the_one_drawn() -> None:
     recording = by_hand()
     other = recording.prediction

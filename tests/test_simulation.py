@@ -218,3 +218,14 @@ def test_a_run_that_is_over_is_not_stopped_by_the_last_look():
 def test_a_time_limit_is_a_number_above_0(seconds):
     with pytest.raises(ValueError, match=r"max_seconds = .*: a finite number above 0 s"):
         simulate(loaded("perpendicular"), max_seconds=seconds)
+
+
+def test_a_name_a_path_and_tables_are_run_as_the_scene_is(tmp_path):
+    loaded = scene.load("perpendicular")
+    path = tmp_path / "mine.toml"
+    path.write_text(scene.to_toml(loaded))
+    whole = simulate(loaded)
+    for given in ("perpendicular", path, str(path), scene.to_dict(loaded)):
+        assert (simulate(given).knots == whole.knots).all()
+    with pytest.raises(scene.SceneError, match="no shipped scene"):
+        simulate("perpendicularly speaking")

@@ -6,6 +6,7 @@ import csv
 import json
 import os
 import re
+import sys
 import tracemalloc
 import zipfile
 from dataclasses import fields, replace
@@ -520,3 +521,23 @@ def test_a_step_must_be_positive_and_finite(tmp_path, step):
     with pytest.raises(ValueError, match="step"):
         run().to_csv(tmp_path, step=step)
     assert listing(tmp_path) == []
+
+
+@pytest.mark.parametrize("name", ["events", "trajectory"])
+def test_frames_are_what_the_csv_files_are_read_as(tmp_path, name):
+    pandas = pytest.importorskip("pandas")
+    recording = run("stream", "stream.count=5")
+    recording.to_csv(tmp_path, step=0.05)
+    read = pandas.read_csv(tmp_path / f"{name}.csv")
+    found = recording.frame(name, step=0.05)
+    pandas.testing.assert_frame_equal(found, read, check_dtype=False, rtol=1e-15)
+    with pytest.raises(ValueError, match="table = 'tracks': one of events, trajectory"):
+        recording.frame("tracks")
+    with pytest.raises(ValueError, match=r"step = -1\.0"):
+        recording.frame(name, step=-1.0)
+
+
+def test_a_frame_without_pandas_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(ImportError, match="pip install pandas"):
+        run("free-fall").frame()

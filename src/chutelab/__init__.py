@@ -1,7 +1,7 @@
 """Chutelab: one belt, one damping plate, a second belt, and every joule accounted for.
 
 >>> import chutelab
->>> recording = chutelab.simulate(chutelab.load("perpendicular"))
+>>> recording = chutelab.simulate("perpendicular")
 >>> chutelab.compare(recording).max < 1e-12
 True
 
@@ -101,4 +101,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return __all__

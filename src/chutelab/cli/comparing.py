@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
 import click
@@ -31,6 +32,18 @@ def _point(text: str) -> tuple[float, float]:
     help="A table with columns t, x, y, such as Tracker exports, or a shipped track.",
 )
 @click.option("--track", metavar="NAME", help="Which track, of a file that holds several.")
+@click.option(
+    "--columns",
+    metavar="T,X,Y",
+    default="",
+    help="Which columns are t, x and y: names or numbers, such as 1,4,5; default: t,x,y.",
+)
+@click.option(
+    "--fps",
+    metavar="F",
+    type=float,
+    help="Frames per second, for a file without times: each line is a frame.",
+)
 @click.option(
     "--scale",
     metavar="M",
@@ -67,6 +80,8 @@ def compare(
     scene: str,
     data: str,
     track: str | None,
+    columns: str,
+    fps: float | None,
     scale: float | None,
     origin: tuple[float, float],
     flip_y: bool,
@@ -81,7 +96,10 @@ def compare(
 
     FILE is a table with a line that names its columns t, x and y, such as the video-analysis
     program Tracker exports: tabs, semicolons or commas between cells, decimal points or commas,
-    other columns and empty cells do no harm. In the world, x = M (x_file - X), and y likewise, with
+    other columns and empty cells do no harm. Of other files --columns says which are t, x and y;
+    a file of three columns of numbers needs no names. --fps is for files without times: with
+    --columns X,Y every line is a frame, with --columns FRAME,X,Y the first counts them. In the
+    world, x = M (x_file - X), and y likewise, with
     --flip-y downward; the clock is t_file - S.
 
     \b
@@ -89,6 +107,7 @@ def compare(
     chutelab compare perpendicular --data perpendicular-track \\
         --fit plate.restitution,incoming.speed --out out
     chutelab compare my.toml --data film.txt --scale 0.0021 --origin 312,95 --flip-y --fit t0
+    chutelab compare my.toml --data ball.csv --columns "frame,ball x,ball y" --fps 240
 
     The shipped track perpendicular-track is not a film: it was made from a simulation with
     restitution 0.62 and 1.9 m/s, seen at 120 frames a second with an error of 1 mm in each
@@ -112,7 +131,10 @@ def compare(
     if robust and not keys:
         raise click.UsageError("--robust is for fits: name what to fit with --fit.")
     loaded = load(scene, overrides)
-    film = measured.read(data, scale=scale, origin=origin, flip_y=flip_y, t0=t0, track=track)
+    film = measured.read(
+        data, scale=scale, origin=origin, flip_y=flip_y, t0=t0, track=track,
+        columns=next(csv.reader([columns], skipinitialspace=True), ()), fps=fps,
+    )  # fmt: skip
     with destination(out, FILES) as place:
         with progress("fitting" if keys else "comparing"):
             fit = measured.fit(loaded, film, keys, robust=robust) if keys else None

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from math import inf
+from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 
 from chutelab.machine import Machine, build
 from chutelab.results import Recording
 from chutelab.results.recorder import EnoughError
-from chutelab.scene import Fault, Scene, SceneError
+from chutelab.scene import Fault, Scene, SceneError, load
 from chutelab.util.arrays import Progress
 
 ENGINES = ("auto", "exact", "contact", "pymunk")
@@ -43,7 +46,7 @@ def choose(machine: Machine, engine: str | None = None) -> str:
 
 
 def simulate(
-    scene: Scene,
+    scene: Scene | str | Path | Mapping[str, Any],
     engine: str | None = None,
     progress: Progress | None = None,
     *,
@@ -53,8 +56,8 @@ def simulate(
 
     Parameters
     ----------
-    scene : Scene
-        From `chutelab.load`.
+    scene : Scene, str, path or mapping
+        A scene, or what `chutelab.load` makes one of: a file, a name, nested mappings.
     engine : {"auto", "exact", "contact", "pymunk"}, optional
         Overrides the scene's ``run.engine``. With auto, what the exact engine cannot follow (a
         spinning disk between a moving surface and another) goes to contact.
@@ -74,7 +77,7 @@ def simulate(
     Raises
     ------
     SceneError
-        If the geometry contradicts itself, or the engine cannot run the scene.
+        If the scene cannot be loaded, its geometry contradicts itself, or the engine cannot run it.
     ValueError
         If `max_seconds` is not a finite number above 0, or there is no such engine.
     """
@@ -88,7 +91,7 @@ def simulate(
         if max_seconds is not None and perf_counter() - began > max_seconds:
             raise EnoughError
 
-    machine = build(scene)
+    machine = build(scene if isinstance(scene, Scene) else load(scene))
     return replace(
         follow(machine, engine, progress if max_seconds is None else bounded),
         seconds=perf_counter() - began,

@@ -268,6 +268,12 @@ class Recording(Shown):
 
         return to_csv(self, folder, step=step, only=only)
 
+    def frame(self, table: str = "trajectory", *, step: float | None = None) -> Any:
+        """Return positions over time, or ``"events"``, as a DataFrame; see `storage.frame`."""
+        from chutelab.results.storage import frame
+
+        return frame(self, table, step=step)
+
     @property
     def owner(self) -> Ints:
         """Whose each knot is, (K,)."""

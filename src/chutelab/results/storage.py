@@ -24,6 +24,7 @@ from chutelab.results.recording import ENTRIES, EVENT, KNOT, REASONS, Kind, Reco
 from chutelab.scene import from_dict
 from chutelab.util.errors import InputError
 from chutelab.util.files import csv_lines, whole, write_lines
+from chutelab.util.tables import frame as data_frame
 from chutelab.util.tables import plain
 
 FORMAT = 1
@@ -54,6 +55,9 @@ ENGINES = ("exact", "contact", "pymunk")
 
 FAR = 1e100
 """Bound on every number: energies and distances computed from it stay finite."""
+
+TABLES = ("events", "trajectory")
+"""What `to_csv` writes."""
 
 COLUMNS = ("t", "particle", "other", "kind", "surface")
 """Fields of an event that events.csv begins with."""
@@ -228,7 +232,7 @@ def to_csv(
     folder: str | Path,
     *,
     step: float | None = None,
-    only: Collection[str] = ("events", "trajectory"),
+    only: Collection[str] = TABLES,
 ) -> list[Path]:
     """Write events.csv and trajectory.csv, each whole or not at all.
 
@@ -249,28 +253,54 @@ def to_csv(
         If `step` is not positive and finite, or so short that the trajectory would have more than
         `MOST_ROWS` rows; nothing is written then.
     """
+    tables = {name: _table(recording, name, step) for name in TABLES if name in only}
+    return [
+        write_lines(Path(folder) / f"{name}.csv", csv_lines(rows)) for name, rows in tables.items()
+    ]
+
+
+def frame(recording: Recording, table: str = "trajectory", *, step: float | None = None) -> Any:
+    """Return what `to_csv` writes as a pandas DataFrame.
+
+    Parameters
+    ----------
+    recording : Recording
+        What to show.
+    table : {"trajectory", "events"}
+        Positions (m) and velocities (m/s) of all particles at even times (s); or what happened to
+        them, in SI units.
+    step : float, optional
+        Interval of the trajectory, s; by default that of `instants`.
+
+    Raises
+    ------
+    ImportError
+        Without pandas.
+    ValueError
+        If there is no such table, or `to_csv` would refuse the step.
+    """
+    if table not in TABLES:
+        raise ValueError(f"table = {table!r}: one of {', '.join(TABLES)}")
+    names, *rows = _table(recording, table, step)
+    return data_frame({str(name): [row[i] for row in rows] for i, name in enumerate(names)})
+
+
+def _table(recording: Recording, name: str, step: float | None) -> Iterator[Sequence[object]]:
+    """Return the rows of a table, the names of its columns first."""
     if step is not None:
         if not 0.0 < step < inf:
             raise ValueError(f"step = {step!r}: a finite number above 0 s")
         first, last = recording.ends()
         spans = float((last["t"] - first["t"]).sum())
         many = spans / step + len(first)
-        if "trajectory" in only and many > MOST_ROWS:
+        if name == "trajectory" and many > MOST_ROWS:
             room = MOST_ROWS - len(first)
             least = f"{1.05 * spans / room:.2g} s or more" if room > 0 else "none"
             raise ValueError(
-                f"step = {step!r}: trajectory.csv would have up to {many:.3g} rows, and"
+                f"step = {step!r}: the trajectory would have up to {many:.3g} rows, and"
                 f" {MOST_ROWS:,} are what a spreadsheet opens; allowed: {least}"
             )
-    written = []
-    for name, rows in (
-        ("events", _events(recording)),
-        ("trajectory", _trajectory(recording, step)),
-    ):
-        if name in only:
-            path = Path(folder) / f"{name}.csv"
-            written.append(write_lines(path, csv_lines(rows)))
-    return written
+    return _events(recording) if name == "events" else _trajectory(recording, step)
 
 
 def instants(recording: Recording) -> int:
@@ -293,7 +323,7 @@ def _events(recording: Recording) -> Iterator[Sequence[object]]:
     scalars = ("omega_before", "omega_after", "normal_impulse", "tangential_impulse")
     yield *COLUMNS, *places, *scalars
     events, kinds = recording.events, [kind.name.lower() for kind in Kind]
-    names = (*recording.surfaces, "")
+    names = (*recording.surfaces, None)
     numbers = [column for name in vectors for column in events[name].T.tolist()]
     numbers += [events[name].tolist() for name in scalars]
     heads = zip(*(events[name].tolist() for name in COLUMNS), strict=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
@@ -17,7 +17,8 @@ from chutelab.scene.conflicts import Look, conflicts
 from chutelab.scene.live import live_faults
 from chutelab.scene.messages import faults_of, nearest
 from chutelab.scene.overrides import Override, apply, joined
-from chutelab.scene.schema import DEFAULTS, Scene, as_written
+from chutelab.scene.schema import DEFAULTS, Scene, as_written, plain_number
+from chutelab.scene.units import flat
 from chutelab.util.errors import Fault, InputError, cut, did_you_mean, printable
 from chutelab.util.files import first_bytes
 
@@ -120,26 +121,61 @@ _MOST_DOTS: Final = 200
 _STARTER: Final = "`chutelab new` writes a complete scene to start from."
 
 
-def load(path: str | Path, overrides: Sequence[str | Override] = ()) -> Scene:
+Overrides = str | Override | Mapping[str, object] | Iterable["Overrides"]
+"""What is laid over a scene: a text ``KEY=VALUE``, values by key, or several of these."""
+
+
+def load(
+    scene: str | Path | Mapping[str, Any], overrides: Overrides = (), *more: Overrides
+) -> Scene:
     """Load a scene from a file or, by name, from the shipped ones.
 
     Parameters
     ----------
-    path
-        A file, or the name of a shipped scene, with or without ``.toml``.
-    overrides
-        Texts ``KEY=VALUE``, laid over the file; see `chutelab.scene.overrides.Override`.
+    scene
+        A file; the name of a shipped scene, with or without ``.toml``; or the tables of a file as
+        nested mappings.
+    overrides, *more
+        Laid over the scene, the last one wins: texts ``KEY=VALUE``; mappings of values by full
+        path, or nested as in the file; or lists of these.
 
     Raises
     ------
     SceneError
-        With all faults of the file and of the overrides.
+        With all faults of the scene and of the overrides.
+
+    Examples
+    --------
+    >>> load("perpendicular", "incoming.speed=3", "plate.angle_deg=20").incoming.speed
+    3.0
+    >>> load("perpendicular", {"incoming.speed": 3, "plate": {"angle_deg": 20}}).plate.angle_deg
+    20.0
+    >>> load({"surface": [{"name": "floor", "from": [0, 0], "to": [1, 0]}],
+    ...       "stream": {"at": [0.5, 1.0], "velocity": [0, 0]}}).surfaces
+    ('floor',)
     """
-    found = find(path)
-    return parse(_read(found), str(found), overrides)
+    overrides = (overrides, *more)
+    if isinstance(scene, Mapping):
+        return from_dict(scene, overrides=overrides)
+    found = find(scene)
+    # Of a shipped scene its name says more than a path inside an environment.
+    source = found.stem if found != Path(scene) else str(found)
+    return parse(_read(found, source), source, overrides)
 
 
-def parse(text: str, source: str = "<scene>", overrides: Sequence[str | Override] = ()) -> Scene:
+def _each(overrides: Overrides) -> Iterator[str | Override]:
+    match overrides:
+        case str() | Override():
+            yield overrides
+        case Mapping():
+            for key, value in flat(overrides).items():
+                yield Override(key, plain_number(plain(value)))
+        case _:
+            for several in overrides:
+                yield from _each(several)
+
+
+def parse(text: str, source: str = "<scene>", overrides: Overrides = ()) -> Scene:
     """Validate a scene given as TOML text; `source` is what messages call it.
 
     Raises
@@ -163,7 +199,7 @@ def parse(text: str, source: str = "<scene>", overrides: Sequence[str | Override
 
 
 def from_dict(
-    mapping: Mapping[str, Any], source: str = "<scene>", overrides: Sequence[str | Override] = ()
+    mapping: Mapping[str, Any], source: str = "<scene>", overrides: Overrides = ()
 ) -> Scene:
     """Validate a scene given as nested mappings, with the keys of the file.
 
@@ -176,7 +212,7 @@ def from_dict(
         document: dict[str, Any] = plain(mapping)
     except RecursionError as error:
         raise SceneError(source, [Fault("", None, str(error))]) from None
-    faults, given = apply(document, overrides)
+    faults, given = apply(document, _each(overrides))
     empty = not document
     if source != "<scene>":
         document.setdefault("title", cut(printable(Path(source).stem), 200))
@@ -284,8 +320,7 @@ def _traced(fault: Fault, given: Mapping[str, str]) -> Fault:
     return fault
 
 
-def _read(path: Path) -> str:
-    source = str(path)
+def _read(path: Path, source: str) -> str:
     try:
         data = first_bytes(path, _LARGEST_FILE)
     except OSError as error:

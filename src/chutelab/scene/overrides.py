@@ -9,7 +9,7 @@ import difflib
 import json
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from math import inf, nextafter
@@ -213,7 +213,7 @@ def read(text: str) -> Override:
 
 
 def apply(
-    document: dict[str, Any], overrides: Sequence[str | Override]
+    document: dict[str, Any], overrides: Iterable[str | Override]
 ) -> tuple[list[Fault], dict[str, str]]:
     """Lay overrides over a scene's tables, in place and in order; the last one wins.
 

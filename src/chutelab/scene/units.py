@@ -211,17 +211,17 @@ def _from_below_to(ends: tuple[float, float]) -> tuple[float, float]:
     return ends
 
 
-def _flat(given: object) -> object:
+def flat(given: object) -> Any:
     """Join the keys of tables inside each other: ``plate.angle_deg = 20`` is one key."""
     if not isinstance(given, Mapping):
         return given
-    flat: dict[str, object] = {}
+    found: dict[str, object] = {}
     for key, value in given.items():
-        inner = _flat(value)
-        flat |= (
+        inner = flat(value)
+        found |= (
             {f"{key}.{k}": v for k, v in inner.items()} if isinstance(inner, dict) else {key: value}
         )
-    return flat
+    return found
 
 
 Keys = Annotated[
@@ -240,13 +240,13 @@ Ranges = Annotated[
             Worded("[from, to] with from < to"),
         ],
     ],
-    BeforeValidator(_flat),
+    BeforeValidator(flat),
     Field(max_length=MOST_KEYS),
     Worded("a table of keys, each with its [from, to]"),
 ]
 Values = Annotated[
     dict[Text, Any],
-    BeforeValidator(_flat),
+    BeforeValidator(flat),
     Field(min_length=1, max_length=MOST_KEYS),
     Worded("a table of keys of the scene and their values, such as { gravity = 1.62 }"),
 ]

@@ -37,7 +37,11 @@ SIZE = (13.0, 7.6)
 
 
 def overlay(
-    recording: Recording, prediction: Transfer | None = None, *, path: str | Path | None = None
+    recording: Recording,
+    prediction: Transfer | None = None,
+    *,
+    path: str | Path | None = None,
+    ax: Axes | None = None,
 ) -> Figure:
     """Draw a recording over its analytic parabola.
 
@@ -49,24 +53,33 @@ def overlay(
         By default `chutelab.theory.predict` of the recording's scene.
     path : path, optional
         Also write the figure there, whole or not at all; the suffix says the format.
+    ax : Axes, optional
+        Draw only the scene with its tracks, and into these; ``ax.legend()`` adds the legend.
 
     Returns
     -------
     Figure
-        Scene with tracks, residual beneath it, velocity and energy ledger beside it. Where nothing
-        is known analytically, of many particles, boxes or strings: in place of the residual all
-        particles at four moments.
+        That of `ax`; or a new one, with scene and tracks, residual beneath it, velocity and energy
+        ledger beside it. Where nothing is known analytically, of many particles, boxes or strings:
+        in place of the residual all particles at four moments.
 
     Raises
     ------
     OSError
         If the file cannot be written.
+    ValueError
+        If both `path` and `ax` are given.
     """
     if prediction is None:
         prediction = recording.prediction
-    figure = Picture(SIZE)
     parts, start = analytic_of(recording, prediction)
     all_of_them = not parts and bodily(recording)
+    if ax is not None:
+        if path is not None:
+            raise ValueError("path and ax: give one; what holds the axes is yours to save")
+        draw_view(ax, recording, parts, bodies=all_of_them, legend=False)
+        return ax.figure.canvas.figure
+    figure = Picture(SIZE)
     grid = figure.add_gridspec(
         2, 1, height_ratios=(2.6 if all_of_them else 4.2, 1.0), left=0.06, right=0.56, top=0.88,
         bottom=0.02 if all_of_them else 0.08, hspace=0.28,
@@ -101,7 +114,12 @@ def overlay(
 
 
 def draw_view(
-    ax: Axes, recording: Recording, parts: tuple[Arc, ...], *, bodies: bool = False
+    ax: Axes,
+    recording: Recording,
+    parts: tuple[Arc, ...],
+    *,
+    bodies: bool = False,
+    legend: bool = True,
 ) -> Axes:
     """Draw the scene to scale with tracks, strobe dots and the analytic parabola, and a legend.
 
@@ -118,7 +136,8 @@ def draw_view(
         ax.set_xlabel(f"x, m    (particles at t = {t:.3g} s)")
     if len(recording.machine.streams) > 1:
         handles += stream_handles(recording.machine)
-    style.legend_above(ax, 4, handles)
+    if legend:
+        style.legend_above(ax, 4, handles)
     return ax
 
 

@@ -137,7 +137,8 @@ def dress(ax: Axes, x: str = "", y: str = "", title: str = "") -> Axes:
     """Give axes the common look, light grid, two spines, readable text; see `plain`."""
     ax.set_xlabel(plain(x), fontsize=NORMAL)
     ax.set_ylabel(plain(y), fontsize=NORMAL)
-    ax.set_title(plain(title), fontsize=NORMAL, loc="left", fontweight="bold")
+    if title:
+        ax.set_title(plain(title), fontsize=NORMAL, loc="left", fontweight="bold")
     ax.tick_params(labelsize=SMALL, color=MUTED)
     ax.grid(visible=True, color=STEEL_LIGHT, linewidth=0.6)
     ax.set_axisbelow(True)

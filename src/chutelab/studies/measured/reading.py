@@ -4,7 +4,8 @@ Tracker (https://opensourcephysics.github.io/tracker-website) writes a line with
 (older versions alone, newer ones over its columns), a line with the names of the columns, and a
 line per frame; a frame without a mark has empty cells. Several tracks stand side by side under
 ``#multi:``, with the names over the first column of each. Separator and decimal mark are the
-user's choice. Any other table with columns t, x and y does as well.
+user's choice. Any other table with columns t, x and y does as well, also without their names, or
+without times where the frames a second are known.
 """
 
 from __future__ import annotations
@@ -99,17 +100,21 @@ PIXELS: Final = ("px", "pixel", "pixels")
 _COLUMN: Final = re.compile(
     r"(time|t|x|y)(?:\s*[(\[/]\s*(?P<bracket>[a-z]+)\s*[)\]]?|(?:\s+in\s+|_)(?P<plain>[a-z]+))?"
 )
+_POSITION: Final = re.compile(r"[1-9]\d{0,5}")
+_WITH_UNIT: Final = re.compile(r"(.*\S)\s*[(\[]\s*([a-zA-Z]+)\s*[)\]]")
+
 _HEADER_WITHIN: Final = 100
 """Lines in which the names of the columns are looked for."""
 
 
 @dataclass(frozen=True)
 class _Columns:
-    """Where a track's t, x and y are: cell numbers, and the units that the header gives them."""
+    """Where a track's t, x and y are: cell numbers of a line of `width`, and their units."""
 
     name: str
     cells: dict[str, int]
     units: dict[str, str]
+    width: int
 
 
 def find(name_or_path: str | Path) -> Path:
@@ -140,8 +145,12 @@ def read(
     flip_y: bool = False,
     t0: float = 0.0,
     track: str | None = None,
+    columns: Sequence[str | int] = (),
+    fps: float | None = None,
 ) -> Track:
     """Read a track from a table with the columns t, x and y; others are ignored.
+
+    A table that names no columns, and has just these three, will do.
 
     Parameters
     ----------
@@ -158,6 +167,11 @@ def read(
         s; the time in the file at which particle 0 is released.
     track
         Which one, of a file that holds several.
+    columns
+        Which are t, x and y: names, or numbers from 1; by default those that are called so.
+    fps
+        Frames per second, of a table without times: each line is a frame, also one without a
+        position. With three `columns` the first is the number of the frame.
 
     Returns
     -------
@@ -170,24 +184,34 @@ def read(
         Says file, line, column and value, and what is allowed.
     """
     source = find(path)
+    if fps is not None and not 0.0 < fps <= LARGEST:
+        raise refused(source, "fps", f"must be a number > 0 and <= {LARGEST:g}", fps)
+    if columns and track is not None:
+        raise refused(source, "", "track and columns both choose columns; give one of them")
     lines = lines_of(source)
-    header, separator = _header(source, lines)
-    above = cells_of(lines[header - 1], separator) if header else []
-    place = f"line {header + 1}"
-    tracks = _tracks(cells_of(lines[header], separator), above)
+    keys = ("x", "y") if fps is not None and len(columns) in (0, 2) else ("t", "x", "y")
+    if columns:
+        header, separator, found = _chosen(source, lines, keys, columns)
+        tracks = [found]
+    else:
+        header, separator = _header(source, lines, keys)
+        above = cells_of(lines[header - 1], separator) if header > 0 else []
+        head = cells_of(lines[header], separator) if header >= 0 else list(keys)
+        tracks = _tracks(head, above, keys)
+    place = f"line {header + 1}" if header >= 0 else ""
     said = ", ".join(f'"{one.name}"' for one in tracks)
     if not tracks:
         raise refused(source, place, "each column x needs a column y after it")
     if track is None and len(tracks) > 1:
         raise refused(source, place, f"holds {len(tracks)} tracks; choose one of {said}")
-    columns = next((one for one in tracks if track in (None, one.name)), None)
-    if columns is None:
+    its = next((one for one in tracks if track in (None, one.name)), None)
+    if its is None:
         raise refused(source, place, f"no such track; there are {said}", track)
-    points, numbers, skipped = _rows(source, lines, header, separator, columns.cells)
+    points, numbers, skipped = _rows(source, lines, header, separator, its)
     if len(points) < LEAST:
         text = f"{len(points)} points with a time and a position; at least {LEAST} are needed"
         raise refused(source, "", text)
-    units = sorted({columns.units["x"] or "m", columns.units["y"] or "m"})
+    units = sorted({its.units["x"] or "m", its.units["y"] or "m"})
     if scale is None and set(units) & set(PIXELS):
         raise refused(source, place, "x and y are in pixels: a scale, metres per pixel, is needed")
     if scale is None and len(units) > 1:
@@ -195,9 +219,9 @@ def read(
     scale = LENGTHS[units[0]] if scale is None else scale
     table = np.array(points)
     return Track(
-        name=columns.name,
+        name=its.name,
         source=str(source),
-        seconds=TIMES[columns.units["t"]] * table[:, 0],
+        seconds=TIMES[its.units["t"]] * table[:, 0] if fps is None else table[:, 0] / fps,
         points=table[:, 1:],
         lines=np.array(numbers),
         placement=Placement(scale, origin, flip_y, t0),
@@ -205,24 +229,94 @@ def read(
     )
 
 
-def _header(source: Path, lines: Sequence[str]) -> tuple[int, str]:
-    """Return the index of the line with the columns' names, and the separator."""
+def _header(source: Path, lines: Sequence[str], keys: Sequence[str]) -> tuple[int, str]:
+    """Return the index of the line with the columns' names, -1 for none, and the separator."""
     best: tuple[int, set[str]] = (0, set())
     for index, line in enumerate(lines[:_HEADER_WITHIN]):
         for separator in SEPARATORS:
             if separator not in line:
                 continue
             found = {name for cell in cells_of(line, separator) if (name := _named(cell)[0])}
-            if {"t", "x", "y"} <= found:
+            if found >= set(keys):
+                if "t" in found - set(keys):
+                    text = "has a column t, so no frames per second are needed; with the columns"
+                    raise refused(source, f"line {index + 1}", f"{text} x,y chosen they are taken")
                 return index, separator
             if len(found) > len(best[1]):
                 best = index, found
+    asked = ", ".join(keys)
     if len(best[1]) > 1:
-        missing = ", ".join(sorted({"t", "x", "y"} - best[1]))
-        raise refused(source, f"line {best[0] + 1}", f"no column {missing}; t, x, y are needed")
-    first = next((line.strip() for line in lines if line.strip()), None)
-    text = "no line names the columns t, x, y; Tracker writes it above the numbers"
-    raise refused(source, "line 1" if first else "", text if first else f"empty; {text}", first)
+        missing = ", ".join(sorted({*keys} - best[1]))
+        raise refused(source, f"line {best[0] + 1}", f"no column {missing}; {asked} are needed")
+    first = _first(lines)
+    for separator in SEPARATORS:
+        cells = cells_of(first, separator)
+        if len(cells) == len(keys) and _numeric(cells):
+            return -1, separator
+    text = f"no line names the columns {asked}; choose them by name or number (--columns)"
+    raise refused(
+        source, "line 1" if first else "", text if first else f"empty; {text}", first or None
+    )
+
+
+def _first(lines: Sequence[str]) -> str:
+    """Return the first line that says anything, "" for none."""
+    told = (line.strip() for line in lines)
+    return next((line for line in told if line and not line.startswith("#")), "")
+
+
+def _numeric(cells: Sequence[str]) -> bool:
+    """Whether cells hold numbers and nothing else; any may be empty."""
+    return all(number(cell) is not None or cell.lower() in _EMPTY for cell in cells)
+
+
+def _chosen(
+    source: Path, lines: Sequence[str], keys: Sequence[str], columns: Sequence[str | int]
+) -> tuple[int, str, _Columns]:
+    """Return the line above the numbers, -1 for none, the separator, and what was chosen."""
+    wanted = [str(column).strip().lower() for column in columns]
+    said, asked = ",".join(map(str, columns)), ",".join(keys)
+    if len(wanted) != len(keys) or len(set(wanted)) < len(wanted):
+        raise refused(source, "columns", f"must be {len(keys)} different ones, for {asked}", said)
+    numbers = [int(one) - 1 for one in wanted if _POSITION.fullmatch(one)]
+    for index, line in enumerate(lines[:_HEADER_WITHIN]):
+        for separator in SEPARATORS:
+            cells = cells_of(line, separator)
+            if max(numbers, default=0) >= len(cells):
+                continue
+            if len(numbers) == len(keys):
+                # What stands above the first line of numbers may name units.
+                picked = [cells[n] for n in numbers]
+                if not _numeric(picked if any(picked) else cells):
+                    continue
+                header, above = index - 1, cells_of(lines[index - 1], separator) if index else []
+                places = numbers
+            else:
+                header, above = index, cells
+                names = [re.sub(_WITH_UNIT, r"\1", cell).lower() for cell in cells]
+                lower = [cell.lower() for cell in cells]
+                found = [
+                    int(one) - 1 if _POSITION.fullmatch(one)
+                    else lower.index(one) if one in lower
+                    else names.index(one) if one in names
+                    else None
+                    for one in wanted
+                ]  # fmt: skip
+                places = [place for place in found if place is not None]
+                if len(set(places)) < len(keys):
+                    continue
+            units = dict.fromkeys(("t", "x", "y"), "")
+            for key, place in zip(keys, places, strict=True):
+                unit = _WITH_UNIT.fullmatch(above[place]) if place < len(above) else None
+                known = TIMES if key == "t" else {*LENGTHS, *PIXELS}
+                units[key] = unit[2].lower() if unit and unit[2].lower() in known else ""
+            its = dict(zip(keys, places, strict=True))
+            units["t"] = units["t"] or "s"
+            return header, separator, _Columns("", its, units, len(cells))
+    text = (
+        "no line has these columns, which are names in a line above the numbers, or numbers from 1"
+    )
+    raise refused(source, "columns", text, said)
 
 
 def _named(cell: str) -> tuple[str, str]:
@@ -239,11 +333,10 @@ def _named(cell: str) -> tuple[str, str]:
     return (name, unit) if not unit or unit in known else ("", "")
 
 
-def _tracks(header: Sequence[str], above: Sequence[str]) -> list[_Columns]:
+def _tracks(header: Sequence[str], above: Sequence[str], keys: Sequence[str]) -> list[_Columns]:
     """Return the tracks that stand side by side: each x with the y that follows it."""
     named = [_named(cell) for cell in header]
     names = [name for name, _ in named]
-    clock = names.index("t")
     starts = [i for i, name in enumerate(names) if name == "x"]
     found = []
     for i, start in enumerate(starts):
@@ -254,19 +347,23 @@ def _tracks(header: Sequence[str], above: Sequence[str]) -> list[_Columns]:
             y = names.index("y")
         if y is None:
             continue
-        cells = {"t": clock, "x": start, "y": y}
+        cells = {"x": start, "y": y} | ({"t": names.index("t")} if "t" in keys else {})
         titles = above[: stop if len(starts) > 1 else None]
         title = next((cell for cell in reversed(titles) if cell), "").removesuffix(":")
         units = {key: named[cell][1] for key, cell in cells.items()}
-        found.append(_Columns(title.lstrip("#").strip(), cells, {**units, "t": units["t"] or "s"}))
+        units["t"] = units.get("t") or "s"
+        found.append(_Columns(title.lstrip("#").strip(), cells, units, len(header)))
     return found
 
 
 def _rows(
-    source: Path, lines: Sequence[str], header: int, separator: str, cells: dict[str, int]
+    source: Path, lines: Sequence[str], header: int, separator: str, columns: _Columns
 ) -> tuple[list[tuple[float, ...]], list[int], int]:
-    """Return time, x and y of each point, their lines, and how many lines have no position."""
-    width = len(cells_of(lines[header], separator))
+    """Return time, x and y of each point, their lines, and how many lines have no position.
+
+    In place of a time that is in no column stands the number of the line of numbers, from 0.
+    """
+    width, frame = columns.width, -1
     points: list[tuple[float, ...]] = []
     numbers: list[int] = []
     marks: set[str] = set()
@@ -282,7 +379,8 @@ def _rows(
                 allowed += "; with decimal commas, export with tabs or semicolons between cells"
             raise refused(source, place, allowed, text.strip())
         row += [""] * (width - len(row))
-        wanted = {key: row[cell] for key, cell in cells.items()}
+        frame += 1
+        wanted = {key: row[columns.cells[key]] for key in ("t", "x", "y") if key in columns.cells}
         if any(cell.lower() in _EMPTY for cell in wanted.values()):
             skipped += 1
             continue
@@ -293,7 +391,7 @@ def _rows(
                 allowed = f"must be a number from {-LARGEST:g} to {LARGEST:g}, or empty"
                 raise refused(source, f"{place}, column {key}", allowed, cell)
             found.append(value)
-        point = tuple(found)
+        point = tuple(found) if "t" in wanted else (float(frame), *found)
         marks |= {mark for cell in wanted.values() for mark in ".," if mark in cell}
         if len(marks) > 1:
             allowed = (

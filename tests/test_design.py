@@ -730,6 +730,38 @@ def test_the_notebook_is_shipped_without_outputs():
     assert {"predict", "run", "compare", "explanation"} <= cells.keys()
 
 
+def asked(n, answer):
+    """What the notebook's cell for an answer says when that stands in place of None."""
+    told = json.loads((LESSON / "exercise.ipynb").read_text(encoding="utf-8"))
+    cells = {cell["id"]: "".join(cell["source"]) for cell in told["cells"]}
+    names = {"chutelab": chutelab, "answer": answer}
+    exec(cells["check"], names)
+    assignment, _, call = cells[f"answer-{n}"].partition("\n")
+    assert assignment == f"answer_{n} = None"
+    return eval(call.replace(f"answer_{n}", "answer"), names)
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        (None, "not attempted"),
+        ("0,54", "without quotes: 0.54"),
+        ((0, 54), "a point: 0.54"),
+        ("half", "without quotes"),
+        (float("nan"), "NaN"),
+        (np.float64("nan"), "NaN"),
+        (np.float32(0.5436), "right"),
+        (np.array([0.5436]), "right"),
+        (0.3, "too large: 0.2 is wanted"),
+        (0.6, "too small: 0.2 is wanted"),
+        (-3.0, "No machine runs with that"),
+        (True, "comparison"),
+    ],
+)
+def test_the_notebook_takes_whatever_is_handed_in(answer, said):
+    assert said in " ".join(str(asked(1, answer)).split())
+
+
 @pytest.mark.slow
 def test_the_notebook_runs_and_accepts_right_answers(tmp_path):
     nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")

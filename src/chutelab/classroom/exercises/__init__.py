@@ -8,7 +8,8 @@
 - `catalogue`: `lesson` hands out a `Task`, with `question`, `check`, `hint`, `reveal` and
   `progress`; all exercises by name.
 - `exercise`: what an exercise is made of: parameters, drawn from a name, questions, known mistakes.
-- `judging`: a number read and judged: right, a known mistake, or how far off; replies.
+- `judging`: a number read and judged: right, a known mistake, or how far off; replies;
+  `try_out` lets a machine judge.
 - ``the-parabola.toml`` and so on: the exercises themselves, a file a lesson: what is drawn,
   questions, and each answer and mistake as a formula.
 
@@ -17,7 +18,14 @@ Answers are computed from `chutelab.theory` for the parameters drawn; none is st
 
 from chutelab.classroom.exercises.catalogue import EXERCISES, ExerciseError, Task, find, lesson
 from chutelab.classroom.exercises.exercise import Exercise, Mistake, Parameter, Question, Values
-from chutelab.classroom.exercises.judging import Passage, Progress, Reply, Standing, Verdict
+from chutelab.classroom.exercises.judging import (
+    Passage,
+    Progress,
+    Reply,
+    Standing,
+    Verdict,
+    try_out,
+)
 
 __all__ = [
     "EXERCISES",
@@ -35,4 +43,5 @@ __all__ = [
     "Verdict",
     "find",
     "lesson",
+    "try_out",
 ]

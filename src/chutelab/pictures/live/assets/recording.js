@@ -285,8 +285,9 @@ class Recording {
     });
     return {
       ...machine, releases, spins, goesOn: renamed.map((its) => its.goesOn),
-      radius: some(machine.radius), mass: some(machine.mass), inertia: some(machine.inertia), segments: machine.segments.map(gate),
-      arcs: machine.arcs.map(gate), endTime: Math.max(0, machine.endTime - t),
+      radius: some(machine.radius), mass: some(machine.mass), inertia: some(machine.inertia),
+      segments: machine.segments.map(gate), arcs: machine.arcs.map(gate),
+      endTime: Math.max(0, machine.endTime - t),
     };
   }
 

@@ -118,7 +118,7 @@ BY_HAND: list[tuple[str, dict[str, Any], str, str]] = [
      "material[1].name", "material[0].name is the same"),
     ("machine", {"conveyor[0].name": "incoming"}, "conveyor[0].name", "reserved"),
     ("machine", {"plate[1].name": "plate"}, "plate[1].name", "reserved"),
-    ("machine", {"particle[0].name": "a b"}, "particle[0].name", "1 to 40 characters"),
+    ("machine", {"particle[0].name": "a  b"}, "particle[0].name", "1 to 40 characters"),
     ("machine", {"stream[0].name": "a.b"}, "stream[0].name", "1 to 40 characters"),
     ("machine", {"particle[1].name": GONE, "stream[1].particle": "small",
                  "stream[2].particle": "small", "pair[1].between": ["small", "gate"]},

@@ -99,7 +99,7 @@ def test_overrides_reach_it():
         ("surface[0]", "a whole table"),
         ("live.predict", "no part of the machine"),
         ("expect[0].value", "no part of the machine"),
-        ("a b", "no key, such as plate.angle_deg"),
+        ("a  b", "no key, such as plate.angle_deg"),
     ],
 )
 def test_a_key_that_the_scene_has_not_is_named_wherever_it_stands(key, says):

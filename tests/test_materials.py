@@ -77,7 +77,7 @@ def test_a_pair_that_is_not_given_is_as_the_material_with_itself():
     [
         {"density": 0.0}, {"density": -1.0}, {"density": float("inf")}, {"restitution": 1.01},
         {"restitution_steel": -0.1}, {"friction": -0.1}, {"friction_rubber": "0.5"},
-        {"name": "iron ore"}, {"name": ""}, {"friction_glass": 0.5}, {"density": None},
+        {"name": "iron  ore"}, {"name": ""}, {"friction_glass": 0.5}, {"density": None},
         {"restitution": None}, {"friction": None}, {"name": None},
     ],
 )  # fmt: skip

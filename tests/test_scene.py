@@ -565,3 +565,61 @@ def test_faults_of_a_shipped_scene_name_it_and_no_path(tmp_path):
     mine.write_text(MACHINE)
     with pytest.raises(sc.SceneError, match=re.escape(f"{mine}: incoming.sped")):
         sc.load(mine, {"incoming.sped": 3})
+
+
+@pytest.mark.parametrize(
+    ("text", "path", "value"),
+    [
+        ("particle.radius=4mm", ("particle", "radius"), 0.004),
+        ("particle.radius= 0.4 cm", ("particle", "radius"), 0.004),
+        ("particle.mass=8 g", ("particle", "mass"), 0.008),
+        ("incoming.speed=250cm/s", ("incoming", "speed"), 2.5),
+        ("incoming.friction=30%", ("incoming", "friction"), 0.3),
+        ("incoming.friction=adhesion", ("incoming", "friction"), "adhesion"),
+        ("plate.angle_deg=-3°", ("plate", "angle_deg"), -3.0),
+        ("gravity=1.62 m/s²", ("gravity",), 1.62),
+        ("run.dt=1ms", ("run", "dt"), 0.001),
+        ("title=4mm", ("title",), "4mm"),
+    ],
+)
+def test_texts_take_units(text, path, value):
+    found = sc.load("perpendicular", text)
+    for part in path:
+        found = getattr(found, part)
+    assert found == value
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("particle.radius=4s", '"4s": must be a number'),
+        ("incoming.speed=2 m", ", in m/s (from --set incoming.speed=2 m)"),
+        ("particle.radius=4,5mm", "write 4.5, with a decimal point"),
+        ("plate.restitution=0.5m", "must be a number from 0 to 1"),
+        ("stream.count=3m", "must be a whole number"),
+    ],
+)
+def test_another_unit_is_refused(text, says):
+    with pytest.raises(sc.SceneError, match=re.escape(says)):
+        sc.load("perpendicular", text)
+
+
+@pytest.mark.parametrize("table", ["surface", "material", "pair", "conveyor", "string", "expect"])
+def test_one_pair_of_brackets_is_answered_with_two(table):
+    text = f"{CONVEYOR}\n[{table}]\nname = 'a'\n"
+    with pytest.raises(sc.SceneError) as caught:
+        sc.parse(text)
+    said = [str(fault) for fault in caught.value.faults]
+    assert f"{table} = a table: head it [[{table}]], with two brackets each" in said[0]
+    assert len(said) == 1
+
+
+def test_names_may_have_spaces():
+    row = '[[surface]]\nname = "my hood"\nfrom = [0, -1]\nto = [1, -1]\n'
+    found = sc.parse(CONVEYOR + row, overrides=["surface.my hood.speed=30cm/s"])
+    assert found.surface[0].speed == 0.3
+    assert sc.parse(sc.to_toml(found)) == found
+    assert found.with_values({"surface.my hood.speed": 1}).surface[0].speed == 1.0
+    for name in (" hood", "hood ", "my  hood", "my\thood", "a.b", "", "x" * 41):
+        with pytest.raises(sc.SceneError, match="must be 1 to 40 characters without"):
+            sc.parse(CONVEYOR + row.replace("my hood", name.replace("\t", "\\t")))

@@ -103,7 +103,8 @@ set_option = click.option(
     "overrides",
     metavar="KEY=VALUE",
     multiple=True,
-    help="Change a key of the scene, such as plate.angle_deg=20. May be repeated.",
+    help="Change a key of the scene, such as plate.angle_deg=20 or particle.radius=4mm. May be"
+    " repeated.",
 )
 
 engine_option = click.option(

@@ -65,6 +65,8 @@ def faults_of(error: ValidationError, document: Mapping[str, Any]) -> list[Fault
         if value is MISSING and not missing:
             # Of keys that were given as tables inside each other.
             value = detail["input"]
+        if len(parts) == 1 and parts[0] in LISTS and isinstance(value, Mapping):
+            text = f"head it [[{parts[0]}]], with two brackets each: there may be several"
         faults.setdefault(parts, Fault(joined(parts), value, text))
     # A list whose entries are refused is refused as too short, too.
     broken_lists = {

@@ -21,6 +21,7 @@ from pydantic_core import core_schema
 
 from chutelab.scene.conflicts import EITHER
 from chutelab.scene.schema import Scene, as_written
+from chutelab.scene.units import WORDS, size_in
 from chutelab.util.errors import MISSING, Fault, InputError, printable
 
 
@@ -60,7 +61,7 @@ NAMED: Final = ("particle", "material", "plate", "conveyor", "surface", "stream"
 
 NOBODY: Final[Mapping[str, Sequence[object]]] = {}
 
-_SEGMENT: Final = re.compile(r"([^\s.=\[\]\"']+)((?:\[\d{1,9}\])*)")
+_SEGMENT: Final = re.compile(rf"({WORDS})((?:\[\d{{1,9}}\])*)")
 _FORM: Final = "must be KEY=VALUE, such as plate.angle_deg=20 or surface[0].speed=1"
 _BARE_KEY: Final = re.compile(r"[\w-]+")
 
@@ -217,7 +218,8 @@ def apply(
 ) -> tuple[list[Fault], dict[str, str]]:
     """Lay overrides over a scene's tables, in place and in order; the last one wins.
 
-    Texts are as `read` takes them; a missing table is made. Returns the faults of those that could
+    Texts are as `read` takes them; a missing table is made; "4 mm" is a number where one is wanted.
+    Returns the faults of those that could
     not be laid over, and what was typed for each of the others by the full path that it set.
     """
     faults: list[Fault] = []
@@ -226,12 +228,21 @@ def apply(
         one = read(given_one) if isinstance(given_one, str) else given_one
         try:
             path = resolved(document, one.key)
-            _put(document, path, one.value)
+            _put(document, path, _measured(path, one.value))
         except InputError as error:
             faults.append(Fault(one.typed or one.key, None, str(error)))
         else:
             given[joined(path)] = one.typed
     return faults, given
+
+
+def _measured(path: Sequence[str | int], value: object) -> object:
+    """Return the number that a text such as "4 mm" is at a path which takes numbers."""
+    rule = rule_at(path)
+    if not isinstance(value, str) or rule is None or limits_of(rule) is None:
+        return value
+    size = size_in(value, str(rule.get("x-unit") or ""))
+    return value if size is None else size
 
 
 def value_of(text: str) -> object:

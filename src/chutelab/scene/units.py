@@ -57,6 +57,8 @@ UNITS: Final = {
     **{f"{prefix}m": ("m", size) for prefix, size in _PREFIXES.items()},
     **{f"{prefix}m/s": ("m/s", size) for prefix, size in _PREFIXES.items()},
     **{f"{prefix}{unit}": (unit, size) for unit in "sJW" for prefix, size in _PREFIXES.items()},
+    **{f"{prefix}g": ("kg", 1e-3 * size) for prefix, size in _PREFIXES.items()},
+    **dict.fromkeys(("m/s²", "m/s^2"), ("m/s²", 1.0)),
     "degrees": ("degrees", 1.0),
     "deg": ("degrees", 1.0),
     "°": ("degrees", 1.0),
@@ -98,6 +100,21 @@ def read_size(text: str) -> tuple[float, str]:
     return number, unit
 
 
+def size_in(text: str, unit: str) -> float | None:
+    """Return a size in the SI unit that it has to have; None if it has none, or another.
+
+    >>> size_in("4 mm", "m"), size_in("20°", "degrees"), size_in("4 s", "m"), size_in("4", "m")
+    (0.004, 20.0, None, None)
+    """
+    try:
+        number, found = read_size(text)
+    except ValueError:
+        # A unit without prefixes, such as 1/s, is as good if it is the one.
+        match = SIZE.fullmatch(text.strip())
+        return float(match[1]) if match and match[2] == unit else None
+    return number if found == (unit or "%") else None
+
+
 def symbol(unit: str) -> str:
     """Return a unit as tables and pictures have it.
 
@@ -135,8 +152,12 @@ def write_size(number: float, unit: str, digits: int = 3) -> str:
 RESERVED_NAMES: Final = ("incoming", "plate", "outgoing", "particles")
 """Names in ledgers and events that a free surface may not take."""
 
-NAME: Final = r"""^[^\s.=\[\]"']{1,40}$"""
+WORDS: Final = r"""[^\s.=\[\]"']+(?: [^\s.=\[\]"']+)*"""
+NAME: Final = f"^{WORDS}$"
 """A free surface's name, such that an override can name it in a path."""
+
+LONGEST_NAME: Final = 40
+"""Characters of it."""
 
 LARGEST: Final = 1e6
 """Bound on every dimensional quantity, SI: far beyond any chute, far from overflow in v⁴."""
@@ -162,8 +183,9 @@ def _distinct(points: tuple[Point, ...]) -> tuple[Point, ...]:
 
 
 def _free(name: str) -> str:
-    if not re.fullmatch(NAME, name):
-        raise ValueError("must be 1 to 40 characters without spaces, dots, =, brackets or quotes")
+    if len(name) > LONGEST_NAME or not re.fullmatch(NAME, name):
+        allowed = "dots, =, brackets, quotes or blanks other than single spaces between words"
+        raise ValueError(f"must be 1 to {LONGEST_NAME} characters without {allowed}")
     if name in RESERVED_NAMES:
         raise ValueError(f"must not be one of the reserved names {', '.join(RESERVED_NAMES)}")
     return name
@@ -173,7 +195,11 @@ Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Whole = Annotated[int, Field(strict=True)]
 Switch = Annotated[bool, Field(strict=True)]
 Text = Annotated[str, Field(strict=True)]
-Name = Annotated[Text, AfterValidator(_free), WithJsonSchema({"type": "string", "pattern": NAME})]
+Name = Annotated[
+    Text,
+    AfterValidator(_free),
+    WithJsonSchema({"type": "string", "pattern": NAME, "maxLength": LONGEST_NAME}),
+]
 Coordinate = Annotated[Number, Field(ge=-LARGEST, le=LARGEST)]
 """Any number of a sane size, negative ones too."""
 

@@ -12,7 +12,7 @@ from rich.text import Text
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
-from chutelab.results.quantities import air_drag, rolling, squeezed, steady, stopped, waits
+from chutelab.results.quantities import air_drag, plugged, rolling, squeezed, steady, stopped, waits
 from chutelab.studies.accuracy import Accuracy, written
 from chutelab.util.tables import Sheet, number, wrapped
 
@@ -37,7 +37,7 @@ def report(recording: Recording, accuracy: Accuracy | None = None) -> list[Rende
     if compared.notes and (way := _way(recording)).rows:
         parts.append(way)
     parts.append(ledger(recording))
-    tell = (stopped, waits, squeezed, rolling, steady, air_drag)
+    tell = (stopped, plugged, waits, squeezed, rolling, steady, air_drag)
     notes = [str(note) for one in tell if (note := one(recording)) is not None]
     parts += [Sheet("", (), (), notes=(f"{note[0].upper()}{note[1:]}.",)) for note in notes]
     if accuracy is not None:

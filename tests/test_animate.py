@@ -240,6 +240,17 @@ def test_a_long_stream_is_filmed_for_three_lives_of_particle_0() -> None:
 # Words
 
 
+def test_a_landing_tells_of_the_flight_if_nothing_was_in_between() -> None:
+    lesson = Path(__file__).parent.parent / "lessons" / "01-the-parabola"
+    for speed in (2.0, 4.0):
+        thrown = scene.load(lesson / "throw.toml", [f"incoming.speed={speed}"])
+        flown = np.sqrt(2.0 * thrown.outgoing.drop / G)
+        said = {shot.words for shot in film(simulate(thrown), 0.0, 5.0, fps=25, slow=4.0)}
+        assert any(f"after {flown:.3f} s of flight" in words for words in said)
+    said = {shot.words for shot in film(by_hand(), 0.4, 2.0, fps=25, slow=8.0)}
+    assert not any("of flight" in words for words in said)
+
+
 def test_words_tell_the_numbers_of_the_impacts() -> None:
     recording = by_hand()
     shots = film(recording, 0.4, BELT_TIME + t_landing(), fps=25, slow=8.0)

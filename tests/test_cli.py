@@ -242,6 +242,23 @@ def test_a_decimal_comma_is_answered_with_the_point(arguments):
     assert "write 2.5, with a decimal point" in refused(*arguments)
 
 
+def test_a_run_without_a_plate_tells_the_time_of_flight():
+    throw = Path(__file__).parent.parent / "lessons" / "01-the-parabola" / "throw.toml"
+    for speed in (2, 4):
+        said = call("run", throw, "--set", f"incoming.speed={speed}", "--set", "outgoing.drop=0.7")
+        assert f"from the first to the second: {(2 * 0.7 / 9.81) ** 0.5:.6g} s" in said.output
+
+
+def test_a_run_of_a_stream_tells_the_spread_of_the_landings():
+    bed = Path(__file__).parent.parent / "lessons" / "07-a-stream" / "bed.toml"
+    said = " ".join(call("run", bed, "--out", "out", "--only", "csv").output.split())
+    with Path("out/events.csv").open(encoding="utf-8") as file:
+        places = [float(row["x"]) for row in csv.DictReader(file) if row["kind"] == "landing"]
+    mean, spread = np.mean(places), np.std(places)
+    assert f"{len(places)} landed on the outgoing belt, at x = {mean:.6g} m" in said
+    assert f"with a spread of {1e3 * spread:.3g} mm" in said
+
+
 def test_a_run_says_that_a_disk_rolls_instead_of_being_carried():
     settings = ("--set", "particle.spin=true", "--set", "outgoing.length=8")
     text = " ".join(call("run", "belt-landing", *settings).stdout.split())

@@ -784,7 +784,7 @@ def test_the_minimum_in_the_readme_is_inside_its_range():
         r"^chutelab solve (\S+) --vary (\S+=(\d+):(\d+)) --minimize belt_work$", text, re.MULTILINE
     )
     name, vary, low, high = line.groups()
-    found = design.solve(chutelab.load(name), vary, minimize="belt_work")
+    found = design.minimize(chutelab.load(name), vary, "belt_work")
     best = found.answer.values[0]
     assert f"here at {best:.0f}°" in text
     # By runs of their own: to both sides the belt pays more.

@@ -408,11 +408,12 @@ def test_the_template_and_the_lessons_know_the_same_keys():
     text = template.read_text(encoding="utf-8").replace("TITLE", '"x"').replace("# slow", "slow")
     keys = tomllib.loads(text)
     from chutelab.classroom.lessons import Lesson
-    from chutelab.classroom.lessons.reading import Page, Picture
+    from chutelab.classroom.lessons.reading import Page, Picture, Teacher
 
     assert set(keys) == set(Lesson.model_fields)
     assert set(keys["picture"]) == set(Picture.model_fields)
     assert set(keys["page"]) == set(Page.model_fields)
+    assert set(keys["teacher"]) == set(Teacher.model_fields)
 
 
 @pytest.mark.parametrize(

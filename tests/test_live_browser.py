@@ -124,6 +124,39 @@ def test_what_is_dragged_into_place_lands_as_it_does_in_python(shown, tmp_path, 
     assert flights > each
 
 
+# Turns the plate every quarter of a second of the run.
+TURNS = """async () => {
+  const { lab } = chutelab, answers = [];
+  const come = (t) => new Promise((resolve) => {
+    const look = () => {
+      lab.engine.allow(t + 1 - lab.recording.shift);
+      if (lab.recording.now >= t || lab.recording.state !== "running") resolve();
+      else setTimeout(look, 2);
+    };
+    look();
+  });
+  for (let n = 1; n <= 10; n += 1) {
+    await come(0.25 * n + 0.05);
+    lab.seek(0.25 * n);
+    lab.change({"plate.angle_deg": 3 * n});
+    const there = lab.recording.tracks.filter(({ count }) => count).length;
+    answers.push([lab.recording.ledger(lab.t), there]);
+  }
+  return answers;
+}"""
+
+
+def test_a_stream_goes_on_under_the_hands_and_its_ledger_closes(shown):
+    page = shown("stream", ["stream.count=120"])
+    answers = page.evaluate(TURNS)
+    assert [there for _, there in answers][-1] == 120
+    for ledger, _ in answers:
+        moved = ledger["belt_work"] + ledger["restitution_loss"] + ledger["friction_loss"]
+        # Tracks may leave out 1e-4 m/s of what lasts in contact.
+        assert abs(ledger["residual"]) <= 2e-3 * (moved + ledger["kinetic"])
+    assert answers[-1][0]["restitution_loss"] > 1.0
+
+
 AXE = Path(__file__).parent / "live" / "node_modules" / "axe-core" / "axe.min.js"
 
 

@@ -21,13 +21,14 @@ from live.machines import as_page_has_it, dumps
 
 HERE = Path(__file__).parent
 ASSETS = Path(live.__file__).parent / "assets"
+THROW = HERE.parent / "lessons" / "01-the-parabola" / "throw.toml"
 NODE = shutil.which("node")
 pytestmark = pytest.mark.skipif(NODE is None, reason="needs node")
 
 # A lone particle and a stream, on plates, round a pulley with slip, on a belt, on arcs; a crowd.
 SCENES = [
     ("perpendicular",), ("inclined-20", "plate.angle_deg=-10"), ("inclined-40",), ("slip",),
-    ("low-speed",), ("belt-landing",), ("spoon",),
+    ("low-speed",), ("belt-landing",), ("spoon",), (str(THROW),),
     ("stream-independent", "stream.count=50"), ("stream", "stream.count=40"),
 ]  # fmt: skip
 
@@ -90,6 +91,15 @@ def test_the_numbers_are_those_of_pythons_recordings(runs):
         its["phi1"] = np.radians(its["phi1"])
         for id_ in ("phi1", "t2", "x2", "v2", "v2r", "t3", "x3", "v3", "d3"):
             assert its[id_] == pytest.approx(ours[id_], rel=1e-13, abs=1e-15), (name, id_)
+
+
+def test_the_time_of_flight_is_told_where_no_plate_is_on_the_way(runs):
+    scene, answer = runs[str(THROW)]
+    told = {row["id"]: row["simulated"] for row in answer["numbers"]}
+    fall = scene.outgoing.drop
+    assert told["t"] == pytest.approx(np.sqrt(2.0 * fall / scene.gravity), rel=1e-9)
+    _, answer = runs["perpendicular"]
+    assert {row["id"]: row["simulated"] for row in answer["numbers"]}["t"] is None
 
 
 def test_a_streams_numbers_are_means_over_its_particles(runs):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 from functools import cache
@@ -12,7 +13,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from chutelab.classroom.exercises import find as find_exercise
+from chutelab.classroom.exercises.exercise import draw, shown
 from chutelab.classroom.lessons import find, scene_of, shipped_lessons
+from chutelab.classroom.lessons.building import start
+from chutelab.classroom.lessons.sheets import SHEETS, sheet
 from chutelab.cli import main
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind
@@ -549,6 +554,107 @@ def test_no_number_of_a_worksheet_goes_unlooked_at(number):
     found = set(re.findall(r"\d+\.\d+(?:e-\d+)?", prose))
     looked_at = {text for said in STATED[number] for text in re.findall(r"\{-?(.*)\}", said)}
     assert found - looked_at - GIVEN[number] == set()
+
+
+def numbers_in(text):
+    """Numbers with decimals, and whole ones of two digits or more, as they are written."""
+    text = re.sub(r"`[^`]*`", "", text)
+    return set(re.findall(r"(?<![\w.])\d+\.\d+|(?<![\w.])\d{2,}(?![\w.])", text))
+
+
+# Of the explanation's numbers, those that the questions give: a row of the paper's table, the
+# textbook's angle, and one of the rates to choose from.
+TOLD = {3: {"0.137"}, 6: {"36.4"}, 7: {"10"}}
+
+
+@pytest.mark.parametrize("number", range(1, 10))
+def test_no_number_of_the_key_is_on_the_students_sheet(number):
+    student = sheet(find(number), "student")
+    explanation = " ".join(sheet(find(number), "explanation").split())
+    stated = {
+        text
+        for said in STATED[number]
+        if re.sub("[{}]", "", said) in explanation
+        for text in re.findall(r"\{-?(.*)\}", said)
+    }
+    assert stated
+    asked = numbers_in(student)
+    assert stated & asked <= TOLD.get(number, set())
+    if number < 9:
+        _, cases = draw(find_exercise(number), "your name")
+        assert {shown(abs(case.right)) for case in cases} & asked <= TOLD.get(number, set())
+    teacher = find(number).teacher
+    if teacher is not None:
+        assert numbers_in(" ".join(teacher.predictions)) & asked <= TOLD.get(number, set())
+    assert "![" not in student
+    assert "teacher" not in student
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_teachers_sheets_have_a_key_goals_and_every_mistake_that_is_named(number):
+    lesson, told = find(number), sheet(find(number), "teacher")
+    heads = re.findall(r"^## (.*)$", told, re.MULTILINE)
+    assert heads == [
+        "Goals", "What to say", "Key to the predictions", "Key to the exercise",
+        "Mistakes to expect", "Shorter and longer", "Where it sits",
+    ]  # fmt: skip
+    asked = sheet(lesson, "student").partition("## Predict")[2].partition("## Run")[0]
+    assert len(lesson.teacher.predictions) == len(re.findall(r"^\d+\. ", asked, re.MULTILINE))
+    assert f"{lesson.minutes} minutes" in told
+    _, cases = draw(find_exercise(number), "your name")
+    for case in cases:
+        assert f"Answer: {shown(case.right)} {case.question.unit}".strip() in told
+        for trace in case.mistakes[: len(case.question.mistakes)]:
+            assert f"| {case.number} | {trace.name} | {trace.says} |" in told
+
+
+KEYS = {
+    "Moon the fall takes 0.994 s, and the particle flies {1.99} m": 2.0 * sqrt(2.0 * 0.8 / 1.62),
+    "(2 g): {0.204} m at 2 m/s": 4.0 / (2.0 * G),
+    "which is {0.0217} J": 0.008 * G * RC * (1.0 - cos(radians(angle(1.5, RC)))),
+}
+
+
+def test_numbers_of_the_keys_are_right():
+    texts = {
+        n: " ".join([*find(n).teacher.predictions, find(n).teacher.stretch]) for n in (1, 2, 3)
+    }
+    for said, value in KEYS.items():
+        assert re.sub("[{}]", "", said) in " ".join(texts.values())
+        (text,) = re.findall(r"\{(.*)\}", said)
+        assert abs(float(text) - value) <= 0.5 * 10.0 ** -len(text.partition(".")[2])
+    looked_at = {text for said in KEYS for text in re.findall(r"\{(.*)\}", said)}
+    for number, text in texts.items():
+        known = {one for said in STATED[number] for one in re.findall(r"\{-?(.*)\}", said)}
+        assert set(re.findall(r"\d+\.\d+", text)) <= known | looked_at | {"0.9"}
+
+
+def test_nothing_tells_of_the_misprint_before_the_explanation_of_lesson_3():
+    lesson = find(3)
+    cells = json.loads((lesson.folder / "exercise.ipynb").read_text(encoding="utf-8"))["cells"]
+    sources = ["".join(cell["source"]) for cell in cells]
+    before = sources[: next(i for i, text in enumerate(sources) if text.startswith("## Run"))]
+    shown_first = [
+        lesson.title, lesson.question, sheet(lesson, "student"), find_exercise(3).title, *before,
+        (lesson.folder / "table-1.toml").read_text(encoding="utf-8"),
+        worksheet(3).partition("## Explain")[0],
+    ]  # fmt: skip
+    for text in shown_first:
+        assert not re.search("misprint|wrong|fault|not what the paper", text), text
+
+
+def test_sheets_are_printed_and_refuse_what_cannot_be(tmp_path):
+    for which in SHEETS:
+        assert chutelab("lesson", "show", 1, "--sheet", which).output == sheet(find(1), which)
+    result = chutelab("lesson", "show", 1, "--sheet", "student", "--json")
+    assert result.exit_code == 2
+    assert "give one of them" in result.output
+    made = start(tmp_path / "mine")
+    assert "for the teacher" in chutelab("lesson", "show", made, "--sheet", "teacher").output
+    (made / "README.md").write_text("# Mine\n\n## Predict\n\nx\n", encoding="utf-8")
+    result = chutelab("lesson", "show", made, "--sheet", "student")
+    assert result.exit_code == 2
+    assert "a sheet needs the parts ## Run, ## Compare, ## Explain" in result.output
 
 
 def test_table_1_differs_in_x3_only_as_worksheet_3_says():

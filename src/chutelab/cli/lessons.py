@@ -73,12 +73,19 @@ def list_lessons(as_json: bool) -> None:
 
 @lesson.command(short_help="Show one lesson, with its worksheet.")
 @click.argument("wanted", metavar="LESSON", type=FileName(), shell_complete=complete_lesson)
+@click.option(
+    "--sheet",
+    type=click.Choice(["student", "teacher", "explanation"]),
+    help="Print one sheet to hand out, as Markdown: the student's (nothing of the answer on it),"
+    " the teacher's (key, mistakes, goals), or the explanation.",
+)
 @json_option()
-def show(wanted: str, as_json: bool) -> None:
+def show(wanted: str, sheet: str | None, as_json: bool) -> None:
     """Show one lesson: its question, scenes and quantities, its files, and the worksheet.
 
     \b
     chutelab lesson show 3
+    chutelab lesson show 3 --sheet student > student.md
     chutelab lesson show the-bounce
     chutelab lesson show ./my-lesson
     """  # noqa: D301 - click wants the backspace
@@ -91,6 +98,13 @@ def show(wanted: str, as_json: bool) -> None:
     from chutelab.util.tables import Sheet
 
     found = find(wanted)
+    if sheet is not None:
+        from chutelab.classroom.lessons.sheets import sheet as sheet_of
+
+        if as_json:
+            raise RefusedError("--sheet is Markdown, and --json is not: give one of them")
+        console.say(sheet_of(found, sheet), end="")
+        return
     if as_json:
         console.show_json({"format": 1, **_plain(found)})
         return

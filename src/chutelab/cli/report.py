@@ -12,7 +12,16 @@ from rich.text import Text
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
-from chutelab.results.quantities import air_drag, plugged, rolling, squeezed, steady, stopped, waits
+from chutelab.results.quantities import (
+    air_drag,
+    measure,
+    plugged,
+    rolling,
+    squeezed,
+    steady,
+    stopped,
+    waits,
+)
 from chutelab.studies.accuracy import Accuracy, written
 from chutelab.util.tables import Sheet, number, wrapped
 
@@ -39,6 +48,14 @@ def report(recording: Recording, accuracy: Accuracy | None = None) -> list[Rende
     parts.append(ledger(recording))
     tell = (stopped, plugged, waits, squeezed, rolling, steady, air_drag)
     notes = [str(note) for one in tell if (note := one(recording)) is not None]
+    landed = measure(recording, "landing.count")
+    if landed > 1:
+        mean, spread = (measure(recording, f"landing.x.{what}") for what in ("mean", "spread"))
+        notes.insert(
+            0,
+            f"{landed:.0f} landed on the outgoing belt, at x = {number(mean)} m on average, with a"
+            f" spread of {1e3 * spread:.3g} mm (standard deviation)",
+        )
     parts += [Sheet("", (), (), notes=(f"{note[0].upper()}{note[1:]}.",)) for note in notes]
     if accuracy is not None:
         what = "relative error" if accuracy.unit == "relative" else "error of places"
@@ -67,4 +84,8 @@ def _way(recording: Recording) -> Sheet:
         numbers = (event["t"], *event["position"], *event["velocity_before"])
         rows.append((f"{what} {name}", *(number(float(value)) for value in numbers)))
     heads = ("", "t, s", "x, m", "y, m", "vx, m/s", "vy, m/s")
-    return Sheet("Particle 0, its first contacts", heads, tuple(rows))
+    notes: tuple[str, ...] = ()
+    if len(own) > 1 and own["kind"][0] == Kind.SEPARATION:
+        flown = float(own["t"][1] - own["t"][0])
+        notes = (f"time of flight, from the first to the second: {number(flown)} s",)
+    return Sheet("Particle 0, its first contacts", heads, tuple(rows), notes=notes)

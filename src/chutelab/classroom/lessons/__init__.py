@@ -2,6 +2,7 @@
 
 - `reading`: ``lesson.toml`` as a frozen model, a lesson's folder with its scenes, all faults in one
   message; the shipped lessons, found by number, by name or by folder.
+- `sheets`: the student's sheet, the teacher's and the explanation, from one source.
 - `building`: ``lesson.gif``, a new lesson from a template, all lessons as web pages.
 
 A lesson is a folder ``NN-name`` with ``lesson.toml``, the worksheet ``README.md``, the picture

@@ -29,6 +29,7 @@ LONGEST: Final = 200
 
 Said = Annotated[Text, Field(min_length=1, max_length=LONGEST)]
 Names = Annotated[tuple[Said, ...], Field(max_length=MOST)]
+Answers = Annotated[tuple[Text, ...], Field(max_length=MOST)]
 
 
 def key(default: Any, what: str, allowed: str, **limits: Any) -> Any:
@@ -80,6 +81,20 @@ class Page(Chosen):
         return [*self.set, *(Override(f"live.{name}", value) for name, value in live.items())]
 
 
+class Teacher(Table):
+    """What the teacher's sheet has besides the worksheet and the exercise."""
+
+    goals: Names = key(
+        (), "What one can do afterwards", f"a list of at most {MOST} texts, each of one sentence"
+    )
+    predictions: Answers = key(
+        (), "Answers to the predictions, in their order", f"a list of at most {MOST} texts"
+    )
+    basic: Text = key("", "What to leave out for a short version", "a text")
+    stretch: Text = key("", "What to add for those who are done", "a text")
+    curriculum: Text = key("", "Where it sits in a curriculum", "a text")
+
+
 class Lesson(Table):
     """A validated lesson; its files lie in `folder`."""
 
@@ -104,6 +119,9 @@ class Lesson(Table):
     )
     picture: Picture = key(Picture(), "How lesson.gif is made", "a table of keys and values")
     page: Page | None = key(None, "What its page offers", "a table of keys and values")
+    teacher: Teacher | None = key(
+        None, "What the teacher's sheet has besides", "a table of keys and values"
+    )
 
     _folder: Path = PrivateAttr()
 
@@ -134,7 +152,7 @@ def split(folder: Path) -> tuple[int | None, str]:
     return (int(match[1]), match[2]) if match else (None, folder.name)
 
 
-TABLES: Final[dict[str, type[Chosen]]] = {"picture": Picture, "page": Page}
+TABLES: Final[dict[str, type[Table]]] = {"picture": Picture, "page": Page, "teacher": Teacher}
 """Model of each table by its key."""
 
 
@@ -276,8 +294,8 @@ def _misfits(lesson: Lesson) -> Iterator[Fault]:
                 text = f"no such quantity in its scenes; {suggestion(name, surfaces[0])}"
                 yield Fault(f"quantities.{name}", words, text)
     for table in TABLES:
-        part: Chosen | None = getattr(lesson, table)
-        if part is None:
+        part = getattr(lesson, table)
+        if not isinstance(part, Chosen):
             continue
         name = part.scene or lesson.scenes[0]
         if name not in lesson.scenes:

@@ -97,6 +97,10 @@ def sentence(recording: Recording, event: Any) -> str:
     into, off = (abs(float(event[v] @ normal)) for v in ("velocity_before", "velocity_after"))
     if into > 0.0:
         text += f", ε = {round(off / into, 3):g}"
+    events = recording.events
+    before_it = events[(events["particle"] == 0) & (events["t"] < event["t"])]
+    if kind == Kind.LANDING and list(before_it["kind"][-1:]) == [Kind.SEPARATION]:
+        text += f", after {event['t'] - before_it['t'][-1]:.3f} s of flight"
     # What the impact booked: its first knot is the state before, its last the one after.
     track = recording.track(0)
     booked = track["entries"][track["t"] == event["t"]]

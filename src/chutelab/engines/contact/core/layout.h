@@ -55,6 +55,7 @@ typedef struct {
     double ahead[3];            /* J; the second half of it */
     int kind;                   /* [in] row of the table of pairs */
     int rides;                  /* [in] the incoming belt carries it by adhesion */
+    int goes_on;                /* [in] it was under way before: released wherever others are */
     int mode;                   /* WAITING at first */
     int changes;                /* counts changes of path, so that foreseen events can be outdated */
     int impacts;                /* in this step */

@@ -156,7 +156,7 @@ static void take_off(int i) {
 /* Release a disk at t if its place is free; its event is then the end of a ride, or an impact. */
 static int release(int i, double t) {
     Disk *d = W.disks + i;
-    if (!place_is_free(i, d->x, d->y, t)) {
+    if (!d->goes_on && !place_is_free(i, d->x, d->y, t)) {
         d->waited = 1;
         return 0;
     }

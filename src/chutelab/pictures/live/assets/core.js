@@ -5,8 +5,8 @@
  * @typedef {{size: number, fields: Record<string, [number, string, number]>}} Struct
  * @typedef {{structs: Record<string, Struct>, enums: Record<string, Record<string, number>>,
  *   constants: Record<string, number>}} Layout
- * @typedef {import("./machine.js").Machine & {spins?: number[]}} Machine with the spin, rad/s, with
- *   which each is released, if not 0
+ * @typedef {import("./machine.js").Machine & {spins?: number[], goesOn?: boolean[]}} Machine
+ *   of a run that goes on after a change: spins, rad/s, and who is under way already
  * @typedef {{t: number, x: number, y: number, before: number[], after: number[],
  *   normal: number, tangent: number, disk: number, other: number, kind: number,
  *   surface: number}} Event
@@ -172,7 +172,7 @@ class Core {
       this.fill("disks", "Disk", i, {
         x: one.x, y: one.y, vx: one.vx, vy: one.vy, spin: machine.spins?.[i] ?? 0, release: one.t,
         radius: machine.radius[i], mass: machine.mass[i], inertia: machine.inertia[i],
-        kind: one.kind, rides: Number(one.carried),
+        kind: one.kind, rides: Number(one.carried), goes_on: Number(machine.goesOn?.[i] ?? false),
       });
     });
     this.exports.prepare();
@@ -233,17 +233,24 @@ class Core {
   }
 
   /** How far those under way have come, as rows of knots; only between steps of a run whose
-   * particles meet. */
+   * particles meet. Of what lasts in contact it is the latest state with a balance that closes. */
   tips() {
-    const { size, fields } = this.layout.structs.Disk, { Mode } = this.layout.enums;
+    const { Disk, Track } = this.layout.structs, { Mode } = this.layout.enums;
     /** @type {number[]} */
     const rows = [];
     const incline = this.get("ride_incline"), now = this.get("t");
     for (let i = 0; i < this.get("disk_count"); i += 1) {
-      const begin = this.get("disks") + i * size;
-      const at = (/** @type {string} */ name) => this.doubles[(begin + fields[name][0]) >> 3];
-      const mode = this.ints[(begin + fields.mode[0]) >> 2];
+      const disk = this.get("disks") + i * Disk.size, track = this.get("tracks") + i * Track.size;
+      const at = (/** @type {string} */ name) => this.doubles[(disk + Disk.fields[name][0]) >> 3];
+      const some = (/** @type {number} */ begin, /** @type {number} */ many) =>
+        this.doubles.subarray(begin >> 3, (begin >> 3) + many);
+      const mode = this.ints[(disk + Disk.fields.mode[0]) >> 2];
       if (mode === Mode.WAITING || mode === Mode.GONE) continue;
+      if (mode === Mode.FREE && this.ints[(track + Track.fields.lasted[0]) >> 2]) {
+        rows.push(...some(track + Track.fields.held[0], 6),
+          ...some(track + Track.fields.held_entries[0], 3), i);
+        continue;
+      }
       let state = ["t", "x", "y", "vx", "vy"].map(at);
       if (mode === Mode.RIDING) {
         const rho = at("ride_rho"), v = at("ride_speed");
@@ -252,8 +259,7 @@ class Core {
         const straight = Math.min(along, 0);
         state = [now, rho * s + straight * c, rho * c - straight * s, v * c, -v * s];
       }
-      const entries = (begin + fields.entries[0]) >> 3;
-      rows.push(...state, at("spin"), ...this.doubles.subarray(entries, entries + 3), i);
+      rows.push(...state, at("spin"), ...some(disk + Disk.fields.entries[0], 3), i);
     }
     return new Float64Array(rows);
   }

@@ -16,7 +16,7 @@ import { predict } from "./prediction.js";
 const SYMBOLS = /** @type {Record<string, [string, string]>} */ ({
   phi1: ["φ₁", "°"], v1: ["v₁", "m/s"], t2: ["t₂", "s"], x2: ["x₂", "m"], v2: ["v₂", "m/s"],
   v2r: ["v₂′", "m/s"], t3: ["t₃", "s"], x3: ["x₃", "m"], v3: ["v₃", "m/s"], d2: ["d₂", "m"],
-  d3: ["d₃", "m"], x: ["x", "m"],
+  d3: ["d₃", "m"], x: ["x", "m"], t: ["t", "s"],
 });
 
 /** What is below this is rounding, in any of the units. */
@@ -59,6 +59,8 @@ function numbersOf(stages, found, pulley, radius) {
     d2: over(({ hit, down }) => (hit && down ? hit.y - down.y : NaN)),
     d3: over(({ down }, i) => (down ? pulley + radius[i] - down.y : NaN)),
     x: over(({ down }) => (down ? down.x : NaN)),
+    // With a plate between, t2 and t3 say it.
+    t: over(({ left, hit, down }) => (left && down && !hit ? down.t - left.t : NaN)),
   });
   const { phi1, x2, x3, y3 } = found;
   const analytic = /** @type {Record<string, number>} */ ({

@@ -28,6 +28,9 @@ class Track {
   /** Whether the last knot only tells how far it has come, until there is another. */
   tip = false;
 
+  /** Whether it is still under way where the run has come to. */
+  live = false;
+
   /** @param {Float64Array} row @param {number} shift s @param {number[] | null} entries */
   add(row, shift, entries) {
     if (this.tip) this.count -= 1;
@@ -89,19 +92,20 @@ class Track {
     return low;
   }
 
-  /** Forget what is after t, but for the state then. @param {number} t */
-  cut(t) {
-    if (!this.count || this.end <= t) return;
-    this.low = Infinity;
-    this.seen = 0;
-    if (this.begin > t) {
+  /** Forget what is after t, but for the state then.
+   * @param {number} t @param {number[]} entries of the ledger then, J */
+  cut(t, entries) {
+    const state = this.state(t);
+    if (!state) {
       this.count = 0;
-      return;
+      this.tip = false;
     }
-    const { x, y, vx, vy, spin } = /** @type {State} */ (this.state(t));
-    const entries = this.entries(t);
+    if (!state || this.end <= t) return;
+    const { x, y, vx, vy, spin } = state;
     this.count = this.knotBefore(t) + 1;
     this.turns.length = Math.min(this.turns.length, this.count);
+    this.low = Infinity;
+    this.seen = 0;
     this.near = 0;
     this.tip = false;
     this.add(new Float64Array([t, x, y, vx, vy, spin, ...entries, 0]), 0, null);
@@ -112,7 +116,7 @@ class Track {
   state(t) {
     if (!this.count || t < this.rows[0]) return null;
     const last = this.count - 1;
-    if (t >= this.end) return this.stateOf(last, t > this.end);
+    if (t >= this.end) return this.stateOf(last, t > this.end && !this.live);
     const i = this.knotBefore(t);
     const h = this.at(i + 1, T) - this.at(i, T);
     const s = (t - this.at(i, T)) / h;
@@ -194,11 +198,13 @@ class Recording {
   add({ knots, tips, events, now, state }) {
     const its = (/** @type {number} */ disk) =>
       this.renamed ? this.renamed[disk] : { index: disk, entries: null, goesOn: false };
+    for (const track of this.tracks) track.live = false;
     for (const rows of [knots, tips]) {
       for (let begin = 0; begin < rows.length; begin += KNOT_ROW) {
         const row = rows.subarray(begin, begin + KNOT_ROW);
         const { index, entries } = its(row[9]);
         const track = this.tracks[index];
+        track.live = rows === tips;
         if (rows === tips && row[0] + this.shift <= track.end) continue;
         track.add(row, this.shift, entries);
         track.tip = rows === tips;
@@ -248,11 +254,14 @@ class Recording {
     const spins = [];
     machine.releases.forEach((release, index) => {
       const track = this.tracks[index] ?? (this.tracks[index] = new Track());
-      const ended = this.hasEnded(index, t);
-      track.cut(t);
+      const ended = track.count > 0 && !track.live && track.end < t;
+      // What a change finds out of balance would stay so.
+      const ledger = this.ledgerOf(index, t);
+      const entries = ledger
+        ? [ledger.belt_work, ledger.restitution_loss, ledger.friction_loss] : [0, 0, 0];
+      track.cut(t, entries);
       const state = track.state(t);
       if (ended) return;
-      const entries = state ? track.entries(t) : [0, 0, 0];
       renamed.push({ index, entries, goesOn: state !== null });
       spins.push(state ? state.spin : 0);
       if (state) {
@@ -275,16 +284,11 @@ class Recording {
       ...piece, appears: piece.appears - t, vanishes: piece.vanishes - t,
     });
     return {
-      ...machine, releases, spins, radius: some(machine.radius), mass: some(machine.mass),
-      inertia: some(machine.inertia), segments: machine.segments.map(gate),
-      arcs: machine.arcs.map(gate), endTime: Math.max(0, machine.endTime - t),
+      ...machine, releases, spins, goesOn: renamed.map((its) => its.goesOn),
+      radius: some(machine.radius), mass: some(machine.mass), inertia: some(machine.inertia),
+      segments: machine.segments.map(gate), arcs: machine.arcs.map(gate),
+      endTime: Math.max(0, machine.endTime - t),
     };
-  }
-
-  /** @param {number} index @param {number} t */
-  hasEnded(index, t) {
-    return this.state === "done" || this.now > this.tracks[index].end + 1e-9
-      ? this.tracks[index].end < Math.min(t, this.now) : false;
   }
 
   /** @param {number} index @param {number} t */
@@ -294,7 +298,8 @@ class Recording {
   }
 
   /** The energy ledger of one particle; while it slips the balance gives the slip heat, while it is
-   * carried the belt's work, in flight what it leaves over is the residual.
+   * carried the belt's work, in flight what it leaves over is the residual. In a crowd particles
+   * give energy to each other, and the balance is that of all.
    * @param {number} index @param {number} t @returns {Ledger | null} */
   ledgerOf(index, t) {
     const track = this.tracks[index];
@@ -311,15 +316,15 @@ class Recording {
     const gain = energy(state) - start;
     const i = t >= track.end ? track.count - 1 : track.knotBefore(t);
     const j = Math.min(i + 1, track.count - 1);
-    const slips = track.at(i, FRICTION) !== track.at(j, FRICTION);
-    const driven = track.at(i, BELT) !== track.at(j, BELT);
     let [belt, restitution, friction] = track.entries(t);
-    restitution = track.at(i, RESTITUTION);
     const residualAt = (/** @type {number} */ k) => energy(track.stateOf(k, false)) - start
       - (track.at(k, BELT) - track.at(k, RESTITUTION) - track.at(k, FRICTION));
     let residual = residualAt(i);
-    if (driven && !slips) belt = gain + restitution + friction - residual;
-    else if (slips) friction = belt - restitution + residual - gain;
+    if (!machine.interact) restitution = track.at(i, RESTITUTION);
+    const changes = (/** @type {number} */ column) =>
+      !machine.interact && track.at(i, column) !== track.at(j, column);
+    if (changes(FRICTION)) friction = belt - restitution + residual - gain;
+    else if (changes(BELT)) belt = gain + restitution + friction - residual;
     else residual = gain - (belt - restitution - friction);
     return {
       start, kinetic: kinetic(state), potential: potential(state), belt_work: belt,

@@ -249,6 +249,21 @@ def test_a_run_without_a_plate_tells_the_time_of_flight():
         assert f"from the first to the second: {(2 * 0.7 / 9.81) ** 0.5:.6g} s" in said.output
 
 
+def test_the_papers_energy_and_power_are_marked_and_the_true_power_is_beside_them():
+    text = call("run", "belt-landing").stdout
+    # 200 of 8 g a second come back with ε v0 = 1 m/s, against a belt of v_b = 2 m/s.
+    flow, belt, back = 200.0 * 0.008, 2.0, 1.0
+    true = flow * belt * (belt + back)
+    papers = 0.5 * flow * (back**2 + belt**2)
+    assert re.search(rf"^P +the paper's power, Eq. \(15\), W +{papers:g} +{papers:g}", text, re.M)
+    assert re.search(rf"^ +its power, to compare with P, W +{true:g} +{true:g} *$", text, re.M)
+    assert "the paper's energy, Eq. (14), J" in text
+    assert "Energy ledger until all have settled, J" in text
+    assert "Energy ledger until the landing, J" in call("run", "perpendicular").stdout
+    timed = call("run", "perpendicular", "--set", "run.until=0.7").stdout
+    assert "Energy ledger until t = 0.7 s, J" in timed
+
+
 def test_a_run_of_a_stream_tells_the_spread_of_the_landings():
     bed = Path(__file__).parent.parent / "lessons" / "07-a-stream" / "bed.toml"
     said = " ".join(call("run", bed, "--out", "out", "--only", "csv").output.split())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from math import isnan
 
 import numpy as np
@@ -45,7 +46,12 @@ def report(recording: Recording, accuracy: Accuracy | None = None) -> list[Rende
     parts: list[RenderableType] = [head, compared]
     if compared.notes and (way := _way(recording)).rows:
         parts.append(way)
-    parts.append(ledger(recording))
+    until = recording.scene.run.until
+    # Belt work goes on after the landing: `belt_work` above is until nothing slips any more.
+    ends = {"landed": "the landing", "settled": "all have settled"}.get(
+        str(until), f"t = {until} s"
+    )
+    parts.append(replace(ledger(recording).sheet(), title=f"Energy ledger until {ends}, J"))
     tell = (stopped, plugged, waits, squeezed, rolling, steady, air_drag)
     notes = [str(note) for one in tell if (note := one(recording)) is not None]
     landed = measure(recording, "landing.count")

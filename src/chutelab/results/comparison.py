@@ -39,10 +39,10 @@ MEANINGS = {
     "v3y": "landing velocity, down",
     "v3": "landing speed",
     "d3": "height of the transfer",
-    "dEk": "energy, Eq. (14)",
-    "P": "power, Eq. (15)",
+    "dEk": "the paper's energy, Eq. (14)",
+    "P": "the paper's power, Eq. (15)",
     "belt_work": "belt work until no slip",
-    "slip_heat": "slip heat until then",
+    "slip_heat": "slip heat until no slip",
 }
 
 
@@ -71,8 +71,13 @@ class Comparison(Shown):
         return max(self.errors.values(), default=None)
 
     def sheet(self) -> Sheet:
-        """Return every quantity that one of the two has, and the largest error."""
+        """Return every quantity that one of the two has, and the largest error.
+
+        Beside the paper's power is the true one, the belt work at the same rate of particles.
+        """
         rows = []
+        energy, power = self.theory["dEk"], self.theory["P"]
+        rate = power / energy if energy > 0.0 else nan
         for name, unit in zip(QUANTITIES, SYMBOLS.values(), strict=True):
             simulated, theory = self.simulated[name], self.theory[name]
             if unit == "degrees":
@@ -81,6 +86,9 @@ class Comparison(Shown):
                 error = f"{self.errors[name]:.1e}" if name in self.errors else ""
                 what = with_unit(MEANINGS[name], unit)
                 rows.append((name, what, number(simulated), number(theory), error))
+                if name == "belt_work" and isfinite(rate):
+                    true = (number(rate * simulated), number(rate * theory))
+                    rows.append(("", "its power, to compare with P, W", *true, ""))
         foot: list[tuple[str, ...]] = []
         if self.max is not None:
             foot = [("max", "largest relative error", "", "", f"{self.max:.1e}")]

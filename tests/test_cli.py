@@ -36,8 +36,8 @@ FILES = [
 # The contract of section 4, copied by hand.
 KEYS = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
-    "impact", "landing", "ended", "stopped", "rolling", "waited", "squeezed", "drag", "steady",
-    "ledger", "theory",
+    "impact", "landing", "ended", "stopped", "rolling", "plugged", "waited", "squeezed",
+    "drag", "steady", "ledger", "theory",
     "theory_as_printed", "error", "accuracy",
 ]  # fmt: skip
 THEORY = [

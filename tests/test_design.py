@@ -584,7 +584,8 @@ def test_uniform_and_relative_spreads():
         ("restitution=0.5±a", "no number"),
         ("restitution=1.5±0.1", "from 0 to 1"),
         ("restitution=0.5±0.1:gamma", "normal and uniform"),
-        ("plate.distance=0.5±1kg", "unknown unit"),
+        ("plate.distance=0.5±1kg", "wrong unit in 1kg: it is in m"),
+        ("plate.distance=0.5±1furlong", "unknown unit"),
         ("plate.distance=0.5±1s", "wrong unit"),
         ("stream.count=5±1", "whole"),
         ("nothing=1±1", "nothing"),
@@ -775,3 +776,21 @@ def test_the_notebook_runs_and_accepts_right_answers(tmp_path):
         assert "right" in shown[f"answer-{n}"][0]["data"]["text/plain"]
     for name in ("picture", "several", "overlay", "spread"):
         assert "image/png" in shown[name][0]["data"]
+
+
+def test_the_minimum_in_the_readme_is_inside_its_range():
+    text = (LESSON.parents[1] / "README.md").read_text(encoding="utf-8")
+    line = re.search(
+        r"^chutelab solve (\S+) --vary (\S+=(\d+):(\d+)) --minimize belt_work$", text, re.MULTILINE
+    )
+    name, vary, low, high = line.groups()
+    found = design.minimize(chutelab.load(name), vary, "belt_work")
+    best = found.answer.values[0]
+    assert f"here at {best:.0f}°" in text
+    # By runs of their own: to both sides the belt pays more.
+    paid = [
+        chutelab.simulate(chutelab.load(name, {"plate.angle_deg": angle, "run.until": "settled"}))
+        for angle in (float(low), best - 2.0, best, best + 2.0, float(high))
+    ]
+    work = [run.by_surface[run.surface_index("outgoing"), 0] for run in paid]
+    assert work[0] > work[1] > work[2] < work[3] < work[4]

@@ -603,6 +603,11 @@ def test_refuses_with_words_and_writes_nothing(tmp_path, arguments, said):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_the_title_says_what_was_set():
+    result = run(*ARGUMENTS, "--set", "plate.restitution=0.6")
+    assert "Perpendicular damping plate, 2 m/s; with plate.restitution=0.6" in result.output
+
+
 def test_a_name_taken_by_a_folder_leaves_everything_as_it_was(tmp_path):
     (tmp_path / "points.csv").mkdir()
     result = run(*ARGUMENTS, "--out", tmp_path)

@@ -18,8 +18,8 @@ from chutelab.results.summary import summary
 
 TOP = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
-    "impact", "landing", "ended", "stopped", "rolling", "waited", "squeezed", "drag", "steady",
-    "ledger", "theory", "theory_as_printed",
+    "impact", "landing", "ended", "stopped", "rolling", "plugged", "waited", "squeezed",
+    "drag", "steady", "ledger", "theory", "theory_as_printed",
     "error",
     "accuracy",
 ]  # fmt: skip
@@ -229,6 +229,18 @@ def test_nobody_waits_where_there_is_room(engine):
     # 1/150 s at 2 m/s is 13.3 mm; the pymunk engine releases at its steps, which is no waiting.
     changed = ("stream.rate=150", "incoming.friction=0.5", f"run.engine={engine}")
     assert printed(run("stream", *FEED, *changed))["waited"] is None
+
+
+def test_a_plugged_hopper_is_announced_and_one_that_runs_out_is_not():
+    # An opening of 2 diameters is bridged by three or four grains, one of 8 is not.
+    narrow = [
+        f"surface[{i}].points=[[{x}0.1, 1.2], [{x}0.1, 0.076], [{x}0.006, 0.0]]"
+        for i, x in enumerate(("-", ""))
+    ]
+    stuck = printed(run("hopper", "stream.count=60", *narrow))["plugged"]
+    assert stuck["still"] + stuck["through"] == 60
+    assert stuck["still"] > 50
+    assert printed(run("hopper", "stream.count=60"))["plugged"] is None
 
 
 def test_who_never_finds_a_place_is_counted_and_who_is_not_due_is_not():

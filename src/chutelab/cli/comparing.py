@@ -9,7 +9,14 @@ import click
 
 from chutelab.cli.console import progress, tell
 from chutelab.cli.output import destination, write_json
-from chutelab.cli.parameters import FileName, json_option, out_option, scene_argument, set_option
+from chutelab.cli.parameters import (
+    FileName,
+    json_option,
+    loaded_as_told,
+    out_option,
+    scene_argument,
+    set_option,
+)
 
 FILES = ("compare.png", "points.csv", "fit.json")
 
@@ -122,7 +129,6 @@ def compare(
     from rich.console import RenderableType
     from rich.text import Text
 
-    from chutelab.scene import load
     from chutelab.studies import measured
     from chutelab.studies.measured.result import advice, as_dict, points_csv
     from chutelab.util.tables import wrapped
@@ -130,7 +136,7 @@ def compare(
     keys = tuple(key.strip() for value in fitted for key in value.split(","))
     if robust and not keys:
         raise click.UsageError("--robust is for fits: name what to fit with --fit.")
-    loaded = load(scene, overrides)
+    loaded = loaded_as_told(scene, overrides)
     film = measured.read(
         data, scale=scale, origin=origin, flip_y=flip_y, t0=t0, track=track,
         columns=next(csv.reader([columns], skipinitialspace=True), ()), fps=fps,

@@ -13,7 +13,16 @@ from rich.text import Text
 from chutelab.results import REASONS, Kind, Recording
 from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
-from chutelab.results.quantities import air_drag, measure, rolling, squeezed, steady, stopped, waits
+from chutelab.results.quantities import (
+    air_drag,
+    measure,
+    plugged,
+    rolling,
+    squeezed,
+    steady,
+    stopped,
+    waits,
+)
 from chutelab.studies.accuracy import Accuracy, written
 from chutelab.util.tables import Sheet, number, wrapped
 
@@ -43,7 +52,7 @@ def report(recording: Recording, accuracy: Accuracy | None = None) -> list[Rende
         str(until), f"t = {until} s"
     )
     parts.append(replace(ledger(recording).sheet(), title=f"Energy ledger until {ends}, J"))
-    tell = (stopped, waits, squeezed, rolling, steady, air_drag)
+    tell = (stopped, plugged, waits, squeezed, rolling, steady, air_drag)
     notes = [str(note) for one in tell if (note := one(recording)) is not None]
     landed = measure(recording, "landing.count")
     if landed > 1:

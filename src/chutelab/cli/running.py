@@ -93,7 +93,7 @@ def run(
     stuck = ""
     with destination(output.out, output.files) as folder:
         try:
-            with progress("simulating", quiet=output.quiet) as update:
+            with progress("simulating", quiet=output.quiet, left=True) as update:
                 if accuracy is None:
                     recording = simulate(loaded, progress=update, max_seconds=max_seconds)
                 else:

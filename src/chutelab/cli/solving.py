@@ -9,7 +9,14 @@ import click
 
 from chutelab.cli.console import progress, tell
 from chutelab.cli.output import destination, write_json
-from chutelab.cli.parameters import json_option, out_option, retitled, scene_argument, set_option
+from chutelab.cli.parameters import (
+    json_option,
+    loaded_as_told,
+    out_option,
+    retitled,
+    scene_argument,
+    set_option,
+)
 
 FILES = ("overlay.png", "scan.png", "solution.toml", "nearest.toml", "solve.json")
 """What ``--out`` may write: scan.png with one key, nearest.toml if there is no solution."""
@@ -92,13 +99,13 @@ def solve(
     from rich.text import Text
 
     from chutelab.engines.simulation import simulate
-    from chutelab.scene import load, to_toml
+    from chutelab.scene import to_toml
     from chutelab.studies import design
     from chutelab.studies.design.answers import as_dict
 
     if len([goal for goal in (targets, minimize, maximize) if goal]) != 1:
         raise click.UsageError("Give one of --target, --minimize and --maximize.")
-    loaded = load(scene, overrides)
+    loaded = loaded_as_told(scene, overrides)
     written = []
     with destination(out, FILES) as place:
         with progress("searching", quiet=quiet) as meter:

@@ -18,6 +18,7 @@ from chutelab.cli.parameters import (
     engine_option,
     file_option,
     json_option,
+    loaded_as_told,
     scene_argument,
     set_option,
 )
@@ -134,8 +135,6 @@ def sweep(
     slip that goes on after it is not in them. With --set run.until=settled it is, as it always is
     in chutelab solve and with --uncertainty.
     """
-    from chutelab.scene import load
-    from chutelab.scene.overrides import Override
     from chutelab.studies.sweep import NUMBERS, LostWorkersError, crew, planned, sweep_to, swept_by
 
     wrote = "\n".join(f"wrote {path}" for path in (out, plot) if path is not None)
@@ -150,12 +149,11 @@ def sweep(
             raise click.UsageError("--resume, --jobs and --scheduler go with --vary only.")
         from chutelab.studies.design.uncertainty import as_dict
 
-        engines = [Override("run.engine", engine, f"--engine {engine}")] if engine else []
-        loaded = load(scene, [*overrides, *engines])
+        loaded = loaded_as_told(scene, overrides, engine)
         spread = _propagated(loaded, uncertain, sample, seed, out, plot, quiet)
         console.tell(as_dict(spread), spread, as_json=as_json, quiet=quiet, wrote=wrote)
         return
-    loaded = load(scene, overrides)
+    loaded = loaded_as_told(scene, overrides)
     if column not in NUMBERS:
         raise RefusedError(f"--of {column}: one of {', '.join(NUMBERS)}")
     check_file("--plot", plot, PICTURES)

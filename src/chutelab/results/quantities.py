@@ -227,6 +227,10 @@ def from_events(
     }
 
 
+STILL = 1e-3
+"""m/s; a bed that trembles is slower, what slides or falls is not for long."""
+
+
 @dataclass(frozen=True)
 class Stopped:
     """A run that was ended before it was over, as ``--max-seconds`` does.
@@ -305,6 +309,43 @@ def waits(recording: Recording) -> Waits | None:
         return None
     longest, mean = (float(late.max()), float(late.mean())) if len(late) else (0.0, 0.0)
     return Waits(len(late), longest, mean, missing)
+
+
+@dataclass(frozen=True)
+class Plug:
+    """Particles that meet each other and lie still in the machine when a run is over.
+
+    How many these are, and how many have left it or come to the outgoing belt.
+    """
+
+    still: int
+    through: int
+
+    def __str__(self) -> str:
+        lie = "1 particle lies" if self.still == 1 else f"{self.still:,} particles lie"
+        return (
+            f"{lie} still in the machine at the end, {self.through:,} got through: it is plugged,"
+            " or something holds them where nothing carries them on"
+        )
+
+
+def plugged(recording: Recording) -> Plug | None:
+    """Return who got stuck; None if nobody did, or nowhere was to be gone to.
+
+    Told of particles that meet, where some got through or an outgoing belt waits for them, of a
+    run that was not stopped. Still is what moves with less than `STILL`.
+    """
+    machine = recording.machine
+    if not machine.interact or stopped(recording) is not None:
+        return None
+    through = recording.ended == REASONS.index("exit")
+    through[recording.select(Kind.LANDING)["particle"]] = True
+    still = np.zeros(recording.count, dtype=bool)
+    still[recording.released] = np.hypot(*recording.ends()[1]["velocity"].T) < STILL
+    lying, gone = int(np.count_nonzero(still & ~through)), int(np.count_nonzero(through))
+    if not lying or not (gone or recording.scene.outgoing is not None):
+        return None
+    return Plug(lying, gone)
 
 
 def air_drag(recording: Recording) -> Drag | None:

@@ -13,6 +13,7 @@ from chutelab.results.quantities import (
     column,
     end_times,
     first,
+    plugged,
     rolling,
     squeezed,
     steady,
@@ -39,7 +40,8 @@ def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> 
     summary.json, where the same run leaves the same bytes. ``accuracy`` is None unless one was
     asked for, ``stopped`` unless the run was ended before it was over (see
     `results.quantities.Stopped`), ``rolling`` unless disks settled on the outgoing belt without
-    being carried by it (see `rolling`), ``waited`` unless particles found their place taken (see
+    being carried by it (see `rolling`), ``plugged`` unless particles got stuck (see
+    `results.quantities.Plug`), ``waited`` unless particles found their place taken (see
     `results.quantities.Waits`), and ``squeezed`` unless riders by adhesion got into each other (see
     `machine.releases.Squeeze`). ``drag`` is what air drag, left out, would do (see `theory.Drag`),
     and ``steady`` is None unless streams were given in t/h (see `results.quantities.Steady`).
@@ -68,6 +70,7 @@ def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> 
         "ended": {"t": end_times(recording), "reason": [REASONS[k] for k in recording.ended]},
         "stopped": stopped(recording),
         "rolling": rolling(recording),
+        "plugged": plugged(recording),
         "waited": waits(recording),
         "squeezed": squeezed(recording),
         "drag": air_drag(recording),

@@ -219,7 +219,8 @@ def _candidates(scene: Scene, machine: Machine, caution: Caution) -> Iterator[Se
     two = [caution.surface, caution.crosses]
     for free in scene.surface:
         other = two[free.name == two[0]]
-        if free.name in two and other in machine.surfaces:
+        # An arc has no points; a straight one may be cut off before it.
+        if free.points and free.name in two and other in machine.surfaces:
             for points in _shortened(np.array(free.points), machine, machine.surfaces.index(other)):
                 yield {f"surface.{free.name}.points": points}
 

@@ -169,4 +169,4 @@ function checked({ key, low, high, name }, value) {
   return value;
 }
 
-export { boundsOf, checked, fieldsOf, homeOf, mayChange, mayDraw, openHandles, sectionsOf };
+export { checked, fieldsOf, mayDraw, openHandles, sectionsOf };

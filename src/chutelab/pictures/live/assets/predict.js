@@ -174,4 +174,4 @@ class Prediction {
   }
 }
 
-export { Prediction, landingLine, whereTo };
+export { Prediction };

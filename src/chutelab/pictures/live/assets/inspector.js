@@ -1,6 +1,6 @@
 // Numbers that can be typed: of one part of the scene, or the main ones of all.
 
-import { checked, fieldsOf, sectionsOf } from "./controls.js";
+import { checked, fieldsOf, sectionsOf, showsFew } from "./controls.js";
 import { canGo, without } from "./edit.js";
 import { card, html } from "./panels.js";
 import { Fault } from "./scene.js";
@@ -55,7 +55,8 @@ class Inspector {
   refresh() {
     const { lab, words, choice } = this;
     if (!lab.given || !lab.scene) return;
-    const sections = sectionsOf(lab.scene);
+    const all = sectionsOf(lab.scene), sections = showsFew(lab.data) ? all.slice(0, 1) : all;
+    choice.hidden = sections.length < 2;
     const section = sections.find(({ name }) => name === this.part) ?? sections[0];
     this.part = section.name;
     const names = sections.map(({ name }) => name);
@@ -79,10 +80,10 @@ class Inspector {
 
   /** @param {Field[]} fields */
   rebuild(fields) {
-    const { words } = this, several = new Set(fields.map(({ table }) => table)).size > 1;
+    const { words } = this, several = this.part === "scene";
     this.inputs.clear();
     this.list.replaceChildren(...fields.map((field) => {
-      const { key, table, name, part, of, unit, low, high } = field;
+      const { key, table, owner, name, part, of, unit, low, high } = field;
       const input = html("input", { type: "text", inputmode: "decimal", autocomplete: "off" });
       const ends = Math.abs(low) < 1e5 && Math.abs(high) < 1e5
         ? words.say("from-to", { low: words.bound(low), high: words.bound(high) }) : "";
@@ -92,9 +93,9 @@ class Inspector {
         if (event.key === "Enter") this.take(key);
       });
       this.inputs.set(key, { input, field });
-      const owner = several && table !== "scene" ? `${words.name(table)}: ` : "";
+      const whose = several && table !== "scene" ? `${words.name(owner)}: ` : "";
       const which = of > 1 ? ` ${(name === "radius" ? "≥≤" : "xy")[part]}` : "";
-      return html("label", {}, html("span", {}, `${owner}${words.key(table, name)}${which}`), input,
+      return html("label", {}, html("span", {}, `${whose}${words.key(table, name)}${which}`), input,
         html("span", { class: "unit" }, words.unit(unit)));
     }));
   }
@@ -119,7 +120,7 @@ class Inspector {
     const { input, field } = its, text = input.value.trim();
     const word = text.toLowerCase() === words.say("adhesion").toLowerCase();
     const value = word ? "adhesion" : words.parse(text);
-    const shown = typeof field.value === "number" ? Number(field.value.toPrecision(12)) : field.value;
+    const shown = typeof field.value === "number" ? words.brief(field.value) : field.value;
     // What was only looked at keeps all its digits.
     if (value === shown && !lab.fault) return;
     try {

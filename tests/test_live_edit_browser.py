@@ -113,12 +113,16 @@ def test_numbers_are_typed_and_a_wrong_one_says_why(shown):
     angle.press("Enter")
     assert value(page, "plate.angle_deg") == 12.5
     assert page.locator("#fault").is_hidden()
-    for typed, why in (("95", "zwischen −90 und 90"), ("steil", "eine Zahl")):
+    for typed, why in (("95", "zwischen −90 und 90"), ("steil", "eine Zahl"), ("0x10", "eine")):
         angle.fill(typed)
         angle.press("Enter")
         assert why in page.inner_text("#fault")
         assert angle.get_attribute("aria-invalid") == "true"
+        assert angle.input_value() == typed
         assert value(page, "plate.angle_deg") == 12.5
+    angle.press("Escape")
+    assert page.locator("#fault").is_hidden()
+    assert angle.input_value() == "12,5"
     distance = field(page, "Prallplatte: Abstand")
     distance.fill("-0,2")
     distance.press("Enter")
@@ -198,6 +202,16 @@ def test_all_of_that_goes_with_the_keyboard_alone(shown):
     assert page.locator("#help").is_hidden()
     page.keyboard.press("Delete")
     assert value(page, "surface") is None
+    assert page.evaluate("document.activeElement.id") == "play"
+    page.focus("#undo")
+    while page.locator("#undo").is_enabled():
+        page.keyboard.press("Enter")
+    assert page.evaluate("document.activeElement.id") == "redo"
+    page.focus("#time")
+    page.keyboard.press("End")
+    assert page.evaluate("chutelab.lab.t") == page.evaluate("chutelab.lab.end")
+    page.keyboard.press("Home")
+    assert page.evaluate("chutelab.lab.t") == 0.0
     page.evaluate("document.activeElement.blur()")
     page.keyboard.press("End")
     end = page.evaluate("chutelab.lab.end")

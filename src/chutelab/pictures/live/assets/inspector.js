@@ -49,7 +49,9 @@ class Inspector {
     const { lab, part } = this;
     if (!lab.given || !this.canDelete) return;
     lab.replace(without(lab.given, part));
-    if (!lab.fault) this.choose("scene");
+    if (lab.fault) return;
+    this.choose("scene");
+    document.getElementById("play")?.focus();
   }
 
   refresh() {
@@ -91,6 +93,9 @@ class Inspector {
       input.addEventListener("change", () => this.take(key));
       input.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
         if (event.key === "Enter") this.take(key);
+        if (event.key !== "Escape" || !this.lab.fault) return;
+        this.lab.fault = null;
+        this.lab.tell("scene");
       });
       this.inputs.set(key, { input, field });
       const whose = several && table !== "scene" ? `${words.name(owner)}: ` : "";
@@ -123,16 +128,16 @@ class Inspector {
     const shown = typeof field.value === "number" ? words.brief(field.value) : field.value;
     // What was only looked at keeps all its digits.
     if (value === shown && !lab.fault) return;
+    // What was typed stands until it is known to be possible.
+    input.setAttribute("aria-invalid", "true");
     try {
       checked(field, value);
-      input.removeAttribute("aria-invalid");
       if (value === shown) lab.replace(/** @type {any} */ (lab.given));
       else lab.change({ [key]: value });
     } catch (error) {
       if (!(error instanceof Fault)) throw error;
       lab.refuse(error);
     }
-    if (lab.fault) input.setAttribute("aria-invalid", "true");
   }
 }
 

@@ -104,7 +104,7 @@ class Words {
   /** A number that somebody typed, with point or comma; NaN if it is none. @param {string} text */
   parse(text) {
     const plain = text.trim().replace("−", "-").replace(",", ".");
-    return plain === "" ? NaN : Number(plain);
+    return /^[-+.\de]+$/i.test(plain) ? Number(plain) : NaN;
   }
 }
 

@@ -5,6 +5,8 @@ import signal
 
 from hypothesis import settings
 
+from live.browser import browser, opened, shown  # noqa: F401
+
 # What runs in the background of a shell ignores Ctrl-C, and so would the commands that tests start.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 

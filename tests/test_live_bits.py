@@ -18,6 +18,7 @@ from chutelab.scene import SceneError, from_dict, load, parse, shipped
 from chutelab.scene.overrides import Override
 from chutelab.theory import Reason, predict, transfer
 from chutelab.theory.results import STAGES
+from live.machines import as_page_has_it, plain
 
 NODE = shutil.which("node")
 ASSETS = Path(chutelab.pictures.live.__file__).parent / "assets"
@@ -39,82 +40,6 @@ def in_node(asked, what="scenes"):
     return json.loads(done.stdout)[what]
 
 
-def plain(value):
-    """Return numbers as they are written in what node says."""
-    if isinstance(value, float) and not np.isfinite(value):
-        return {"inf": "Infinity", "-inf": "-Infinity", "nan": "NaN"}[str(value)]
-    if isinstance(value, list | tuple):
-        return [plain(entry) for entry in value]
-    return {key: plain(entry) for key, entry in value.items()} if isinstance(value, dict) else value
-
-
-def rows(**columns):
-    """Return arrays (N, ...) as N tables."""
-    lists = {name: column.tolist() for name, column in columns.items()}
-    return [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)]
-
-
-def by_kind(values, kinds):
-    """Return values (S,) or (K, S) as (S, K)."""
-    count = np.size(values) // kinds
-    return np.array(values).reshape(kinds, count).T
-
-
-def numbers(machine):
-    """Return a machine as JavaScript has it."""
-    count, kinds = machine.count, len(machine.rolling)
-    starts, bends, releases = machine.segments, machine.arcs, machine.releases
-    pairs = [
-        {
-            "restitution": by_kind(part.restitution, kinds),
-            "friction": by_kind(part.friction, kinds),
-            "surface": part.surface, "appears": part.appears, "vanishes": part.vanishes,
-            "speed": part.speed,
-        }
-        for part in (starts, bends)
-    ]  # fmt: skip
-    pulley = None
-    if machine.pulley is not None:
-        pulley = {
-            name: getattr(machine.pulley, name)
-            for name in ("radius", "speed", "incline", "surface")
-        }
-        for name in ("restitution", "friction"):
-            value = np.array(getattr(machine.pulley, name), dtype=float)
-            pulley[name] = value.reshape(kinds).tolist()
-    return plain({
-        "surfaces": list(machine.surfaces),
-        "gravity": machine.gravity,
-        "landing": machine.landing,
-        "until": machine.until,
-        "endTime": float(machine.end_time),
-        "dt": machine.dt,
-        "interact": machine.interact,
-        "exitBox": [float(side) for side in machine.exit_box],
-        "segments": rows(
-            x=starts.start[:, 0], y=starts.start[:, 1], tx=starts.tangent[:, 0],
-            ty=starts.tangent[:, 1], length=starts.length, **pairs[0],
-        ),
-        "arcs": rows(
-            x=bends.center[:, 0], y=bends.center[:, 1], radius=bends.radius, begin=bends.begin,
-            extent=bends.extent, **pairs[1],
-        ),
-        "pulley": pulley,
-        "releases": rows(
-            t=releases.t, x=releases.position[:, 0], y=releases.position[:, 1],
-            vx=releases.velocity[:, 0], vy=releases.velocity[:, 1], carried=releases.carried,
-            stream=releases.stream, kind=releases.kind,
-        ),
-        **{
-            name: np.broadcast_to(getattr(machine.particle, name), count).tolist()
-            for name in ("radius", "mass", "inertia")
-        },
-        "pairRestitution": machine.pair_restitution.tolist(),
-        "pairFriction": machine.pair_friction.tolist(),
-        "rolling": machine.rolling.tolist(),
-    })  # fmt: skip
-
-
 def differences(mine, other, path=""):
     """Yield where two trees differ."""
     if isinstance(mine, dict) and isinstance(other, dict):
@@ -131,7 +56,7 @@ def compare(documents, names):
     for document, name, found in zip(documents, names, in_node(documents), strict=True):
         scene = from_dict(document)
         assert "machine" in found, (name, found)
-        wrong = list(differences(numbers(build(scene)), found["machine"]))
+        wrong = list(differences(plain(as_page_has_it(build(scene))), found["machine"]))
         assert not wrong, (name, len(wrong), wrong[:5])
         assert parse(found["toml"]) == scene, name
 

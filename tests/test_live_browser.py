@@ -2,33 +2,16 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import chutelab
-from chutelab.pictures.live.page import write
 from chutelab.results import Kind
 from chutelab.scene import load
 
-playwright = pytest.importorskip(
-    "playwright.sync_api", reason='needs Playwright: pip install "chutelab[test]"'
-)
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
-pytestmark = pytest.mark.skipif(
-    CHROMIUM is None, reason="needs a browser: apt-get install chromium"
-)
-
 SCENES = ("perpendicular", "inclined-40", "spoon", "cascade", "inclined-conveyor")
-
-# A page without `eval` cannot be waited for by a condition.
-READY = """() => new Promise((resolve) => {
-  const look = () => (globalThis.chutelab?.lab.recording.tracks[0].count > 0
-    ? resolve() : setTimeout(look, 5));
-  look();
-})"""
 
 # Takes hold of random handles, as a pointer would, and waits until the run is there.
 DRAG = """async ([count, seed]) => {
@@ -55,38 +38,6 @@ DRAG = """async ([count, seed]) => {
   }
   return answers;
 }"""
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with playwright.sync_playwright() as driver:
-        opened = driver.chromium.launch(executable_path=CHROMIUM)
-        yield opened
-        opened.close()
-
-
-@pytest.fixture
-def shown(browser, tmp_path):
-    """Open a scene; at the end nothing must have been asked for, and nothing said."""
-    pages, said, asked = [], [], []
-
-    def show(name, overrides=(), **options):
-        path = tmp_path / f"{len(pages)}.html"
-        write(load(name, overrides), path)
-        page = browser.new_page(**options)
-        page.on("console", lambda message: said.append(message.text))
-        page.on("pageerror", lambda error: said.append(str(error)))
-        page.on("request", lambda request: asked.append(request.url))
-        page.goto(path.as_uri())
-        page.evaluate(READY)
-        pages.append(page)
-        return page
-
-    yield show
-    for page in pages:
-        page.close()
-    assert not said
-    assert all(url.startswith(("file:", "blob:")) for url in asked)
 
 
 def lands_as_in_python(page, file, seed, count):
@@ -247,22 +198,3 @@ def test_names_from_scenes_never_become_markup(shown, tmp_path):
     page = shown(file)
     assert page.evaluate("document.title") == evil
     assert page.locator("img").count() == 0
-
-
-def test_in_a_frame_that_is_hidden_when_it_loads_all_is_drawn_once_it_shows(shown, tmp_path):
-    inner = tmp_path / "inner.html"
-    write(load("perpendicular"), inner)
-    page = shown("perpendicular")
-    outer = tmp_path / "outer.html"
-    outer.write_text(
-        '<div id="tab" style="display:none"><iframe src="inner.html" width="900" height="600">'
-        "</iframe></div>",
-        encoding="utf-8",
-    )
-    page.goto(outer.as_uri())
-    frame = page.frames[1]
-    frame.evaluate(READY)
-    page.evaluate('document.getElementById("tab").style.display = "block"')
-    page.evaluate("() => new Promise((then) => setTimeout(then, 300))")
-    assert frame.evaluate("document.querySelectorAll('.track').length") == 1
-    assert frame.evaluate("chutelab.stage.view.width") > 300

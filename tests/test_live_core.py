@@ -13,7 +13,7 @@ import pytest
 from chutelab.engines.contact import engine, module
 from chutelab.machine import build
 from chutelab.scene import load
-from live.machines import as_page_has_it, dumps
+from live.machines import as_page_has_it, plain
 
 HERE = Path(__file__).parent
 NODE = shutil.which("node")
@@ -33,7 +33,7 @@ def test_the_pages_host_runs_every_kind_of_scene_as_python_does():
         machines.append(build(load(name, overrides)))
     done = subprocess.run(
         [str(NODE), HERE / "live" / "core.mjs"],
-        input=dumps([as_page_has_it(machine) for machine in machines]),
+        input=json.dumps(plain([as_page_has_it(machine) for machine in machines])),
         capture_output=True, text=True, check=True,
     )  # fmt: skip
     answers = json.loads(done.stdout)

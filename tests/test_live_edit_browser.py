@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import shutil
 from io import BytesIO, StringIO
 
 import numpy as np
@@ -14,26 +13,7 @@ import chutelab
 from chutelab.pictures.live.page import html
 from chutelab.results import Kind
 from chutelab.scene import load, parse, to_toml
-
-playwright = pytest.importorskip(
-    "playwright.sync_api", reason='needs Playwright: pip install "chutelab[test]"'
-)
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
-pytestmark = pytest.mark.skipif(
-    CHROMIUM is None, reason="needs a browser: apt-get install chromium"
-)
-
-# A page without `eval` cannot be waited for by a condition; a run is done some frames after.
-DONE = """() => new Promise((resolve, reject) => {
-  const end = performance.now() + 5000;
-  const look = () => {
-    if ((globalThis.chutelab?.lab.recording.state ?? "running") !== "running") {
-      requestAnimationFrame(() => requestAnimationFrame(resolve));
-    } else if (performance.now() > end) reject(new Error("no run that ends"));
-    else setTimeout(look, 5);
-  };
-  look();
-})"""
+from live.browser import DONE
 
 PREDICT = """
 [live]
@@ -42,43 +22,6 @@ predict = true
 name = "Moon"
 set = { gravity = 1.62 }
 """
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with playwright.sync_playwright() as driver:
-        opened = driver.chromium.launch(executable_path=CHROMIUM)
-        yield opened
-        opened.close()
-
-
-@pytest.fixture
-def shown(browser, tmp_path):
-    """Open a scene; at the end nothing must have been said, and nothing asked for."""
-    said, contexts = [], []
-
-    def show(name="perpendicular", more="", *, language="en", address="", **options):
-        path = tmp_path / f"{len(contexts)}.html"
-        path.write_text(html(parse(to_toml(load(name)) + more), language=language), "utf-8")
-        context = browser.new_context(**{"viewport": {"width": 1366, "height": 620}, **options})
-        contexts.append(context)
-        page = context.new_page()
-        page.set_default_timeout(10_000)
-        page.on("console", lambda message: said.append(message.text))
-        page.on("pageerror", lambda error: said.append(str(error)))
-        page.on("request", lambda request: asked(request.url))
-        page.goto(path.as_uri() + address)
-        page.evaluate(DONE)
-        return page
-
-    def asked(url):
-        if not url.startswith(("file:", "blob:", "data:")):
-            said.append(url)
-
-    yield show
-    for context in contexts:
-        context.close()
-    assert said == []
 
 
 def value(page, key):
@@ -253,7 +196,7 @@ def landing_of(scene):
 
 
 def test_path_and_numbers_are_hidden_until_there_is_a_mark_and_play_was_pressed(shown):
-    page = shown("inclined-40", PREDICT)
+    page = shown("inclined-40", more=PREDICT)
     hidden = ("#numbers", "#energy", "#curves", ".tools", ".symbols")
     dots = "chutelab.stage.paths.childElementCount"
 
@@ -324,7 +267,7 @@ def test_a_mark_may_stand_where_it_is_and_what_lands_nowhere_is_said(shown):
 
 
 def test_where_there_is_no_belt_the_mark_goes_anywhere(shown):
-    page = shown("free-fall", "[live]\npredict = true\n")
+    page = shown("free-fall", more="[live]\npredict = true\n")
     page.click("#play")
     page.keyboard.press("ArrowUp")
     page.keyboard.press("ArrowRight")
@@ -347,7 +290,7 @@ controls = ["plate.angle_deg"]
 panels = ["numbers", "edit"]
 ranges = { "plate.angle_deg" = [20, 60] }
 """
-    page = shown("inclined-40", live)
+    page = shown("inclined-40", more=live)
     grips = page.evaluate("chutelab.stage.handles.flatMap(({ axes }) => axes.map((a) => a.key))")
     assert set(grips) == {"plate.angle_deg"}
     assert page.locator("#tool-line").count() == 0
@@ -461,22 +404,22 @@ def test_scene_tables_and_picture_are_saved(shown):
         assert np.mean(np.abs(image - np.array(colour)).max(axis=-1) < 30) > 5e-4
 
 
+@pytest.mark.parametrize("own_file", [True, False])
 def test_in_a_frame_that_is_hidden_at_first_it_draws_once_it_is_seen_and_tells_changes(
-    browser, tmp_path
+    opened, tmp_path, own_file
 ):
-    outer = tmp_path / "outer.html"
+    outer, inner = tmp_path / "outer.html", html(load("perpendicular"))
+    (tmp_path / "inner.html").write_text(inner, "utf-8")
     # As the notebook's widget has it: a text of its own, without an origin.
-    inner = html(load("perpendicular")).replace("&", "&amp;").replace('"', "&quot;")
+    text = inner.replace("&", "&amp;").replace('"', "&quot;")
+    frame = f'sandbox="allow-scripts allow-downloads" srcdoc="{text}"'
     outer.write_text(
         "<!doctype html><script>addEventListener('message', ({data}) => (window.heard = data))"
         "</script><div id='tab' style='display: none'><iframe style='width: 700px; height: 560px' "
-        f'sandbox="allow-scripts allow-downloads" srcdoc="{inner}"></iframe></div>',
+        f"{'src=inner.html' if own_file else frame}></iframe></div>",
         "utf-8",
     )
-    page = browser.new_page()
-    said = []
-    page.on("pageerror", lambda error: said.append(str(error)))
-    page.goto(outer.as_uri())
+    page = opened(outer)
     page.wait_for_timeout(300)
     page.evaluate("document.getElementById('tab').style.display = 'block'")
     frame = page.frames[1]
@@ -485,6 +428,7 @@ def test_in_a_frame_that_is_hidden_at_first_it_draws_once_it_is_seen_and_tells_c
     size = frame.evaluate("[chutelab.stage.view.width, chutelab.stage.canvas.width]")
     assert min(size) > 300
     assert frame.evaluate("chutelab.stage.paths.childElementCount") == 1
+    assert frame.evaluate("document.querySelectorAll('.track').length") == 1
     assert page.evaluate("window.heard") is None
     frame.evaluate("chutelab.lab.change({ 'plate.angle_deg': 20 }, { done: false })")
     page.wait_for_timeout(50)
@@ -494,8 +438,6 @@ def test_in_a_frame_that_is_hidden_at_first_it_draws_once_it_is_seen_and_tells_c
     heard = page.evaluate("window.heard")
     assert heard["chutelab"] == "scene"
     assert parse(heard["toml"]).plates[0].angle_deg == 20.0
-    assert said == []
-    page.close()
 
 
 @pytest.mark.parametrize("size", [(1366, 620), (360, 740), (740, 360)])
@@ -503,8 +445,8 @@ def test_in_a_frame_that_is_hidden_at_first_it_draws_once_it_is_seen_and_tells_c
 def test_picture_and_play_are_seen_together_and_fingers_hit(shown, size, scheme):
     width, height = size
     page = shown(
-        "inclined-40", PREDICT, viewport={"width": width, "height": height}, color_scheme=scheme,
-        has_touch=True, reduced_motion="reduce",
+        "inclined-40", more=PREDICT, viewport={"width": width, "height": height},
+        color_scheme=scheme, has_touch=True, reduced_motion="reduce",
     )  # fmt: skip
     page.click("#show-all")
     page.evaluate("scrollTo(0, 0)")
@@ -545,7 +487,7 @@ def test_titles_and_names_are_never_markup(shown, tmp_path):
     old = scene.splitlines()[0]
     assert old.startswith("title = ")
     own.write_text(scene.replace(old, f"title = '{title}'"), "utf-8")
-    page = shown(own, more)
+    page = shown(own, more=more)
     page.locator("#edit select").select_option(name)
     assert page.locator("img, b:text('bold')").count() == 0
     assert name in page.locator("#edit select").inner_text()

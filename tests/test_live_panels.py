@@ -17,7 +17,7 @@ from chutelab.machine import build
 from chutelab.pictures import live
 from chutelab.results import Kind
 from chutelab.scene import load
-from live.machines import as_page_has_it, dumps
+from live.machines import as_page_has_it, plain
 
 HERE = Path(__file__).parent
 ASSETS = Path(live.__file__).parent / "assets"
@@ -34,10 +34,9 @@ SCENES = [
 
 
 def ask(**questions):
-    text = dumps(questions) if "machines" in questions else json.dumps(questions)
     done = subprocess.run(
         [str(NODE), HERE / "live" / "panels.mjs"],
-        input=text, capture_output=True, text=True, check=True,
+        input=json.dumps(plain(questions)), capture_output=True, text=True, check=True,
     )  # fmt: skip
     return json.loads(done.stdout)
 

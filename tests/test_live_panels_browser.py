@@ -3,59 +3,13 @@
 from __future__ import annotations
 
 import re
-import shutil
 
 import numpy as np
 import pytest
 
-from chutelab.pictures.live.page import write
-from chutelab.scene import load
-
 playwright = pytest.importorskip(
     "playwright.sync_api", reason='needs Playwright: pip install "chutelab[test]"'
 )
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser"))), None)
-pytestmark = pytest.mark.skipif(
-    CHROMIUM is None, reason="needs a browser: apt-get install chromium"
-)
-
-# A page without `eval` cannot be waited for by a condition.
-READY = """() => new Promise((resolve, reject) => {
-  const look = () => (globalThis.chutelab?.lab.recording.state === "done"
-    ? resolve() : setTimeout(look, 5));
-  look();
-  setTimeout(() => reject(new Error("no run")), 20000);
-})"""
-
-
-@pytest.fixture(scope="module")
-def browser():
-    with playwright.sync_playwright() as driver:
-        opened = driver.chromium.launch(executable_path=CHROMIUM)
-        yield opened
-        opened.close()
-
-
-@pytest.fixture
-def show(browser, tmp_path):
-    """Open a scene's page; at the end it must not have complained of anything."""
-    pages, said = [], []
-
-    def opened(name, overrides=(), language="en"):
-        path = tmp_path / f"{len(pages)}.html"
-        write(load(name, overrides), path, language=language)
-        page = browser.new_page(viewport={"width": 1366, "height": 620})
-        page.on("console", lambda message: said.append(message.text))
-        page.on("pageerror", lambda error: said.append(str(error)))
-        page.goto(path.as_uri())
-        page.evaluate(READY)
-        pages.append(page)
-        return page
-
-    yield opened
-    for page in pages:
-        page.close()
-    assert not said
 
 
 def said_by(page, selector):
@@ -72,8 +26,8 @@ def middle_of(page, selector):
     return box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
 
 
-def test_tape_and_tracer_with_the_keyboard_alone(show):
-    page = show("perpendicular")
+def test_tape_and_tracer_with_the_keyboard_alone(shown):
+    page = shown("perpendicular")
     page.focus("#play")
     for _ in range(30):
         page.keyboard.press("Tab")
@@ -110,8 +64,8 @@ def test_tape_and_tracer_with_the_keyboard_alone(show):
     assert v == pytest.approx(np.hypot(2.0, 9.81 * fall), abs=6e-4)
 
 
-def test_tape_and_tracer_with_a_pointer(show):
-    page = show("perpendicular")
+def test_tape_and_tracer_with_a_pointer(shown):
+    page = shown("perpendicular")
     page.click("#tool-tape")
     scale = page.evaluate("chutelab.stage.view.scale")
     before = numbers_in(said_by(page, '[data-id="tape-0"]'))
@@ -136,8 +90,8 @@ def test_tape_and_tracer_with_a_pointer(show):
     )
 
 
-def test_curves_are_read_off_and_set_the_time(show):
-    page = show("perpendicular")
+def test_curves_are_read_off_and_set_the_time(shown):
+    page = shown("perpendicular")
     page.focus(".curves")
     page.keyboard.press("Home")
     for _ in range(3):
@@ -155,9 +109,9 @@ def test_curves_are_read_off_and_set_the_time(show):
     assert 0.4 * end < page.evaluate("chutelab.lab.t") < 0.55 * end
 
 
-def test_a_streams_landings_fill_up_with_time_and_a_lone_particle_has_none(show):
-    assert show("perpendicular").locator("#landing").is_hidden()
-    page = show("stream-independent", ["stream.count=60"], language="de")
+def test_a_streams_landings_fill_up_with_time_and_a_lone_particle_has_none(shown):
+    assert shown("perpendicular").locator("#landing").is_hidden()
+    page = shown("stream-independent", ["stream.count=60"], language="de")
     result = page.locator("#landing .result")
     playwright.expect(result).to_have_text(re.compile("^Mittelwert von 60: x = 0,4"))
     times = page.evaluate("chutelab.panels[2].landings.map(({ t }) => t)")

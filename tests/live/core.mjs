@@ -9,7 +9,7 @@ const layout = JSON.parse(readFileSync(new URL("layout.json", home), "utf8"));
 const core = await startCore(await WebAssembly.compile(readFileSync(new URL("core.wasm", home))), layout);
 
 // JSON has no infinity.
-const revive = (_, value) => (value === "inf" ? Infinity : value === "-inf" ? -Infinity : value);
+const revive = (_, value) => (["Infinity", "-Infinity"].includes(value) ? Number(value) : value);
 const answers = JSON.parse(readFileSync(0, "utf8"), revive).map((machine) => {
   core.begin(machine);
   const knots = [], events = [];

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import json
-from math import inf
-
 import numpy as np
 
 
@@ -96,14 +93,10 @@ def as_page_has_it(machine):
     }
 
 
-def dumps(value):
-    """Return JSON in which infinities are texts."""
-
-    def plain(one):
-        if isinstance(one, dict):
-            return {key: plain(item) for key, item in one.items()}
-        if isinstance(one, list):
-            return [plain(item) for item in one]
-        return {inf: "inf", -inf: "-inf"}.get(one, one) if isinstance(one, float) else one
-
-    return json.dumps(plain(value))
+def plain(value):
+    """Return a tree with the numbers that JSON has not as JavaScript writes them."""
+    if isinstance(value, float) and not np.isfinite(value):
+        return {"inf": "Infinity", "-inf": "-Infinity", "nan": "NaN"}[str(value)]
+    if isinstance(value, list | tuple):
+        return [plain(entry) for entry in value]
+    return {key: plain(entry) for key, entry in value.items()} if isinstance(value, dict) else value

@@ -58,7 +58,7 @@ function watchOf(acts) {
   return { reading: watch.reading(acts.at(-1)[1]), laps: watch.laps };
 }
 
-const revive = (_, value) => (value === "inf" ? Infinity : value === "-inf" ? -Infinity : value);
+const revive = (_, value) => (["Infinity", "-Infinity"].includes(value) ? Number(value) : value);
 const asked = JSON.parse(readFileSync(0, "utf8"), revive);
 process.stdout.write(JSON.stringify({
   runs: asked.machines?.map(runOf),

@@ -99,7 +99,8 @@ def find(name_or_path: str | Path) -> Path:
     if folder and source:
         text = "a directory; give a scene file, or the name of a shipped scene"
         raise SceneError(source, [Fault("", None, text)])
-    advice = did_you_mean(path.stem, scenes, f"there are {', '.join(scenes)}", most=3)
+    there = f"there are {', '.join([*scenes][:5])} and others, see `chutelab scenes`"
+    advice = did_you_mean(path.stem, scenes, there, most=3)
     text = f"no such file, and no shipped scene of this name; {advice}"
     raise SceneError(source or '""', [Fault("", None, text)])
 

@@ -176,6 +176,4 @@ function checked({ key, low, high, name }, value) {
   return value;
 }
 
-export {
-  boundsOf, checked, fieldsOf, homeOf, mayChange, mayDraw, openHandles, sectionsOf, showsFew,
-};
+export { checked, fieldsOf, mayDraw, openHandles, sectionsOf, showsFew };

@@ -207,4 +207,4 @@ class CurvesPanel {
   }
 }
 
-export { CurvesPanel, sampleAt, samplesOf };
+export { CurvesPanel, samplesOf };

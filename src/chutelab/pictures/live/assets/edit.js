@@ -102,4 +102,4 @@ function without(given, name) {
 const canGo = (/** @type {Given} */ given, name) =>
   JSON.stringify(without(given, name)) !== JSON.stringify(given);
 
-export { canGo, listed, surfaceAt, withArc, withLine, withParticle, without };
+export { canGo, surfaceAt, withArc, withLine, withParticle, without };

@@ -16,6 +16,9 @@
 /** m of arrow for each m/s. */
 const ARROW = 0.08;
 
+/** m beyond the plate, where the outgoing belt is taken hold of. */
+const AHEAD_OF_PLATE = 0.1;
+
 const DEGREE = Math.PI / 180;
 
 /** Steps of arrow keys by unit. */
@@ -91,8 +94,11 @@ class Handles {
     this.arrow("incoming.speed", "incoming",
       [end[0] - at * c - 0.03 * s, end[1] - at * s + 0.03 * c], [c, s], incoming.speed);
     if (!outgoing) return;
-    const top = radius - outgoing.drop, middle = outgoing.start + 0.5 * outgoing.length;
-    const last = outgoing.start + outgoing.length;
+    const top = radius - outgoing.drop, last = outgoing.start + outgoing.length;
+    // Ahead of the plate, where it is in the picture; the belt may be long.
+    const plate = this.scene.plates.find(({ pivot }) => !pivot);
+    const ahead = radius + (plate ? plate.distance + AHEAD_OF_PLATE : 0);
+    const middle = Math.min(Math.max(ahead, outgoing.start), last);
     this.add("outgoing.drop", "outgoing", "height", "point", [middle, top],
       [this.axis("outgoing.drop", outgoing.drop, "m")], (_, y) => [radius - y]);
     this.add("outgoing.start", "outgoing", "begin", "point", [outgoing.start, top],

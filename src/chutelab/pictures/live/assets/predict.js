@@ -188,4 +188,4 @@ class Prediction {
   }
 }
 
-export { Prediction, landingLine, whereTo };
+export { Prediction };

@@ -15,6 +15,9 @@ const SVG = "http://www.w3.org/2000/svg";
 /** Tracks that are drawn at most; more are a blot. */
 const MOST_TRACKS = 40;
 
+/** Pixels of radius that a particle has at least, and where there are few, which one looks for. */
+const LEAST = 1.2, LEAST_FEW = 3;
+
 /** Pixels between the dashes that show a belt run. */
 const DASH = 26;
 
@@ -231,7 +234,8 @@ class Stage {
     for (const { element, appears, vanishes } of this.gates) {
       element.classList.toggle("absent", t < appears || t >= vanishes);
     }
-    const ink = this.colour("particle"), rim = this.colour("ink");
+    const few = recording.tracks.length <= MOST_TRACKS;
+    const ink = this.colour(few ? "few" : "particle"), rim = this.colour("ink");
     if (this.show.strobe && !this.blind && !machine.interact) this.strobe(context);
     const spins = machine.inertia.some((value) => value > 0);
     context.lineWidth = 1;
@@ -240,7 +244,7 @@ class Stage {
       const state = recording.tracks[i].state(t);
       if (!state || (state.ended && recording.tracks.length > 1)) continue;
       const x = view.px(state.x), y = view.py(state.y);
-      const r = Math.max(1.2, (machine.radius[i] ?? 0) * view.scale);
+      const r = Math.max(few ? LEAST_FEW : LEAST, (machine.radius[i] ?? 0) * view.scale);
       if (x < -r || x > view.width + r || y < -r || y > view.height + r) continue;
       context.beginPath();
       context.arc(x, y, r, 0, 2 * Math.PI);

@@ -168,4 +168,4 @@ class Symbols {
   }
 }
 
-export { Symbols, overlap, placed, spaceOf };
+export { Symbols, placed, spaceOf };

@@ -1,0 +1,80 @@
+"""Pages in a real browser: none of them says anything on the console, or asks for anything."""
+
+from __future__ import annotations
+
+import shutil
+
+import pytest
+
+from chutelab.pictures.live.page import html
+from chutelab.scene import load, parse, to_toml
+
+# A page without `eval` cannot be waited for by a condition; a run is shown some frames after it is
+# there, or is as far as it may go.
+DONE = """() => new Promise((resolve, reject) => {
+  const end = performance.now() + 20000;
+  const under = ({ engine, machine, recording: { state, now, shift } }) =>
+    state === "running" && !(machine.interact && now - shift >= engine.until);
+  const look = () => {
+    if (globalThis.chutelab && !under(chutelab.lab)) {
+      requestAnimationFrame(() => requestAnimationFrame(resolve));
+    } else if (performance.now() > end) reject(new Error("no run that ends"));
+    else setTimeout(look, 5);
+  };
+  look();
+})"""
+
+
+@pytest.fixture(scope="module")
+def browser():
+    playwright = pytest.importorskip(
+        "playwright.sync_api", reason='needs Playwright: pip install "chutelab[test]"'
+    )
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+    if chromium is None:
+        pytest.skip("needs a browser: apt-get install chromium")
+    with playwright.sync_playwright() as driver:
+        opened = driver.chromium.launch(executable_path=chromium)
+        yield opened
+        opened.close()
+
+
+@pytest.fixture
+def opened(browser):
+    """Open a file, each in a context of its own."""
+    contexts, said = [], []
+
+    def asked(url):
+        if not url.startswith(("file:", "blob:")):
+            said.append(url)
+
+    def open_(path, address="", **options):
+        context = browser.new_context(**{"viewport": {"width": 1366, "height": 620}, **options})
+        contexts.append(context)
+        page = context.new_page()
+        page.set_default_timeout(10_000)
+        page.on("console", lambda message: said.append(message.text))
+        page.on("pageerror", lambda error: said.append(str(error)))
+        page.on("request", lambda request: asked(request.url))
+        page.goto(path.as_uri() + address)
+        return page
+
+    yield open_
+    for context in contexts:
+        context.close()
+    assert said == []
+
+
+@pytest.fixture
+def shown(opened, tmp_path):
+    """Open the live page of a scene, with `more` after its file's end, and wait for the run."""
+
+    def show(name="perpendicular", overrides=(), *, more="", language="en", **options):
+        path = tmp_path / "page.html"
+        scene = parse(to_toml(load(name, overrides)) + more)
+        path.write_text(html(scene, language=language), encoding="utf-8")
+        page = opened(path, **options)
+        page.evaluate(DONE)
+        return page
+
+    return show

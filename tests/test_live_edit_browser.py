@@ -248,7 +248,7 @@ def test_path_and_numbers_are_hidden_until_there_is_a_mark_and_play_was_pressed(
 
 def test_a_mark_may_stand_where_it_is_and_what_lands_nowhere_is_said(shown):
     for touch in (False, True):
-        page = shown("perpendicular", PREDICT)
+        page = shown("perpendicular", more=PREDICT)
         if touch:
             box = page.locator(".guess .room").bounding_box()
             page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
@@ -324,7 +324,7 @@ ranges = { "plate.angle_deg" = [20, 60] }
     ],
 )
 def test_all_that_can_be_changed_is_shown_at_once(shown, name, controls, labels):
-    page = shown(name, f"[live]\npredict = true\ncontrols = {controls}\n")
+    page = shown(name, more=f"[live]\npredict = true\ncontrols = {controls}\n")
     assert page.locator("#edit label span:first-child").all_inner_texts() == labels
     assert page.locator("#edit select").is_hidden()
 

@@ -19,10 +19,6 @@ import numpy as np
 
 from chutelab.classroom.exercises.exercise import DIGITS, GRAVITY, ROUNDED, TOLERANCE, Case, shown
 from chutelab.pictures import GREEN, GREY, ORANGE, SKY, VERMILION
-from chutelab.results.recorder import StalledError
-from chutelab.scene import Scene
-from chutelab.studies import design
-from chutelab.util.errors import InputError
 from chutelab.util.tables import Sheet
 
 WIDTH: Final = 88
@@ -353,45 +349,3 @@ def _distance(case: Case, answer: float) -> str:
         return f"It looks like no mistake I know. It is about {size} too {way}.{more}"
     power = "10" if FAR <= max(ratio, 1.0 / ratio) < FAR**2 else "100"
     return f"It looks like no mistake I know. It is more than {power} times too {way}.{more}"
-
-
-def try_out(
-    number: int,
-    answer: object,
-    scene: Scene,
-    key: str,
-    wanted: tuple[str, float],
-    within: float,
-) -> Reply:
-    """Let a machine judge an answer: run it with that number, and look at what comes out.
-
-    No error is raised for what a student hands over, as by `Task.check`.
-
-    Parameters
-    ----------
-    number, answer
-        The question, and what stands there for a number.
-    scene, key
-        The machine, and the key that the answer is for.
-    wanted
-        A quantity, as for `chutelab.design.value`, and what it is to be.
-    within
-        Difference up to which it is right, in the unit of the quantity.
-    """
-    value = number_of(answer)
-    if value is None:
-        return Reply(number, Verdict.BLANK, "Put your number in place of None, and run the cell.")
-    if isinstance(value, str):
-        return Reply(number, Verdict.UNREAD, value)
-    name, target = wanted
-    try:
-        got = design.value(scene.with_values({key: value}), name)
-    except (InputError, StalledError) as error:
-        return Reply(number, Verdict.OFF, f"No machine runs with that: {error}")
-    if isnan(got):
-        return Reply(number, Verdict.OFF, f"With {key} = {shown(value)} it does not get that far.")
-    found = f"With {key} = {shown(value)} the machine does {name} = {shown(got)}."
-    if abs(got - target) < within:
-        return Reply(number, Verdict.RIGHT, found)
-    way = "large" if got > target else "small"
-    return Reply(number, Verdict.OFF, f"{found} That is too {way}: {shown(target)} is wanted.")

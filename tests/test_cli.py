@@ -37,7 +37,7 @@ FILES = [
 KEYS = [
     "format", "scene", "engine", "particles", "seconds", "steps", "contacts", "separation",
     "impact", "landing", "ended", "stopped", "rolling", "plugged", "waited", "squeezed",
-    "drag", "steady", "ledger", "theory",
+    "doubtful", "drag", "steady", "ledger", "theory",
     "theory_as_printed", "error", "accuracy",
 ]  # fmt: skip
 THEORY = [

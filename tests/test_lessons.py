@@ -75,7 +75,7 @@ CONTROLS = {
     5: ("outgoing.speed", "outgoing.friction"),
     6: ("incoming.friction",),
     7: ("stream.bed_height", "plate.angle_deg"),
-    8: ("run.dt",),
+    8: ("plate.distance", "incoming.speed"),
     9: ("plate.angle_deg", "plate.restitution"),
 }
 
@@ -149,19 +149,11 @@ def test_all_faults_of_a_file_are_in_one_message(tmp_path):
     [
         ('x3 = "way', 'x9 = "way', 'quantities.x9 = "way back from the plate to the landing": no'),
         ("set = []", 'set = ["plate.tilt=3"]', "picture.set = "),
-        (
-            'controls = ["plate.restitution"]',
-            'controls = ["plate.tilt"]',
-            'page.live.controls[0] = "plate.tilt": unknown',
-        ),
+        ('["plate.restitution"]', '["plate.tilt"]', 'page.live.controls[0] = "plate.tilt": unk'),
         ("[page.live]", "live = 3\n[other]", "page.live = 3: must be a table such as [live] of"),
         ("[page.live]", "[page.vary]", "page.vary = a table: unknown key; known are scene, set, l"),
         ("predict = true", "predict = 1", "page.live.predict = 1: must be true or false"),
-        (
-            "predict = true",
-            "panel = []",
-            "page.live.panel = []: unknown key; did you mean live.pan",
-        ),
+        ("predict = true", "panel = []", "page.live.panel = []: unknown key; did you mean live.pa"),
         ("minutes = 45", "minutes = true", "minutes = true: must be a whole number"),
         ('["scene.toml"]', '["../scene.toml"]', 'scenes[0] = "../scene.toml": no shipped scene'),
         ('["scene.toml"]', '["a\\u0000b"]', "scenes[0] = "),

@@ -15,6 +15,7 @@ from chutelab.cli.parameters import (
     Number,
     json_option,
     loaded_as_told,
+    max_seconds_option,
     out_option,
     scene_argument,
     set_option,
@@ -53,13 +54,8 @@ REPEATS = 9
     show_default=True,
     help="Timed runs after the first, at most; fewer of what takes long.",
 )
-@click.option(
-    "--max-seconds",
-    metavar="S",
-    type=Number(min=0.0, min_open=True),
-    default=60.0,
-    show_default=True,
-    help="Leave out what is not measured after S seconds, repeats aside: short steps of crowds.",
+@max_seconds_option(
+    60.0, "Leave out what is not measured after S seconds, repeats aside: short steps of crowds."
 )
 @set_option
 @out_option("Write work-precision.tsv and work-precision.png into this folder.")

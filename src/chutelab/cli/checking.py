@@ -9,12 +9,12 @@ import click
 
 from chutelab.cli.console import progress, say, tell
 from chutelab.cli.parameters import (
-    Number,
     complete_scene,
     dt_option,
     engine_option,
     json_option,
     loaded_as_told,
+    max_seconds_option,
     scene_argument,
     set_option,
 )
@@ -55,14 +55,7 @@ def check(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool) ->
 
 @click.command(short_help="Check what scenes promise; compare independent answers.")
 @click.argument("scenes", metavar="[SCENE]...", nargs=-1, shell_complete=complete_scene)
-@click.option(
-    "--max-seconds",
-    metavar="S",
-    type=Number(min=0.0, min_open=True),
-    default=300.0,
-    show_default=True,
-    help="Leave out an answer that takes longer than S seconds.",
-)
+@max_seconds_option(300.0, "Leave out an answer that takes longer than S seconds.")
 @json_option()
 def verify(scenes: tuple[str, ...], max_seconds: float, as_json: bool) -> None:
     """Check what each SCENE is expected to show (default: all shipped ones).

@@ -96,6 +96,18 @@ def json_option(text: str = "Print one JSON object.") -> Decorator:
     return click.option("--json", "as_json", is_flag=True, help=text)
 
 
+def max_seconds_option(default: float, text: str) -> Decorator:
+    """Return ``--max-seconds``, more than 0."""
+    return click.option(
+        "--max-seconds",
+        metavar="S",
+        type=Number(min=0.0, min_open=True),
+        default=default,
+        show_default=True,
+        help=text,
+    )
+
+
 scene_argument = click.argument("scene", shell_complete=complete_scene)
 
 set_option = click.option(

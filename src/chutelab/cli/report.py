@@ -15,6 +15,7 @@ from chutelab.results.comparison import compare
 from chutelab.results.ledger import ledger
 from chutelab.results.quantities import (
     air_drag,
+    doubtful,
     measure,
     plugged,
     rolling,
@@ -52,7 +53,7 @@ def report(recording: Recording, accuracy: Accuracy | None = None) -> list[Rende
         str(until), f"t = {until} s"
     )
     parts.append(replace(ledger(recording).sheet(), title=f"Energy ledger until {ends}, J"))
-    tell = (stopped, plugged, waits, squeezed, rolling, steady, air_drag)
+    tell = (stopped, doubtful, plugged, waits, squeezed, rolling, steady, air_drag)
     notes = [str(note) for one in tell if (note := one(recording)) is not None]
     landed = measure(recording, "landing.count")
     if landed > 1:

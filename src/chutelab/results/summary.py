@@ -11,6 +11,7 @@ from chutelab.results.ledger import ledger
 from chutelab.results.quantities import (
     air_drag,
     column,
+    doubtful,
     end_times,
     first,
     plugged,
@@ -42,9 +43,11 @@ def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> 
     `results.quantities.Stopped`), ``rolling`` unless disks settled on the outgoing belt without
     being carried by it (see `rolling`), ``plugged`` unless particles got stuck (see
     `results.quantities.Plug`), ``waited`` unless particles found their place taken (see
-    `results.quantities.Waits`), and ``squeezed`` unless riders by adhesion got into each other (see
-    `machine.releases.Squeeze`). ``drag`` is what air drag, left out, would do (see `theory.Drag`),
-    and ``steady`` is None unless streams were given in t/h (see `results.quantities.Steady`).
+    `results.quantities.Waits`), ``squeezed`` unless riders by adhesion got into each other (see
+    `machine.releases.Squeeze`), and ``doubtful`` unless entries of the ledger are too large to be
+    true (see `results.quantities.Doubtful`). ``drag`` is what air drag, left out, would do (see
+    `theory.Drag`), and ``steady`` is None unless streams were given in t/h (see
+    `results.quantities.Steady`).
     """
     error, scene = compare(recording), recording.scene
     as_printed = None
@@ -73,6 +76,7 @@ def summary(recording: Recording, accuracy: Mapping[str, Any] | None = None) -> 
         "plugged": plugged(recording),
         "waited": waits(recording),
         "squeezed": squeezed(recording),
+        "doubtful": doubtful(recording),
         "drag": air_drag(recording),
         "steady": steady(recording),
         "ledger": ledger(recording),

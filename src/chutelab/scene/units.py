@@ -213,12 +213,6 @@ Share = Annotated[Number, Field(ge=0.0, le=1.0)]
 Angle = Annotated[Number, Field(ge=-720.0, le=720.0)]
 
 
-def _ascending(span: tuple[float, float]) -> tuple[float, float]:
-    if not span[0] < span[1]:
-        raise ValueError("must be a number, or [from, to] with from < to")
-    return span
-
-
 class Worded:
     """Says what a list is in words, for messages; `Field` would be overruled by that of a key."""
 
@@ -231,7 +225,7 @@ class Worded:
         return {**handler(schema), "x-words": self.words}
 
 
-def _from_below_to(ends: tuple[float, float]) -> tuple[float, float]:
+def _ascending(ends: tuple[float, float]) -> tuple[float, float]:
     if not ends[0] < ends[1]:
         raise ValueError("must be [from, to] with from < to")
     return ends
@@ -262,7 +256,7 @@ Ranges = Annotated[
         Text,
         Annotated[
             tuple[Number, Number],
-            AfterValidator(_from_below_to),
+            AfterValidator(_ascending),
             Worded("[from, to] with from < to"),
         ],
     ],

@@ -389,7 +389,9 @@ WITHOUT_GRAVITY = {
 def test_another_g_is_suspected_where_there_is_one(name):
     task = lesson(name, "gravity")
     for number, right in enumerate(solution(name, task.given), start=1):
-        reply = task.check(number, 0.97 * right)
+        # On one side there may be a known mistake.
+        replies = [task.check(number, factor * right) for factor in (1.03, 0.97)]
+        reply = next(one for one in replies if one.verdict is Verdict.OFF)
         assert "Were numbers rounded on the way" in reply.text
         assert ("g not 9.81" in reply.text) == (number not in WITHOUT_GRAVITY.get(name, ()))
 

@@ -72,6 +72,21 @@ def test_a_name_has_the_same_numbers_in_every_language(name):
             assert repr(task.given) == repr(other.given)
 
 
+def test_a_conversation_in_german_has_no_english_in_it():
+    task = lesson("the-bounce", "Ada", language="de")
+    right = [case.right for case in draw(EXERCISES["the-bounce"], "Ada")[1]]
+    said = [task, task.questions, task.check(1), task.check(1, -right[0])]
+    said += [task.check(1, 1.03 * right[0]), task.check(2, 3.3 * right[1]), task.check(3, "bald")]
+    said += [task.check(2, right[1]), task.check(9), [task.hint(4) for _ in range(3)]]
+    said += [task.reveal(4), task.progress(), task.check(3, 2000 * right[2])]
+    html = task._repr_html_() + task.check(1, right[0])._repr_html_()
+    text = f"{said} {html} {task.progress()._repr_html_()}"
+    assert not re.findall(r"(?i)\b(?:the|question|answer|with|right|tries|shown|not)\b", text)
+    assert not re.search(r"\d\.\d", str(said))
+    assert "g = 9,81 m/s²" in text
+    assert task.check(2, right[1]).right
+
+
 def test_a_mistake_has_one_name_in_all_languages_and_is_called_by_its_own():
     for name in EXERCISES:
         english, german = lesson(name, "Ada"), lesson(name, "Ada", language="de")

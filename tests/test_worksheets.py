@@ -572,7 +572,8 @@ def numbers_in(text):
 # Of the answers' numbers, those that the questions give: a row of the paper's table, the plates'
 # angles, the textbook's and its belt's µ, rates to choose from, steps, and the end of a range.
 TOLD = {
-    3: {"0.137"}, 4: {"20", "40", "60"}, 6: {"0.5", "36.4"}, 7: {"10", "50"}, 8: {"0.1", "0.2"}, 9: {"60"},
+    3: {"0.137"}, 4: {"20", "40", "60"}, 6: {"0.5", "36.4"}, 7: {"10", "50"},
+    8: {"0.1", "0.2"}, 9: {"60"},
 }  # fmt: skip
 
 

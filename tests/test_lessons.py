@@ -381,7 +381,7 @@ def test_each_command_explains_itself(command):
     said = chutelab("lesson", command, "--help").stdout
     assert len(said) > 200
     if command == "grade":
-        assert "RUNS THE STUDENTS' CODE" in said
+        assert "THIS RUNS THE CODE IN NOTEBOOKS" in said
         assert "container" in said
 
 

@@ -180,7 +180,7 @@ MISTAKES = {
     ("the-parabola", 2): {
         "height for distance": lambda g: g.h,
         "speed of falling for the belt speed": lambda g: 2 * g.h,
-        "the straight way": lambda g: sqrt(2 * g.v0**2 * g.h / G + g.h**2),
+        "straight line for distance": lambda g: sqrt(2 * g.v0**2 * g.h / G + g.h**2),
         "a 2 forgotten": lambda g: g.v0 * sqrt(g.h / G),
     },
     ("the-parabola", 3): {
@@ -214,7 +214,7 @@ MISTAKES = {
     ("letting-go", 3): {
         "radius forgotten": lambda g: g.R * u(g),
         "sine for cosine": lambda g: ride(g) * sqrt(1 - u(g) ** 2),
-        "way down for height": lambda g: ride(g) - g.v0**2 / G,
+        "distance fallen for height": lambda g: ride(g) - g.v0**2 / G,
         "degrees for radians": lambda g: ride(g) * cos(degrees(turn(g))),
     },
     ("letting-go", 4): {

@@ -4,7 +4,9 @@
   message; the shipped lessons, found by number, by name or by folder.
 - `texts`: a lesson's Markdown as HTML and for a terminal, its formulas too.
 - `sheets`: the student's sheet, the teacher's and the explanation.
-- `building`: ``lesson.gif``, a new lesson from a template, all lessons as web pages.
+- `cells`: the notebook, made of the worksheet, the lesson's own cells and its exercise.
+- `building`: ``lesson.gif``, ``exercise.ipynb``, a new lesson from a template, all lessons as web
+  pages.
 
 A lesson is a folder ``NN-name`` with ``lesson.toml``, the worksheet ``README.md``, the explanation
 ``explanation.md``, the film ``lesson.gif``, and the notebook ``exercise.ipynb``; scene files of its

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import zlib
 from base64 import b64encode
 from functools import cache
 from hashlib import sha256
@@ -53,7 +54,7 @@ def html(scene: Scene, *, language: str = "en", home: tuple[str, str] | None = N
         "language": language,
         "strings": json.loads(_asset(f"strings/{language}.json")),
         "layout": json.loads((core / "layout.json").read_text(encoding="utf-8")),
-        "wasm": b64encode((core / "core.wasm").read_bytes()).decode("ascii"),
+        "wasm": b64encode(zlib.compress((core / "core.wasm").read_bytes(), 9)).decode("ascii"),
     }
     # Within a script element nothing but an end tag must look like one.
     packed = json.dumps(data, allow_nan=False, separators=(",", ":"), ensure_ascii=False)

@@ -75,7 +75,7 @@ CONTROLS = {
     5: ("outgoing.speed", "outgoing.friction"),
     6: ("incoming.friction",),
     7: ("stream.bed_height", "plate.angle_deg"),
-    8: ("run.dt",),
+    8: ("plate.distance", "incoming.speed"),
     9: ("plate.angle_deg", "plate.restitution"),
 }
 

@@ -365,8 +365,10 @@ def test_show_has_question_scenes_quantities_and_worksheet(number):
     shown = chutelab("lesson", "show", number)
     assert shown.exit_code == 0
     flat = " ".join(shown.stdout.split())
-    for said in (lesson.title, lesson.question, "Predict", "Compare", "Explain", "For the teacher"):
+    for said in (lesson.title, lesson.question, "Predict", "Compare", "Afterwards"):
         assert said in flat
+    assert "$" not in flat
+    assert " ".join(lesson.teacher.say.split()[:6]) not in flat
     for name in (*lesson.scenes, *lesson.quantities):
         assert name in flat
     assert json.loads(chutelab("lesson", "show", number, "--json").stdout)["number"] == number

@@ -18,6 +18,7 @@ from chutelab.classroom.exercises.exercise import draw, shown
 from chutelab.classroom.lessons import find, scene_of, shipped_lessons
 from chutelab.classroom.lessons.building import start
 from chutelab.classroom.lessons.sheets import SHEETS, sheet
+from chutelab.classroom.lessons.texts import without_tex, words_for
 from chutelab.cli import main
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind
@@ -39,9 +40,12 @@ def chutelab(*arguments):
 
 
 def worksheet(number):
-    """Text of a lesson's worksheet, or of docs/physics.md."""
-    path = PHYSICS if number == "physics" else find(number).worksheet
-    return path.read_text(encoding="utf-8")
+    """All that a lesson says, worksheet, explanation and what to say; or docs/physics.md."""
+    if number == "physics":
+        return PHYSICS.read_text(encoding="utf-8")
+    lesson = find(number)
+    texts = (lesson.text("README"), lesson.text("explanation"), lesson.teacher.say)
+    return without_tex("\n\n".join(texts))
 
 
 def commands(text):
@@ -52,15 +56,18 @@ def commands(text):
 
 
 @pytest.mark.parametrize("number", range(1, 10))
-def test_worksheets_have_the_four_parts_and_fit_about_a_page(number):
-    text = worksheet(number)
+def test_a_worksheet_asks_and_an_explanation_tells_and_both_fit_about_a_page(number):
     lesson = find(number)
-    assert text.startswith(f"# Lesson {number}. {lesson.title}\n\n![")
-    heads = re.findall(r"^## (.*)$", text, re.MULTILINE)
-    assert heads == ["Predict", "Run", "Compare", "Explain"]
-    assert 300 < len(text.split()) < 800
-    assert "*For the teacher.*" in text
-    assert max(map(len, text.splitlines())) < 240
+    asked, told = lesson.text("README"), lesson.text("explanation")
+    head = f"# Lesson {number}. {lesson.title}\n\n"
+    assert asked.startswith(head)
+    assert told.startswith(f"{head}*The explanation: open it when your table is filled in.*\n\n![")
+    heads = re.findall(r"^## (.*)$", asked, re.MULTILINE)
+    assert heads == ["Predict", "Run", "Compare", "Afterwards"]
+    assert links(asked.partition("## Afterwards")[2]) == ["explanation.md", "exercise.ipynb"]
+    for text in (asked, told):
+        assert 80 < len(text.split()) < 550
+        assert max(map(len, text.splitlines())) < 240
 
 
 SLOW = (
@@ -320,7 +327,7 @@ STATED = {
         "gives {78.4}°": angle(1.0, RC),
         "{63.1}° and": angle(1.5, RC),
         "and {36.4}°": angle(2.0, RC),
-        "√(g Rc) = {2.23} m/s": sqrt(G * RC),
+        "√(g R_c) = {2.23} m/s": sqrt(G * RC),
         "it is {0.229} m": 1.5**2 / G,
         "v0 sin φ1 = {1.34} m/s": 1.5 * sin(radians(angle(1.5, RC))),
         "negative, {-0.0217} J": 0.008 * (1.5**2 - G * RC),
@@ -365,11 +372,11 @@ STATED = {
         "(v_b - v_x)²: {23.5} mJ": belt(2.0, plate(20)[1])[1],
         "23.5 mJ, {8.0} mJ": belt(2.0, plate(40)[1])[1],
         "8.0 mJ and {0.8} mJ": belt(2.0, plate(60)[1])[1],
-        "there, with {0.29} m/s": plate(20, 0.0, v=1.0)[1],
+        "forward there, with {0.29} m/s": plate(20, 0.0, v=1.0)[1],
         "20 mm, with {0.07} m/s": plate(20, 0.02, v=1.0)[1],
         "It turns at {17.9}°": leaving_at(0.0, 0.02, v=1.0),
         "the point at {14.2}°": leaving_at(0.0, 0.0, v=1.0),
-        "so from tan α = v0²/(2 g d1) on, {59.5}° at": degrees(atan(4.0 / (2.0 * G * 0.12))),
+        "so from tan α = v0² / (2 g d1) on, {59.5}° at": degrees(atan(4.0 / (2.0 * G * 0.12))),
         "touches up to {66.1}°": matching(BALL, 0.12),
     },
     5: {
@@ -395,22 +402,21 @@ STATED = {
         "and {2.137} m/s": sqrt(G * RC * cos(slipping(0.5, U0)[0])),
         "not at {36.4}°": angle(2.0, RC),
         "µ = 0: {20.8}°": degrees(acos((2.0 + U0) / 3.0)),
-        "v0²/(g Rc) = {0.805}": U0,
+        "v0² / (g R_c) = {0.805}": U0,
         "100: {25.2}°": degrees(slipping(1.0, U0)[0]),
         "25.2°, {32.0}°": degrees(slipping(5.0, U0)[0]),
         "and {36.1}°": degrees(slipping(100.0, U0)[0]),
-        "leaves at {23.2} degrees": degrees(slipping(0.5, U0)[0]),
         "here {23.6}°": degrees(acos((3.0 * U0 + 4.0) / 7.0)),
     },
     7: {
         "second belt {48} mJ": belt(2.0)[0],
         "m n = {1.6} kg/s": 0.008 * 200.0,
-        "v0/n = {10} mm, less than a diameter": 1e3 * 2.0 / 200.0,
+        "v0 / n = {10} mm, less than a diameter": 1e3 * 2.0 / 200.0,
         "by up to {11.5} mm": 1e3 * layer_delay(0.05),
         "of that, {3.3} mm": 1e3 * layer_delay(0.05) / sqrt(12.0),
         "(v_b - v_x) = {9.6} W": 0.008 * 200.0 * 2.0 * 3.0,
         "or {9.6} J": 200.0 * 1e-3 * belt(2.0)[0],
-        "v_y = {2.91} m/s": G * T2,
+        "w = {2.91} m/s": G * T2,
         "pushes with {0.81} % of": 100.0 * GRAIN[0],
         "with half of it on sand of {1} mm": 2.0 * SAND[0],
     },
@@ -569,8 +575,8 @@ TOLD = {3: {"0.137"}, 6: {"36.4"}, 7: {"10"}}
 
 @pytest.mark.parametrize("number", range(1, 10))
 def test_no_number_of_the_key_is_on_the_students_sheet(number):
-    student = sheet(find(number), "student")
-    explanation = " ".join(sheet(find(number), "explanation").split())
+    student = without_tex(sheet(find(number), "student"))
+    explanation = " ".join(without_tex(sheet(find(number), "explanation")).split())
     stated = {
         text
         for said in STATED[number]
@@ -617,7 +623,8 @@ KEYS = {
 
 def test_numbers_of_the_keys_are_right():
     texts = {
-        n: " ".join([*find(n).teacher.predictions, find(n).teacher.stretch]) for n in (1, 2, 3)
+        n: without_tex(" ".join([*find(n).teacher.predictions, find(n).teacher.stretch]))
+        for n in (1, 2, 3)
     }
     for said, value in KEYS.items():
         assert re.sub("[{}]", "", said) in " ".join(texts.values())
@@ -637,7 +644,7 @@ def test_nothing_tells_of_the_misprint_before_the_explanation_of_lesson_3():
     shown_first = [
         lesson.title, lesson.question, sheet(lesson, "student"), find_exercise(3).title, *before,
         (lesson.folder / "table-1.toml").read_text(encoding="utf-8"),
-        worksheet(3).partition("## Explain")[0],
+        lesson.text("README"), words_for("lesson.gif", lesson.text("explanation")),
     ]  # fmt: skip
     for text in shown_first:
         assert not re.search("misprint|wrong|fault|not what the paper", text), text
@@ -654,7 +661,11 @@ def test_sheets_are_printed_and_refuse_what_cannot_be(tmp_path):
     (made / "README.md").write_text("# Mine\n\n## Predict\n\nx\n", encoding="utf-8")
     result = chutelab("lesson", "show", made, "--sheet", "student")
     assert result.exit_code == 2
-    assert "a sheet needs the parts ## Run, ## Compare, ## Explain" in result.output
+    assert "a sheet needs the parts ## Run, ## Compare" in result.output
+    (made / "explanation.md").unlink()
+    result = chutelab("lesson", "show", made, "--sheet", "explanation")
+    assert result.exit_code == 2
+    assert "explanation.md: is not there, or empty" in result.output
 
 
 def test_table_1_differs_in_x3_only_as_worksheet_3_says():

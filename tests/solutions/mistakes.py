@@ -1,6 +1,6 @@
 """Every known mistake of every question, made by hand: formulas of the student's numbers."""
 
-from math import acos, asin, atan, cos, degrees, hypot, log10, radians, sin, sqrt
+from math import acos, asin, atan, cos, degrees, hypot, log10, radians, sin, sqrt, tan
 
 G = 9.81
 
@@ -129,6 +129,46 @@ def books(g):
 
 def share(g, energy):
     return g.residual_uJ / 1000 / energy
+
+
+# Lesson 9
+
+
+def after(g, alpha, e, along=1.0):
+    """Velocity forward after a plate that damps the part into it with e, that along it too."""
+    c, s = cos(radians(alpha)), sin(radians(alpha))
+    return along * (g.v0 * s + g.vy * c) * s - e * (g.v0 * c - g.vy * s) * c
+
+
+def plate_for(g, vx, e, along=1.0):
+    low, high = 0.0, 80.0
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if after(g, middle, e, along) < vx else (low, middle)
+    return low
+
+
+def plate_at(g, vx):
+    return plate_for(g, vx, g.e)
+
+
+def per_kg(g):
+    """What the second belt may pay, J/kg."""
+    return g.paid / g.grams
+
+
+def lining(g):
+    a = radians(g.alpha)
+    return (g.v0 * sin(a) + g.vy * cos(a)) * tan(a) / (g.v0 * cos(a) - g.vy * sin(a))
+
+
+def by_e(g):
+    return (after(g, g.alpha, g.e - g.s_e) - after(g, g.alpha, g.e + g.s_e)) / 2
+
+
+def by_alpha(g):
+    small = 1e-3
+    return g.s_a * (after(g, g.alpha + small, g.e) - after(g, g.alpha - small, g.e)) / (2 * small)
 
 
 MISTAKES = {
@@ -355,6 +395,38 @@ MISTAKES = {
         "radius forgotten": lambda g: g.thick_mm / 2000 / g.v,
         "the whole thickness": lambda g: (g.r_mm + g.thick_mm) / 1000 / g.v,
         "upside down": lambda g: g.v / ((g.r_mm + g.thick_mm / 2) / 1000),
+    },
+    ("design", 1): {
+        "ε forgotten": lambda g: plate_for(g, 0.0, 1.0),
+        "the fall forgotten": lambda g: degrees(atan(sqrt(g.e))),
+        "ε on the wrong component": lambda g: plate_for(g, 0.0, 1.0, g.e),
+        "angle from the horizontal": lambda g: 90 - plate_at(g, 0.0),
+        "the tangent, not the angle": lambda g: tan(radians(plate_at(g, 0.0))),
+    },
+    ("design", 2): {
+        "the fall forgotten": lambda g: tan(radians(g.alpha)) ** 2,
+        "upside down": lambda g: 1 / lining(g),
+        "both parts into the plate": lambda g: (
+            (g.v0 * tan(radians(g.alpha)) + g.vy)
+            * tan(radians(g.alpha))
+            / (g.v0 + g.vy * tan(radians(g.alpha)))
+        ),
+        "a share of the energy": lambda g: lining(g) ** 2,
+        "the part lost for the part kept": lambda g: 1 - lining(g),
+    },
+    ("design", 3): {
+        "kinetic energy gained": lambda g: plate_at(g, sqrt(g.vb**2 - 2 * per_kg(g))),
+        "heat for work": lambda g: plate_at(g, g.vb - sqrt(2 * per_kg(g))),
+        "straight down": lambda g: plate_at(g, 0.0),
+        "belt and particle speed exchanged": lambda g: plate_at(g, g.v0 - per_kg(g) / g.v0),
+        "angle from the horizontal": lambda g: 90 - plate_at(g, g.vb - per_kg(g) / g.vb),
+    },
+    ("design", 4): {
+        "deviations added up": lambda g: by_e(g) + by_alpha(g),
+        "the angle forgotten": by_e,
+        "ε forgotten": by_alpha,
+        "degrees for radians": lambda g: hypot(by_e(g), degrees(by_alpha(g))),
+        "the variance": lambda g: by_e(g) ** 2 + by_alpha(g) ** 2,
     },
 }
 """By lesson and question: what the mistake is called, and the number that it leads to."""

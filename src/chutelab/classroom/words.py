@@ -65,7 +65,7 @@ def words(language: str = "en") -> Words:
     if language not in LANGUAGES:
         listed = ", ".join(LANGUAGES)
         raise LanguageError(f"no language {language[:40]!r}; there are {listed}", "language")
-    said = {}
+    said: dict[str, str] = {}
     for one in ("en", language):
         said |= json.loads((STRINGS / f"{one}.json").read_text(encoding="utf-8"))
     return Words(language, said)

@@ -93,8 +93,8 @@ def show(wanted: str, sheet: str | None, as_json: bool) -> None:
     from rich.text import Text
 
     from chutelab.classroom.lessons import find, scene_of
-    from chutelab.classroom.lessons.building import plain_of
     from chutelab.classroom.lessons.reading import unit_in
+    from chutelab.classroom.lessons.texts import plain_of
     from chutelab.util.tables import Sheet
 
     found = find(wanted)
@@ -117,9 +117,7 @@ def show(wanted: str, sheet: str | None, as_json: bool) -> None:
         rows = tuple((name, unit_in(found, name), what) for name, what in found.quantities.items())
         console.show(Sheet("Quantities", ("quantity", "unit", "what it is"), rows, texts=3))
     console.show(Text(f"\nFiles in {found.folder}\n"))
-    if found.worksheet.is_file():
-        worksheet = plain_of(found.worksheet.read_text(encoding="utf-8"))
-        console.show(Markdown(worksheet, hyperlinks=False))
+    console.show(Markdown(plain_of(found.text("README")), hyperlinks=False))
 
 
 @lesson.command(short_help="Make the picture of each lesson that changed.")
@@ -165,7 +163,7 @@ def build(wanted: tuple[str, ...], out: Path | None, force: bool, quiet: bool) -
     help="Begin with a copy of this lesson: worksheet, exercise, scenes and all.",
 )
 def new(name: Path, model: str | None) -> None:
-    """Start a lesson of your own: a folder NAME with lesson.toml, worksheet and scene.
+    """Start a lesson of your own: a folder NAME with lesson.toml, worksheet, explanation and scene.
 
     It can be shown and built at once; change it from there. With --from it is a copy of a shipped
     lesson, for whoever wants to adapt one, or to work through it. Nothing is ever overwritten.

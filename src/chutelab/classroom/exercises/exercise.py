@@ -237,14 +237,14 @@ def translated(exercise: Exercise, file: Path, language: str) -> Exercise:
             for known in asked.mistakes
             for row in [there.get("mistakes", {}).get(known.name, ())]
         ]
-        new = texts(there, asked, "title", "text", "hints", "working", "source")
-        questions.append(replace(new, mistakes=mistakes))
+        question = texts(there, asked, "title", "text", "hints", "working", "source")
+        questions.append(replace(question, mistakes=mistakes))
     meanings = found.get("parameters", {})
     parameters = [
         texts({"meaning": meanings[one.name]} if one.name in meanings else {}, one, "meaning")
         for one in exercise.parameters
     ]
-    new = texts(found, exercise, "title", "story")
+    new: Exercise = texts(found, exercise, "title", "story")
     return replace(new, questions=questions, parameters=parameters, language=language, whole=whole)
 
 

@@ -20,10 +20,6 @@ import numpy as np
 from chutelab.classroom.exercises.exercise import DIGITS, GRAVITY, ROUNDED, TOLERANCE, Case, shown
 from chutelab.classroom.words import Words, words
 from chutelab.pictures import GREEN, GREY, ORANGE, SKY, VERMILION
-from chutelab.results.recorder import StalledError
-from chutelab.scene import Scene
-from chutelab.studies import design
-from chutelab.util.errors import InputError
 from chutelab.util.tables import Sheet
 
 WIDTH: Final = 88
@@ -379,56 +375,3 @@ def _distance(case: Case, answer: float, said: Words) -> str:
         return f"{say('off-about', size=size, way=way)} {more}"
     times = "10" if FAR <= max(ratio, 1.0 / ratio) < FAR**2 else "100"
     return f"{say('off-more', times=times, way=way)} {more}"
-
-
-def try_out(
-    number: int,
-    answer: object,
-    scene: Scene,
-    key: str,
-    wanted: tuple[str, float],
-    within: float,
-    language: str = "en",
-) -> Reply:
-    """Let a machine judge an answer: run it with that number, and look at what comes out.
-
-    No error is raised for what a student hands over, as by `Task.check`.
-
-    Parameters
-    ----------
-    number, answer
-        The question, and what stands there for a number.
-    scene, key
-        The machine, and the key that the answer is for.
-    wanted
-        A quantity, as for `chutelab.design.value`, and what it is to be.
-    within
-        Difference up to which it is right, in the unit of the quantity.
-    language
-        Of the reply.
-    """
-    said = words(language)
-    say = said.say
-    value = number_of(answer, said)
-
-    def reply(verdict: Verdict, text: str) -> Reply:
-        return Reply(number, verdict, text, language=language)
-
-    if value is None:
-        return reply(Verdict.BLANK, say("python-blank"))
-    if isinstance(value, str):
-        return reply(Verdict.UNREAD, value)
-    name, target = wanted
-    shown_value = said.local(shown(value))
-    try:
-        got = design.value(scene.with_values({key: value}), name)
-    except (InputError, StalledError) as error:
-        return reply(Verdict.OFF, say("machine-none", error=error))
-    if isnan(got):
-        return reply(Verdict.OFF, say("machine-short", key=key, value=shown_value))
-    found = say("machine-found", key=key, value=shown_value, name=name, got=said.local(shown(got)))
-    if abs(got - target) < within:
-        return reply(Verdict.RIGHT, found)
-    way = say("large" if got > target else "small")
-    off = say("machine-off", way=way, wanted=said.local(shown(target)))
-    return reply(Verdict.OFF, f"{found} {off}")

@@ -1,4 +1,5 @@
-// A student's numbers from the name, and what follows from them: as Python's `exercises/exercise.py`.
+// A student's numbers from the name, and what follows from them, as Python's
+// `exercises/exercise.py`.
 
 import { generalText } from "./decimal.js";
 import { DomainError, carried, known, valueOfTree } from "./formula.js";
@@ -31,8 +32,9 @@ const MOST_DRAWS = 1000;
 const MOST_TENS = 6;
 
 /** A template of the catalogue with its names filled in.
- * @param {Exercise} exercise @param {string} id @param {Record<string, string | number>} [values] */
-function sayOf({ words }, id, values = {}) {
+ * @param {Exercise} exercise @param {string} id
+ * @param {Record<string, string | number>} [values] */
+function worded({ words }, id, values = {}) {
   return words[id].replace(/\{(\w+)\}/g, (_, name) => String(values[name]));
 }
 
@@ -74,23 +76,23 @@ class DrawnNumbers {
 /** What any question knows, with what each makes of a right answer of 1, by the key of its name.
  * @param {Exercise} exercise @returns {[string, string, number][]} */
 function generalMistakes(exercise) {
-  const say = (/** @type {string} */ id, values = {}) => sayOf(exercise, id, values);
+  const its = (/** @type {string} */ id, values = {}) => worded(exercise, id, values);
   /** @type {[string, string, number][]} */
   const found = [
-    ["mistake-sign", say("reply-sign"), -1],
-    ["mistake-half-missing", say("reply-half-missing"), 2],
-    ["mistake-half-too-many", say("reply-half-too-many"), 0.5],
+    ["mistake-sign", its("reply-sign"), -1],
+    ["mistake-half-missing", its("reply-half-missing"), 2],
+    ["mistake-half-too-many", its("reply-half-too-many"), 0.5],
   ];
   for (let tens = 1; tens <= MOST_TENS; tens += 1) {
     const times = String(10 ** tens).replace(/\B(?=(\d{3})+$)/g, " ");
     for (const [way, factor] of /** @type {const} */ ([["large", 10 ** tens], ["small", 10 ** -tens]])) {
-      const says = say("reply-ten", { power: "⁰¹²³⁴⁵⁶"[tens], times, way: say(way) });
+      const says = its("reply-ten", { power: "⁰¹²³⁴⁵⁶"[tens], times, way: its(way) });
       found.push(["mistake-ten", says, factor],
-        ["mistake-ten", `${says} ${say("reply-ten-sign")}`, -factor]);
+        ["mistake-ten", `${says} ${its("reply-ten-sign")}`, -factor]);
     }
   }
-  return [...found, ["mistake-radians", say("reply-radians"), Math.PI / 180],
-    ["mistake-radians", say("reply-degrees"), 180 / Math.PI]];
+  return [...found, ["mistake-radians", its("reply-radians"), Math.PI / 180],
+    ["mistake-radians", its("reply-degrees"), 180 / Math.PI]];
 }
 
 /** One question for one student. */
@@ -111,7 +113,7 @@ class Case {
     const { exercise } = this.numbers, { general } = this.question;
     return [...this.own, ...generalMistakes(exercise).flatMap(([id, says, factor]) =>
       (general.includes(id)
-        ? [{ called: sayOf(exercise, id), says, number: this.right * factor }] : []))];
+        ? [{ called: worded(exercise, id), says, number: this.right * factor }] : []))];
   }
 
   /** A mistake of its own, and what is common on top of it. @returns {Trace[]} */
@@ -122,8 +124,8 @@ class Case {
       ["mistake-ten", "besides-small", 1e-3],
     ]).filter(([id]) => general.includes(id));
     return this.own.flatMap((first) => more.map(([id, besides, factor]) => ({
-      called: sayOf(exercise, "pair", { first: first.called, second: sayOf(exercise, id) }),
-      says: `${first.says} ${sayOf(exercise, besides)}`,
+      called: worded(exercise, "pair", { first: first.called, second: worded(exercise, id) }),
+      says: `${first.says} ${worded(exercise, besides)}`,
       number: factor * first.number,
     })));
   }
@@ -131,7 +133,8 @@ class Case {
   /** Whether the right answer is another one where g is. */
   get feelsGravity() {
     const { exercise, drawn } = this.numbers;
-    const other = new DrawnNumbers(exercise, drawn, 1.001 * STANDARD_GRAVITY).of(this.question.answer);
+    const elsewhere = new DrawnNumbers(exercise, drawn, 1.001 * STANDARD_GRAVITY);
+    const other = elsewhere.of(this.question.answer);
     return Math.abs(other - this.right) > 1e-9 * Math.max(Math.abs(other), Math.abs(this.right));
   }
 
@@ -195,4 +198,4 @@ function drawnFor(exercise, student) {
   throw new Error(`${exercise.name}: no draw fits`);
 }
 
-export { Case, DrawnNumbers, STANDARD_GRAVITY, TOLERANCE, drawnFor, plainName, sayOf, shownNumber };
+export { Case, STANDARD_GRAVITY, TOLERANCE, drawnFor, plainName, shownNumber, worded };

@@ -1,8 +1,8 @@
-// From what a student types to a reply: as Python's `exercises/judging.py`, but that what is typed is
-// text, with a point or a comma, and perhaps with its unit.
+// From what a student types to a reply: as Python's `exercises/judging.py`, but that what is typed
+// is text, with a point or a comma, and perhaps with its unit.
 
 import { fixedText, scientific } from "./decimal.js";
-import { STANDARD_GRAVITY, TOLERANCE, sayOf, shownNumber } from "./draw.js";
+import { STANDARD_GRAVITY, TOLERANCE, worded, shownNumber } from "./draw.js";
 
 /**
  * @typedef {import("./draw.js").Case} Case
@@ -33,7 +33,7 @@ const DEGREES_TYPED = ["°", "deg", "degree", "degrees", "grad"];
 
 /** The number that was typed, null for nothing, or what to say instead.
  * @param {string} typed @param {string} unit that is asked for
- * @returns {number | null | {say: string, text: string}} */
+ * @returns {number | null | {why: string, text: string}} */
 function readTyped(typed, unit) {
   const text = typed.trim();
   if (/^[.?…_\s-]*$/.test(text)) return null;
@@ -41,15 +41,15 @@ function readTyped(typed, unit) {
   const plain = text.replace(/[−–]/g, "-")
     .replace(/[⁰¹²³⁴⁵⁶⁷⁸⁹⁻]/g, (sign) => "0123456789-"[SUPERSCRIPTS.indexOf(sign)]);
   const found = TYPED_NUMBER.exec(plain);
-  if (!found) return { say: "typed-text", text: shown };
+  if (!found) return { why: "text", text: shown };
   const [, digits, power = "", times = power, rest] = found;
   const said = rest.replace(/\s/g, "").toLowerCase();
   const asked = /^(degrees|grad)$/i.test(unit) ? DEGREES_TYPED : [unit.toLowerCase()];
-  if (/^['.,\d]/.test(said)) return { say: "typed-pieces", text: shown };
-  if (/^[-+*/^=(:]/.test(said)) return { say: "typed-sum", text: shown };
-  if (said && !asked.includes(said)) return { say: "typed-unit", text: shown };
+  if (/^['.,\d]/.test(said)) return { why: "pieces", text: shown };
+  if (/^[-+*/^=(:]/.test(said)) return { why: "sum", text: shown };
+  if (said && !asked.includes(said)) return { why: "unit", text: shown };
   const value = Number(`${digits.replace(",", ".")}e${times || 0}`);
-  return Number.isFinite(value) ? value : { say: "typed-infinite", text: shown };
+  return Number.isFinite(value) ? value : { why: "infinite", text: shown };
 }
 
 /** Whether an answer stands for a number. @param {number} answer @param {number} number */
@@ -78,7 +78,7 @@ function judge(its, answer, others = []) {
   const mistaken = (/** @type {string} */ mistake, /** @type {string} */ text) =>
     /** @type {Reply} */ ({ verdict: "mistake", text, mistake });
   if (isClose(answer, right)) {
-    const text = sayOf(exercise, "right", {
+    const text = worded(exercise, "right", {
       answer: withUnit(exercise, answer, unit), percent: 100 * TOLERANCE,
     });
     return { verdict: "right", text, mistake: "" };
@@ -87,7 +87,7 @@ function judge(its, answer, others = []) {
   if (known) return mistaken(known.called, known.says);
   for (const [name, number] of others) {
     if (isRounded(answer, number)) {
-      return mistaken(sayOf(exercise, "mistake-others"), sayOf(exercise, "reply-others", { name }));
+      return mistaken(worded(exercise, "mistake-others"), worded(exercise, "reply-others", { name }));
     }
   }
   // What is close has hardly two mistakes in it, and what two pairs lead to tells of neither.
@@ -102,22 +102,21 @@ function judge(its, answer, others = []) {
  * @param {number} answer */
 function distanceSaid(its, answer) {
   const { exercise } = its.numbers, ratio = answer / its.right;
-  const say = (/** @type {string} */ id, values = {}) => sayOf(exercise, id, values);
-  const local = (/** @type {string} */ text) => text.replace(".", say("decimal-mark"));
-  if (ratio === 0) return say("off-zero");
-  if (ratio < 0) return say("off-sign");
+  const local = (/** @type {string} */ text) => text.replace(".", worded(exercise, "decimal-mark"));
+  if (ratio === 0) return worded(exercise, "off-zero");
+  if (ratio < 0) return worded(exercise, "off-sign");
   const off = Math.abs(ratio - 1), times = Math.max(ratio, 1 / ratio);
-  const way = say(ratio > 1 ? "large" : "small"), percent = fixedText(100 * off, 0);
+  const way = worded(exercise, ratio > 1 ? "large" : "small"), percent = fixedText(100 * off, 0);
   if (off <= CLOSE_BY) {
     const gravity = local(String(STANDARD_GRAVITY));
-    return say(its.feelsGravity ? "off-close-gravity" : "off-close", { percent, way, gravity });
+    return worded(exercise, its.feelsGravity ? "off-close-gravity" : "off-close", { percent, way, gravity });
   }
   if (1 / FAR_OFF < ratio && ratio < FAR_OFF) {
-    const size = off < 1 ? say("off-percent", { percent })
-      : say("off-factor", { factor: local(fixedText(times, 1)) });
-    return say("off-about", { size, way });
+    const size = off < 1 ? worded(exercise, "off-percent", { percent })
+      : worded(exercise, "off-factor", { factor: local(fixedText(times, 1)) });
+    return worded(exercise, "off-about", { size, way });
   }
-  return say("off-more", { times: FAR_OFF <= times && times < FAR_OFF ** 2 ? 10 : 100, way });
+  return worded(exercise, "off-more", { times: FAR_OFF <= times && times < FAR_OFF ** 2 ? 10 : 100, way });
 }
 
 export { judge, readTyped, withUnit };

@@ -5,9 +5,9 @@
 const MOST_ROUNDS = 100;
 
 /**
- * With u = v² / (g Rc) and φ the angle from the top, the normal force is m g w, w = cos φ - u. Held,
- * u = u0 + 2/(1 + k) (1 - cos φ) for a body that rolls, k = I/(m r²), else u0, until friction cannot
- * bear the pull any more; then it slips, w' = 2 µ w - 3 sin φ, and leaves where w = 0.
+ * With u = v² / (g Rc) and φ the angle from the top, the normal force is m g w, w = cos φ - u.
+ * Held, u = u0 + 2/(1 + k) (1 - cos φ) for a body that rolls, k = I/(m r²), else u0, until friction
+ * cannot bear the pull any more; then it slips, w' = 2 µ w - 3 sin φ, and leaves where w = 0.
  * @param {{speed: number, pulleyRadius: number, gravity: number, friction: number,
  *   particleRadius?: number, spin?: boolean, inertia?: number}} parameters SI units
  * @returns {{phi1: number, v1: number}} rad, m/s

@@ -1,6 +1,6 @@
 // One lesson's exercise for one student, and how far that got: as Python's `Task`.
 
-import { Case, drawnFor, plainName, sayOf } from "./draw.js";
+import { Case, drawnFor, plainName, worded } from "./draw.js";
 import { judge, readTyped, withUnit } from "./judging.js";
 
 /**
@@ -33,8 +33,8 @@ class Task {
   }
 
   /** @param {string} id @param {Record<string, string | number>} [values] */
-  say(id, values) {
-    return sayOf(this.exercise, id, values);
+  worded(id, values) {
+    return worded(this.exercise, id, values);
   }
 
   /** Symbol, value with unit, and meaning of each number. */
@@ -56,16 +56,16 @@ class Task {
   /** What a question asks, and in which unit. @param {number} n */
   asked(n) {
     const { title, text, unit } = this.exercise.questions[n];
-    const values = { unit: unit || this.say("pure-number"), digits: 3, percent: 1 };
+    const values = { unit: unit || this.worded("pure-number"), digits: 3, percent: 1 };
     return {
-      title: this.say("question-title", { number: n + 1, title }),
+      title: this.worded("question-title", { number: n + 1, title }),
       text: this.numbers.text(text),
-      needed: this.say("answer-in", values),
+      needed: this.worded("answer-in", values),
     };
   }
 
   /** Say what becomes of what was typed. @param {number} n @param {string} typed
-   * @returns {Reply & {heading: string, unread?: {say: string, text: string}}} */
+   * @returns {Reply & {heading: string, unread?: {why: string, text: string}}} */
   check(n, typed) {
     const standing = this.standings[n];
     const value = readTyped(typed, this.exercise.questions[n].unit);
@@ -104,8 +104,8 @@ class Task {
 
   /** @param {number} n @param {Reply} reply */
   heading(n, { verdict, mistake }) {
-    return mistake ? this.say("heading-mistake", { number: n + 1, mistake })
-      : this.say("heading", { number: n + 1, verdict: this.say(`verdict-${verdict}`) });
+    return mistake ? this.worded("heading-mistake", { number: n + 1, mistake })
+      : this.worded("heading", { number: n + 1, verdict: this.worded(`verdict-${verdict}`) });
   }
 
   /** The next hint; the last one again when there are no more. @param {number} n */
@@ -119,7 +119,7 @@ class Task {
   hintAt(n, hint) {
     const { hints } = this.exercise.questions[n];
     return {
-      title: this.say("hint-title", { hint, hints: hints.length, number: n + 1 }),
+      title: this.worded("hint-title", { hint, hints: hints.length, number: n + 1 }),
       text: this.numbers.text(hints[hint - 1]),
       last: hint === hints.length,
     };
@@ -130,21 +130,23 @@ class Task {
     const { working, unit, source } = this.exercise.questions[n];
     this.standings[n].revealed = true;
     return {
-      title: this.say("working-title", { number: n + 1 }),
+      title: this.worded("working-title", { number: n + 1 }),
       lines: [...working.map((line) => this.numbers.text(line)),
-        this.say("answer", { answer: withUnit(this.exercise, this.case(n).right, unit) }),
-        this.say("source", { source })],
+        this.worded("answer", { answer: withUnit(this.exercise, this.case(n).right, unit) }),
+        this.worded("source", { source })],
     };
   }
 
   /** How far a question got, in words. @param {number} n */
   state(n) {
     const { verdict, tries, hints, revealed } = this.standings[n];
-    const count = (/** @type {string} */ id, /** @type {number} */ number) =>
-      (number ? [number === 1 ? this.say(`${id}-one`) : this.say(id, { count: number })] : []);
+    const count = (/** @type {string} */ id, /** @type {number} */ number) => {
+      if (!number) return [];
+      return [number === 1 ? this.worded(`${id}-one`) : this.worded(id, { count: number })];
+    };
     const remarks = [...count("tries", tries), ...count("hints", hints),
-      ...(revealed ? [this.say("working-shown")] : [])].join(", ");
-    const said = this.say(`verdict-${verdict}`);
+      ...(revealed ? [this.worded("working-shown")] : [])].join(", ");
+    const said = this.worded(`verdict-${verdict}`);
     return remarks ? `${said} (${remarks})` : said;
   }
 

@@ -98,7 +98,7 @@ def test_a_mistake_has_one_name_in_all_languages_and_is_called_by_its_own():
     sign = lesson("the-parabola", "Ada", language="de")
     reply = sign.check(1, -draw(EXERCISES["the-parabola"], "Ada")[1][0].right)
     assert reply.mistake == "sign or direction"
-    assert reply.heading == "Frage 1: vermutlich Vorzeichen oder Richtung"
+    assert reply.heading == "Frage 1: vermutlich „Vorzeichen oder Richtung“"
 
 
 def placed(name, exercise):

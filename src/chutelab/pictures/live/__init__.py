@@ -8,8 +8,8 @@
   (the closed form), ``core.js`` and ``worker.js`` (the contact engine in its thread),
   ``engine.js``, ``recording.js``, ``lab.js``, ``handles.js``, ``view.js``, ``words.js``; and of a
   lesson's exercise, as `chutelab.classroom.exercises` has it, ``formula.js``, ``draw.js``,
-  ``judging.js``, ``task.js``. With one: ``exercise.js``, ``stage.js``, ``transport.js`` and ``app.js``,
-  which joins all.
+  ``judging.js``, ``task.js``. With one: ``exercise.js``, ``stage.js``, ``transport.js`` and
+  ``app.js``, which joins all.
 """
 
 from __future__ import annotations

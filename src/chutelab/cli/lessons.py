@@ -130,7 +130,10 @@ def show(wanted: str, sheet: str | None, language: str, as_json: bool) -> None:
     heads = (say("show-scene"), say("show-shows"))
     console.show(head, Sheet(say("show-scenes"), heads, scenes, texts=2))
     if found.quantities:
-        rows = tuple((name, unit_in(found, name), what) for name, what in found.quantities.items())
+        unit = words(language).unit
+        rows = tuple(
+            (name, unit(unit_in(found, name)), what) for name, what in found.quantities.items()
+        )
         heads = (say("show-quantity"), say("show-unit"), say("show-meaning"))
         console.show(Sheet(say("show-quantities"), heads, rows, texts=3))
     console.show(Text(f"\n{say('show-files', folder=found.folder)}\n"))
@@ -203,8 +206,9 @@ def new(name: Path, model: str | None) -> None:
 @lesson.command(short_help="Bundle the lessons as web pages that need no server.")
 @lessons_argument
 @out_option("The folder; files that are there are replaced.", "-o", required=True)
+@language_option
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing, and show no progress bar.")
-def page(wanted: tuple[str, ...], out: Path, quiet: bool) -> None:
+def page(wanted: tuple[str, ...], out: Path, language: str, quiet: bool) -> None:
     """Bundle lessons (without LESSON: all that are shipped) into a folder of web pages.
 
     index.html, and for each lesson its worksheet, animation, files, and a live page, which offers
@@ -214,17 +218,17 @@ def page(wanted: tuple[str, ...], out: Path, quiet: bool) -> None:
     from chutelab.classroom.lessons.building import bundle
 
     with writing(instead="another folder"), progress("making the pages", quiet=quiet) as update:
-        made = bundle(_lessons(wanted), out, update)
+        made = bundle(_lessons(wanted, language), out, update)
     if not quiet:
         size = sum(path.stat().st_size for path in made)
         console.say(f"wrote {len(made)} files, {size / 1e6:.1f} MB; open {out / 'index.html'}")
 
 
-def _lessons(wanted: tuple[str, ...]) -> list[Lesson]:
+def _lessons(wanted: tuple[str, ...], language: str = "en") -> list[Lesson]:
     """Return the lessons that are named, or all that are shipped."""
     from chutelab.classroom.lessons import find, shipped_lessons
 
-    return [find(name) for name in wanted] or shipped_lessons()
+    return [find(name, language) for name in wanted] or shipped_lessons(language)
 
 
 def _plain(lesson: Lesson) -> dict[str, object]:

@@ -134,8 +134,8 @@ def show(wanted: str, sheet: str | None, language: str, as_json: bool) -> None:
         rows = tuple(
             (name, unit(unit_in(found, name)), what) for name, what in found.quantities.items()
         )
-        heads = (say("show-quantity"), say("show-unit"), say("show-meaning"))
-        console.show(Sheet(say("show-quantities"), heads, rows, texts=3))
+        columns = (say("show-quantity"), say("show-unit"), say("show-meaning"))
+        console.show(Sheet(say("show-quantities"), columns, rows, texts=3))
     console.show(Text(f"\n{say('show-files', folder=found.folder)}\n"))
     console.show(Markdown(plain_of(found.text("README")), hyperlinks=False))
 

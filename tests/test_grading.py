@@ -19,8 +19,9 @@ from click.testing import CliRunner
 import chutelab
 from chutelab.classroom import grading
 from chutelab.classroom.exercises import EXERCISES, lesson
-from chutelab.classroom.grading import LARGEST, Grade, grade, write_csv
+from chutelab.classroom.grading import Grade, grade, write_csv
 from chutelab.classroom.kernel import Ran
+from chutelab.classroom.returned import LARGEST
 from chutelab.cli import main
 
 pytest.importorskip("nbclient")
@@ -456,7 +457,7 @@ def test_whatever_ends_the_grading_keeps_the_marks_so_far(tmp_path, in_own_tmp, 
     )
     if sent != signal.SIGKILL:
         assert "1 of 4 (1 0 0 0)" in out
-        assert said.startswith("the marks of 1 of 2 notebooks are in class.csv.part\n")
+        assert said.startswith("the marks of 1 of 2 files are in class.csv.part\n")
         assert "Traceback" not in said
     assert all(map(gone, map(int, pids.read_text().split())))
     names = ["1.ipynb", "2.ipynb", "class.csv.part", "pids", "temporary"]
@@ -468,7 +469,7 @@ def test_no_marks_and_no_notebook_are_written_over(tmp_path):
     before = book.read_bytes()
     refused = CliRunner().invoke(main, ["lesson", "grade", str(tmp_path), "--out", str(book)])
     assert (refused.exit_code, book.read_bytes()) == (2, before)
-    assert "one of the notebooks" in refused.stderr
+    assert "one of the files that were returned" in refused.stderr
     longest = str(tmp_path / ("x" * 252))  # one more than leaves room for .part
     refused = CliRunner().invoke(main, ["lesson", "grade", str(tmp_path), "--out", longest])
     assert refused.exit_code == 2

@@ -56,12 +56,16 @@ def test_numbers_are_typed_and_a_wrong_one_says_why(shown):
     angle.press("Enter")
     assert value(page, "plate.angle_deg") == 12.5
     assert page.locator("#fault").is_hidden()
-    for typed, why in (("95", "zwischen −90 und 90"), ("steil", "eine Zahl")):
+    for typed, why in (("95", "zwischen −90 und 90"), ("steil", "eine Zahl"), ("0x10", "eine")):
         angle.fill(typed)
         angle.press("Enter")
         assert why in page.inner_text("#fault")
         assert angle.get_attribute("aria-invalid") == "true"
+        assert angle.input_value() == typed
         assert value(page, "plate.angle_deg") == 12.5
+    angle.press("Escape")
+    assert page.locator("#fault").is_hidden()
+    assert angle.input_value() == "12,5"
     distance = field(page, "Prallplatte: Abstand")
     distance.fill("-0,2")
     distance.press("Enter")
@@ -141,6 +145,16 @@ def test_all_of_that_goes_with_the_keyboard_alone(shown):
     assert page.locator("#help").is_hidden()
     page.keyboard.press("Delete")
     assert value(page, "surface") is None
+    assert page.evaluate("document.activeElement.id") == "play"
+    page.focus("#undo")
+    while page.locator("#undo").is_enabled():
+        page.keyboard.press("Enter")
+    assert page.evaluate("document.activeElement.id") == "redo"
+    page.focus("#time")
+    page.keyboard.press("End")
+    assert page.evaluate("chutelab.lab.t") == page.evaluate("chutelab.lab.end")
+    page.keyboard.press("Home")
+    assert page.evaluate("chutelab.lab.t") == 0.0
     page.evaluate("document.activeElement.blur()")
     page.keyboard.press("End")
     end = page.evaluate("chutelab.lab.end")
@@ -196,7 +210,9 @@ def test_path_and_numbers_are_hidden_until_there_is_a_mark_and_play_was_pressed(
     page.click("#play")
     assert not page.evaluate("chutelab.lab.playing")
     is_hidden()
-    # The mark has the focus now.
+    # It says what is to be done first, and the mark has the focus now.
+    assert "First your mark" in page.inner_text("#guess")
+    assert page.evaluate("document.activeElement.getAttribute('aria-describedby')") == "guess"
     for _ in range(3):
         page.keyboard.press("PageUp")
     x = float(page.locator(".guess").get_attribute("aria-valuenow"))
@@ -228,6 +244,26 @@ def test_path_and_numbers_are_hidden_until_there_is_a_mark_and_play_was_pressed(
     page.select_option("#presets", label="Moon")
     assert page.locator("#numbers").is_visible()
     assert page.locator("#guess").is_hidden()
+
+
+def test_a_mark_may_stand_where_it_is_and_what_lands_nowhere_is_said(shown):
+    for touch in (False, True):
+        page = shown("perpendicular", more=PREDICT)
+        if touch:
+            box = page.locator(".guess .room").bounding_box()
+            page.mouse.click(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+        else:
+            page.focus(".guess")
+            page.keyboard.press("Enter")
+        assert "mark is set" in page.inner_text("#guess")
+        page.click("#play")
+        assert "off by" in page.inner_text("#guess")
+        page.evaluate("chutelab.lab.change({ 'outgoing.length': 0.1 })")
+        page.evaluate(DONE)
+        page.focus(".guess")
+        page.keyboard.press("Enter")
+        page.click("#play")
+        assert page.inner_text("#guess") == "Nothing lands on the outgoing belt."
 
 
 def test_where_there_is_no_belt_the_mark_goes_anywhere(shown):
@@ -274,6 +310,42 @@ ranges = { "plate.angle_deg" = [20, 60] }
     for _ in range(4):
         page.keyboard.press("PageUp")
     assert value(page, "plate.angle_deg") == 60.0
+
+
+@pytest.mark.parametrize(
+    ("name", "controls", "labels"),
+    [
+        ("slip", ["incoming.friction"], ["incoming belt: friction µ"]),
+        (
+            "stream-independent",
+            ["stream.bed_height", "plate.angle_deg"],
+            ["plate: angle α", "particles: height of the bed"],
+        ),
+    ],
+)
+def test_all_that_can_be_changed_is_shown_at_once(shown, name, controls, labels):
+    page = shown(name, more=f"[live]\npredict = true\ncontrols = {controls}\n")
+    assert page.locator("#edit label span:first-child").all_inner_texts() == labels
+    assert page.locator("#edit select").is_hidden()
+
+
+def test_without_a_belt_nothing_is_said_of_one(shown, tmp_path):
+    few = tmp_path / "few.toml"
+    few.write_text(to_toml(load("hopper", ["stream.count=20", "run.until=0.4"])), "utf-8")
+    page = shown(few)
+    assert page.locator("#landing").is_hidden()
+    assert page.locator("#numbers tbody tr").count() == 0
+    assert "no incoming belt" in page.inner_text("#numbers")
+
+
+def test_values_have_no_more_digits_than_are_read(shown):
+    page = shown()
+    page.evaluate("chutelab.lab.change({ 'outgoing.drop': 0.93222821234 })")
+    drop = field(page, "outgoing belt: height of the drop")
+    assert drop.input_value() == "0.932228"
+    # What was only looked at keeps them all.
+    drop.press("Enter")
+    assert value(page, "outgoing.drop") == 0.93222821234
 
 
 def test_the_address_holds_the_scene_and_one_that_does_not_is_said(shown):

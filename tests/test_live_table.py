@@ -146,6 +146,12 @@ def test_ranges_ascend_and_stay_within_what_a_key_can_be():
     assert "no number" in found['live.ranges."run.engine"']
 
 
+def test_steps_of_an_engine_are_nothing_to_change_on_a_page():
+    found = faults('controls = ["gravity", "run.dt"]')
+    assert list(found) == ["live.controls[1]"]
+    assert "without steps" in found["live.controls[1]"]
+
+
 def test_presets_have_names_of_their_own_and_values_that_their_keys_take():
     rows = '{ name = "Moon", set = { gravity = -1 } }, { name = "Moon", set = { gravity = 1 } }'
     found = faults(f"presets = [{rows}]")

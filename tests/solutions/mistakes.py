@@ -1,6 +1,6 @@
 """Every known mistake of every question, made by hand: formulas of the student's numbers."""
 
-from math import acos, asin, atan, cos, degrees, hypot, log10, radians, sin, sqrt
+from math import acos, asin, atan, cos, degrees, hypot, log10, radians, sin, sqrt, tan
 
 G = 9.81
 
@@ -23,6 +23,25 @@ def fall_speed(g):
 
 def turn(g):
     return acos(u(g))
+
+
+# Lesson 0: heights of the fall and of the rebound, times of flight
+
+
+def down(g):
+    return g.y0 - g.r
+
+
+def keeps(g):
+    return sqrt((g.y1 - g.r) / down(g))
+
+
+def first_fall(g):
+    return sqrt(2 * down(g) / G)
+
+
+def tap_ratio(g):
+    return (g.c3 - g.c2) / (g.c2 - g.c1)
 
 
 # Lessons 3 and 7: the plate stands upright, v2y on arrival, time for a fall that begins with it
@@ -131,7 +150,77 @@ def share(g, energy):
     return g.residual_uJ / 1000 / energy
 
 
+# Lesson 9
+
+
+def after(g, alpha, e, along=1.0):
+    """Velocity forward after a plate that damps the part into it with e, that along it too."""
+    c, s = cos(radians(alpha)), sin(radians(alpha))
+    return along * (g.v0 * s + g.vy * c) * s - e * (g.v0 * c - g.vy * s) * c
+
+
+def plate_for(g, vx, e, along=1.0):
+    low, high = 0.0, 80.0
+    for _ in range(60):
+        middle = (low + high) / 2
+        low, high = (middle, high) if after(g, middle, e, along) < vx else (low, middle)
+    return low
+
+
+def plate_at(g, vx):
+    return plate_for(g, vx, g.e)
+
+
+def per_kg(g):
+    """What the second belt may pay, J/kg."""
+    return g.paid / g.grams
+
+
+def lining(g):
+    a = radians(g.alpha)
+    return (g.v0 * sin(a) + g.vy * cos(a)) * tan(a) / (g.v0 * cos(a) - g.vy * sin(a))
+
+
+def by_e(g):
+    return (after(g, g.alpha, g.e - g.s_e) - after(g, g.alpha, g.e + g.s_e)) / 2
+
+
+def by_alpha(g):
+    small = 1e-3
+    return g.s_a * (after(g, g.alpha + small, g.e) - after(g, g.alpha - small, g.e)) / (2 * small)
+
+
 MISTAKES = {
+    ("film-a-ball", 1): {
+        "ratio of heights for ε": lambda g: (g.y1 - g.r) / (g.y0 - g.r),
+        "radius forgotten": lambda g: sqrt(g.y1 / g.y0),
+        "ratio of heights, radius forgotten": lambda g: g.y1 / g.y0,
+        "upside down": lambda g: sqrt((g.y0 - g.r) / (g.y1 - g.r)),
+        "squared instead of the root": lambda g: (g.y1 - g.r) ** 2 / (g.y0 - g.r) ** 2,
+        "share lost for share kept": lambda g: 1 - keeps(g),
+    },
+    ("film-a-ball", 2): {
+        "a root where there is none": lambda g: sqrt(tap_ratio(g)),
+        "squared": lambda g: tap_ratio(g) ** 2,
+        "upside down": lambda g: (g.c2 - g.c1) / (g.c3 - g.c2),
+        "times on the clock for times of flight": lambda g: g.c2 / g.c3,
+        "share lost for share kept": lambda g: 1 - tap_ratio(g),
+    },
+    ("film-a-ball", 3): {
+        "radius forgotten": lambda g: 2 * g.y0 * (g.f / g.n) ** 2,
+        "slow motion for real time": lambda g: 2 * down(g) * (30 / g.n) ** 2,
+        "square forgotten": lambda g: 2 * down(g) * g.f / g.n,
+        "frames for seconds": lambda g: 2 * down(g) / g.n**2,
+        "a ½ too many": lambda g: down(g) * (g.f / g.n) ** 2,
+        "a fall taken for up and down": lambda g: 2 * down(g) / (g.n / g.f / 2) ** 2,
+    },
+    ("film-a-ball", 4): {
+        "up or down forgotten": lambda g: first_fall(g) * (1 + keeps(g) / (1 - keeps(g))),
+        "a way up before the first fall": lambda g: 2 * first_fall(g) / (1 - keeps(g)),
+        "the first fall forgotten": lambda g: 2 * first_fall(g) * keeps(g) / (1 - keeps(g)),
+        "radius forgotten": lambda g: sqrt(2 * g.y0 / G) * (1 + 2 * keeps(g) / (1 - keeps(g))),
+        "the first fall alone": first_fall,
+    },
     ("the-parabola", 1): {
         "square root forgotten": lambda g: 2 * g.h / G,
         "a 2 forgotten": lambda g: sqrt(g.h / G),
@@ -140,7 +229,7 @@ MISTAKES = {
     ("the-parabola", 2): {
         "height for distance": lambda g: g.h,
         "speed of falling for the belt speed": lambda g: 2 * g.h,
-        "the straight way": lambda g: sqrt(2 * g.v0**2 * g.h / G + g.h**2),
+        "straight line for distance": lambda g: sqrt(2 * g.v0**2 * g.h / G + g.h**2),
         "a 2 forgotten": lambda g: g.v0 * sqrt(g.h / G),
     },
     ("the-parabola", 3): {
@@ -174,7 +263,7 @@ MISTAKES = {
     ("letting-go", 3): {
         "radius forgotten": lambda g: g.R * u(g),
         "sine for cosine": lambda g: ride(g) * sqrt(1 - u(g) ** 2),
-        "way down for height": lambda g: ride(g) - g.v0**2 / G,
+        "distance fallen for height": lambda g: ride(g) - g.v0**2 / G,
         "degrees for radians": lambda g: ride(g) * cos(degrees(turn(g))),
     },
     ("letting-go", 4): {
@@ -355,6 +444,38 @@ MISTAKES = {
         "radius forgotten": lambda g: g.thick_mm / 2000 / g.v,
         "the whole thickness": lambda g: (g.r_mm + g.thick_mm) / 1000 / g.v,
         "upside down": lambda g: g.v / ((g.r_mm + g.thick_mm / 2) / 1000),
+    },
+    ("design", 1): {
+        "ε forgotten": lambda g: plate_for(g, 0.0, 1.0),
+        "the fall forgotten": lambda g: degrees(atan(sqrt(g.e))),
+        "ε on the wrong component": lambda g: plate_for(g, 0.0, 1.0, g.e),
+        "angle from the horizontal": lambda g: 90 - plate_at(g, 0.0),
+        "the tangent, not the angle": lambda g: tan(radians(plate_at(g, 0.0))),
+    },
+    ("design", 2): {
+        "the fall forgotten": lambda g: tan(radians(g.alpha)) ** 2,
+        "upside down": lambda g: 1 / lining(g),
+        "both parts into the plate": lambda g: (
+            (g.v0 * tan(radians(g.alpha)) + g.vy)
+            * tan(radians(g.alpha))
+            / (g.v0 + g.vy * tan(radians(g.alpha)))
+        ),
+        "a share of the energy": lambda g: lining(g) ** 2,
+        "the part lost for the part kept": lambda g: 1 - lining(g),
+    },
+    ("design", 3): {
+        "kinetic energy gained": lambda g: plate_at(g, sqrt(g.vb**2 - 2 * per_kg(g))),
+        "heat for work": lambda g: plate_at(g, g.vb - sqrt(2 * per_kg(g))),
+        "straight down": lambda g: plate_at(g, 0.0),
+        "belt and particle speed exchanged": lambda g: plate_at(g, g.v0 - per_kg(g) / g.v0),
+        "angle from the horizontal": lambda g: 90 - plate_at(g, g.vb - per_kg(g) / g.vb),
+    },
+    ("design", 4): {
+        "deviations added up": lambda g: by_e(g) + by_alpha(g),
+        "the angle forgotten": by_e,
+        "ε forgotten": by_alpha,
+        "degrees for radians": lambda g: hypot(by_e(g), degrees(by_alpha(g))),
+        "the variance": lambda g: by_e(g) ** 2 + by_alpha(g) ** 2,
     },
 }
 """By lesson and question: what the mistake is called, and the number that it leads to."""

@@ -1,90 +1,35 @@
-"""Marks from returned notebooks. It runs students' code: use a container for strangers.
+"""Marks from what students return. It runs notebooks' code: use a container for strangers.
 
 A notebook runs in a kernel of its own (`kernel`), with limits. What it prints is not looked at: the
-kernel hands over the numbers that were checked, and they are judged again here, against right ones
-that are computed here. Each notebook is marked by itself, whatever becomes of the others;
+kernel hands over the numbers that were checked. A result file of a lesson's live page (`returned`)
+has those numbers in it, and nothing of it runs. They are judged again here, against right ones
+that are computed here. Each file is marked by itself, whatever becomes of the others;
 `write_csv` writes the marks of a class, a row as soon as there is one.
 """
 
 from __future__ import annotations
 
-import json
 import os
-import stat
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from math import isfinite
 from pathlib import Path
-from typing import Any, Final
 
 from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises.catalogue import LONGEST_NAME, OPENED, UNNAMED
 from chutelab.classroom.exercises.exercise import draw, plain
 from chutelab.classroom.exercises.judging import is_rounded, judge
 from chutelab.classroom.kernel import ForgedError, run
-from chutelab.util.errors import InputError, MissingLibraryError, printable
+from chutelab.classroom.returned import ReturnedError, code_of, is_result, result_of
+from chutelab.util.errors import MissingLibraryError, printable, printable_lines
 from chutelab.util.files import csv_lines
 from chutelab.util.versions import too_old
-
-LARGEST: Final = 25 << 20
-"""Bytes; a notebook with its pictures is a tenth of it. As JSON it takes up to 30 times that."""
-
-
-class NotebookError(InputError):
-    """A file that is no notebook; its text says why."""
-
-
-def code_of(path: Path) -> list[str | None]:
-    """Return the code cells of a notebook of version 4, None for one whose source is no text.
-
-    The JSON is read here and not by nbformat: that refuses a notebook with a cell that has lost its
-    metadata or its source, and what was checked in the other cells counts.
-
-    Raises
-    ------
-    NotebookError
-        If it cannot be read.
-    """
-    try:
-        # Asked before it is opened, which alone would set off some devices; and not waited for, if
-        # it has become a pipe since then.
-        regular = stat.S_ISREG(path.stat().st_mode)
-        data = b""
-        if regular:
-            flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
-            with os.fdopen(os.open(path, flags), "rb") as file:
-                # A size that is told may be wrong.
-                regular = stat.S_ISREG(os.fstat(file.fileno()).st_mode)
-                data = file.read(LARGEST + 1) if regular else b""
-    except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else ""
-        raise NotebookError(f"cannot be read: {reason or error}") from None
-    if not regular:
-        raise NotebookError("not a notebook: not a regular file")
-    if len(data) > LARGEST:
-        raise NotebookError(f"too large for a notebook, which has at most {LARGEST >> 20} MB")
-    try:
-        cells = json.loads(data.decode("utf-8"))["cells"]
-        sources = [one.get("source", "") for one in cells if one.get("cell_type") == "code"]
-    except UnicodeDecodeError:
-        raise NotebookError("not a notebook: not UTF-8 text") from None
-    except (ValueError, RecursionError):
-        raise NotebookError("not a notebook: not JSON") from None
-    except (AttributeError, LookupError, TypeError):
-        raise NotebookError("not a notebook: it has no cells") from None
-    return list(map(_text, sources))
-
-
-def _text(source: Any) -> str | None:
-    """Return the source of a cell: a text, or a list of lines."""
-    lines = source if isinstance(source, list) else [source]
-    return "".join(lines) if all(isinstance(line, str) for line in lines) else None
 
 
 @dataclass(frozen=True)
 class Grade:
-    """The row of one notebook; what it does not have is empty."""
+    """The row of one file; what it does not have is empty."""
 
     file: str  # as it was given
     student: str = ""
@@ -94,6 +39,8 @@ class Grade:
     revealed: tuple[int, ...] = ()  # questions whose working was shown; they count all the same
     reason: str = ""  # what to know about this row
     answers: Mapping[int, float] = field(default_factory=dict, compare=False)  # by question
+    mistakes: Mapping[int, str] = field(default_factory=dict, compare=False)  # known ones
+    words: Mapping[str, str] = field(default_factory=dict, compare=False)  # what was written
 
     @property
     def total(self) -> int:
@@ -102,31 +49,34 @@ class Grade:
 
 
 def grade(paths: Iterable[str | Path], time_limit: float = 60.0) -> Iterator[Grade]:
-    """Run returned notebooks and mark them, one after the other. This runs the students' code.
+    """Mark what students returned, one after the other. This runs the code of notebooks.
 
     Parameters
     ----------
     paths
-        Notebooks.
+        Notebooks, and result files of lessons' live pages (``*.json``).
     time_limit
-        s for each. One that hangs is stopped, and marked for what it had answered by then.
+        s for each notebook. One that hangs is stopped, and marked for what it had answered by then.
 
     Returns
     -------
     iterator of Grade
-        One per path, in their order, each when it is done; a notebook that cannot be read, run or
+        One per path, in their order, each when it is done; a file that cannot be read, run or
         marked has its reason.
 
     Raises
     ------
     MissingLibraryError
-        Without IPython and psutil, which the extra ``notebook`` brings.
+        For notebooks, without IPython and psutil, which the extra ``notebook`` brings.
     """
-    missing = [name for name in ("IPython", "psutil") if find_spec(name) is None]
-    if missing := missing or too_old("notebook"):
-        install = 'python -m pip install "chutelab[notebook]"'
-        raise MissingLibraryError(f"grading needs {' and '.join(missing)}: {install}")
-    return _each(list(map(str, paths)), time_limit)
+    files = list(map(str, paths))
+    if not all(is_result(Path(file)) for file in files):
+        missing = [name for name in ("IPython", "psutil") if find_spec(name) is None]
+        if missing := missing or too_old("notebook"):
+            install = 'python -m pip install "chutelab[notebook]"'
+            said = f"grading notebooks needs {' and '.join(missing)}: {install}"
+            raise MissingLibraryError(said)
+    return _each(files, time_limit)
 
 
 def _each(files: list[str], time_limit: float) -> Iterator[Grade]:
@@ -134,14 +84,20 @@ def _each(files: list[str], time_limit: float) -> Iterator[Grade]:
     rows: list[Grade] = []
     for file in files:
         try:
-            row = _grade(file, time_limit)
-        except NotebookError as error:
+            result = is_result(Path(file))
+            row = _of_result(file) if result else _of_notebook(file, time_limit)
+        except ReturnedError as error:
             row = Grade(file, reason=str(error))
         except ForgedError as error:
             row = Grade(file, reason=f"refused: {error}")
         except Exception as error:  # the others are marked all the same
             row = Grade(file, reason=f"cannot be graded: {type(error).__name__}: {error}")
-        row = replace(row, student=printable(row.student), reason=printable(row.reason))
+        row = replace(
+            row,
+            student=printable(row.student),
+            reason=printable(row.reason),
+            words={printable(key): printable_lines(text) for key, text in row.words.items()},
+        )
         who = (row.lesson, plain(row.student))
         if row.lesson and who in first:
             same = printable(f"same lesson and student as {first[who]}")
@@ -217,40 +173,58 @@ def write_csv(grades: Iterable[Grade], path: str | Path) -> Path:
 
 @dataclass
 class _Work:
-    """What a student checked in one lesson, as the kernel reports it."""
+    """What a student did in one lesson, as the kernel or a result file reports it."""
 
     lesson: str
     student: str
     answers: dict[int, float] = field(default_factory=dict)
     revealed: set[int] = field(default_factory=set)
+    words: dict[str, str] = field(default_factory=dict)
 
 
-def _grade(file: str, time_limit: float) -> Grade:
+def _of_notebook(file: str, time_limit: float) -> Grade:
     ran = run(code_of(Path(file)), time_limit)
     works = _works(ran.tasks)
     if not works:
         nothing = "no exercise was opened: lesson(…) was never called"
         return Grade(file, reason=ran.trouble or nothing)
     work = max(reversed(works), key=lambda one: len(one.answers))
-    # The right answers come from here, whatever was made of them in the kernel.
-    _, cases = draw(EXERCISES[work.lesson], work.student)
-    right = tuple(
-        int(case.number in work.answers and judge(case, work.answers[case.number]).right)
-        for case in cases
-    )
     others = (one for one in works if one is not work and one.answers)
-    reasons = [ran.trouble, *(f"also answered {one.lesson} as {one.student}" for one in others)]
+    also = (f"also answered {one.lesson} as {one.student}" for one in others)
+    return _marked(file, work, [ran.trouble, *also])
+
+
+def _of_result(file: str) -> Grade:
+    result = result_of(Path(file))
+    if result.lesson not in EXERCISES:
+        raise ReturnedError(f"not a result file: no lesson {result.lesson!r} has an exercise")
+    numbers = {str(n): n for n in range(1, len(EXERCISES[result.lesson].questions) + 1)}
+    if not {*result.answers, *map(str, result.revealed)} <= {*numbers}:
+        raise ReturnedError(f"not a result file: the lesson has questions 1 to {len(numbers)} only")
+    answers = {numbers[key]: answer for key, answer in result.answers.items()}
+    words = {key: text.strip() for key, text in result.words.items() if text.strip()}
+    work = _Work(result.lesson, result.student, answers, set(result.revealed), words)
+    return _marked(file, work, [])
+
+
+def _marked(file: str, work: _Work, reasons: list[str]) -> Grade:
+    # The right answers come from here, whatever was made of them in the kernel or the page.
+    _, cases = draw(EXERCISES[work.lesson], work.student)
+    replies = [judge(cases[n - 1], answer) for n, answer in sorted(work.answers.items())]
+    right = {reply.question for reply in replies if reply.right}
     if plain(work.student) == UNNAMED:
-        reasons.append(f"the name was left at {UNNAMED!r}")
+        reasons = [*reasons, f"the name was left at {UNNAMED!r}"]
     return Grade(
         file=file,
         student=work.student,
         lesson=work.lesson,
-        marks=right,
-        out_of=len(right),
+        marks=tuple(int(case.number in right) for case in cases),
+        out_of=len(cases),
         revealed=tuple(sorted(work.revealed)),
         reason="; ".join(filter(None, reasons)),
         answers=work.answers,
+        mistakes={reply.question: reply.mistake for reply in replies if reply.mistake},
+        words=work.words,
     )
 
 

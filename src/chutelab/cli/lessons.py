@@ -13,9 +13,9 @@ from click.shell_completion import CompletionItem
 from chutelab.cli import console
 from chutelab.cli.console import progress
 from chutelab.cli.output import check_file
-from chutelab.cli.parameters import FileName, Number, json_option, out_option
+from chutelab.cli.parameters import FileName, Number, file_option, json_option, out_option
 from chutelab.cli.program import InOrder, RefusedError
-from chutelab.util.files import writing
+from chutelab.util.files import write_lines, writing
 
 if TYPE_CHECKING:
     from chutelab.classroom.grading import Grade
@@ -93,8 +93,8 @@ def show(wanted: str, sheet: str | None, as_json: bool) -> None:
     from rich.text import Text
 
     from chutelab.classroom.lessons import find, scene_of
-    from chutelab.classroom.lessons.building import plain_of
     from chutelab.classroom.lessons.reading import unit_in
+    from chutelab.classroom.lessons.texts import plain_of
     from chutelab.util.tables import Sheet
 
     found = find(wanted)
@@ -117,9 +117,7 @@ def show(wanted: str, sheet: str | None, as_json: bool) -> None:
         rows = tuple((name, unit_in(found, name), what) for name, what in found.quantities.items())
         console.show(Sheet("Quantities", ("quantity", "unit", "what it is"), rows, texts=3))
     console.show(Text(f"\nFiles in {found.folder}\n"))
-    if found.worksheet.is_file():
-        worksheet = plain_of(found.worksheet.read_text(encoding="utf-8"))
-        console.show(Markdown(worksheet, hyperlinks=False))
+    console.show(Markdown(plain_of(found.text("README")), hyperlinks=False))
 
 
 @lesson.command(short_help="Make the picture of each lesson that changed.")
@@ -165,7 +163,7 @@ def build(wanted: tuple[str, ...], out: Path | None, force: bool, quiet: bool) -
     help="Begin with a copy of this lesson: worksheet, exercise, scenes and all.",
 )
 def new(name: Path, model: str | None) -> None:
-    """Start a lesson of your own: a folder NAME with lesson.toml, worksheet and scene.
+    """Start a lesson of your own: a folder NAME with lesson.toml, worksheet, explanation and scene.
 
     It can be shown and built at once; change it from there. With --from it is a copy of a shipped
     lesson, for whoever wants to adapt one, or to work through it. Nothing is ever overwritten.
@@ -224,7 +222,7 @@ def _plain(lesson: Lesson) -> dict[str, object]:
     }
 
 
-@lesson.command(short_help="Run returned notebooks and mark them.")
+@lesson.command(short_help="Mark what students returned: notebooks, result files.")
 @click.argument(
     "files",
     metavar="FILES...",
@@ -237,8 +235,13 @@ def _plain(lesson: Lesson) -> dict[str, object]:
     "--out",
     metavar="FILE",
     type=FileName(dir_okay=False, path_type=Path),
-    help="Write the marks into this CSV file, a row for each notebook. Until the last is marked,"
-    " the rows are in FILE.part.",
+    help="Write the marks into this CSV file, a row for each file returned. Until the last is"
+    " marked, the rows are in FILE.part.",
+)
+@file_option(
+    "--report",
+    text="Write what the class did into this Markdown file: by lesson how many were right, which"
+    " mistakes were made how often, and what students wrote.",
 )
 @click.option(
     "--time-limit",
@@ -248,84 +251,109 @@ def _plain(lesson: Lesson) -> dict[str, object]:
     type=Number(1.0, 3600.0),
     help="Seconds that a notebook may run.",
 )
+@json_option()
 @click.option("--quiet", "-q", is_flag=True, help="Print no table, and show no progress bar.")
-def grade(files: tuple[Path, ...], out: Path | None, time_limit: float, quiet: bool) -> None:
-    """Run the exercise notebooks that students returned, and mark each question.
+def grade(
+    files: tuple[Path, ...],
+    out: Path | None,
+    report: Path | None,
+    time_limit: float,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Mark each question of the exercises that students returned.
 
-    A folder stands for the notebooks in it. What a student checked is judged anew against the
-    numbers that belong to that student's name; what a notebook prints does not count.
+    They return notebooks (*.ipynb), or the result files that a lesson's live page writes (*.json);
+    a folder stands for those in it. What a student checked is judged anew against the numbers that
+    belong to that student's name; what a notebook prints, or a file says of itself, does not count.
 
-    THIS RUNS THE STUDENTS' CODE, with all that you may do on this computer. Each notebook has
+    THIS RUNS THE CODE IN NOTEBOOKS, with all that you may do on this computer. Each notebook has
     processes and a folder of its own, which end with it, and limits of time, memory and processes:
-    that is for accidents. Grade the notebooks of strangers in a container.
+    that is for accidents. Grade the notebooks of strangers in a container. Nothing of a result file
+    is run.
 
     Marks say which numbers were handed in, not how they were found: whoever looks for the right
     ones finds them, by trying until the replies say so, with chutelab's own theory, or in the
-    exercises' source. Working that was shown in the notebook is in the column "revealed", and has
-    a * in the table.
+    exercises' source. Working that was shown is in the column "revealed", and has a * in the table;
+    a result file can be written so that it does not tell.
 
     Ctrl-C, or a crash, keeps the marks so far, in FILE.part.
 
     \b
-    chutelab lesson grade returned/ --out class.csv
-    chutelab lesson grade anna.ipynb ben.ipynb --time-limit 30
+    chutelab lesson grade returned/ --out class.csv --report class.md
+    chutelab lesson grade anna.ipynb the-bounce-Ben.chutelab.json --time-limit 30
     """  # noqa: D301 - click wants the backspace
-    from chutelab.classroom.grading import grade as grade_notebooks
+    from chutelab.classroom.class_report import report as class_report
+    from chutelab.classroom.grading import grade as grade_returned
     from chutelab.classroom.grading import write_csv
     from chutelab.util.tables import Sheet
 
-    notebooks: list[Path] = []
+    returned: list[Path] = []
     for file in files:
-        found = sorted(file.glob("*.ipynb")) if file.is_dir() else [file]
+        found = [file]
+        if file.is_dir():
+            found = sorted([*file.glob("*.ipynb"), *file.glob("*.json")])
         if not found:
-            raise RefusedError(f"{file}: there is no notebook (*.ipynb) in this folder")
-        notebooks += found
-    check_file("--out", out)
+            said = "there is no notebook (*.ipynb) and no result file (*.json) in this folder"
+            raise RefusedError(f"{file}: {said}")
+        returned += found
+    for option, target in (("--out", out), ("--report", report)):
+        if target is None:
+            continue
+        check_file(option, target)
+        if target.exists() and any(one.exists() and one.samefile(target) for one in returned):
+            said = "is one of the files that were returned; give another name"
+            raise RefusedError(f"{option} {target}: {said}")
     if out is not None:
         part = out.with_name(f"{out.name}.part")
         with writing(f"--out {out}", instead="another name"):
-            interrupted, there = part.exists(), out.exists()
+            interrupted = part.exists()
         if interrupted:
             raise RefusedError(
                 f"{part}: has the marks of a grading that was interrupted, or still runs; move or"
                 " remove it first"
             )
-        if there and any(one.exists() and one.samefile(out) for one in notebooks):
-            raise RefusedError(f"--out {out}: is one of the notebooks; give another name")
     done: list[Grade] = []
 
     def rows(update: Callable[[float], None] | None) -> Iterator[Grade]:
-        for row in grade_notebooks(notebooks, time_limit=time_limit):
+        for row in grade_returned(returned, time_limit=time_limit):
             done.append(row)
             yield row
             if update is not None:
-                update(len(done) / len(notebooks))
+                update(len(done) / len(returned))
         if not any(one.marks for one in done):
             raise RefusedError(
-                "nothing to mark: none of these is a notebook of a lesson's exercise"
+                "nothing to mark: none of these is a notebook or a result file of a lesson's"
+                " exercise"
             )
 
     try:
-        with progress("running the notebooks", quiet=quiet) as update, writing(f"--out {out}"):
+        with progress("marking", quiet=quiet) as update, writing(f"--out {out}"):
             if out is None:
                 deque(rows(update), maxlen=0)
             else:
                 write_csv(rows(update), out)
     finally:
-        if done and not quiet:
+        if done and as_json:
+            console.show_json({"format": 1, "grades": done})
+        elif done and not quiet:
             console.show(Sheet("", HEADS, tuple(map(_cells, done)), texts=5))
         if out is not None and part.exists():
-            marked = f"{len(done)} of {len(notebooks)} notebooks"
+            marked = f"{len(done)} of {len(returned)} files"
             console.say(f"the marks of {marked} are in {part}", err=True)
-    if out is not None:
-        console.say(f"wrote {out}")
+    if report is not None:
+        with writing(f"--report {report}"):
+            write_lines(report, [class_report(done)], errors="replace")
+    for target in filter(None, (out, report)):
+        if not as_json:
+            console.say(f"wrote {target}")
 
 
 HEADS = ("file", "student", "lesson", "marks (*: working shown)", "remarks")
 
 
 def _cells(one: Grade) -> tuple[str, ...]:
-    """Return the cells of a notebook's row in the table, see `HEADS`."""
+    """Return the cells of a row in the table, see `HEADS`."""
     shown = (f"{mark}*" if n in one.revealed else str(mark) for n, mark in enumerate(one.marks, 1))
     marks = f"{one.total} of {one.out_of} ({' '.join(shown)})"
     return (one.file, one.student, one.lesson, marks if one.marks else "-", one.reason)

@@ -42,6 +42,8 @@ def live_faults(document: Mapping[str, Any], live: Live) -> Iterator[Fault]:
     for i, key in enumerate(live.controls or ()):
         if said := _refused(document, key):
             yield Fault(f"live.controls[{i}]", key, said)
+        elif resolved(document, key)[0] == "run":
+            yield Fault(f"live.controls[{i}]", key, "a page runs without steps, as [run] sets them")
     for key, ends in live.ranges.items():
         if said := _refused(document, key) or _beyond(document, key, ends):
             yield Fault(joined(("live", "ranges", key)), list(ends), said)

@@ -114,7 +114,7 @@ def slide(
     u = [(a² - 2) sin θ - 3 a cos θ]/(1 + a²) + C exp(-a θ). For a chute see A. W. Roberts, An
     investigation of the gravity flow of noncohesive granular materials through discharge chutes,
     J. Eng. Ind. 91, 373-381, 1969. One that rolls has u = u0 - 2/(1 + k) (sin θ - sin θ0),
-    k = I/(m r²), while k/(1 + k) |cos θ| <= µ n. The time is a quadrature, to about 1e-13.
+    k = I/(m r²), while `k/(1 + k) |cos θ| <= µ n`. The time is a quadrature, to about 1e-13.
 
     Examples
     --------

@@ -124,8 +124,8 @@ def transfer(
     Notes
     -----
     V. Molnár et al., Mech. Sci. 7, 167-177, 2016, doi:10.5194/ms-7-167-2016. Relative errors are a
-    few units in the last place times the conditioning: 1/|1 - v²/(g Rc)| near the critical speed,
-    v2/|v_n| near a grazing impact.
+    few units in the last place times the conditioning: `1/|1 - v²/(g Rc)|` near the critical speed,
+    `v2/|v_n|` near a grazing impact.
 
     Examples
     --------

@@ -8,8 +8,7 @@
 - `catalogue`: `lesson` hands out a `Task`, with `question`, `check`, `hint`, `reveal` and
   `progress`; all exercises by name.
 - `exercise`: what an exercise is made of: parameters, drawn from a name, questions, known mistakes.
-- `judging`: a number read and judged: right, a known mistake, or how far off; replies;
-  `try_out` lets a machine judge.
+- `judging`: a number read and judged: right, a known mistake, or how far off; replies.
 - ``the-parabola.toml`` and so on: the exercises themselves, a file a lesson: what is drawn,
   questions, and each answer and mistake as a formula.
 
@@ -24,7 +23,6 @@ from chutelab.classroom.exercises.judging import (
     Reply,
     Standing,
     Verdict,
-    try_out,
 )
 
 __all__ = [
@@ -43,5 +41,4 @@ __all__ = [
     "Verdict",
     "find",
     "lesson",
-    "try_out",
 ]

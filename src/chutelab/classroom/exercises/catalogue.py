@@ -21,7 +21,7 @@ from chutelab.classroom.exercises.exercise import (
     draw,
     plain,
     read,
-    shown,
+    translated,
 )
 from chutelab.classroom.exercises.judging import (
     Passage,
@@ -30,7 +30,9 @@ from chutelab.classroom.exercises.judging import (
     Standing,
     Verdict,
     number_of,
+    with_unit,
 )
+from chutelab.classroom.words import words
 from chutelab.util.errors import InputError
 
 OPENED: Final[deque[Task]] = deque(maxlen=64)
@@ -58,14 +60,18 @@ class Task:
         The student's name.
     given : Values
         The student's parameters, as attributes.
+    language : str
+        What the task speaks.
     """
 
     def __init__(self, exercise: Exercise, student: str) -> None:
         self.lesson = exercise.name
         self.student = student
+        self.language = exercise.language
         self.given, _ = draw(exercise, student)
         self._standings = [
-            Standing(number, asked.title) for number, asked in enumerate(exercise.questions, 1)
+            Standing(number, asked.title, language=exercise.language)
+            for number, asked in enumerate(exercise.questions, 1)
         ]
         OPENED.append(self)
 
@@ -102,15 +108,15 @@ class Task:
         standing = self._found(number)
         if standing is None:
             return self._unknown
-        value = number_of(answer)
+        said, n = words(self.language), standing.number
+        value = number_of(answer, said)
         if value is None:
-            text = "Put your number in place of None, and run the cell. Stuck?"
-            return Reply(standing.number, Verdict.BLANK, f"{text} task.hint({standing.number})")
+            text = f"{said.say('python-blank')} {said.say('python-stuck', number=n)}"
+            return Reply(n, Verdict.BLANK, text, language=self.language)
         if isinstance(value, str):
-            reply = Reply(standing.number, Verdict.UNREAD, value)
+            reply = Reply(n, Verdict.UNREAD, value, language=self.language)
         else:
             standing.answer = value
-            n = standing.number
             reply = judging.judge(_case(self, n), value, _of_others(self, n))
         standing.tries += 1
         standing.verdict = reply.verdict
@@ -124,10 +130,11 @@ class Task:
         case = _case(self, standing.number)
         hints = case.question.hints
         standing.hints = min(standing.hints + 1, len(hints))
-        title = f"Hint {standing.hints} of {len(hints)} to question {case.number}"
+        n, say = case.number, words(self.language).say
+        title = say("hint-title", hint=standing.hints, hints=len(hints), number=n)
         text = case.numbers.text(hints[standing.hints - 1])
         if standing.hints == len(hints):
-            text += f"\nThat was the last one. task.reveal({case.number}) shows the working."
+            text += f"\n{say('hint-last')} {say('python-reveal', number=n)}"
         return Passage(case.number, title, text)
 
     def reveal(self, number: object = None) -> Passage | Reply:
@@ -139,14 +146,16 @@ class Task:
         standing.revealed = True
         asked = case.question
         lines = [case.numbers.text(line) for line in asked.working.splitlines()]
-        right = f"Answer: {shown(case.right)} {asked.unit}".strip()
-        text = "\n".join([*lines, right, f"Source: {asked.source}"])
-        return Passage(case.number, f"Working of question {case.number}", text, asked.unit)
+        said = words(self.language)
+        right = said.say("answer", answer=with_unit(case.right, asked.unit, said))
+        text = "\n".join([*lines, right, said.say("source", source=asked.source)])
+        title = said.say("working-title", number=case.number)
+        return Passage(case.number, title, text, asked.unit)
 
     def progress(self) -> Progress:
         """Draw what is done."""
         rows = tuple(replace(standing) for standing in self._standings)
-        return Progress(f"{EXERCISES[self.lesson].title}, {self.student}", rows)
+        return Progress(f"{_exercise(self).title}, {self.student}", rows, self.language)
 
     def _found(self, number: object) -> Standing | None:
         """Return how far the student got with a question, None if there is no such one."""
@@ -157,44 +166,53 @@ class Task:
 
     @property
     def _unknown(self) -> Reply:
-        text = (
-            f"This lesson has questions 1 to {len(self._standings)}; ask for one of them, as in"
-            " task.check(1, …)."
-        )
-        return Reply(0, Verdict.UNKNOWN, text)
+        text = words(self.language).say("python-unknown", count=len(self._standings))
+        return Reply(0, Verdict.UNKNOWN, text, language=self.language)
 
     def _rows(self) -> list[tuple[str, str, str]]:
+        said = words(self.language)
         return [
-            (one.symbol, f"{shown(self.given[one.name])} {one.unit}".strip(), one.meaning)
-            for one in EXERCISES[self.lesson].parameters
+            (one.symbol, with_unit(self.given[one.name], one.unit, said), one.meaning)
+            for one in _exercise(self).parameters
         ]
 
     def _head(self) -> str:
-        exercise = EXERCISES[self.lesson]
-        return f"Lesson {exercise.number}: {exercise.title}"
+        exercise = _exercise(self)
+        say = words(self.language).say
+        return say("lesson-title", number=exercise.number, title=exercise.title)
 
     def __repr__(self) -> str:
         rows = self._rows()
         left, middle = (max(len(row[i]) for row in rows) for i in (0, 1))
         lines = [f"  {s:<{left}} = {value:<{middle}}  {meaning}" for s, value, meaning in rows]
-        head = f"{self._head()}\nNumbers of {self.student}:"
+        say = words(self.language).say
+        head = f"{self._head()}\n{say('numbers-of', student=self.student)}"
         questions = [f"  {one.number} {one.title}" for one in self._standings]
-        return "\n".join([head, *lines, judging.filled(_story(self)), "Questions:", *questions])
+        story = judging.filled(_story(self))
+        return "\n".join([head, *lines, story, say("questions"), *questions])
 
     def _repr_html_(self) -> str:
-        head = f"{self._head()}, numbers of {self.student}"
+        head = words(self.language).say(
+            "numbers-of-title", title=self._head(), student=self.student
+        )
         rows = [(f"{s} = {value}", meaning) for s, value, meaning in self._rows()]
         return f"{judging.box(head, _story(self))}{judging.table(rows)}"
 
 
+def _exercise(task: Task) -> Exercise:
+    """Return the exercise of a task in its language."""
+    return told(task.lesson, task.language)
+
+
 def _case(task: Task, number: int) -> Case:
     """Return a question with a student's numbers, and all that follows from them."""
-    return _case_of(EXERCISES[task.lesson], task.given, number)
+    return _case_of(_exercise(task), task.given, number)
 
 
 def _case_of(exercise: Exercise, given: Values, number: int) -> Case:
     drawn = {name: given[name] for name in given}
-    return Case(number, exercise.questions[number - 1], Numbers(drawn, exercise.formulas))
+    numbers = Numbers(drawn, exercise.formulas, language=exercise.language)
+    return Case(number, exercise.questions[number - 1], numbers)
 
 
 def _of_others(task: Task, number: int) -> Iterator[tuple[str, float]]:
@@ -206,7 +224,7 @@ def _of_others(task: Task, number: int) -> Iterator[tuple[str, float]]:
             given.setdefault(plain(one.student), (one.student, one.given))
     given.pop(plain(task.student), None)
     for name, values in given.values():
-        yield f"“{name}”", _case_of(exercise, values, number).right
+        yield name, _case_of(exercise, values, number).right
 
 
 @cache
@@ -216,17 +234,18 @@ def _of_nobody(name: str) -> Values:
 
 
 def _story(task: Task) -> str:
-    return _case(task, 1).numbers.text(EXERCISES[task.lesson].story)
+    exercise = _exercise(task)
+    story = _case(task, 1).numbers.text(exercise.story)
+    return story if exercise.whole else f"{story}\n{words(task.language).say('untranslated')}"
 
 
 def _asked(case: Case) -> Passage:
     asked = case.question
-    needed = (
-        f"Answer in: {asked.unit or 'a pure number'}, rounded to {ROUNDED} digits (right to within"
-        f" {100 * TOLERANCE:g} %)."
-    )
-    text = f"{case.numbers.text(asked.text)}\n{needed}"
-    return Passage(case.number, f"Question {case.number}: {asked.title}", text, asked.unit)
+    said = words(case.numbers.language)
+    unit = said.unit(asked.unit) or said.say("pure-number")
+    needed = said.say("answer-in", unit=unit, digits=ROUNDED, percent=f"{100 * TOLERANCE:g}")
+    title = said.say("question-title", number=case.number, title=asked.title)
+    return Passage(case.number, title, f"{case.numbers.text(asked.text)}\n{needed}", asked.unit)
 
 
 def report() -> list[dict[str, object]]:
@@ -242,11 +261,24 @@ def report() -> list[dict[str, object]]:
     ]
 
 
+_HERE: Final = Path(__file__).parent
+
 EXERCISES: Final[dict[str, Exercise]] = {
     one.name: one
-    for one in sorted(map(read, Path(__file__).parent.glob("*.toml")), key=lambda one: one.number)
+    for one in sorted(
+        (read(file) for file in _HERE.glob("*.toml") if "." not in file.stem),
+        key=lambda one: one.number,
+    )
 }
 """All exercises by name, in the order of the lessons."""
+
+
+@cache
+def told(name: str, language: str) -> Exercise:
+    """Return an exercise in a language; what is not translated is in English."""
+    english = EXERCISES[name]
+    file = _HERE / f"{name}.{language}.toml"
+    return english if language == "en" else translated(english, file, language)
 
 
 class ExerciseError(InputError):
@@ -273,7 +305,7 @@ def find(name: str | int) -> Exercise:
     raise ExerciseError(f"no lesson {str(name)[:40]!r}.{hint} There are: {listed}")
 
 
-def lesson(name: str | int, student: object = "") -> Task:
+def lesson(name: str | int, student: object = "", language: str = "en") -> Task:
     """Hand out a lesson's exercise with a student's own numbers.
 
     Parameters
@@ -283,6 +315,9 @@ def lesson(name: str | int, student: object = "") -> Task:
     student : object
         Any name; its text counts. The same name gives the same numbers on every machine; capitals
         and spaces do not matter.
+    language : str
+        "en", or that of a translation, such as "de"; what is not translated is in English. The
+        numbers are the same ones.
 
     Returns
     -------
@@ -293,6 +328,8 @@ def lesson(name: str | int, student: object = "") -> Task:
     ------
     ExerciseError
         If there is no such lesson, or the name is longer than `LONGEST_NAME`.
+    LanguageError
+        If there is no such language.
 
     Examples
     --------
@@ -304,4 +341,4 @@ def lesson(name: str | int, student: object = "") -> Task:
     if len(who) > LONGEST_NAME:
         said = f"a name has at most {LONGEST_NAME} characters; this one has {len(who)}"
         raise ExerciseError(said, "student", who)
-    return Task(find(name), who)
+    return Task(told(find(name).name, words(language).language), who)

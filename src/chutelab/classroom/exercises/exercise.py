@@ -3,7 +3,8 @@
 An exercise is a file ``NAME.toml`` beside this module, without any code: what is drawn, formulas,
 and four questions, each with its right answer and a row for each known mistake: name, formula,
 reply. A formula is a Python expression of the parameters, of other formulas and of `FUNCTIONS`.
-Texts are templates: ``{name}`` stands for a number, and a line break for a space.
+Texts are templates: ``{name}`` stands for a number, and a line break for a space. ``NAME.de.toml``
+has the texts in German, and nothing else: each takes the place of the English one.
 
 Some mistakes any question knows: a sign, a power of ten, radians, ½. A student's own parameters are
 drawn from the name, the same on every machine, and redrawn until every mistake can be told from the
@@ -26,6 +27,7 @@ from pathlib import Path
 from types import CodeType, SimpleNamespace
 from typing import Any, Final
 
+from chutelab.classroom.words import words
 from chutelab.theory import transfer
 
 DIGITS: Final = 4
@@ -111,13 +113,19 @@ def _compiled(formula: str) -> CodeType:
 class Numbers(dict[str, Any]):
     """The parameters of one draw and all that follows from them, by name.
 
-    A formula is computed when its number is first asked for; g is `gravity`, m/s².
+    A formula is computed when its number is first asked for; g is `gravity`, m/s². Texts have
+    their numbers as `language` writes them.
     """
 
     def __init__(
-        self, drawn: Mapping[str, float], formulas: Mapping[str, str], gravity: float = GRAVITY
+        self,
+        drawn: Mapping[str, float],
+        formulas: Mapping[str, str],
+        gravity: float = GRAVITY,
+        language: str = "en",
     ) -> None:
         super().__init__(drawn)
+        self.language = language
         self.drawn = tuple(drawn)
         self.formulas = formulas
         self.known = {**FUNCTIONS, "g": gravity, "transfer": partial(_carried, gravity)}
@@ -134,7 +142,8 @@ class Numbers(dict[str, Any]):
     def text(self, template: str) -> str:
         """Return a template on one line, with every ``{name}`` replaced by its number."""
         line = " ".join(template.split())
-        return re.sub(r"\{(\w+)\}", lambda match: shown(self[match[1]]), line)
+        local = words(self.language).local
+        return re.sub(r"\{(\w+)\}", lambda match: local(shown(self[match[1]])), line)
 
 
 @dataclass(frozen=True)
@@ -158,9 +167,10 @@ class Mistake:
     What the student is told is a template: what seems to have happened, never the right number.
     """
 
-    name: str  # a few words; a general mistake of this name is left out
+    name: str  # a few words in English; a general mistake of this name is left out
     formula: str  # of the wrong answer
     says: str
+    called: str = ""  # its name in the learner's language; "": `name`
 
 
 @dataclass(frozen=True)
@@ -190,6 +200,8 @@ class Exercise:
     formulas: Mapping[str, str]  # what texts and other formulas need besides
     tell: Sequence[str] = ()  # formulas whose numbers are told to the student too
     fits: Sequence[str] = ()  # conditions of a draw that the lesson is about
+    language: str = "en"  # of the texts
+    whole: bool = True  # whether all texts are in that language
 
 
 def read(file: Path) -> Exercise:
@@ -205,6 +217,37 @@ def read(file: Path) -> Exercise:
     return Exercise(name=file.stem, **found)
 
 
+def translated(exercise: Exercise, file: Path, language: str) -> Exercise:
+    """Return an exercise with the texts of a TOML file; what is not in there stays as it is."""
+    found = tomllib.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
+    whole = True
+
+    def texts(there: Any, english: Any, *names: str) -> Any:
+        """Lay a table of texts over an object."""
+        nonlocal whole
+        kept = {name: there[name] for name in names if name in there}
+        whole = whole and len(kept) == len(names)
+        return replace(english, **kept)
+
+    questions = []
+    for i, asked in enumerate(exercise.questions):
+        there = dict(enumerate(found.get("questions", ()))).get(i, {})
+        mistakes = [
+            texts(dict(zip(("called", "says"), row, strict=False)), known, "called", "says")
+            for known in asked.mistakes
+            for row in [there.get("mistakes", {}).get(known.name, ())]
+        ]
+        question = texts(there, asked, "title", "text", "hints", "working", "source")
+        questions.append(replace(question, mistakes=mistakes))
+    meanings = found.get("parameters", {})
+    parameters = [
+        texts({"meaning": meanings[one.name]} if one.name in meanings else {}, one, "meaning")
+        for one in exercise.parameters
+    ]
+    new: Exercise = texts(found, exercise, "title", "story")
+    return replace(new, questions=questions, parameters=parameters, language=language, whole=whole)
+
+
 def _choices(values: list[float] | dict[str, float]) -> list[float]:
     """Return a list as it is, or the round numbers of a range, its ends included."""
     if isinstance(values, list):
@@ -218,7 +261,8 @@ def _choices(values: list[float] | dict[str, float]) -> list[float]:
 class Trace:
     """A wrong number, the mistake it tells of, and what to say about it."""
 
-    name: str
+    name: str  # in English
+    called: str  # in the learner's language
     says: str
     number: float
 
@@ -229,52 +273,55 @@ MOST_TENS: Final = 6
 _RAISED: Final = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def _powers_of_ten() -> Iterator[Trace]:
+def _trace(language: str, name: str, says: str, number: float) -> Trace:
+    """Return a mistake by the key of its name."""
+    return Trace(words().say(name), words(language).say(name), says, number)
+
+
+def _powers_of_ten(language: str) -> Iterator[Trace]:
+    say = words(language).say
     for power in range(1, MOST_TENS + 1):
         times = f"{10**power:,}".replace(",", " ")
         for way, factor in (("large", 10.0**power), ("small", 10.0**-power)):
-            says = (
-                f"The digits are right, but it is 10{str(power).translate(_RAISED)} = {times}"
-                f" times too {way}. Is it all in SI units: kg for g, m for mm, J for mJ?"
-            )
-            yield Trace("power of ten", says, factor)
-            also = f"{says} And the sign is the other way round."
-            yield Trace("power of ten", also, -factor)
+            raised = str(power).translate(_RAISED)
+            says = say("reply-ten", power=raised, times=times, way=say(way))
+            yield _trace(language, "mistake-ten", says, factor)
+            also = f"{says} {say('reply-ten-sign')}"
+            yield _trace(language, "mistake-ten", also, -factor)
 
 
-GENERAL: Final = (
-    Trace(
-        "sign or direction",
-        "The size is right, but the sign is not. Which way does it point, and which way counts"
-        " as positive here?",
-        -1.0,
-    ),
-    Trace("a missing ½", "Twice what it should be. Is a ½ missing?", 2.0),
-    Trace("a ½ too many", "Half of what it should be. Is there a ½ too many, or a 2 missing?", 0.5),
-    *_powers_of_ten(),
-)
-"""The general mistakes, with what each makes of a right answer of 1."""
+@cache
+def general(language: str) -> tuple[Trace, ...]:
+    """Return the general mistakes, with what each makes of a right answer of 1."""
+    say, one = words(language).say, partial(_trace, language)
+    return (
+        one("mistake-sign", say("reply-sign"), -1.0),
+        one("mistake-half-missing", say("reply-half-missing"), 2.0),
+        one("mistake-half-too-many", say("reply-half-too-many"), 0.5),
+        *_powers_of_ten(language),
+    )
 
-OF_ANGLES: Final = (
-    Trace(
-        "radians for degrees",
-        "That is the angle in radians; degrees are asked for.",
-        radians(1.0),
-    ),
-    Trace(
-        "radians for degrees",
-        "An angle that was in degrees seems to have been turned into degrees once more.",
-        degrees(1.0),
-    ),
-)
-"""Those of answers in degrees besides."""
 
-BESIDES: Final = (
-    ("sign or direction", "Besides, the sign is the other way round.", -1.0),
-    ("power of ten", "Besides, it is 1000 times too large: kg for g, m for mm?", 1e3),
-    ("power of ten", "Besides, it is 1000 times too small: kg for g, m for mm?", 1e-3),
-)
-"""What is common on top of a question's own mistake, and its factor."""
+@cache
+def of_angles(language: str) -> tuple[Trace, ...]:
+    """Return those of answers in degrees besides."""
+    say, one = words(language).say, partial(_trace, language)
+    return (
+        one("mistake-radians", say("reply-radians"), radians(1.0)),
+        one("mistake-radians", say("reply-degrees"), degrees(1.0)),
+    )
+
+
+@cache
+def besides(language: str) -> tuple[Trace, ...]:
+    """Return what is common on top of a question's own mistake, with its factor."""
+    say, one = words(language).say, partial(_trace, language)
+    return (
+        one("mistake-sign", say("besides-sign"), -1.0),
+        one("mistake-ten", say("besides-large"), 1e3),
+        one("mistake-ten", say("besides-small"), 1e-3),
+    )
+
 
 LEAST: Final = 1e-9
 """An answer smaller than that in its unit has no digits to judge."""
@@ -296,24 +343,30 @@ class Case:
     @cached_property
     def mistakes(self) -> tuple[Trace, ...]:
         """The question's own mistakes first, then the general ones that it does not replace."""
+        value, text, language = self.numbers.of, self.numbers.text, self.numbers.language
         own = [
-            Trace(known.name, self.numbers.text(known.says), float(self.numbers.of(known.formula)))
-            for known in self.question.mistakes
+            Trace(one.name, one.called or one.name, text(one.says), float(value(one.formula)))
+            for one in self.question.mistakes
         ]
         replaced = {trace.name for trace in own}
-        general = GENERAL + OF_ANGLES if self.question.unit == "degrees" else GENERAL
-        kept = [trace for trace in general if trace.name not in replaced]
+        more = general(language)
+        if self.question.unit == "degrees":
+            more += of_angles(language)
+        kept = [trace for trace in more if trace.name not in replaced]
         return (*own, *(replace(trace, number=self.right * trace.number) for trace in kept))
 
     @property
     def pairs(self) -> Iterator[Trace]:
-        """A mistake of the question's own, and a general one of `BESIDES` on top of it."""
+        """A mistake of the question's own, and one of `besides` on top of it."""
         own = {known.name for known in self.question.mistakes}
+        say, language = words(self.numbers.language).say, self.numbers.language
         for first in self.mistakes[: len(own)]:
-            for name, says, factor in BESIDES:
-                if name not in own:
-                    both = f"{first.name}, and {name}"
-                    yield Trace(both, f"{first.says} {says}", factor * first.number)
+            for more in besides(language):
+                if more.name not in own:
+                    name = words().say("pair", first=first.name, second=more.name)
+                    called = say("pair", first=first.called, second=more.called)
+                    says = f"{first.says} {more.says}"
+                    yield Trace(name, called, says, more.number * first.number)
 
     @cached_property
     def feels_gravity(self) -> bool:
@@ -348,7 +401,7 @@ def attempt(exercise: Exercise, student: str, number: int) -> tuple[Case, ...] |
         key = "\n".join((exercise.name, plain(student), parameter.name, str(number)))
         random = int.from_bytes(sha256(key.encode("utf-8", "replace")).digest()[:8])
         drawn[parameter.name] = float(parameter.values[random % len(parameter.values)])
-    numbers = Numbers(drawn, exercise.formulas)
+    numbers = Numbers(drawn, exercise.formulas, language=exercise.language)
     cases = tuple(Case(n, asked, numbers) for n, asked in enumerate(exercise.questions, start=1))
     try:
         fits = all(map(numbers.of, exercise.fits)) and all(case.clear for case in cases)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from html import escape
@@ -18,11 +18,8 @@ from typing import Any, Final
 import numpy as np
 
 from chutelab.classroom.exercises.exercise import DIGITS, GRAVITY, ROUNDED, TOLERANCE, Case, shown
+from chutelab.classroom.words import Words, words
 from chutelab.pictures import GREEN, GREY, ORANGE, SKY, VERMILION
-from chutelab.results.recorder import StalledError
-from chutelab.scene import Scene
-from chutelab.studies import design
-from chutelab.util.errors import InputError
 from chutelab.util.tables import Sheet
 
 WIDTH: Final = 88
@@ -49,6 +46,11 @@ MARKS: Final = {
     Verdict.UNKNOWN: ("?", ORANGE),
 }
 """Sign and colour of each verdict; the words always say it too."""
+
+
+def in_words(verdict: Verdict, language: str) -> str:
+    """Return a verdict as a learner is told it."""
+    return words(language).say(f"verdict-{verdict.name.lower()}")
 
 
 def filled(text: str) -> str:
@@ -81,14 +83,16 @@ class Reply:
         Its number; 0 if there is no such one.
     verdict, text
         What became of the answer, and what to tell the student.
-    mistake
-        Name of the known mistake that it looks like, or empty.
+    mistake, called
+        The known mistake that it looks like, or empty: its name in English, and in `language`.
     """
 
     question: int
     verdict: Verdict
     text: str
     mistake: str = ""
+    called: str = ""
+    language: str = "en"
 
     @property
     def right(self) -> bool:
@@ -98,8 +102,12 @@ class Reply:
     @property
     def heading(self) -> str:
         """The reply in a few words."""
-        words = f"looks like {self.mistake}" if self.mistake else str(self.verdict)
-        return f"Question {self.question}: {words}" if self.question else "No such question"
+        say = words(self.language).say
+        if not self.question:
+            return say("heading-unknown")
+        if self.mistake:
+            return say("heading-mistake", number=self.question, mistake=self.called)
+        return say("heading", number=self.question, verdict=in_words(self.verdict, self.language))
 
     def __repr__(self) -> str:
         return filled(f"{MARKS[self.verdict][0]} {self.heading}. {self.text}")
@@ -139,21 +147,25 @@ class Standing:
     tries: int = 0  # blank answers are not counted
     hints: int = 0  # how many were read
     revealed: bool = False  # whether the working was shown
+    language: str = "en"
 
     @property
     def remarks(self) -> str:
         """Tries, hints and whether the working was shown, in words."""
-        words = []
+        say, remarks = words(self.language).say, []
         if self.tries:
-            words.append("1 try" if self.tries == 1 else f"{self.tries} tries")
+            key = "tries-one" if self.tries == 1 else "tries"
+            remarks.append(say(key, count=self.tries))
         if self.hints:
-            words.append("1 hint" if self.hints == 1 else f"{self.hints} hints")
-        return ", ".join([*words, "working shown"] if self.revealed else words)
+            key = "hints-one" if self.hints == 1 else "hints"
+            remarks.append(say(key, count=self.hints))
+        return ", ".join([*remarks, say("working-shown")] if self.revealed else remarks)
 
     @property
     def state(self) -> str:
         """Verdict and remarks."""
-        return f"{self.verdict} ({self.remarks})" if self.remarks else str(self.verdict)
+        verdict = in_words(self.verdict, self.language)
+        return f"{verdict} ({self.remarks})" if self.remarks else verdict
 
 
 BAR, HEIGHT, GAP = 150, 12, 4
@@ -169,6 +181,7 @@ class Progress:
 
     title: str
     rows: tuple[Standing, ...]
+    language: str = "en"
 
     @property
     def done(self) -> int:
@@ -178,7 +191,8 @@ class Progress:
     @property
     def summary(self) -> str:
         """The state in a line."""
-        return f"{self.title}: {self.done} of {len(self.rows)} done"
+        say = words(self.language).say
+        return say("progress", title=self.title, done=self.done, count=len(self.rows))
 
     def __repr__(self) -> str:
         width = max(len(row.title) for row in self.rows)
@@ -212,70 +226,65 @@ _LONGEST: Final = 40
 """Characters of a student's text that are shown back."""
 
 
-def number_of(answer: object) -> float | str | None:
+def number_of(answer: object, said: Words | None = None) -> float | str | None:
     """Return the number that an answer is, None for no attempt, or else words: what to do instead.
+
+    The words are those of a language, by default of English.
 
     >>> number_of([2]), number_of("..."), number_of("2,5")
     (2.0, None, 'That is text. Give the number without quotes: 2.5.')
     """
+    say = (said or words()).say
     try:
-        return _read(answer)
+        return _read(answer, say)
     except OverflowError:
-        return "That is infinite, or nearly so. Was something multiplied?"
+        return say("unread-infinite")
     except Exception:  # a student's object may raise anything
-        return f"That is a {type(answer).__name__[:_LONGEST]}, and one number is asked for."
+        return say("unread-object", type=type(answer).__name__[:_LONGEST])
 
 
-def _read(answer: Any) -> float | str | None:
+def _read(answer: Any, say: Callable[..., str]) -> float | str | None:
     if answer is None or answer is Ellipsis:
         return None
     if isinstance(answer, (bool, np.bool_)):
-        return f"That is {bool(answer)}, the result of a comparison. A number is asked for."
+        return say("unread-truth", value=bool(answer))
     if isinstance(answer, (str, bytes)):
-        return _of_text(answer if isinstance(answer, str) else answer.decode("utf-8", "replace"))
+        text = answer if isinstance(answer, str) else answer.decode("utf-8", "replace")
+        return _of_text(text, say)
     if isinstance(answer, (complex, np.complexfloating)) and not isinstance(answer, float):
-        return "That is a complex number. Was there the square root of something negative?"
+        return say("unread-complex")
     if isinstance(answer, (list, tuple, np.ndarray)):
         items = answer.ravel().tolist() if isinstance(answer, np.ndarray) else answer
         if len(items) > 1:
-            return _of_several(answer, items)
-        return _read(items[0]) if items else None
+            return _of_several(answer, items, say)
+        return _read(items[0], say) if items else None
     if callable(answer):
-        return "That is a function, not its result. Call it, with its numbers in parentheses."
+        return say("unread-function")
     value = float(answer)
     if isnan(value):
-        return (
-            "That is NaN, not a number: somewhere on the way something had no answer, such as the"
-            " arccos of more than 1 or 0 / 0. Print the steps one by one."
-        )
-    return "That is infinite. Was something divided by zero?" if isinf(value) else value
+        return say("unread-nan")
+    return say("unread-divided") if isinf(value) else value
 
 
-def _of_several(answer: object, items: Sequence[Any]) -> str:
+def _of_several(answer: object, items: Sequence[Any], say: Callable[..., str]) -> str:
     """Say what to do about several values: one to pick, or a decimal comma, which makes two."""
     match answer:
         case (int(whole), int(digits)) if type(answer) is tuple and digits >= 0:
-            return (
-                f"Python takes {whole},{digits} for two numbers. Write the decimal comma as a"
-                f" point: {whole}.{digits}."
-            )
-    return f"Those are {len(items)} values, and one number is asked for. Pick it, with [0] say."
+            return say("unread-comma", whole=whole, digits=digits)
+    return say("unread-several", count=len(items))
 
 
-def _of_text(text: str) -> str | None:
+def _of_text(text: str, say: Callable[..., str]) -> str | None:
     """Say what to do about a text: a number in quotes, one with a unit, or words."""
     if not text.strip(" \t\n.?…_-"):
         return None
     found = _NUMBER.match(text)
     if found is None:
-        return f"That is text (“{text.strip()[:_LONGEST]}”). Give a number, without quotes."
+        return say("unread-text", text=text.strip()[:_LONGEST])
     if found[2].strip():
-        return (
-            "That is text with a unit in it. Give the number alone, without quotes and unit, in the"
-            " unit that is asked for."
-        )
+        return say("unread-unit")
     bare = found[1].replace(",", ".").replace("−", "-")[:_LONGEST]
-    return f"That is text. Give the number without quotes: {bare}."
+    return say("unread-quoted", number=bare)
 
 
 CLOSE: Final = 0.05
@@ -309,89 +318,60 @@ def judge(case: Case, answer: float, others: Iterable[tuple[str, float]] = ()) -
     others
         Name and right answer to the same question of others; looked at only if need be.
     """
+    said = words(case.numbers.language)
+
+    def reply(verdict: Verdict, text: str, name: str = "", called: str = "") -> Reply:
+        return Reply(case.number, verdict, text, name, called, said.language)
+
     if is_close(answer, case.right):
-        found = f"{shown(answer)} {case.question.unit}".strip()
-        text = f"{found} is within {100 * TOLERANCE:g} % of what the theory gives."
-        return Reply(case.number, Verdict.RIGHT, text)
+        found = with_unit(answer, case.question.unit, said)
+        text = said.say("right", answer=found, percent=f"{100 * TOLERANCE:g}")
+        return reply(Verdict.RIGHT, text)
     for trace in case.mistakes:
         if is_close(answer, trace.number):
-            return Reply(case.number, Verdict.MISTAKE, trace.says, trace.name)
+            return reply(Verdict.MISTAKE, trace.says, trace.name, trace.called)
     for name, number in others:
         if is_rounded(answer, number):
-            says = f"That is right for the numbers of {name}, and yours are different ones."
-            return Reply(case.number, Verdict.MISTAKE, says, "somebody else's numbers")
+            known, called = (one.say("mistake-others") for one in (words(), said))
+            return reply(Verdict.MISTAKE, said.say("reply-others", name=name), known, called)
     # What is close has hardly two mistakes in it, and what two pairs lead to tells of neither.
     near = abs(answer / case.right - 1.0) <= CLOSE
     pairs = [trace for trace in case.pairs if is_close(answer, trace.number)]
     if len(pairs) == 1 and not near:
-        return Reply(case.number, Verdict.MISTAKE, pairs[0].says, pairs[0].name)
-    return Reply(case.number, Verdict.OFF, _distance(case, answer))
+        return reply(Verdict.MISTAKE, pairs[0].says, pairs[0].name, pairs[0].called)
+    return reply(Verdict.OFF, _distance(case, answer, said))
+
+
+def with_unit(number: float, unit: str, said: Words) -> str:
+    """Return a number with its unit, as texts show it."""
+    return f"{said.local(shown(number))} {said.unit(unit)}".strip()
 
 
 FAR: Final = 10.0
 """Ratio from which on a percentage says less than a factor."""
 
 
-def _distance(case: Case, answer: float) -> str:
+def _distance(case: Case, answer: float, said: Words) -> str:
     """Say how far off an answer is, without giving the right one away to all digits."""
-    more = f" Try task.hint({case.number})."
+    say = said.say
+    more = say("python-hint", number=case.number)
     ratio = answer / case.right
     if ratio == 0.0:
-        return f"It is not 0.{more}"
+        return f"{say('off-zero')} {more}"
     if ratio < 0.0:
-        return f"The sign is the other way round, and the size is not right either.{more}"
+        return f"{say('off-sign')} {more}"
     off = abs(ratio - 1.0)
-    way = "large" if ratio > 1.0 else "small"
+    way = say("large" if ratio > 1.0 else "small")
     if off <= CLOSE:
-        gravity = f", or is g not {GRAVITY} m/s²" if case.feels_gravity else ""
-        return (
-            f"Close: about {100 * off:.0f} % too {way}. Were numbers rounded on the way{gravity}?"
-        )
+        percent, gravity = f"{100 * off:.0f}", said.local(str(GRAVITY))
+        key = "off-close-gravity" if case.feels_gravity else "off-close"
+        return say(key, percent=percent, way=way, gravity=gravity)
     if 1.0 / FAR < ratio < FAR:
-        factor = max(ratio, 1.0 / ratio)
-        size = f"{100 * off:.0f} %" if off < 1.0 else f"a factor of {factor:.1f}"
-        return f"It looks like no mistake I know. It is about {size} too {way}.{more}"
-    power = "10" if FAR <= max(ratio, 1.0 / ratio) < FAR**2 else "100"
-    return f"It looks like no mistake I know. It is more than {power} times too {way}.{more}"
-
-
-def try_out(
-    number: int,
-    answer: object,
-    scene: Scene,
-    key: str,
-    wanted: tuple[str, float],
-    within: float,
-) -> Reply:
-    """Let a machine judge an answer: run it with that number, and look at what comes out.
-
-    No error is raised for what a student hands over, as by `Task.check`.
-
-    Parameters
-    ----------
-    number, answer
-        The question, and what stands there for a number.
-    scene, key
-        The machine, and the key that the answer is for.
-    wanted
-        A quantity, as for `chutelab.design.value`, and what it is to be.
-    within
-        Difference up to which it is right, in the unit of the quantity.
-    """
-    value = number_of(answer)
-    if value is None:
-        return Reply(number, Verdict.BLANK, "Put your number in place of None, and run the cell.")
-    if isinstance(value, str):
-        return Reply(number, Verdict.UNREAD, value)
-    name, target = wanted
-    try:
-        got = design.value(scene.with_values({key: value}), name)
-    except (InputError, StalledError) as error:
-        return Reply(number, Verdict.OFF, f"No machine runs with that: {error}")
-    if isnan(got):
-        return Reply(number, Verdict.OFF, f"With {key} = {shown(value)} it does not get that far.")
-    found = f"With {key} = {shown(value)} the machine does {name} = {shown(got)}."
-    if abs(got - target) < within:
-        return Reply(number, Verdict.RIGHT, found)
-    way = "large" if got > target else "small"
-    return Reply(number, Verdict.OFF, f"{found} That is too {way}: {shown(target)} is wanted.")
+        factor = said.local(f"{max(ratio, 1.0 / ratio):.1f}")
+        percent = f"{100 * off:.0f}"
+        size = (
+            say("off-percent", percent=percent) if off < 1.0 else say("off-factor", factor=factor)
+        )
+        return f"{say('off-about', size=size, way=way)} {more}"
+    times = "10" if FAR <= max(ratio, 1.0 / ratio) < FAR**2 else "100"
+    return f"{say('off-more', times=times, way=way)} {more}"

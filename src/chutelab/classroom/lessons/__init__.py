@@ -2,11 +2,13 @@
 
 - `reading`: ``lesson.toml`` as a frozen model, a lesson's folder with its scenes, all faults in one
   message; the shipped lessons, found by number, by name or by folder.
-- `sheets`: the student's sheet, the teacher's and the explanation, from one source.
+- `texts`: a lesson's Markdown as HTML and for a terminal, its formulas too.
+- `sheets`: the student's sheet, the teacher's and the explanation.
 - `building`: ``lesson.gif``, a new lesson from a template, all lessons as web pages.
 
-A lesson is a folder ``NN-name`` with ``lesson.toml``, the worksheet ``README.md``, the picture
-``lesson.gif``, and the notebook ``exercise.ipynb``; scene files of its own lie beside them.
+A lesson is a folder ``NN-name`` with ``lesson.toml``, the worksheet ``README.md``, the explanation
+``explanation.md``, the film ``lesson.gif``, and the notebook ``exercise.ipynb``; scene files of its
+own lie beside them.
 """
 
 from chutelab.classroom.lessons.reading import (

@@ -23,11 +23,10 @@ from string import Template
 from typing import Final
 from urllib.parse import quote
 
-from markdown_it import MarkdownIt
-from markdown_it.tree import SyntaxTreeNode
 from PIL.GifImagePlugin import GifImageFile
 
 from chutelab.classroom.lessons.reading import Lesson, LessonError, read, scene_of, split, unusable
+from chutelab.classroom.lessons.texts import INDEX, html_of, words_for
 from chutelab.engines.simulation import simulate
 from chutelab.scene import Fault, to_dict
 from chutelab.util.files import aside, refuse_other, together
@@ -130,49 +129,6 @@ def comment_of(picture: Path) -> str:
         return ""
     # Every GIF ends with a semicolon.
     return str(comment.decode("ascii", "replace")) if gif.endswith(b";") else ""
-
-
-INDEX: Final = "index.html"
-_WORKSHEET: Final = re.compile(r"(^|/)README\.md(?=$|#)")
-
-
-def html_of(markdown: str) -> str:
-    """Return the HTML of a worksheet, without its title and its picture, which the page has.
-
-    Raw HTML is shown, not obeyed. Links to worksheets become links to pages.
-    """
-    parser = MarkdownIt("commonmark", {"html": False}).enable("table")
-    worksheet = SyntaxTreeNode(parser.parse(markdown))
-    kept = []
-    for part in worksheet.children:
-        inside = [one.type for line in part.children for one in line.children]
-        if part.tag != "h1" and (part.type, inside) != ("paragraph", ["image"]):
-            kept.append(part)
-    worksheet.children = kept
-    for link in worksheet.walk():
-        if link.type == "link":
-            link.attrs["href"] = _WORKSHEET.sub(rf"\g<1>{INDEX}", str(link.attrs["href"]))
-    made = str(parser.renderer.render(worksheet.to_tokens(), parser.options, {}))
-    # What is too wide for a phone scrolls by itself, and with the keyboard.
-    return re.sub("<(pre|table)>", r'<\1 tabindex="0">', made)
-
-
-def plain_of(markdown: str) -> str:
-    r"""Return a worksheet for a terminal, which shows no pictures, under a title of its own.
-
-    >>> plain_of("# Title\n\n![x](x.gif)\n\nSee [it](it.ipynb), [doi](https://doi.org/1).\n")
-    'See it, [doi](https://doi.org/1).\n'
-    """
-    text = re.sub(r"\A# .*\n+|^!\[[^\]]*\]\([^)]*\)\n+", "", markdown, flags=re.MULTILINE)
-    return re.sub(r"(?<!!)\[([^\]]+)\]\((?!https?:)[^)]*\)", r"\1", text)
-
-
-def words_for(picture: str, markdown: str) -> str | None:
-    """Return the words that stand for a picture in a worksheet, None if it is not in there."""
-    for node in SyntaxTreeNode(MarkdownIt("commonmark").parse(markdown)).walk():
-        if node.type == "image" and node.attrs["src"] == picture:
-            return node.content
-    return None
 
 
 _NAME: Final = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
@@ -336,7 +292,7 @@ def _lesson(lesson: Lesson, folder: Path, before: str, after: str) -> str:
         if (folder / name).is_file():
             door = f'<li><a href="{_address(name)}" download>Scene {escape(name)}</a></li>'
             doors.append(door)
-    markdown = lesson.worksheet.read_text(encoding="utf-8") if lesson.worksheet.is_file() else ""
+    worksheet, explanation = lesson.text("README"), lesson.text("explanation")
     facts = {
         "folder": _address(lesson.folder.name),
         "title": _heading(lesson),
@@ -349,8 +305,9 @@ def _lesson(lesson: Lesson, folder: Path, before: str, after: str) -> str:
     page = _page(
         "lesson.html",
         **facts,
-        alt=escape(words_for(PICTURE, markdown) or lesson.title),
-        worksheet=html_of(markdown),
+        alt=escape(words_for(PICTURE, explanation) or lesson.title),
+        worksheet=html_of(worksheet),
+        explanation=html_of(explanation),
         doors="\n".join(doors),
         before=before,
         after=after,

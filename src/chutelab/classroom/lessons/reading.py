@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import Field, PrivateAttr, ValidationError
+from pydantic import AfterValidator, Field, PrivateAttr, ValidationError
 
 from chutelab.scene import MISSING, Fault, Scene, SceneError, load, shipped
 from chutelab.scene.overrides import Override, at_path, joined
@@ -29,7 +29,10 @@ LONGEST: Final = 200
 
 Said = Annotated[Text, Field(min_length=1, max_length=LONGEST)]
 Names = Annotated[tuple[Said, ...], Field(max_length=MOST)]
-Answers = Annotated[tuple[Text, ...], Field(max_length=MOST)]
+Words = Annotated[Text, AfterValidator(lambda text: " ".join(text.split()))]
+"""A text that may be broken into lines anywhere."""
+
+Answers = Annotated[tuple[Words, ...], Field(max_length=MOST)]
 
 
 def key(default: Any, what: str, allowed: str, **limits: Any) -> Any:
@@ -87,12 +90,13 @@ class Teacher(Table):
     goals: Names = key(
         (), "What one can do afterwards", f"a list of at most {MOST} texts, each of one sentence"
     )
+    say: Words = key("", "What to say and do in class", "a text")
     predictions: Answers = key(
         (), "Answers to the predictions, in their order", f"a list of at most {MOST} texts"
     )
-    basic: Text = key("", "What to leave out for a short version", "a text")
-    stretch: Text = key("", "What to add for those who are done", "a text")
-    curriculum: Text = key("", "Where it sits in a curriculum", "a text")
+    basic: Words = key("", "What to leave out for a short version", "a text")
+    stretch: Words = key("", "What to add for those who are done", "a text")
+    curriculum: Words = key("", "Where it sits in a curriculum", "a text")
 
 
 class Lesson(Table):
@@ -140,10 +144,15 @@ class Lesson(Table):
         """The number its folder begins with; None for one that has none."""
         return split(self._folder)[0]
 
-    @property
-    def worksheet(self) -> Path:
-        """The worksheet, in Markdown."""
-        return self._folder / "README.md"
+    def text(self, name: str, language: str = "en") -> str:
+        """Return ``README`` or ``explanation``, in Markdown; "" if the lesson has none.
+
+        It is in English where there is none in that language.
+        """
+        for file in (f"{name}.{language}.md", f"{name}.md"):
+            if (path := self._folder / file).is_file():
+                return path.read_text(encoding="utf-8")
+        return ""
 
 
 def split(folder: Path) -> tuple[int | None, str]:
@@ -164,7 +173,7 @@ def shipped_lessons() -> list[Lesson]:
 PLAN: Final = "lesson.toml"
 
 LARGEST: Final = 1 << 20
-"""Bytes of it, and characters of a worksheet."""
+"""Bytes of it, and characters of a worksheet or an explanation."""
 
 
 class LessonError(SceneError):
@@ -215,24 +224,25 @@ def read(folder: str | Path) -> Lesson:
     lesson._folder = source.parent.resolve()
     if "scenes" in sound:
         faults += _misfits(lesson)
-    faults += _unread(lesson.worksheet)
+    for text in sorted(source.parent.glob("*.md")):
+        faults += _unread(text)
     if faults:
         raise LessonError(str(source), faults)
     return lesson
 
 
-def _unread(worksheet: Path) -> Iterator[Fault]:
-    """Yield why a worksheet, if there is one, cannot be shown."""
-    if not worksheet.is_file():
+def _unread(text: Path) -> Iterator[Fault]:
+    """Yield why a text of a lesson cannot be shown."""
+    if not text.is_file():
         return
     try:
-        with worksheet.open(encoding="utf-8") as file:
+        with text.open(encoding="utf-8") as file:
             if len(file.read(LARGEST + 1)) > LARGEST:
-                yield Fault(worksheet.name, None, f"too large: it has at most {LARGEST} characters")
+                yield Fault(text.name, None, f"too large: it has at most {LARGEST} characters")
     except OSError as error:
-        yield Fault(worksheet.name, None, f"cannot be read: {error.strerror or error}")
+        yield Fault(text.name, None, f"cannot be read: {error.strerror or error}")
     except UnicodeDecodeError:
-        yield Fault(worksheet.name, None, "not UTF-8 text; save the file as UTF-8")
+        yield Fault(text.name, None, "not UTF-8 text; save the file as UTF-8")
 
 
 def _strays(folder: Path) -> list[Fault]:

@@ -1,8 +1,8 @@
-"""Three sheets from one source: the student's, the teacher's, and the explanation.
+"""Three sheets: the student's, the teacher's, and the explanation.
 
-The source is the worksheet, `README.md`, with its four parts, the table ``[teacher]`` of
-``lesson.toml``, and the exercise. The student's sheet has no picture and nothing of what is under
-"Explain": whoever predicts has not seen what comes out.
+The student's is the worksheet, `README.md`, with a line for the name; it says nothing of what comes
+out. The explanation is `explanation.md`. The teacher's comes of the table ``[teacher]`` of
+``lesson.toml`` and of the exercise.
 """
 
 from __future__ import annotations
@@ -14,13 +14,10 @@ from typing import Final
 from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises.catalogue import UNNAMED
 from chutelab.classroom.exercises.exercise import draw, shown
-from chutelab.classroom.lessons.building import plain_of
-from chutelab.classroom.lessons.reading import Lesson, unusable
+from chutelab.classroom.lessons.reading import Lesson, Teacher, unusable
 
 SHEETS: Final = ("student", "teacher", "explanation")
-PARTS: Final = ("Predict", "Run", "Compare", "Explain")
-
-_SAID: Final = re.compile(r"^\*For the teacher\.\* *(.*?)(?:\n\n|\Z)", re.MULTILINE | re.DOTALL)
+PARTS: Final = ("Predict", "Run", "Compare")
 
 
 def sheet(lesson: Lesson, which: str) -> str:
@@ -29,44 +26,43 @@ def sheet(lesson: Lesson, which: str) -> str:
     Raises
     ------
     LessonError
-        If the lesson has no worksheet with the parts "Predict", "Run", "Compare" and "Explain".
+        If the lesson's worksheet has not the parts "Predict", "Run" and "Compare", or if it has no
+        explanation.
     """
-    found = lesson.worksheet.read_text(encoding="utf-8") if lesson.worksheet.is_file() else ""
-    said = " ".join(" ".join(_SAID.findall(found)).split())
-    opening, *pieces = re.split(r"^## (.*)\n+", plain_of(_SAID.sub("", found)), flags=re.MULTILINE)
-    parts = dict(zip(pieces[::2], pieces[1::2], strict=True))
-    if missing := [name for name in PARTS if name not in parts]:
-        text = f"a sheet needs the parts ## {', ## '.join(missing)} of the worksheet"
-        raise unusable(lesson.worksheet, text)
-    number = "" if lesson.number is None else f"Lesson {lesson.number}. "
-    head = f"# {number}{lesson.title}"
     match which:
         case "student":
-            body = [f"## {name}\n\n{parts[name].strip()}" for name in PARTS[:3]]
-            if lesson.name in EXERCISES:
-                own = "The notebook `exercise.ipynb` asks four questions with numbers of your own."
-                body.append(f"## Your own numbers\n\n{own}")
-            lines = [head, "Name: ____________________  Date: ____________", opening.strip(), *body]
+            text = lesson.text("README")
+            heads = re.findall(r"^## (.*)$", text, flags=re.MULTILINE)
+            if missing := [name for name in PARTS if name not in heads]:
+                said = f"a sheet needs the parts ## {', ## '.join(missing)} of the worksheet"
+                raise unusable(lesson.folder / "README.md", said)
+            title, _, rest = text.partition("\n")
+            return f"{title}\n\nName: ____________________  Date: ____________\n{rest}"
         case "explanation":
-            lines = [f"{head}: explanation", "*To be opened afterwards.*", parts["Explain"].strip()]
+            if found := lesson.text("explanation"):
+                return found
+            raise unusable(lesson.folder / "explanation.md", "is not there, or empty")
         case _:
-            lines = [f"{head}: for the teacher", *_for_the_teacher(lesson, said)]
-    return "\n\n".join(lines) + "\n"
+            number = "" if lesson.number is None else f"Lesson {lesson.number}. "
+            head = f"# {number}{lesson.title}: for the teacher"
+            return "\n\n".join([head, *_for_the_teacher(lesson)]) + "\n"
 
 
-def _for_the_teacher(lesson: Lesson, said: str) -> Iterator[str]:
+def _for_the_teacher(lesson: Lesson) -> Iterator[str]:
     yield f"{lesson.question}\n\nLevel: {lesson.level}. Time as taught: {lesson.minutes} minutes."
-    teacher = lesson.teacher
-    if teacher is not None:
+    teacher = lesson.teacher or Teacher()
+    if teacher.goals:
         yield "## Goals\n\n" + "\n".join(f"- {goal}" for goal in teacher.goals)
-    if said:
-        yield f"## What to say\n\n{said}"
-    if teacher is not None:
+    if teacher.say:
+        yield f"## What to say\n\n{teacher.say}"
+    if teacher.predictions:
         key = "\n".join(f"{n}. {answer}" for n, answer in enumerate(teacher.predictions, 1))
         yield f"## Key to the predictions\n\n{key}"
     yield from _of_exercise(lesson)
-    if teacher is not None:
-        yield f"## Shorter and longer\n\n- Basic: {teacher.basic}\n- Stretch: {teacher.stretch}"
+    lengths = (("Basic", teacher.basic), ("Stretch", teacher.stretch))
+    if said := [f"- {name}: {text}" for name, text in lengths if text]:
+        yield "## Shorter and longer\n\n" + "\n".join(said)
+    if teacher.curriculum:
         yield f"## Where it sits\n\n{teacher.curriculum}"
 
 

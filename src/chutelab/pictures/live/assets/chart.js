@@ -37,7 +37,7 @@ function rangeOf(values, room = 0.06) {
   }
   if (low > high) return [0, 1];
   // Rounding is not to fill a diagram.
-  const span = Math.max(high - low, 1e-6 * Math.max(Math.abs(low), Math.abs(high), 1e-6));
+  const span = Math.max(high - low, 1e-4 * Math.max(Math.abs(low), Math.abs(high), 1e-6));
   return [low - room * span, high + room * span];
 }
 

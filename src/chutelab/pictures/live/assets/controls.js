@@ -14,9 +14,9 @@ import { Fault, met } from "./scene.js";
  * @typedef {{tables: Record<string, Record<string, any>>, live?: Live}} Page
  * @typedef {{table: string, row: number, name: string}} Section  a part of the scene; "scene" of
  *   the main numbers of all
- * @typedef {{key: string, table: string, name: string, part: number, of: number, unit: string,
- *   low: number, high: number, value: number | string}} Field  a number that can be typed; it is
- *   the n-th `part` `of` so many
+ * @typedef {{key: string, table: string, owner: string, name: string, part: number, of: number,
+ *   unit: string, low: number, high: number, value: number | string}} Field  a number that can be
+ *   typed; it is the n-th `part` `of` so many
  */
 
 /** A key of the only plate can be written in two ways: this is one of them. @param {string} key */
@@ -36,6 +36,10 @@ function mayChange({ live }, key) {
  * @param {Page} page */
 const mayDraw = ({ live }) =>
   !live?.controls?.length && (!live?.panels || live.panels.includes("edit"));
+
+/** Whether the scene names what can be changed: few enough to be shown together.
+ * @param {Page} page */
+const showsFew = ({ live }) => Boolean(live?.controls?.length);
 
 /** The handles of what can be changed. @param {Handle[]} handles @param {Page} page */
 function openHandles(handles, page) {
@@ -127,9 +131,11 @@ function numberAt(scene, section, key) {
  * @returns {Field[]} */
 function fieldsOf(page, given, scene, section) {
   if (section.table === "scene") {
-    const firsts = sectionsOf(scene).filter(({ table, row }) => MAIN[table] && row === 0);
-    return firsts.flatMap((one) => ownFields(page, given, scene, one)
-      .filter(({ name }) => MAIN[one.table].includes(name)));
+    const isMain = (/** @type {Section} */ { table, row }) => MAIN[table] && row === 0;
+    const all = showsFew(page);
+    return sectionsOf(scene).filter((one) => all || isMain(one))
+      .flatMap((one) => ownFields(page, given, scene, one)
+        .filter(({ name }) => all || MAIN[one.table].includes(name)));
   }
   return ownFields(page, given, scene, section);
 }
@@ -148,7 +154,8 @@ function ownFields(page, given, scene, section) {
       if (Array.isArray(value)) {
         value.forEach((entry, n) => add(`${key}[${n}]`, entry, n, value.length));
       } else if ((typeof value === "number" || value === "adhesion") && mayChange(page, key)) {
-        fields.push({ key, table, name, part, of, value, ...boundsOf(page, key) });
+        const owner = section.name;
+        fields.push({ key, table, owner, name, part, of, value, ...boundsOf(page, key) });
       }
     };
     const written = valueAt(given, path);
@@ -169,4 +176,4 @@ function checked({ key, low, high, name }, value) {
   return value;
 }
 
-export { checked, fieldsOf, mayDraw, openHandles, sectionsOf };
+export { checked, fieldsOf, mayDraw, openHandles, sectionsOf, showsFew };

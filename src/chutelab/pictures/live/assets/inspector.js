@@ -1,6 +1,6 @@
 // Numbers that can be typed: of one part of the scene, or the main ones of all.
 
-import { checked, fieldsOf, sectionsOf } from "./controls.js";
+import { checked, fieldsOf, sectionsOf, showsFew } from "./controls.js";
 import { canGo, without } from "./edit.js";
 import { card, html } from "./panels.js";
 import { Fault } from "./scene.js";
@@ -49,13 +49,16 @@ class Inspector {
     const { lab, part } = this;
     if (!lab.given || !this.canDelete) return;
     lab.replace(without(lab.given, part));
-    if (!lab.fault) this.choose("scene");
+    if (lab.fault) return;
+    this.choose("scene");
+    document.getElementById("play")?.focus();
   }
 
   refresh() {
     const { lab, words, choice } = this;
     if (!lab.given || !lab.scene) return;
-    const sections = sectionsOf(lab.scene);
+    const all = sectionsOf(lab.scene), sections = showsFew(lab.data) ? all.slice(0, 1) : all;
+    choice.hidden = sections.length < 2;
     const section = sections.find(({ name }) => name === this.part) ?? sections[0];
     this.part = section.name;
     const names = sections.map(({ name }) => name);
@@ -79,10 +82,10 @@ class Inspector {
 
   /** @param {Field[]} fields */
   rebuild(fields) {
-    const { words } = this, several = new Set(fields.map(({ table }) => table)).size > 1;
+    const { words } = this, several = this.part === "scene";
     this.inputs.clear();
     this.list.replaceChildren(...fields.map((field) => {
-      const { key, table, name, part, of, unit, low, high } = field;
+      const { key, table, owner, name, part, of, unit, low, high } = field;
       const input = html("input", { type: "text", inputmode: "decimal", autocomplete: "off" });
       const ends = Math.abs(low) < 1e5 && Math.abs(high) < 1e5
         ? words.say("from-to", { low: words.bound(low), high: words.bound(high) }) : "";
@@ -90,11 +93,14 @@ class Inspector {
       input.addEventListener("change", () => this.take(key));
       input.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
         if (event.key === "Enter") this.take(key);
+        if (event.key !== "Escape" || !this.lab.fault) return;
+        this.lab.fault = null;
+        this.lab.tell("scene");
       });
       this.inputs.set(key, { input, field });
-      const owner = several && table !== "scene" ? `${words.name(table)}: ` : "";
+      const whose = several && table !== "scene" ? `${words.name(owner)}: ` : "";
       const which = of > 1 ? ` ${(name === "radius" ? "≥≤" : "xy")[part]}` : "";
-      return html("label", {}, html("span", {}, `${owner}${words.key(table, name)}${which}`), input,
+      return html("label", {}, html("span", {}, `${whose}${words.key(table, name)}${which}`), input,
         html("span", { class: "unit" }, words.unit(unit)));
     }));
   }
@@ -119,19 +125,19 @@ class Inspector {
     const { input, field } = its, text = input.value.trim();
     const word = text.toLowerCase() === words.say("adhesion").toLowerCase();
     const value = word ? "adhesion" : words.parse(text);
-    const shown = typeof field.value === "number" ? Number(field.value.toPrecision(12)) : field.value;
+    const shown = typeof field.value === "number" ? words.brief(field.value) : field.value;
     // What was only looked at keeps all its digits.
     if (value === shown && !lab.fault) return;
+    // What was typed stands until it is known to be possible.
+    input.setAttribute("aria-invalid", "true");
     try {
       checked(field, value);
-      input.removeAttribute("aria-invalid");
       if (value === shown) lab.replace(/** @type {any} */ (lab.given));
       else lab.change({ [key]: value });
     } catch (error) {
       if (!(error instanceof Fault)) throw error;
       lab.refuse(error);
     }
-    if (lab.fault) input.setAttribute("aria-invalid", "true");
   }
 }
 

@@ -20,7 +20,7 @@ const MOST_POINTS = 300;
 function histogram(values, of = values) {
   const [low, high] = rangeOf(of, 0);
   // All may land at one place.
-  const span = Math.max(high - low, 1e-6 * Math.max(Math.abs(low), Math.abs(high), 1e-6));
+  const span = Math.max(high - low, 1e-4 * Math.max(Math.abs(low), Math.abs(high), 1e-6));
   const width = roundUp(span / Math.max(4, Math.min(40, Math.sqrt(of.length))));
   const first = Math.floor(low / width), last = Math.floor(high / width);
   const counts = new Array(last - first + 1).fill(0);
@@ -55,8 +55,11 @@ class LandingPanel {
       html("p", { class: "note" }, words.say("landing-note")));
     this.panel.hidden = true;
     home.append(this.panel);
-    lab.on("scene", () => { this.panel.hidden = (lab.machine?.releases.length ?? 0) < 2; });
-    this.panel.hidden = (lab.machine?.releases.length ?? 0) < 2;
+    const look = () => {
+      this.panel.hidden = (lab.machine?.releases.length ?? 0) < 2 || !lab.scene?.outgoing;
+    };
+    lab.on("scene", look);
+    look();
     follow(lab, this.panel, ["run"], () => this.draw());
     follow(lab, this.panel, ["time"], () => this.fill());
     onWidth(this.bars.root, (width) => {
@@ -123,8 +126,10 @@ class LandingPanel {
     this.means.point(n || NaN);
     // Before the first one lands the whole is told.
     const which = n || landings.length, { mean, error } = this.running[which - 1];
+    // Both with the same places; below a nanometre is rounding.
+    const places = error > 1e-9 ? Math.max(3, 1 - Math.floor(Math.log10(error))) : 3;
     this.result.textContent = words.say(isFinite(error) ? "landing-result" : "landing-first", {
-      n: which, mean: words.number(mean), error: words.number(error, 2),
+      n: which, mean: words.fixed(mean, places), error: words.fixed(error, places),
     });
   }
 

@@ -43,6 +43,8 @@ function mean(values) {
  * @param {number} pulley its radius, m @param {number[]} radius of each particle, m
  * @returns {Row[]} */
 function numbersOf(stages, found, pulley, radius) {
+  // What leaves a wall or a hopper has not left a pulley.
+  if (!isFinite(pulley)) stages = stages.map(({ hit, down }) => ({ hit, down }));
   const speed = (/** @type {number[]} */ v) => Math.hypot(v[0], v[1]);
   const over = (/** @type {(its: Stages, i: number) => number} */ value) => mean(stages.map(value));
   // The paper counts x3 back from the plate, and heights down.
@@ -106,7 +108,7 @@ class NumbersPanel {
     const why = reason ? words.say(`reason-${reason.text}`, Object.fromEntries(Object
       .entries(reason.words).map(([key, value]) => [key, typeof value === "number"
         ? words.number(value) : words.name(value)]))) : "";
-    this.reason.textContent = rows.length ? why : words.say("numbers-none");
+    this.reason.textContent = rows.length || !machine.pulley ? why : words.say("numbers-none");
   }
 }
 

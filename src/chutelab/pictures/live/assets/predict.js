@@ -46,6 +46,8 @@ class Prediction {
     this.hides = true;
     this.isSet = false;
     this.always = false;
+    /** Whether play was pressed too early. */
+    this.asked = false;
     /** @type {[number, number]} */
     this.at = [0, 0];
     this.note = /** @type {any} */ (document.getElementById("guess"));
@@ -54,6 +56,7 @@ class Prediction {
     this.grip.append(svg("circle", { class: "room", r: 20 }),
       svg("path", { d: "M0 0L-8 -17A9.5 9.5 0 1 1 8 -17Z" }));
     this.grip.setAttribute("aria-label", words.say("mark"));
+    this.grip.setAttribute("aria-describedby", "guess");
     this.line = svg("path", { class: "miss" });
     stage.over.append(this.line, this.grip);
     this.show.hidden = false;
@@ -86,7 +89,7 @@ class Prediction {
         ? [Math.min(Math.max(view.x, this.belt.left), this.belt.right), this.belt.y]
         : [view.x, view.y];
     }
-    this.isSet = false;
+    this.isSet = this.asked = false;
     if (!this.always) this.hide(true);
   }
 
@@ -111,7 +114,11 @@ class Prediction {
   begin() {
     if (!this.hides) return true;
     if (this.isSet) this.hide(false);
-    else this.grip.focus();
+    else {
+      this.asked = true;
+      this.place();
+      this.grip.focus();
+    }
     return this.isSet;
   }
 
@@ -138,12 +145,16 @@ class Prediction {
       if (held) this.set(stage.view.worldX(px), stage.view.worldY(py));
     });
     for (const end of ["pointerup", "pointercancel"]) {
-      grip.addEventListener(end, () => { held = false; });
+      grip.addEventListener(end, () => {
+        // It may be right where it stands.
+        if (held && !this.isSet) this.set(...this.at);
+        held = false;
+      });
     }
     grip.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
       const ways = /** @type {Record<string, [number, number]>} */ ({
         ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1],
-        PageUp: [10, 0], PageDown: [-10, 0],
+        PageUp: [10, 0], PageDown: [-10, 0], Enter: [0, 0],
       });
       const way = ways[event.key];
       if (!way || !this.hides) return;
@@ -166,8 +177,11 @@ class Prediction {
     this.line.setAttribute("d", went
       ? `M${view.px(x)} ${view.py(y)}L${view.px(went[0])} ${view.py(went[1])}` : "");
     const off = went ? Math.hypot(went[0] - x, belt ? 0 : went[1] - y) : 0;
-    const said = this.always ? "" : this.hides ? words.say(this.isSet ? "mark-play" : "mark-set")
-      : went ? words.say("mark-off", { distance: words.number(100 * off, 3) }) : "";
+    const wish = this.isSet ? "mark-play" : this.asked ? "mark-first" : "mark-set";
+    const isOver = this.isSet && lab.recording?.state !== "running";
+    const said = this.always ? "" : this.hides ? words.say(wish)
+      : went ? words.say("mark-off", { distance: words.number(100 * off, 3) })
+        : isOver ? words.say("mark-none") : "";
     this.note.hidden = !said;
     // Only what is new is read out.
     if (this.note.textContent !== said) this.note.textContent = said;

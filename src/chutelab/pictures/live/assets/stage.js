@@ -323,6 +323,8 @@ class Stage {
     const wanted = new Set(this.handles.map(({ id }) => id));
     for (const [id, grip] of this.gripOf) {
       if (wanted.has(id)) continue;
+      // Where its focus went to, the space bar plays as it does on a handle.
+      if (grip === document.activeElement) document.getElementById("play")?.focus();
       grip.remove();
       this.gripOf.delete(id);
     }

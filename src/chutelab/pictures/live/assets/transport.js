@@ -47,8 +47,10 @@ class Transport {
     }
     this.rate.addEventListener("change", () => { lab.rate = Number(this.rate.value); });
     this.time.addEventListener("input", () => {
+      // A pause puts the slider back to the time that is shown.
+      const share = Number(this.time.value) / PLACES;
       lab.pause();
-      lab.seek(lab.start + (lab.end - lab.start) * (Number(this.time.value) / PLACES));
+      lab.seek(lab.start + (lab.end - lab.start) * share);
     });
     this.undoButton = element("undo");
     this.redoButton = element("redo");
@@ -83,8 +85,12 @@ class Transport {
     this.time.setAttribute("aria-valuetext", clock);
     this.playButton.classList.toggle("playing", lab.playing);
     this.playButton.setAttribute("aria-label", words.say(lab.playing ? "pause" : "play"));
-    this.undoButton.disabled = !lab.past.length;
-    this.redoButton.disabled = !lab.future.length;
+    const { undoButton, redoButton } = this, { activeElement } = document;
+    undoButton.disabled = !lab.past.length;
+    redoButton.disabled = !lab.future.length;
+    // What cannot be pressed any more loses the focus.
+    if (undoButton.disabled && activeElement === undoButton) redoButton.focus();
+    if (redoButton.disabled && activeElement === redoButton) undoButton.focus();
     this.fault.hidden = !lab.fault;
     if (lab.fault) this.fault.textContent = words.fault(lab.fault);
   }

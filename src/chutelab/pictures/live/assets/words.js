@@ -51,9 +51,14 @@ class Words {
     return this.local(String(Number(value.toPrecision(6))));
   }
 
-  /** A value with all the digits it has, to be typed over. @param {number} value */
+  /** A value with as many digits as are read. @param {number} value */
+  brief(value) {
+    return Number.isInteger(value) ? value : Number(value.toPrecision(6));
+  }
+
+  /** A value to be typed over. @param {number} value */
   plain(value) {
-    return this.local(String(Number(value.toPrecision(12))));
+    return this.local(String(this.brief(value)));
   }
 
   /** A unit as it is written behind a number. @param {string} unit */
@@ -99,7 +104,7 @@ class Words {
   /** A number that somebody typed, with point or comma; NaN if it is none. @param {string} text */
   parse(text) {
     const plain = text.trim().replace("−", "-").replace(",", ".");
-    return plain === "" ? NaN : Number(plain);
+    return /^[-+.\de]+$/i.test(plain) ? Number(plain) : NaN;
   }
 }
 

@@ -1,0 +1,147 @@
+r"""A lesson's Markdown as HTML, as text for a terminal, and the words it has for a picture.
+
+Formulas stand between dollar signs, in the part of TeX that MathML, matplotlib and Jupyter share:
+letters, ``_`` and ``^``, ``\frac``, ``\sqrt``, ``\dot``, functions such as ``\sin``, and the
+symbols in `SYMBOLS`.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Final
+
+from latex2mathml.converter import convert
+from markdown_it import MarkdownIt
+from markdown_it.tree import SyntaxTreeNode
+from mdit_py_plugins.dollarmath import dollarmath_plugin
+
+INDEX: Final = "index.html"
+_ADDRESSES: Final = (
+    (r"(^|/)README\.md(?=$|#)", rf"\1{INDEX}"),
+    (r"\bexplanation\.md$", "#explanation"),
+)
+
+SYMBOLS: Final = {
+    "alpha": "α", "varepsilon": "ε", "mu": "µ", "varphi": "φ", "omega": "ω", "pi": "π",
+    "rho": "ρ", "sigma": "σ", "Delta": "Δ", "cdot": "·", "le": "≤", "ge": "≥", "approx": "≈",
+    "ne": "≠", "to": "→", "infty": "∞", "pm": "±", "circ": "°",
+    "sin": "sin ", "cos": "cos ", "tan": "tan ", "arctan": "arctan ", "arccos": "arccos ",
+    "log": "log ", "ln": "ln ",
+}  # fmt: skip
+"""What each name after a backslash is in plain text."""
+
+_FORMULA: Final = re.compile(
+    r"(```.*?```|`[^`]*`)|\$\$(.+?)\$\$|(?<![\\\w$])\$(?![\s$])([^$]+?)(?<![\s\\])\$(?!\w)",
+    re.DOTALL,
+)
+
+
+def parser() -> MarkdownIt:
+    """Return a parser of lessons' Markdown, for which raw HTML is text."""
+    made = MarkdownIt("commonmark", {"html": False}).enable("table")
+    return made.use(dollarmath_plugin, allow_space=False, allow_digits=False, renderer=_mathematics)
+
+
+def _mathematics(tex: str, options: dict[str, bool]) -> str:
+    return mathml(tex, display=options["display_mode"])
+
+
+_NAMED: Final = r"(?:<mi>[a-z]{2,}</mi>|<(msu[bp])><mi>[a-z]{2,}</mi>.*?</\1>)"
+_BESIDE: Final = re.compile(rf"{_NAMED}(?=<m[isf])|</m(?!o)\w+>(?={_NAMED.replace('1', '2')})")
+
+
+def mathml(tex: str, *, display: bool = False) -> str:
+    r"""Return a formula as MathML; functions such as cos stand apart from what is beside them.
+
+    >>> mathml(r"2 \sin x").count("<mspace")
+    2
+    """
+    made: str = convert(tex.strip(), display="block" if display else "inline")
+    return _BESIDE.sub(r'\g<0><mspace width="0.167em" />', made)
+
+
+def html_of(markdown: str) -> str:
+    """Return the HTML of a worksheet, without its title and its pictures, which the page has.
+
+    Raw HTML is shown, not obeyed; formulas are MathML. Links to worksheets become links to pages,
+    and that to the explanation leads to its place in the page.
+    """
+    read = parser()
+    worksheet = SyntaxTreeNode(read.parse(markdown))
+    kept = []
+    for part in worksheet.children:
+        inside = [one.type for line in part.children for one in line.children]
+        if part.tag != "h1" and (part.type, inside) != ("paragraph", ["image"]):
+            kept.append(part)
+    worksheet.children = kept
+    for link in worksheet.walk():
+        if link.type == "link":
+            for file, page in _ADDRESSES:
+                link.attrs["href"] = re.sub(file, page, str(link.attrs["href"]))
+    made = str(read.renderer.render(worksheet.to_tokens(), read.options, {}))
+    # What is too wide for a phone scrolls by itself, and with the keyboard.
+    return re.sub("<(pre|table)>", r'<\1 tabindex="0">', made)
+
+
+def plain_of(markdown: str) -> str:
+    r"""Return a text for a terminal, which shows no pictures, under a title of its own.
+
+    >>> plain_of("# Title\n\n![x](x.gif)\n\nSee [it](it.ipynb), [doi](https://doi.org/1).\n")
+    'See it, [doi](https://doi.org/1).\n'
+    """
+    text = re.sub(r"\A# .*\n+|^!\[[^\]]*\]\([^)]*\)\n+", "", markdown, flags=re.MULTILINE)
+    text = re.sub(r"(?<!!)\[([^\]]+)\]\((?!https?:)[^)]*\)", r"\1", text)
+    return without_tex(text)
+
+
+def without_tex(markdown: str) -> str:
+    r"""Return a text whose formulas are written with plain characters.
+
+    >>> without_tex(r"It costs $5. $v_2' = v_0 \sqrt{1 - \varepsilon^2}$, `$x`, $\frac{1}{2} v_x$")
+    "It costs $5. v2' = v0 √(1 - ε²), `$x`, ½ v_x"
+    """
+
+    def written(found: re.Match[str]) -> str:
+        code, display, inline = found.groups()
+        return str(code) if code else _plain(display or inline)
+
+    return _FORMULA.sub(written, markdown)
+
+
+def _plain(tex: str) -> str:
+    """Return a formula in plain characters; what it does not know stays as it is."""
+    text = re.sub(r"\\([A-Za-z]+)", _symbol, tex.strip()).replace(r"\,", " ")
+    before = ""
+    while text != before:  # from the innermost braces outwards
+        before = text
+        text = re.sub(r"\\(frac)\{([^{}]*)\}\{([^{}]*)\}", _fraction, text)
+        text = re.sub(r"\\sqrt\{([^{}]*)\}", lambda m: f"√{_grouped(m[1])}", text)
+        text = re.sub(r"\\dot ?\{?(\w)\}?", "\\1\N{COMBINING DOT ABOVE}", text)
+        text = re.sub(r"\^\{([^{}]*)\}", lambda m: f"^{_grouped(m[1])}", text)
+        text = re.sub(r"_\{([^{}]*)\}", r"_\1", text)
+    text = re.sub(r"_(?=\d)", "", text)
+    text = re.sub(r"\^(\d)(?!\d)", lambda m: "⁰¹²³⁴⁵⁶⁷⁸⁹"[int(m[1])], text)
+    text = re.sub(r"(sin|cos|tan) ([²³])", r"\1\2 ", text)
+    text = re.sub(r"(sin|cos|tan|log|ln) \(", r"\1(", text)
+    return re.sub(r" +", " ", text).strip()
+
+
+def _symbol(found: re.Match[str]) -> str:
+    return SYMBOLS.get(found[1], found[0])
+
+
+def _grouped(text: str) -> str:
+    return text if re.fullmatch(r"-?[\w.^]+", text) else f"({text})"
+
+
+def _fraction(found: re.Match[str]) -> str:
+    above, below = found[2], found[3]
+    return "½" if (above, below) == ("1", "2") else f"{_grouped(above)}/{_grouped(below)}"
+
+
+def words_for(picture: str, markdown: str) -> str | None:
+    """Return the words that stand for a picture in a text, None if it is not in there."""
+    for node in SyntaxTreeNode(parser().parse(markdown)).walk():
+        if node.type == "image" and node.attrs["src"] == picture:
+            return node.content
+    return None

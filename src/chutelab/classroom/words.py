@@ -1,0 +1,71 @@
+"""What a learner is told, in each language: a catalogue of templates, ``strings/LANGUAGE.json``.
+
+A translation is a file. Templates have ``{names}`` for what is filled in; a live page reads the
+same files, in which keys that begin with ``python-`` speak of cells and ``task``, which it has not.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Final
+
+from chutelab.util.errors import InputError
+
+STRINGS: Final = Path(__file__).parent / "strings"
+
+LANGUAGES: Final = tuple(sorted((path.stem for path in STRINGS.glob("*.json")), key="en".__ne__))
+"""English first."""
+
+
+class LanguageError(InputError):
+    """A language that there is no catalogue for."""
+
+
+class Words:
+    """The catalogue of one language; `words` hands it out."""
+
+    def __init__(self, language: str, catalogue: Mapping[str, str]) -> None:
+        self.language = language
+        self._catalogue = catalogue
+
+    def say(self, key: str, /, **values: object) -> str:
+        """Return a template with its names filled in.
+
+        >>> words("en").say("question-title", number=2, title="the fall")
+        'Question 2: the fall'
+        """
+        return re.sub(r"\{(\w+)\}", lambda match: str(values[match[1]]), self._catalogue[key])
+
+    def local(self, number: str) -> str:
+        """Return a number's digits as this language writes them.
+
+        >>> words("de").local("0.35")
+        '0,35'
+        """
+        return number.replace(".", self._catalogue["decimal-mark"])
+
+    def unit(self, unit: str) -> str:
+        """Return a unit as it is written behind a number."""
+        return self._catalogue.get(f"unit-{unit}", unit)
+
+
+@cache
+def words(language: str = "en") -> Words:
+    """Return what is said in a language, such as "de"; what it has not is said in English.
+
+    Raises
+    ------
+    LanguageError
+        If there is no such language; the message lists those there are.
+    """
+    if language not in LANGUAGES:
+        listed = ", ".join(LANGUAGES)
+        raise LanguageError(f"no language {language[:40]!r}; there are {listed}", "language")
+    said: dict[str, str] = {}
+    for one in ("en", language):
+        said |= json.loads((STRINGS / f"{one}.json").read_text(encoding="utf-8"))
+    return Words(language, said)

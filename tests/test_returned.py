@@ -1,0 +1,193 @@
+"""Result files of a lesson's live page: marked like notebooks, and none of them stops a class."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+
+import pytest
+from click.testing import CliRunner
+from markdown_it import MarkdownIt
+
+from chutelab.classroom.exercises import EXERCISES, lesson
+from chutelab.classroom.grading import Grade, grade
+from chutelab.classroom.returned import LARGEST_RESULT
+from chutelab.cli import main
+
+
+def right(student):
+    """The right answer to question 1 of lesson 3: off the plate at ε v0, back."""
+    given = lesson("the-bounce", student).given
+    return -given.e * given.v0
+
+
+def result(student="Ada", **changes):
+    if "answers" not in changes:
+        changes["answers"] = {"1": right(student)}
+    return {
+        "chutelab_result": 1, "lesson": "the-bounce", "student": student, "tries": {"1": 2},
+        "hints": {"1": 1}, "revealed": [], "words": {}, "language": "en", **changes,
+    }  # fmt: skip
+
+
+@pytest.fixture
+def returned(tmp_path):
+    """Write what was returned into the folder of a class; return its path."""
+    folder = tmp_path / "class"
+    folder.mkdir()
+
+    def write(name, content):
+        text = content if isinstance(content, str) else json.dumps(content)
+        path = folder / name
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+def test_a_result_file_is_judged_again_for_the_numbers_of_its_name(returned):
+    forged = result(verdicts={"1": "right", "2": "right"}, score=100, done=4)
+    ada = returned("the-bounce-Ada.chutelab.json", forged)
+    sign = {"1": -right("Ben"), "2": 3}
+    ben = returned("the-bounce-Ben.chutelab (1).JSON", result("Ben", answers=sign, revealed=[2, 2]))
+    first, second = grade([ada, ben])
+    assert first == Grade(str(ada), "Ada", "the-bounce", (1, 0, 0, 0), 4)
+    assert second == Grade(str(ben), "Ben", "the-bounce", (0, 0, 0, 0), 4, (2,))
+    assert second.mistakes[1] == "sign or direction"
+
+
+@pytest.mark.parametrize("name", EXERCISES)
+def test_all_right_answers_of_every_lesson_are_marked_so(returned, name):
+    # What the working says is right, rounded as the question asks.
+    task = lesson(name, "Ada")
+    said = [task.reveal(n + 1).text for n in range(len(task.questions))]
+    numbers = [next(x for x in text.splitlines() if x.startswith("Answer: ")) for text in said]
+    answers = {str(n): float(x.split()[1]) for n, x in enumerate(numbers, 1)}
+    [row] = grade([returned("x.json", result(lesson=name, answers=answers))])
+    assert row.marks == (1,) * len(numbers)
+
+
+NONSENSE = [
+    ("not JSON", "my homework"),
+    ("not JSON", "[" * 100_000),
+    ("not JSON", '{"answers": ' + "1" * 10_000 + "}"),
+    ("not UTF-8 text", b"\xff\xfe"),
+    ('it has no "chutelab_result"', "[]"),
+    ('it has no "chutelab_result"', "null"),
+    ('it has no "chutelab_result"', {"cells": []}),
+    ("upgrade to read it", result(chutelab_result=2)),
+    ("chutelab_result: ", result(chutelab_result="1")),
+    ("no lesson 'dancing'", result(lesson="dancing")),
+    ("lesson: ", result(lesson=["the-bounce"])),
+    ("student: ", result(student="  ", answers={})),
+    ("student: ", result(student=5, answers={})),
+    ("student: ", result(student="x" * 201, answers={})),
+    ("student: ", result(student="\ud800", answers={})),
+    ("answers: ", result(answers=[1.0])),
+    ("answers: 1: ", result(answers={"1": True})),
+    ("answers: 1: ", result(answers={"1": "2"})),
+    ("answers: 1: ", result(answers={"1": None})),
+    ("answers: 1: ", result(answers={"1": 10**400})),
+    ("answers: 1: ", result(answers={"1": math.nan})),
+    ("answers: 1: ", result(answers={"1": -math.inf})),
+    ("answers: ", result(answers={"one": 1})),
+    ("questions 1 to 4 only", result(answers={"5": 1.0})),
+    ("questions 1 to 4 only", result(revealed=[0])),
+    ("revealed: 0: ", result(revealed=[True])),
+    ("revealed: ", result(revealed=[1] * 1000)),
+    ("words: ", result(words="I think")),
+    ("words: explain: ", result(words={"explain": "x" * 10_001})),
+]
+
+
+def test_nonsense_has_its_reason_as_its_row_and_stops_nobody(returned, tmp_path):
+    paths = [returned("first.json", result())]
+    for i, (_, content) in enumerate(NONSENSE):
+        paths.append(returned(f"{i}.json", content if not isinstance(content, bytes) else ""))
+        if isinstance(content, bytes):
+            paths[-1].write_bytes(content)
+    paths.append(returned("last.json", result("Zoe")))
+    first, *rows, last = grade(paths)
+    for (reason, _), row in zip(NONSENSE, rows, strict=True):
+        assert reason in row.reason
+        assert len(row.reason) <= 200
+        assert (row.student, row.marks, row.out_of) == ("", (), 0)
+    assert first.marks == last.marks == (1, 0, 0, 0)
+
+
+def test_what_is_no_file_or_too_large_a_one_is_said_and_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe.json")
+    (tmp_path / "endless.json").symlink_to("/dev/zero")
+    (tmp_path / "folder.json").mkdir()
+    with (tmp_path / "large.json").open("wb") as large:
+        large.truncate(LARGEST_RESULT + 1)
+    names = ("pipe", "endless", "folder", "large", "gone")
+    assert [row.reason for row in grade([tmp_path / f"{name}.json" for name in names])] == [
+        "not a result file: not a regular file",
+        "not a result file: not a regular file",
+        "not a result file: not a regular file",
+        "too large for a result file, which has at most 256 kB",
+        "cannot be read: No such file or directory",
+    ]
+
+
+def test_the_same_student_twice_and_answers_of_another_are_told(returned):
+    ada = returned("1.json", result())
+    again = returned("2.json", result(" ADA "))
+    copied = returned("3.json", result("Cleo", answers=result()["answers"]))
+    unnamed = returned("4.json", result("Your name", answers={}))
+    assert [row.reason for row in grade([ada, again, copied, unnamed])] == [
+        "",
+        f"same lesson and student as {ada}",
+        "answers 1 are right for the numbers of Ada",
+        "the name was left at 'your name'",
+    ]
+
+
+def test_only_notebooks_need_a_kernel(returned, monkeypatch):
+    monkeypatch.setattr("chutelab.classroom.grading.find_spec", lambda _: None)
+    path = returned("x.json", result())
+    assert [row.total for row in grade([path])] == [1]
+    with pytest.raises(ImportError, match="grading notebooks needs IPython and psutil"):
+        grade([path, "x.ipynb"])
+
+
+SAID = "The belt | *gave* it <b>ε</b> v0.\x1b[31m\n\n# Not a heading\n![x](http://x)"
+
+
+def test_table_csv_json_and_report_tell_of_a_class(returned, tmp_path):
+    ada = returned("ada.json", result(revealed=[1], words={"explain": SAID, "empty": " "}))
+    answers = {"1": -right("*Ben* | <i>")}
+    returned("ben.json", result("*Ben* | <i>", answers=answers))
+    returned("broken.json", "{")
+    out, report = tmp_path / "class.csv", tmp_path / "class.md"
+    marking = ["lesson", "grade", str(ada.parent), "--out", str(out), "--report", str(report)]
+    shown = CliRunner(env={"COLUMNS": "200"}).invoke(main, marking)
+    assert shown.exit_code == 0
+    assert "1 of 4 (1* 0 0 0)" in shown.output
+    assert out.read_text(encoding="utf-8").splitlines()[1].endswith("Ada,the-bounce,1,0,0,0,1,4,1,")
+    as_json = json.loads(CliRunner().invoke(main, [*marking, "--json"]).output)
+    assert [one["student"] for one in as_json["grades"]] == ["Ada", "*Ben* | <i>", ""]
+    assert as_json["grades"][0]["revealed"] == [1]
+    assert as_json["grades"][0]["words"] == {"explain": SAID.replace("\x1b", r"\x1b")}
+    assert as_json["grades"][1]["mistakes"] == {"1": "sign or direction"}
+    text = report.read_text(encoding="utf-8")
+    made = MarkdownIt("commonmark").enable("table").render(text)
+    assert "2 students" in made
+    cells = [row.split(" | ")[1:] for row in text.splitlines() if row.startswith("| 1 ")]
+    assert cells == [["1", "1", "0", "1 |"], ["sign or direction", "1 |"]]
+    assert "<strong>Ada</strong> (explain)" in made
+    assert "not a result file: not JSON" in made
+    # What a student wrote is shown as it is.
+    for markup in ("<b>", "<i>", "<img", "<h1>Not", "<em>", "href", "\x1b"):
+        assert markup not in made
+    assert "The belt | *gave* it &lt;b&gt;ε&lt;/b&gt; v0." in made
+
+
+def test_a_report_writes_over_no_file_that_was_returned(returned):
+    path = returned("x.json", result())
+    before = path.read_bytes()
+    refused = CliRunner().invoke(main, ["lesson", "grade", str(path), "--report", str(path)])
+    assert (refused.exit_code, path.read_bytes()) == (2, before)
+    assert "one of the files that were returned" in refused.stderr

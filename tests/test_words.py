@@ -1,0 +1,168 @@
+"""What a learner is told in each language: whole catalogues, and exercises laid over by texts."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from chutelab.classroom import exercises as package
+from chutelab.classroom.exercises import EXERCISES, Verdict, lesson
+from chutelab.classroom.exercises.exercise import draw, translated
+from chutelab.classroom.words import LANGUAGES, STRINGS, LanguageError, words
+from chutelab.util.errors import InputError
+
+EXERCISE_FILES = Path(package.__file__).parent
+TRANSLATIONS = sorted(EXERCISE_FILES.glob("*.*.toml"))
+CLASSROOM = STRINGS.parent
+
+
+def catalogue(language):
+    return json.loads((STRINGS / f"{language}.json").read_text(encoding="utf-8"))
+
+
+def names_in(text):
+    return Counter(re.findall(r"\{(\w+)\}", text))
+
+
+def test_every_language_says_all_that_english_says_with_the_same_numbers_in_it():
+    english = catalogue("en")
+    assert list(english) == sorted(english)
+    assert LANGUAGES[0] == "en"
+    assert len(LANGUAGES) > 1
+    for language in LANGUAGES:
+        found = catalogue(language)
+        assert list(found) == list(english), language
+        for key, text in found.items():
+            assert names_in(text) == names_in(english[key]), (language, key)
+
+
+def test_every_sentence_of_the_catalogue_is_said_somewhere():
+    sources = [*CLASSROOM.rglob("*.py"), *CLASSROOM.rglob("*.js")]
+    sources += (CLASSROOM.parent / "pictures" / "live").rglob("*.js")
+    code = "\n".join(path.read_text(encoding="utf-8") for path in sources)
+    # What is put together from a verdict or a unit.
+    built = {f"verdict-{one.name.lower()}" for one in Verdict} | {"unit-degrees"}
+    unused = {
+        key for key in catalogue("en") if not re.search(f"[\"'`]{re.escape(key)}[\"'`]", code)
+    }
+    assert unused == built
+
+
+def test_verdicts_are_called_what_they_are():
+    for one in Verdict:
+        assert words().say(f"verdict-{one.name.lower()}") == one.value
+
+
+def test_an_unknown_language_is_told_which_there_are():
+    with pytest.raises(LanguageError, match=r"no language 'fr'; there are en, de"):
+        lesson("the-bounce", "Ada", language="fr")
+    assert issubclass(LanguageError, InputError)
+
+
+@pytest.mark.parametrize("name", list(EXERCISES))
+def test_a_name_has_the_same_numbers_in_every_language(name):
+    for language in LANGUAGES:
+        for student in ("Ada", "Ben"):
+            task, other = lesson(name, student), lesson(name, student, language=language)
+            assert repr(task.given) == repr(other.given)
+
+
+def test_a_conversation_in_german_has_no_english_in_it():
+    task = lesson("the-bounce", "Ada", language="de")
+    right = [case.right for case in draw(EXERCISES["the-bounce"], "Ada")[1]]
+    said = [task, task.questions, task.check(1), task.check(1, -right[0])]
+    said += [task.check(1, 1.03 * right[0]), task.check(2, 3.3 * right[1]), task.check(3, "bald")]
+    said += [task.check(2, right[1]), task.check(9), [task.hint(4) for _ in range(3)]]
+    said += [task.reveal(4), task.progress(), task.check(3, 2000 * right[2])]
+    html = task._repr_html_() + task.check(1, right[0])._repr_html_()
+    text = f"{said} {html} {task.progress()._repr_html_()}"
+    assert not re.findall(r"(?i)\b(?:the|question|answer|with|right|tries|shown|not)\b", text)
+    assert not re.search(r"\d\.\d", str(said))
+    assert "g = 9,81 m/s²" in text
+    assert task.check(2, right[1]).right
+
+
+def test_a_mistake_has_one_name_in_all_languages_and_is_called_by_its_own():
+    for name in EXERCISES:
+        english, german = lesson(name, "Ada"), lesson(name, "Ada", language="de")
+        for number, case in enumerate(draw(EXERCISES[name], "Ada")[1], start=1):
+            for trace in case.mistakes:
+                said, other = (task.check(number, trace.number) for task in (english, german))
+                assert (other.verdict, other.mistake) == (said.verdict, said.mistake)
+                assert said.called == said.mistake
+    sign = lesson("the-parabola", "Ada", language="de")
+    reply = sign.check(1, -draw(EXERCISES["the-parabola"], "Ada")[1][0].right)
+    assert reply.mistake == "sign or direction"
+    assert reply.heading == "Frage 1: vermutlich „Vorzeichen oder Richtung“"
+
+
+def placed(name, exercise):
+    """Every text of an exercise by its place."""
+    yield "title", exercise.title
+    yield "story", exercise.story
+    for one in exercise.parameters:
+        yield one.name, one.meaning
+    for i, asked in enumerate(exercise.questions, start=1):
+        for field in ("title", "text", "working", "source"):
+            yield f"{i} {field}", getattr(asked, field)
+        for n, hint in enumerate(asked.hints):
+            yield f"{i} hint {n}", hint
+        for known in asked.mistakes:
+            yield f"{i} {known.name}", known.says
+
+
+@pytest.mark.parametrize("file", TRANSLATIONS, ids=lambda file: file.stem)
+def test_a_translation_has_texts_only_and_all_of_them(file):
+    name, language = file.stem.split(".")
+    english = EXERCISES[name]
+    found = tomllib.loads(file.read_text(encoding="utf-8"))
+    assert set(found) <= {"title", "story", "parameters", "questions"}
+    assert set(found["parameters"]) <= {one.name for one in english.parameters}
+    assert len(found["questions"]) == len(english.questions)
+    general = {
+        words().say(key): words(language).say(key)
+        for key in catalogue("en")
+        if key.startswith("mistake-")
+    }
+    for asked, there in zip(english.questions, found["questions"], strict=True):
+        assert set(there) == {"title", "text", "hints", "working", "source", "mistakes"}
+        assert len(there["hints"]) == len(asked.hints)
+        assert set(there["mistakes"]) <= {known.name for known in asked.mistakes}
+        for known, (called, _) in there["mistakes"].items():
+            assert general.get(known, called) == called
+    laid_over = translated(english, file, language)
+    missing = [
+        one.name for asked in laid_over.questions for one in asked.mistakes if not one.called
+    ]
+    assert laid_over.whole, f"not translated: {missing or 'a meaning, the title or the story'}"
+    pairs = zip(placed(name, english), placed(name, laid_over), strict=True)
+    for (place, said), (_, translation) in pairs:
+        assert names_in(said) == names_in(translation), place
+        assert not re.search(r"\d\.\d", translation), (place, "a decimal point")
+
+
+def test_what_is_not_translated_is_in_english_and_that_is_said(tmp_path):
+    english = EXERCISES["trust"]
+    file = tmp_path / "trust.de.toml"
+    told = translated(english, file, "de")
+    assert (told.story, told.language, told.whole) == (english.story, "de", False)
+    file.write_text(
+        'title = "Kann man einer Simulation trauen?"\n[[questions]]\ntitle = "Ordnung"\n'
+        '[questions.mistakes]\n"upside down" = ["Kehrwert", "Umgekehrt."]\n',
+        encoding="utf-8",
+    )
+    told = translated(english, file, "de")
+    assert (told.title, told.questions[0].title) == ("Kann man einer Simulation trauen?", "Ordnung")
+    assert (told.questions[0].text, told.whole) == (english.questions[0].text, False)
+    assert told.questions[0].mistakes[0].called == "Kehrwert"
+    assert told.questions[1:] == [*english.questions[1:]]
+    note = words("de").say("untranslated")
+    task = lesson("a-stream", "Ada", language="de")
+    assert " ".join(note.split()) in " ".join(repr(task).split())
+    assert note in task._repr_html_()
+    assert note not in repr(lesson("a-stream", "Ada"))

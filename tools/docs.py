@@ -1,0 +1,226 @@
+"""Make the documentation site: pages of HTML that need no server and no network.
+
+    python tools/docs.py [DIRECTORY]
+
+They go to the directory, by default ``out/site``, and `index.html` is the first. The texts are
+those of the repository: README, `docs`, the lessons, the docstrings, CONTRIBUTING. They are laid
+out in a temporary folder as they lie in the repository, so that their links hold; then Sphinx is
+called, which takes every warning for an error. Needs ``pip install ".[docs]"``.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import sys
+import tempfile
+from importlib import import_module
+from pathlib import Path
+from pkgutil import walk_packages
+from types import ModuleType
+
+from sphinx.cmd.build import build_main
+from sphinx.pycode import ModuleAnalyzer
+
+import chutelab
+from chutelab.classroom.lessons import Lesson, shipped_lessons
+from chutelab.classroom.lessons.building import LIVE, bundle
+from chutelab.pictures.live.page import write
+from chutelab.scene import SceneError, load
+from chutelab.scene.loading import about
+
+ROOT = Path(__file__).resolve().parent.parent
+DEVELOPERS = ("CONTRIBUTING", "SECURITY", "CHANGELOG")
+
+TREE = """\
+```{{toctree}}
+:hidden:
+{options}
+{pages}
+```
+"""
+
+PLAY = """\
+<details class="play"><summary>Play with it here</summary>
+<iframe data-page="{page}" title="{title}"></iframe>
+</details>
+
+<p><a href="{page}">Play with it in a window of its own</a></p>
+"""
+
+
+def tree(*pages: str, options: str = "") -> str:
+    """Return a table of contents, which the site shows beside every page."""
+    return TREE.format(pages="\n".join(pages), options=options)
+
+
+def sections(markdown: str) -> dict[str, str]:
+    """Return what stands under each heading of level 2, by heading; before the first, by ""."""
+    parts = re.split(r"^## (.+)\n", markdown, flags=re.MULTILINE)
+    return {"": parts[0], **dict(zip(parts[1::2], parts[2::2], strict=True))}
+
+
+def public_packages() -> dict[str, ModuleType]:
+    """Return chutelab and its packages that say what is public, by name."""
+    names = [one.name for one in walk_packages(chutelab.__path__, "chutelab.") if one.ispkg]
+    found = {name: import_module(name) for name in ("chutelab", *sorted(names))}
+    return {name: package for name, package in found.items() if hasattr(package, "__all__")}
+
+
+def readme(pages: Path) -> None:
+    """Make the first pages of the README."""
+    found = sections((ROOT / "README.md").read_text(encoding="utf-8"))
+    first = [found[""], f"## Citing\n{found['Citing']}", f"## Licence\n{found['Licence']}"]
+    contents = [
+        tree(
+            *("start", "tour", "Gallery <docs/gallery>", "lessons/index", "docs/physics"),
+            *("Accuracy and speed <accuracy>", "api"),
+        ),
+        tree(*DEVELOPERS, options=":caption: For developers"),
+    ]
+    (pages / "index.md").write_text("\n".join(first + contents), encoding="utf-8")
+    for name, title in (
+        ("start", "Start"),
+        ("tour", "A short tour"),
+        ("accuracy", "How exact is it, and how fast?"),
+    ):
+        more = tree("scenes/data/index") if name == "tour" else ""
+        (pages / f"{name}.md").write_text(f"# {title}\n{found[title]}\n{more}", encoding="utf-8")
+
+
+def gallery(pages: Path, extra: Path) -> None:
+    """Make the gallery, with a live page of every scene that can be shown so."""
+    text = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
+    (extra / "live").mkdir(parents=True)
+    for one in about():
+        page = extra / "live" / f"{one.name}.html"
+        try:
+            write(load(one.name), page)
+        except SceneError:
+            said = "It has parts that a page cannot run yet: run it with the command.\n"
+        else:
+            said = PLAY.format(page=f"../live/{page.name}", title=one.title)
+        # Below its own words, which end with the next heading.
+        text = re.sub(
+            rf"(^## `{one.name}`: .*?\n)(?=\n## |\Z)",
+            lambda found, said=said: f"{found[1]}\n{said}",
+            text,
+            flags=re.MULTILINE | re.DOTALL,
+        )
+    (pages / "docs" / "gallery.md").write_text(text, encoding="utf-8")
+
+
+def lessons(pages: Path, extra: Path) -> None:
+    """Make a page of each worksheet, of its explanation, and the live pages."""
+    shipped = shipped_lessons()
+    with tempfile.TemporaryDirectory(prefix="chutelab-docs-") as folder:
+        bundle(shipped, folder)
+        for one in shipped:
+            page = Path(folder) / one.folder.name / LIVE
+            if page.is_file():
+                target = extra / "lessons" / one.folder.name
+                target.mkdir(parents=True)
+                shutil.copyfile(page, target / LIVE)
+    shutil.copytree(
+        ROOT / "lessons", pages / "lessons", ignore=shutil.ignore_patterns("*.de.*", ".*")
+    )
+    for one in shipped:
+        lesson_page(one, pages / "lessons" / one.folder.name)
+    start = pages / "lessons" / "README.md"
+    listed = tree(*(f"{one.folder.name}/index" for one in shipped))
+    start.write_text(f"{start.read_text(encoding='utf-8')}\n{listed}", encoding="utf-8")
+
+
+def lesson_page(lesson: Lesson, folder: Path) -> None:
+    """Add to a worksheet the live page, and what lies beside it."""
+    worksheet = folder / "README.md"
+    text = worksheet.read_text(encoding="utf-8")
+    if lesson.page is not None:
+        text += "\n## In the page\n\n" + PLAY.format(page=LIVE, title=lesson.title)
+    beside = [path.stem for path in sorted(folder.glob("*.md")) if path != worksheet]
+    worksheet.write_text(f"{text}\n{tree(*beside)}", encoding="utf-8")
+
+
+def reference(pages: Path) -> None:
+    """Make a page for each package: all that it says is public."""
+    packages = public_packages()
+    homes = {
+        id(getattr(package, name)): f"{title}.{name}"
+        for title, package in packages.items()
+        if title != "chutelab"
+        for name in package.__all__
+    }
+    (pages / "api").mkdir()
+    for title, package in packages.items():
+        said = [title, "=" * len(title), "", f".. automodule:: {title}", ""]
+        for name in package.__all__:
+            value = getattr(package, name)
+            home = value.__name__ if isinstance(value, ModuleType) else homes.get(id(value))
+            if value is sys.modules.get(f"{title}.{name}"):
+                continue  # it has a page of its own
+            if title == "chutelab" and home is not None:
+                said += data(name, [f"See `{home}`."])
+            elif isinstance(value, type):
+                said += [f".. autoclass:: {title}.{name}", "   :members:", ""]
+            elif callable(value):
+                said += [f".. autofunction:: {title}.{name}", ""]
+            else:
+                said += data(name, words_under(name, title))
+        (pages / "api" / f"{title}.rst").write_text("\n".join(said), encoding="utf-8")
+    (pages / "api.md").write_text(
+        "# Reference\n\nEvery public name, a page for each package.\n\n"
+        + tree(*(f"{title.removeprefix('chutelab.')} <api/{title}>" for title in packages)),
+        encoding="utf-8",
+    )
+
+
+def data(name: str, said: list[str]) -> list[str]:
+    """Return the directive for a value of the package at hand."""
+    return [f".. py:data:: {name}", "", *(f"   {line}" for line in said), ""]
+
+
+def words_under(name: str, package: str) -> list[str]:
+    """Return what stands under a value, in the module of the package where it is given."""
+    said: list[str] = []
+    for module in [one for one in sys.modules if one.startswith(package)]:
+        said = ModuleAnalyzer.for_module(module).find_attr_docs().get(("", name), said)
+    return said
+
+
+def gather(pages: Path, extra: Path) -> None:
+    """Lay out the sources of all pages, and beside them what is copied as it is."""
+    readme(pages)
+    kept = shutil.ignore_patterns("site", "gallery.md")
+    shutil.copytree(ROOT / "docs", pages / "docs", ignore=kept)
+    shutil.copytree(ROOT / "scenes" / "data", pages / "scenes" / "data")
+    for name in (*(f"{one}.md" for one in DEVELOPERS), "LICENSE"):
+        shutil.copyfile(ROOT / name, pages / name)
+    gallery(pages, extra)
+    lessons(pages, extra)
+    reference(pages)
+    # A folder's README is its first page.
+    for page in pages.rglob("*.md"):
+        text = re.sub(r"(\]\([^)]*)\bREADME\.md", r"\1index.md", page.read_text(encoding="utf-8"))
+        page.write_text(text, encoding="utf-8")
+        if page.name == "README.md":
+            page.rename(page.with_name("index.md"))
+
+
+def make(folder: Path) -> int:
+    """Make the site in a folder, which is replaced; return Sphinx's exit code."""
+    with tempfile.TemporaryDirectory(prefix="chutelab-docs-") as aside:
+        pages, extra = Path(aside) / "pages", Path(aside) / "extra"
+        pages.mkdir()
+        extra.mkdir()
+        gather(pages, extra)
+        shutil.rmtree(folder, ignore_errors=True)
+        strict = ("--fail-on-warning", "--keep-going", "--quiet", "--fresh-env")
+        places = ("--conf-dir", ROOT / "docs" / "site", "--doctree-dir", Path(aside) / "made")
+        copied = ("--define", f"html_extra_path={extra}")
+        return build_main([str(part) for part in (*strict, *places, *copied, pages, folder)])
+
+
+if __name__ == "__main__":
+    if len(sys.argv) > 2 or any(argument.startswith("-") for argument in sys.argv[1:]):
+        sys.exit(__doc__)
+    sys.exit(make(Path(sys.argv[1]) if sys.argv[1:] else ROOT / "out" / "site"))

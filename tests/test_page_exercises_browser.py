@@ -23,7 +23,7 @@ def page_of(opened, tmp_path):
 
     def open_(number, language="en", **options):
         path = tmp_path / f"{number}-{language}.html"
-        live_page(find(number), path, language=language)
+        live_page(find(number, language), path)
         page = opened(path, **options)
         page.evaluate(DONE)
         return page

@@ -17,8 +17,7 @@ from scipy.optimize import fsolve
 from chutelab.classroom.exercises import find as find_exercise
 from chutelab.classroom.exercises.exercise import draw, shown
 from chutelab.classroom.lessons import find, scene_of, shipped_lessons
-from chutelab.classroom.lessons.building import start
-from chutelab.classroom.lessons.sheets import SHEETS, sheet
+from chutelab.classroom.lessons.sheets import sheet
 from chutelab.classroom.lessons.texts import without_tex, words_for
 from chutelab.cli import main
 from chutelab.engines.simulation import simulate
@@ -674,24 +673,6 @@ def test_nothing_tells_of_the_misprint_before_the_explanation_of_lesson_3():
     ]  # fmt: skip
     for text in shown_first:
         assert not re.search("misprint|wrong|fault|not what the paper", text), text
-
-
-def test_sheets_are_printed_and_refuse_what_cannot_be(tmp_path):
-    for which in SHEETS:
-        assert chutelab("lesson", "show", 1, "--sheet", which).output == sheet(find(1), which)
-    result = chutelab("lesson", "show", 1, "--sheet", "student", "--json")
-    assert result.exit_code == 2
-    assert "give one of them" in result.output
-    made = start(tmp_path / "mine")
-    assert "for the teacher" in chutelab("lesson", "show", made, "--sheet", "teacher").output
-    (made / "README.md").write_text("# Mine\n\n## Predict\n\nx\n", encoding="utf-8")
-    result = chutelab("lesson", "show", made, "--sheet", "student")
-    assert result.exit_code == 2
-    assert "a sheet needs the parts ## Run, ## Compare" in result.output
-    (made / "explanation.md").unlink()
-    result = chutelab("lesson", "show", made, "--sheet", "explanation")
-    assert result.exit_code == 2
-    assert "explanation.md: is not there, or empty" in result.output
 
 
 def test_table_1_differs_in_x3_only_as_worksheet_3_says():

@@ -30,7 +30,7 @@ _FORMULA: Final = re.compile(
 def parser() -> MarkdownIt:
     """Return a parser of lessons' Markdown, for which raw HTML is text."""
     made = MarkdownIt("commonmark", {"html": False}).enable("table")
-    return made.use(dollarmath_plugin, allow_space=False, allow_digits=False, renderer=_mathematics)
+    return made.use(dollarmath_plugin, allow_space=False, renderer=_mathematics)
 
 
 def _mathematics(tex: str, options: dict[str, bool]) -> str:

@@ -276,11 +276,11 @@ def page(wanted: tuple[str, ...], out: Path, quiet: bool) -> None:
         console.say(f"wrote {len(made)} files, {size / 1e6:.1f} MB; open {out / 'index.html'}")
 
 
-def _lessons(wanted: tuple[str, ...]) -> list[Lesson]:
+def _lessons(wanted: tuple[str, ...], language: str = "en") -> list[Lesson]:
     """Return the lessons that are named, or all that are shipped."""
     from chutelab.classroom.lessons import find, shipped_lessons
 
-    return [find(name) for name in wanted] or shipped_lessons()
+    return [find(name, language) for name in wanted] or shipped_lessons(language)
 
 
 def _plain(lesson: Lesson) -> dict[str, object]:

@@ -158,9 +158,12 @@ def show(
     heads = (say("show-scene"), say("show-shows"))
     console.show(head, Sheet(say("show-scenes"), heads, scenes, texts=2))
     if found.quantities:
-        rows = tuple((name, unit_in(found, name), what) for name, what in found.quantities.items())
-        heads = (say("show-quantity"), say("show-unit"), say("show-meaning"))
-        console.show(Sheet(say("show-quantities"), heads, rows, texts=3))
+        unit = words(language).unit
+        rows = tuple(
+            (name, unit(unit_in(found, name)), what) for name, what in found.quantities.items()
+        )
+        columns = (say("show-quantity"), say("show-unit"), say("show-meaning"))
+        console.show(Sheet(say("show-quantities"), columns, rows, texts=3))
     console.show(Text(f"\n{say('show-files', folder=found.folder)}\n"))
     console.show(Markdown(plain_of(found.text("README")), hyperlinks=False))
 
@@ -259,8 +262,9 @@ def new(name: Path, model: str | None) -> None:
 @lesson.command(short_help="Bundle the lessons as web pages that need no server.")
 @lessons_argument
 @out_option("The folder; files that are there are replaced.", "-o", required=True)
+@language_option
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing, and show no progress bar.")
-def page(wanted: tuple[str, ...], out: Path, quiet: bool) -> None:
+def page(wanted: tuple[str, ...], out: Path, language: str, quiet: bool) -> None:
     """Bundle lessons (without LESSON: all that are shipped) into a folder of web pages.
 
     index.html, and for each lesson its worksheet, animation, files, and a live page, which offers
@@ -270,7 +274,7 @@ def page(wanted: tuple[str, ...], out: Path, quiet: bool) -> None:
     from chutelab.classroom.lessons.building import bundle
 
     with writing(instead="another folder"), progress("making the pages", quiet=quiet) as update:
-        made = bundle(_lessons(wanted), out, update)
+        made = bundle(_lessons(wanted, language), out, update)
     if not quiet:
         size = sum(path.stat().st_size for path in made)
         console.say(f"wrote {len(made)} files, {size / 1e6:.1f} MB; open {out / 'index.html'}")

@@ -17,8 +17,8 @@ from chutelab.classroom.lessons.formulas import parsed, plain
 
 INDEX: Final = "index.html"
 _ADDRESSES: Final = (
-    (r"(^|/)README\.md(?=$|#)", rf"\1{INDEX}"),
-    (r"\bexplanation\.md$", "#explanation"),
+    (r"(^|/)README(\.\w+)?\.md(?=$|#)", rf"\1{INDEX}"),
+    (r"\bexplanation(\.\w+)?\.md$", "#explanation"),
 )
 
 _FORMULA: Final = re.compile(

@@ -43,7 +43,7 @@ def chutelab(*arguments):
 def worksheet(number):
     """All that a lesson says, worksheet, explanation and what to say; or docs/physics.md."""
     if number == "physics":
-        return PHYSICS.read_text(encoding="utf-8")
+        return without_tex(PHYSICS.read_text(encoding="utf-8"))
     lesson = find(number)
     texts = (lesson.text("README"), lesson.text("explanation"), lesson.teacher.say)
     return without_tex("\n\n".join(texts))
@@ -512,7 +512,7 @@ STATED = {
         "leave at {22.27}°": ease(0.5),
         "22.27° or {22.13}°": ease(0.4),
         "it would be after {15} s": 2.0 / (2.0 / 3.0 * 0.02 * G),
-        "(2/3) c g, {0.13} m/s²": 2.0 / 3.0 * 0.02 * G,
+        "2/3 c g, {0.13} m/s²": 2.0 / 3.0 * 0.02 * G,
         "5 cm up leaves at {42.9}°": angle(2.0, RC + 0.05),
         "one body, at {24.9}°": angle(2.0 * (RC + 0.05) / 0.5, RC + 0.05),
         "leave at {34.3}°": angle(2.0 * RC / 0.5, RC),
@@ -525,8 +525,8 @@ STATED = {
         "46 % and {43} mm": SAND[1],
         "pays {48} or": belt(2.0)[0],
         "48 or {16} mJ": belt(2.0)[0] / 3.0,
-        "g dt²/8, {1.2} µm": 1e6 * G * 1e-6 / 8.0,
-        "√(0.008 r/g), {2.3} ms at r": 1e3 * sqrt(0.008 * BALL / G),
+        "1/8 g dt², {1.2} µm": 1e6 * G * 1e-6 / 8.0,
+        "√(0.008 r / g), {2.3} ms at r": 1e3 * sqrt(0.008 * BALL / G),
         "2 g dt, {2} cm/s": 100.0 * 2.0 * G * 1e-3,
     },
 }

@@ -180,8 +180,8 @@ def _inline(node: SyntaxTreeNode) -> str:
             return " "
         case "hardbreak":
             return "#linebreak()"
-        case "strong" | "em" as name:
-            return f"#{'strong' if name == 'strong' else 'emph'}[{inside}]"
+        case "strong" | "em":
+            return f"#{'strong' if node.type == 'strong' else 'emph'}[{inside}]"
         case "code_inline":
             return f"#raw({_text(node.content)})"
         case "math_inline":

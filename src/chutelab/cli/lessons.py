@@ -186,18 +186,20 @@ def new(name: Path, model: str | None) -> None:
 @lesson.command(short_help="Bundle the lessons as web pages that need no server.")
 @lessons_argument
 @out_option("The folder; files that are there are replaced.", "-o", required=True)
+@click.option("--wheel/--no-wheel", default=True, help="With what students install, or without.")
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing, and show no progress bar.")
-def page(wanted: tuple[str, ...], out: Path, quiet: bool) -> None:
+def page(wanted: tuple[str, ...], out: Path, wheel: bool, quiet: bool) -> None:
     """Bundle lessons (without LESSON: all that are shipped) into a folder of web pages.
 
     index.html, and for each lesson its worksheet, animation, files, and a live page, which offers
     what [page.live] of lesson.toml says. All links are relative: the folder works from a memory
-    stick, from any static web server, and on a phone.
+    stick, from any static web server, and on a phone. The wheel of this chutelab is beside them,
+    and index.html says how to install it, for the notebooks.
     """
     from chutelab.classroom.lessons.building import bundle
 
     with writing(instead="another folder"), progress("making the pages", quiet=quiet) as update:
-        made = bundle(_lessons(wanted), out, update)
+        made = bundle(_lessons(wanted), out, update, wheel=wheel)
     if not quiet:
         size = sum(path.stat().st_size for path in made)
         console.say(f"wrote {len(made)} files, {size / 1e6:.1f} MB; open {out / 'index.html'}")

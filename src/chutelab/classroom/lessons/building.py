@@ -27,6 +27,7 @@ from PIL.GifImagePlugin import GifImageFile
 
 from chutelab.classroom.lessons.reading import Lesson, LessonError, read, scene_of, split, unusable
 from chutelab.classroom.lessons.texts import INDEX, html_of, words_for
+from chutelab.classroom.lessons.wheel import write_wheel
 from chutelab.engines.simulation import simulate
 from chutelab.scene import Fault, to_dict
 from chutelab.util.files import aside, refuse_other, together
@@ -194,6 +195,8 @@ def bundle(
     lessons: Sequence[Lesson],
     folder: str | Path,
     progress: Callable[[float], None] | None = None,
+    *,
+    wheel: bool = True,
 ) -> list[Path]:
     """Write web pages into a folder: an index of the lessons, and a folder with a page for each.
 
@@ -207,6 +210,8 @@ def bundle(
         Made if need be.
     progress
         Called with the share that is done, 0 to 1.
+    wheel
+        Put the wheel of this chutelab in, and how to install from it.
 
     Returns
     -------
@@ -217,6 +222,8 @@ def bundle(
     ------
     InputError
         If a lesson's scene cannot be run, or shown as a live page.
+    MissingLibraryError
+        If chutelab is not installed, so that there is no wheel.
     OSError
         If it cannot be written.
     """
@@ -232,11 +239,13 @@ def bundle(
         for i, lesson in enumerate(lessons):
             before = _link(lessons[i - 1], "prev", "← {}") if i > 0 else ""
             after = _link(lessons[i + 1], "next", "{} →") if i + 1 < len(lessons) else ""
-            cards += _lesson(lesson, made / lesson.folder.name, before, after)
+            cards += _lesson(lesson, made / lesson.folder.name, before, after, wheel=wheel)
             if progress is not None:
                 progress((i + 1) / len(lessons))
         many = "One lesson" if len(lessons) == 1 else f"{len(lessons)} lessons"
-        (made / INDEX).write_text(_page("index.html", cards=cards, count=many), encoding="utf-8")
+        install = _page("install.html", wheel=write_wheel(made).name) if wheel else ""
+        index = _page("index.html", cards=cards, count=many, install=install)
+        (made / INDEX).write_text(index, encoding="utf-8")
         for name in _SHARED:
             shutil.copyfile(_HERE / "assets" / name, made / name)
         files = [path.relative_to(made) for path in made.rglob("*") if path.is_file()]
@@ -266,7 +275,7 @@ def _address(*names: str) -> str:
     return "/".join(quote(os.fsencode(name)) for name in names)
 
 
-def _lesson(lesson: Lesson, folder: Path, before: str, after: str) -> str:
+def _lesson(lesson: Lesson, folder: Path, before: str, after: str, *, wheel: bool) -> str:
     """Make the folder of one lesson, with links to its neighbours; return its card."""
     folder.mkdir()
     for file in files_of(lesson):
@@ -288,6 +297,8 @@ def _lesson(lesson: Lesson, folder: Path, before: str, after: str) -> str:
         doors.append(f'<li><a class="main" href="{LIVE}">Try it: change the machine</a></li>')
     if (folder / "exercise.ipynb").is_file():
         doors.append('<li><a href="exercise.ipynb" download>Exercise (Jupyter notebook)</a></li>')
+        if wheel:
+            doors.append(f'<li><a href="../{INDEX}#get">What the notebook needs</a></li>')
     for name in lesson.scenes:
         if (folder / name).is_file():
             door = f'<li><a href="{_address(name)}" download>Scene {escape(name)}</a></li>'

@@ -17,8 +17,8 @@ from mdit_py_plugins.dollarmath import dollarmath_plugin
 
 INDEX: Final = "index.html"
 _ADDRESSES: Final = (
-    (r"(^|/)README\.md(?=$|#)", rf"\1{INDEX}"),
-    (r"\bexplanation\.md$", "#explanation"),
+    (r"(^|/)README(\.\w+)?\.md(?=$|#)", rf"\1{INDEX}"),
+    (r"\bexplanation(\.\w+)?\.md$", "#explanation"),
 )
 
 SYMBOLS: Final = {

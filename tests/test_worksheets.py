@@ -676,7 +676,7 @@ KEYS = {
     "of them: at {23.2}°": degrees(slipping(0.5, U0)[0]),
     "{16} mm, twice its diameter": 4e3 * 0.004,
     "keys: at {44.4}°": TWO_KEYS[0],
-    "ε = {0.276} land": TWO_KEYS[1],
+    "ε = {0.276} the particle lands": TWO_KEYS[1],
 }
 
 

@@ -102,8 +102,23 @@ def process(*arguments, **options):
 # run: what it prints
 
 
+def test_a_learner_reads_no_rounding_no_engine_and_no_rounds():
+    for scene in ("perpendicular", "belt-landing", "free-fall", "inclined-20"):
+        text = call("run", scene).stdout
+        assert re.search(r"^\d particles?, \d+ contacts?, computed in \S+ s$", text, re.MULTILINE)
+        assert not re.search(r"engine|rounds|steps|turned over|residual|e-1\d|-0 ", text)
+        assert "ledger cannot explain: 0.000 %" in text
+    # Half a millisecond late at 2 m/s, 1 mm of 0.6 m and more: in percent, as errors are.
+    plain = ("perpendicular", "--engine", "pymunk", "--set", "run.align=false", "--dt", "0.001")
+    text = call("run", *plain).stdout
+    percent = float(re.search(r"^max .* (\S+)$", text, re.MULTILINE)[1])
+    worst = json.loads(call("run", *plain, "--json").stdout)["error"]["max"]
+    assert percent == pytest.approx(100.0 * worst, abs=6e-4)
+    assert percent > 0.05
+
+
 def test_a_run_prints_particle_0_beside_the_theory_the_ledger_and_the_endings():
-    result = call("run", "perpendicular")
+    result = call("run", "perpendicular", "--details")
     text = result.stdout
     assert result.stderr == ""
     assert "Perpendicular damping plate, 2 m/s\nengine exact, 1 particle, 2 contacts" in text
@@ -913,7 +928,7 @@ def test_show_prints_the_summary_of_the_run_and_makes_its_files_again():
     ran = call("run", "perpendicular", "--out", "out", "--only", "npz,json").stdout
     shown = call("show", "out/recording.npz").stdout
     ran = ran.replace("wrote into out: recording.npz, summary.json\n", "")
-    assert shown == re.sub(r"(rounds), \S+ s$", r"\1", ran, flags=re.MULTILINE)
+    assert shown == re.sub(r"(contacts), computed in \S+ s$", r"\1", ran, flags=re.MULTILINE)
     assert shown != ran
     summary = json.loads(Path("out/summary.json").read_text(encoding="utf-8"))
     assert json.loads(call("show", "out/recording.npz", "--json").stdout) == summary
@@ -1082,7 +1097,7 @@ def test_a_run_that_takes_too_long_ends_with_what_is_recorded():
     told = json.loads(Path("out/summary.json").read_text())
     assert told["ended"]["reason"] == 200 * ["stopped"]
     assert told["stopped"]["particles"] + told["stopped"]["unreleased"] == 200
-    lasted = re.search(r", [-\d.e]+ s(?= ended)", text)[0]  # what no recording tells
+    lasted = re.search(r", computed in [-\d.e]+ s(?= ended)", text)[0]  # what no recording tells
     assert " ".join(call("show", "out/recording.npz").stdout.split()) in text.replace(lasted, "")
     assert json.loads(call("run", "perpendicular", "--json").stdout)["stopped"] is None
 

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -432,12 +433,24 @@ def test_no_text_is_cut_off_overlapping_or_small(name: str, runs: dict[str, Reco
 
 
 def test_overlay_holds_all_its_parts(tmp_path: Path) -> None:
-    figure = plots.overlay(by_hand(), path=tmp_path / "overlay.png")
+    figure = plots.overlay(by_hand(), path=tmp_path / "overlay.png", details=True)
+    assert "engine exact" in " ".join(one.get_text() for one in figure.texts)
     gids = {one.get_gid() for ax in figure.axes for one in ax.lines}
     assert gids >= {"track", "analytic", "strobe", "impacts", "residual", "vx", "vy", "supplied"}
     assert [file.name for file in tmp_path.iterdir()] == ["overlay.png"]
     with Image.open(tmp_path / "overlay.png") as image:
         assert image.size == (1560, 912)
+
+
+def test_overlay_keeps_what_is_for_experts_to_itself() -> None:
+    figure = plots.overlay(by_hand())
+    gids = {one.get_gid() for ax in figure.axes for one in ax.lines}
+    assert "residual" not in gids
+    assert gids >= {"track", "analytic", "strobe", "impacts", "vx", "vy", "supplied"}
+    words = [ax.get_title("left") for ax in figure.axes] + [one.get_text() for one in figure.texts]
+    assert not re.search("engine|exact|residual", " ".join(words))
+    wrong = plots.overlay(by_hand(residual=0.003)).axes[-1]
+    assert wrong.get_title("left") == "Energy ledger: residual −3e−3 J"
 
 
 def test_given_axes_get_the_scene_and_keep_what_is_theirs(tmp_path: Path) -> None:
@@ -457,7 +470,7 @@ def test_given_prediction_is_the_one_drawn() -> None:
     recording = by_hand()
     other = recording.prediction
     slower = replace(other, t2=other.t2 * 2.0)
-    figure = plots.overlay(recording, slower)
+    figure = plots.overlay(recording, slower, details=True)
     residual = line(figure.axes[1], "residual")
     assert residual[:, 1].max() > 0.1
 
@@ -478,7 +491,7 @@ def test_a_run_that_is_over_at_once_can_be_drawn() -> None:
     recorder = Recorder(machine)
     recorder.knots([0], [0.0], [-1.0, R + PARTICLE], [V, 0.0], 0.0)
     recording = recorder.finish(engine="exact", steps=0)
-    figure = plots.overlay(recording)
+    figure = plots.overlay(recording, details=True)
     figure.canvas.draw()
     assert (line(figure.axes[0], "track") == [-1.0, R + PARTICLE]).all()
     assert figure.axes[3].get_title("left") == "Energy ledger: residual 0 J"

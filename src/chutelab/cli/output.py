@@ -93,6 +93,7 @@ class Output:
     chosen: bool  # by ``--only``
     as_json: bool
     quiet: bool  # no bar, and no summary but as JSON
+    details: bool  # engine, steps, and errors down to rounding
 
     @property
     def files(self) -> list[str]:
@@ -115,8 +116,10 @@ class Output:
                 elif kind in ("png", "strobe"):
                     from chutelab.pictures import plots
 
-                    draw = plots.overlay if kind == "png" else plots.strobe
-                    draw(recording, path=path)
+                    if kind == "png":
+                        plots.overlay(recording, path=path, details=self.details)
+                    else:
+                        plots.strobe(recording, path=path)
                 elif kind == "csv":
                     tables = ("events", "trajectory")[self.leaves_out(recording) :]
                     recording.to_csv(folder, only=tables)
@@ -134,7 +137,7 @@ class Output:
         elif not self.quiet:
             from chutelab.cli.report import report
 
-            show(*report(recording, accuracy))
+            show(*report(recording, accuracy, details=self.details))
             if self.out is not None:
                 files = [name for name in self.files if name != "events.csv" or not left_out]
                 say(f"wrote into {self.out}: {', '.join(files)}")
@@ -182,7 +185,7 @@ def _kinds(
 
 
 def output_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Add ``--out``, ``--only``, ``--format``, ``--json`` and ``--quiet``, given as one `Output`.
+    """Add ``--out``, ``--only``, ``--format``, ``--details``, ``--json``, ``--quiet``: an `Output`.
 
     Refused are ``--only`` and ``--format`` where nothing is written, ``--format`` where there is no
     film, and a film that cannot be written here.
@@ -205,6 +208,12 @@ def output_options(command: Callable[..., None]) -> Callable[..., None]:
         help="With --out: the lesson picture as this instead of a GIF; mp4 and webm need the"
         " extra chutelab[video].",
     )
+    @click.option(
+        "--details",
+        is_flag=True,
+        help="For experts: engine and steps, errors and residuals down to rounding, in the summary"
+        " and in overlay.png.",
+    )
     @json_option("Print one JSON object instead of tables.")
     @click.option("--quiet", "-q", is_flag=True, help="Print no summary and no progress bar.")
     @wraps(command)
@@ -212,6 +221,7 @@ def output_options(command: Callable[..., None]) -> Callable[..., None]:
         out: Path | None,
         only: tuple[str, ...] | None,
         film: str | None,
+        details: bool,
         as_json: bool,
         quiet: bool,
         **others: Any,
@@ -232,7 +242,7 @@ def output_options(command: Callable[..., None]) -> Callable[..., None]:
             from chutelab.pictures.animation import need_video
 
             need_video(kind)
-        command(**others, output=Output(out, kinds, only is not None, as_json, quiet))
+        command(**others, output=Output(out, kinds, only is not None, as_json, quiet, details))
 
     return told
 

@@ -31,19 +31,27 @@ STATIONS = 6
 """Contacts of particle 0 that are listed where no theory speaks of them."""
 
 
-def report(recording: Recording, accuracy: Accuracy | None = None) -> list[RenderableType]:
-    """Return what a run leaves to read: particle 0 beside the theory, the ledger, the accuracy."""
+def report(
+    recording: Recording, accuracy: Accuracy | None = None, *, details: bool = False
+) -> list[RenderableType]:
+    """Return what a run leaves to read: particle 0 beside the theory, the ledger, the accuracy.
+
+    With `details` also the engine and its steps, and errors down to rounding.
+    """
     counted = Counter(recording.ended.tolist())
     head = Text(recording.title, style="bold")
+    facts = [_many(recording.count, "particle"), _many(recording.contacts, "contact")]
+    if details:
+        steps = f"{recording.steps} {'rounds' if recording.engine == 'exact' else 'steps'}"
+        facts = [f"engine {recording.engine}", *facts, steps]
+    if not isnan(recording.seconds):
+        facts.append(f"computed in {recording.seconds:.3g} s")
     head.append(
-        f"\nengine {recording.engine}, {_many(recording.count, 'particle')},"
-        f" {_many(recording.contacts, 'contact')},"
-        f" {recording.steps} {'rounds' if recording.engine == 'exact' else 'steps'}"
-        f"{'' if isnan(recording.seconds) else f', {recording.seconds:.3g} s'}\n"
+        f"\n{', '.join(facts)}\n"
         f"ended: {', '.join(f'{counted[k]} {REASONS[k]}' for k in sorted(counted))}",
         style="not bold",
     )
-    compared = compare(recording).sheet()
+    compared = compare(recording).sheet(details=details)
     parts: list[RenderableType] = [head, compared]
     if compared.notes and (way := _way(recording)).rows:
         parts.append(way)
@@ -52,7 +60,8 @@ def report(recording: Recording, accuracy: Accuracy | None = None) -> list[Rende
     ends = {"landed": "the landing", "settled": "all have settled"}.get(
         str(until), f"t = {until} s"
     )
-    parts.append(replace(ledger(recording).sheet(), title=f"Energy ledger until {ends}, J"))
+    books = ledger(recording).sheet(details=details)
+    parts.append(replace(books, title=f"Energy ledger until {ends}, J"))
     tell = (stopped, doubtful, plugged, waits, squeezed, rolling, steady, air_drag)
     notes = [str(note) for one in tell if (note := one(recording)) is not None]
     landed = measure(recording, "landing.count")

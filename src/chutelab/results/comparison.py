@@ -70,11 +70,16 @@ class Comparison(Shown):
         """Largest of the errors; None if nothing could be compared."""
         return max(self.errors.values(), default=None)
 
-    def sheet(self) -> Sheet:
+    def sheet(self, *, details: bool = False) -> Sheet:
         """Return every quantity that one of the two has, and the largest error.
 
         Beside the paper's power is the true one, the belt work at the same rate of particles.
+        Errors are in percent; with `details` they are as they are, down to rounding.
         """
+
+        def written(error: float) -> str:
+            return f"{error:.1e}" if details else f"{100.0 * error:.3f}"
+
         rows = []
         energy, power = self.theory["dEk"], self.theory["P"]
         rate = power / energy if energy > 0.0 else nan
@@ -83,7 +88,7 @@ class Comparison(Shown):
             if unit == "degrees":
                 simulated, theory = degrees(simulated), degrees(theory)
             if isfinite(simulated) or isfinite(theory):
-                error = f"{self.errors[name]:.1e}" if name in self.errors else ""
+                error = written(self.errors[name]) if name in self.errors else ""
                 what = with_unit(MEANINGS[name], unit)
                 rows.append((name, what, number(simulated), number(theory), error))
                 if name == "belt_work" and isfinite(rate):
@@ -91,12 +96,12 @@ class Comparison(Shown):
                     rows.append(("", "its power, to compare with P, W", *true, ""))
         foot: list[tuple[str, ...]] = []
         if self.max is not None:
-            foot = [("max", "largest relative error", "", "", f"{self.max:.1e}")]
+            foot = [("max", "largest relative error", "", "", written(self.max))]
         begun = any(isfinite(value) for value in self.theory.values())
         ends = "No closed form from here on" if begun else "No closed form"
         return Sheet(
             "Particle 0",
-            ("", "", "simulated", "theory", "error"),
+            ("", "", "simulated", "theory", "error" if details else "error, %"),
             tuple(rows),
             foot=tuple(foot),
             texts=2,

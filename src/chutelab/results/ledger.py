@@ -60,8 +60,18 @@ class Ledger(Shown):
         """|residual| as a share of the energy turned over (0 if nothing was)."""
         return abs(self.residual) / self.turned_over if self.turned_over > 0.0 else 0.0
 
-    def sheet(self) -> Sheet:
-        """Return the entries of each surface that has any, their sum, and how the books close."""
+    def sheet(self, *, details: bool = False) -> Sheet:
+        """Return the entries of each surface that has any, their sum, and how the books close.
+
+        With `details` the residual is told down to rounding.
+        """
+        share = self.relative_residual
+        left = (
+            f"residual {self.residual:.1e} J, {share:.1e} of the {number(self.turned_over)} J"
+            " turned over"
+            if details
+            else f"share of these energies that the ledger cannot explain: {100.0 * share:.3f} %"
+        )
         total = (self.belt_work, self.restitution_loss, self.friction_loss)
         moved = (
             f"{name} {number(before)} -> {number(after)} J"
@@ -77,11 +87,7 @@ class Ledger(Shown):
             ("", *(name.replace("_", " ") for name in ENTRIES)),
             tuple((name, *map(number, entries)) for name, entries in rows if any(entries)),
             foot=(("total", *map(number, total)),),
-            notes=(
-                ", ".join(moved),
-                f"residual {self.residual:.1e} J, {self.relative_residual:.1e} of the"
-                f" {number(self.turned_over)} J turned over",
-            ),
+            notes=(", ".join(moved), left),
         )
 
 

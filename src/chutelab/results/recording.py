@@ -226,20 +226,20 @@ class Recording(Shown):
         """Which particles were released, (N,)."""
         return self.offsets[1:] > self.offsets[:-1]
 
-    def sheet(self) -> Sheet:
-        """Return what it holds, in a few lines."""
+    def sheet(self, *, details: bool = False) -> Sheet:
+        """Return what it holds, in a few lines; with `details` also how it was computed."""
         first, last = self.ends()
         happened = sorted(Counter(self.events["kind"].tolist()).items())
         ended = sorted(Counter(self.ended.tolist()).items())
         told = {
-            "engine": self.engine,
             "particles": f"{self.count:,}",
             "time": f"{first['t'].min():.6g} to {last['t'].max():.6g} s" if len(first) else "none",
             "events": ", ".join(f"{n:,} {Kind(k).name.lower()}" for k, n in happened),
             "ended": ", ".join(f"{n:,} {REASONS[k]}" for k, n in ended),
-            "knots": f"{len(self.knots):,}",
         }
-        if not isnan(self.seconds):
+        if details:
+            told |= {"engine": self.engine, "knots": f"{len(self.knots):,}"}
+        if details and not isnan(self.seconds):
             told["run time"] = f"{self.seconds:.3g} s"
         return Sheet(self.title, ("", ""), tuple(told.items()), texts=2)
 

@@ -109,7 +109,7 @@ def sentence(recording: Recording, event: Any) -> str:
         f"{'+' if value > 0.0 else ''}{quantity(value, 'J')} {what}"
         for value, what in (
             (-float(restitution), "in the rebound"),
-            (-float(friction), "to slip heat"),
+            (-float(friction), "to friction"),
             (float(belt), "from the belt"),
         )
         if abs(value) > 1e-15

@@ -42,6 +42,7 @@ def overlay(
     *,
     path: str | Path | None = None,
     ax: Axes | None = None,
+    details: bool = False,
 ) -> Figure:
     """Draw a recording over its analytic parabola.
 
@@ -55,13 +56,15 @@ def overlay(
         Also write the figure there, whole or not at all; the suffix says the format.
     ax : Axes, optional
         Draw only the scene with its tracks, and into these; ``ax.legend()`` adds the legend.
+    details : bool
+        For experts: also the numerical error, the ledger's residual and the engine.
 
     Returns
     -------
     Figure
-        That of `ax`; or a new one, with scene and tracks, residual beneath it, velocity and energy
-        ledger beside it. Where nothing is known analytically, of many particles, boxes or strings:
-        in place of the residual all particles at four moments.
+        That of `ax`; or a new one, with scene and tracks, velocity and energy ledger beside it;
+        with `details` the distance from the analytic path beneath it. Where nothing is known
+        analytically, of many particles, boxes or strings: there all particles at four moments.
 
     Raises
     ------
@@ -80,8 +83,9 @@ def overlay(
         draw_view(ax, recording, parts, bodies=all_of_them, legend=False)
         return ax.figure.canvas.figure
     figure = Picture(SIZE)
+    ratios = [2.6, 1.0] if all_of_them else [4.2, 1.0] if details else [1.0]
     grid = figure.add_gridspec(
-        2, 1, height_ratios=(2.6 if all_of_them else 4.2, 1.0), left=0.06, right=0.56, top=0.88,
+        len(ratios), 1, height_ratios=ratios, left=0.06, right=0.56, top=0.88,
         bottom=0.02 if all_of_them else 0.08, hspace=0.28,
     )  # fmt: skip
     side = figure.add_gridspec(2, 1, left=0.63, right=0.985, top=0.88, bottom=0.155, hspace=0.34)
@@ -89,10 +93,10 @@ def overlay(
     draw_view(view, recording, parts, bodies=all_of_them)
     if all_of_them:
         draw_moments(figure, grid[1], recording)
-    else:
+    elif details:
         draw_residual(figure.add_subplot(grid[1]), recording, parts, start, str(prediction.reason))
     draw_velocity(figure.add_subplot(side[0]), recording, parts, start)
-    books = draw_ledger(figure.add_subplot(side[1]), recording)
+    books = draw_ledger(figure.add_subplot(side[1]), recording, details=details)
     figure.legend(
         *books.get_legend_handles_labels(),
         loc="lower center",
@@ -108,7 +112,8 @@ def overlay(
     drawn = len(drawn_tracks(recording))
     if drawn < recording.count:
         said += f", {drawn} tracks drawn"
-    figure.remark(0.985, 0.965, f"engine {recording.engine}, {said}", ha="right", va="center")
+    said = f"engine {recording.engine}, {said}" if details else said
+    figure.remark(0.985, 0.965, said, ha="right", va="center")
     figure.write(path)
     return figure
 

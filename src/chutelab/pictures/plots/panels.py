@@ -275,11 +275,16 @@ def _beyond(times: Floats) -> float:
     return float(times[-1] + (0.04 * (times[-1] - times[0]) or 1e-3))
 
 
-def draw_ledger(ax: Axes, recording: Recording) -> Axes:
+SHOWN = 1e-9
+"""A residual of more than this part of what was put in is no rounding."""
+
+
+def draw_ledger(ax: Axes, recording: Recording, *, details: bool = True) -> Axes:
     """Draw the energy ledger of all particles over time.
 
     Kinetic and potential energy and both losses are stacked; energy at release plus belt work is a
-    line. The line runs along the top of the stack but for the residual, which the title states.
+    line. The line runs along the top of the stack but for the residual, which the title states:
+    always with `details`, and otherwise if it is more than rounding.
     """
     t = recording.knots["t"]
     times = np.linspace(t.min(), t.max(), 240)
@@ -299,8 +304,11 @@ def draw_ledger(ax: Axes, recording: Recording) -> Axes:
     )
     (line,) = ax.plot(times, factor * supplied, color=style.INK, lw=1.6, gid="supplied")
     line.set(linestyle=(0, (4, 1.5)), label="at release + belt work")
-    residual = style.scientific(float(books["residual"][-1]), "J")
-    style.dress(ax, "time, s", f"energy, {unit}", f"Energy ledger: residual {residual}")
+    residual = float(books["residual"][-1])
+    title = "Energy ledger"
+    if details or abs(residual) > SHOWN * np.abs(supplied).max():
+        title += f": residual {style.scientific(residual, 'J')}"
+    style.dress(ax, "time, s", f"energy, {unit}", title)
     ax.set_xlim(times[0], times[-1])
     ax.set_ylim(bottom=min(0.0, factor * float(supplied.min())))
     return ax

@@ -52,7 +52,7 @@ ENERGY_LABEL = {
     "potential": "potential",
     "belt_work": "belt work",
     "restitution_loss": "restitution loss",
-    "friction_loss": "slip heat",
+    "friction_loss": "friction loss",
     "residual": "residual (error)",
 }
 

@@ -43,7 +43,7 @@ lessons_argument = click.argument(
 
 @click.group(
     cls=InOrder,
-    short_help="Lessons: list, show, build, start, grade, bundle.",
+    short_help="Lessons: list, show, build, start, grade, bundle, package.",
     epilog="Begin with: chutelab lesson list, then: chutelab lesson show 1",
 )
 def lesson() -> None:
@@ -201,6 +201,76 @@ def page(wanted: tuple[str, ...], out: Path, quiet: bool) -> None:
     if not quiet:
         size = sum(path.stat().st_size for path in made)
         console.say(f"wrote {len(made)} files, {size / 1e6:.1f} MB; open {out / 'index.html'}")
+
+
+@lesson.command(short_help="Package lessons for a learning platform (SCORM 1.2).")
+@lessons_argument
+@click.option("--all", "everything", is_flag=True, help="All lessons that are shipped.")
+@click.option(
+    "--out",
+    "-o",
+    metavar="DIR|FILE.zip",
+    type=FileName(path_type=Path),
+    default=Path(),
+    help="The folder for the packages, NN-name.scorm.zip each, by default this one; or, for one"
+    " lesson, the zip file itself. Files that are there are replaced.",
+)
+@click.option(
+    "--language",
+    metavar="CODE",
+    default="en",
+    show_default=True,
+    help="Of the page and its exercise, where they are translated.",
+)
+@click.option("--quiet", "-q", is_flag=True, help="Print nothing, and show no progress bar.")
+def scorm(
+    wanted: tuple[str, ...], everything: bool, out: Path, language: str, quiet: bool
+) -> None:
+    """Make a SCORM 1.2 package of each LESSON: its live page with its exercise, for a course.
+
+    The platform tells the page each student's name, from which the numbers are drawn, and keeps the
+    score (0 to 100, a share of right answers), whether the lesson is completed (every question is
+    right, or its working was shown), each answer, the time, and where to go on next time. The page
+    asks for nothing from the network; students install nothing.
+
+    \b
+    Moodle   Turn editing on; Add an activity or resource; SCORM package; drag the zip into
+             "Package file". Appearance: "New window", or "Current window" and a height
+             of 900. Grade: "Learning objects" off, "Highest grade", 100. Attempts:
+             unlimited, "Force new attempt: No", or students begin anew each time.
+             Save and display. Results: the activity's "Reports".
+    ILIAS    Add new item; Learning Module SCORM; Upload: the zip; type SCORM 1.2.
+             Settings: Online; "Fullscreen", or a new window. Results: "Tracking Data".
+             Learning Progress: "Tracked SCOs".
+    others   Import as SCORM 1.2. The platform has to show the page with scripts on.
+
+    If no platform is found, as when index.html is opened from a folder, a line on the page says so;
+    students then hand in the result file for `chutelab lesson grade`. A score from a browser can be
+    forged, as on every platform: use it to see where a class stands, not as an exam.
+
+    \b
+    chutelab lesson scorm 3
+    chutelab lesson scorm 1 2 3 --language de -o packages/
+    chutelab lesson scorm --all -o packages/
+    """  # noqa: D301 - click wants the backspace
+    from chutelab.classroom.lessons.scorm import package
+
+    if everything == bool(wanted):
+        raise RefusedError("give lessons, such as: chutelab lesson scorm 3; or --all")
+    lessons = _lessons(wanted)
+    is_file = out.suffix.lower() == ".zip"
+    if is_file and len(lessons) > 1:
+        raise RefusedError(f"--out {out}: {len(lessons)} lessons go into a folder, not one zip")
+    with writing(instead="another place"), progress("packaging", quiet=quiet) as update:
+        if not is_file:
+            out.mkdir(parents=True, exist_ok=True)
+        for i, one in enumerate(lessons, 1):
+            target = out if is_file else out / f"{one.folder.name}.scorm.zip"
+            made = package(one, target, language=language)
+            if update is not None:
+                update(i / len(lessons))
+            if not quiet:
+                console.say(f"wrote {made}, {made.stat().st_size / 1000:.0f} kB")
 
 
 def _lessons(wanted: tuple[str, ...]) -> list[Lesson]:

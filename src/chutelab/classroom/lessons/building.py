@@ -295,7 +295,7 @@ def _lesson(lesson: Lesson, folder: Path, before: str, after: str) -> str:
     worksheet, explanation = lesson.text("README"), lesson.text("explanation")
     facts = {
         "folder": _address(lesson.folder.name),
-        "title": _heading(lesson),
+        "title": heading(lesson),
         "question": escape(lesson.question),
         "level": lesson.level,
         "minutes": str(lesson.minutes),
@@ -316,12 +316,13 @@ def _lesson(lesson: Lesson, folder: Path, before: str, after: str) -> str:
     return _page("card.html", **facts)
 
 
-def _heading(lesson: Lesson) -> str:
+def heading(lesson: Lesson) -> str:
+    """Return number and title of a lesson, as HTML."""
     return escape(lesson.title if lesson.number is None else f"{lesson.number}. {lesson.title}")
 
 
 def _link(lesson: Lesson, relation: str, form: str) -> str:
-    text = form.format(_heading(lesson))
+    text = form.format(heading(lesson))
     return f'<a rel="{relation}" href="../{_address(lesson.folder.name, INDEX)}">{text}</a>'
 
 

@@ -14,10 +14,12 @@ from string import Template
 from typing import Final
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
-from chutelab.classroom.lessons.building import LIVE, live_page
+from chutelab.classroom.exercises import EXERCISES
+from chutelab.classroom.lessons.building import LIVE, heading, live_page
 from chutelab.classroom.lessons.reading import Lesson, LessonError
 from chutelab.classroom.words import words
 from chutelab.scene import Fault
+from chutelab.util.errors import printable
 from chutelab.util.files import whole
 
 MANIFEST: Final = "imsmanifest.xml"
@@ -33,17 +35,17 @@ def package(lesson: Lesson, path: str | Path, *, language: str = "en") -> Path:
     Raises
     ------
     LessonError
-        If the lesson has no live page, which is what is in the package.
+        If the lesson has no live page with an exercise, which is what is in the package.
     OSError
         If it cannot be written.
     """
-    if lesson.page is None:
-        fault = Fault("page", None, "a package is made of a lesson's live page; add [page]")
-        raise LessonError(str(lesson.folder / "lesson.toml"), [fault])
+    if lesson.page is None or lesson.name not in EXERCISES:
+        fault = Fault("", None, "a package is a live page with an exercise, and it has none")
+        raise LessonError(str(lesson.folder), [fault])
     values = {
         # An XML name begins with a letter and has no spaces.
         "identifier": "chutelab-" + re.sub(r"[^A-Za-z0-9_.-]", "-", lesson.name),
-        "title": escape(lesson.heading),
+        "title": printable(heading(lesson)),
         "language": language,
         "page": LIVE,
         "alone": escape(words(language).say("scorm-alone")),

@@ -4,9 +4,17 @@
 "use strict";
 
 (() => {
-  const SOON = 2000; // ms from the last change to a commit
+  /**
+   * @typedef {Record<string, (...values: string[]) => unknown>} Api
+   * @typedef {{score: number, status: string, suspend_data: string,
+   *   verdicts?: Record<string, string>,
+   *   result: {answers?: Record<string, number>, tries?: Record<string, number>}}} Progress
+   */
 
-  // In a window above this one, or above the one that opened this one.
+  const SOON = 2000; // ms from the last change to a commit
+  const LONGEST_NAME = 200; // characters, as the page has it
+
+  /** The API in a window or above it. @param {any} first @returns {Api | null} */
   function found(first) {
     let above = first;
     for (let steps = 0; above && steps < 20; steps += 1) {
@@ -23,90 +31,95 @@
 
   const api = found(window) ?? found(window.opener) ?? found(window.top?.opener);
 
+  /** @param {string} name @param {string[]} values */
   function call(name, ...values) {
     try {
-      return String(api[name](...values));
+      return String(api?.[name](...values));
     } catch {
       return "";
     }
   }
 
-  const get = (key) => call("LMSGetValue", key);
-  const set = (key, value) => call("LMSSetValue", key, String(value)) === "true";
+  const get = (/** @type {string} */ key) => call("LMSGetValue", key);
+  const set = (/** @type {string} */ key, /** @type {string | number} */ value) =>
+    call("LMSSetValue", key, String(value)) === "true";
 
-  // hours:minutes:seconds, as CMITime and CMITimespan have it
-  function clock(hours, minutes, seconds) {
-    const two = (number) => String(number).padStart(2, "0");
-    return `${two(hours)}:${two(minutes)}:${two(seconds)}`;
-  }
+  /** A time of day or a duration. @param {number[]} parts hours, minutes, seconds */
+  const clock = (...parts) => parts.map((part) => String(part).padStart(2, "0")).join(":");
 
   const began = Date.now();
-  let open = Boolean(api) && call("LMSInitialize", "") === "true";
-  let answered = null; // tries by question, from the first progress on
+  let isOpen = api !== null && call("LMSInitialize", "") === "true";
+  /** How often each question was tried; null until the page has told where it goes on.
+   * @type {Record<string, number> | null} */
+  let tried = null;
   let later = 0;
 
   function warn() {
-    document.getElementById("alone").hidden = false;
+    document.getElementById("alone")?.removeAttribute("hidden");
   }
 
   function commit() {
     clearTimeout(later);
-    if (open) call("LMSCommit", "");
+    if (isOpen) call("LMSCommit", "");
   }
 
+  /** @param {Window} page */
   function begin(page) {
-    const student = get("cmi.core.student_name").trim() || get("cmi.core.student_id").trim();
+    const name = get("cmi.core.student_name").trim() || get("cmi.core.student_id").trim();
     if (["not attempted", "unknown", ""].includes(get("cmi.core.lesson_status"))) {
       set("cmi.core.lesson_status", "incomplete");
     }
-    const suspended = get("cmi.suspend_data");
+    const student = name.slice(0, LONGEST_NAME), suspended = get("cmi.suspend_data");
     page.postMessage({ chutelab: "begin", student, suspend_data: suspended }, "*");
   }
 
-  // Each answer that was checked since the last time, the last of each question.
-  function tell({ verdicts = {}, result }) {
-    const { answers = {}, tries = {} } = result;
-    const fresh = Object.keys(verdicts).filter((n) => answered && tries[n] !== answered[n]);
-    answered = { ...tries };
-    for (const number of fresh) {
-      const next = Number(get("cmi.interactions._count"));
-      if (!Number.isInteger(next)) return; // a platform that keeps none
-      const at = `cmi.interactions.${next}`;
-      const now = new Date();
-      set(`${at}.id`, `question-${number}`);
-      set(`${at}.type`, "numeric");
-      set(`${at}.time`, clock(now.getHours(), now.getMinutes(), now.getSeconds()));
-      if (number in answers) set(`${at}.student_response`, answers[number]);
-      set(`${at}.result`, verdicts[number] === "right" ? "correct" : "wrong");
-    }
+  /** Tell of an answer, under the next number of those that the platform has.
+   * @param {string} question @param {number} answer @param {boolean} isRight */
+  function tell(question, answer, isRight) {
+    const next = get("cmi.interactions._count"), at = `cmi.interactions.${next}`;
+    if (!/^\d+$/.test(next)) return; // a platform that keeps none
+    const now = new Date();
+    set(`${at}.id`, `question-${question}`);
+    set(`${at}.type`, "numeric");
+    set(`${at}.time`, clock(now.getHours(), now.getMinutes(), now.getSeconds()));
+    set(`${at}.student_response`, answer);
+    set(`${at}.result`, isRight ? "correct" : "wrong");
   }
 
-  function keep(progress) {
+  /** @param {Progress} progress */
+  function keep({ score, status, suspend_data: suspended, verdicts = {}, result }) {
+    const { answers = {}, tries = {} } = result, before = tried;
+    tried = tries;
+    if (!before) return; // where it goes on, which the platform has
     set("cmi.core.score.min", 0);
     set("cmi.core.score.max", 100);
-    const scored = set("cmi.core.score.raw", progress.score);
-    const stated = set("cmi.core.lesson_status", progress.status);
-    set("cmi.suspend_data", progress.suspend_data);
-    if (!scored || !stated) warn();
-    tell(progress);
+    const isKept = [
+      set("cmi.core.score.raw", score), set("cmi.core.lesson_status", status),
+      set("cmi.suspend_data", suspended),
+    ].every(Boolean);
+    if (!isKept) warn();
+    for (const [question, verdict] of Object.entries(verdicts)) {
+      if (tries[question] !== before[question] && ["right", "mistake", "off"].includes(verdict)) {
+        tell(question, answers[question], verdict === "right");
+      }
+    }
     clearTimeout(later);
-    later = setTimeout(commit, SOON);
+    later = window.setTimeout(commit, SOON);
   }
 
   function leave() {
-    if (!open) return;
-    const seconds = Math.floor((Date.now() - began) / 1000);
-    const minutes = Math.floor(seconds / 60);
+    if (!isOpen) return;
+    const seconds = Math.floor((Date.now() - began) / 1000), minutes = Math.floor(seconds / 60);
     set("cmi.core.session_time", clock(Math.floor(minutes / 60), minutes % 60, seconds % 60));
     set("cmi.core.exit", "suspend"); // what was done is there again next time
     commit();
     call("LMSFinish", "");
-    open = false;
+    isOpen = false;
   }
 
   addEventListener("message", ({ data, source }) => {
     const page = document.querySelector("iframe")?.contentWindow;
-    if (!open || !source || source !== page) return;
+    if (!isOpen || !page || source !== page) return;
     if (data?.chutelab === "ready") begin(page);
     if (data?.chutelab === "progress") keep(data);
   });
@@ -115,5 +128,5 @@
   addEventListener("pagehide", leave);
   // A page that comes back from the browser's memory has left already.
   addEventListener("pageshow", ({ persisted }) => persisted && location.reload());
-  addEventListener("DOMContentLoaded", () => open || warn());
+  addEventListener("DOMContentLoaded", () => isOpen || warn());
 })();

@@ -55,6 +55,7 @@ def solution(name, given):
 
 def test_a_name_draws_the_same_numbers_on_every_machine():
     found = {name: [lesson(name, "Ada Lovelace").given[key] for key in keys] for name, keys in {
+        "film-a-ball": ("r", "y0", "y1", "f", "c1", "c2", "c3", "n"),
         "the-parabola": ("v0", "h"),
         "letting-go": ("v0", "R", "r"),
         "the-bounce": ("v0", "R", "r", "grams", "d", "e", "d2"),
@@ -69,6 +70,7 @@ def test_a_name_draws_the_same_numbers_on_every_machine():
 
 
 PINNED = {
+    "film-a-ball": [0.1, 1.5, 0.92, 120.0, 0.4, 1.02, 1.5, 64.0],
     "the-parabola": [1.6, 0.5],
     "letting-go": [1.7, 0.4, 0.05],
     "the-bounce": [3.4, 0.2, 0.05, 20.0, 0.4, 0.4, 0.8],
@@ -373,6 +375,7 @@ def test_what_is_no_known_mistake_is_told_how_far_off_it_is():
 
 # Questions whose answers have no g in their formula, by lesson; all others have.
 WITHOUT_GRAVITY = {
+    "film-a-ball": {1, 2, 3},
     "the-bounce": {1, 4},
     "turning-the-plate": {1, 2, 3},
     "landing": {1, 2, 4},
@@ -386,7 +389,9 @@ WITHOUT_GRAVITY = {
 def test_another_g_is_suspected_where_there_is_one(name):
     task = lesson(name, "gravity")
     for number, right in enumerate(solution(name, task.given), start=1):
-        reply = task.check(number, 1.03 * right)
+        # On one side there may be a known mistake.
+        replies = [task.check(number, factor * right) for factor in (1.03, 0.97)]
+        reply = next(one for one in replies if one.verdict is Verdict.OFF)
         assert "Were numbers rounded on the way" in reply.text
         assert ("g not 9.81" in reply.text) == (number not in WITHOUT_GRAVITY.get(name, ()))
 
@@ -633,7 +638,7 @@ def test_html_is_whole_and_takes_the_colours_of_the_page():
 def test_lessons_are_found_by_number_or_name():
     for ask in (3, "3", "the-bounce", "03-the-bounce", "The Bounce", "03"):
         assert find(ask).name == "the-bounce"
-    assert [exercise.number for exercise in EXERCISES.values()] == list(range(1, 10))
+    assert [exercise.number for exercise in EXERCISES.values()] == list(range(10))
     with pytest.raises(ExerciseError, match="Did you mean 'the-bounce'"):
         lesson("the-bonce", "x")
     with pytest.raises(ExerciseError, match=r"no lesson '99'.* 8 trust"):

@@ -25,6 +25,25 @@ def turn(g):
     return acos(u(g))
 
 
+# Lesson 0: heights of the fall and of the rebound, times of flight
+
+
+def down(g):
+    return g.y0 - g.r
+
+
+def keeps(g):
+    return sqrt((g.y1 - g.r) / down(g))
+
+
+def first_fall(g):
+    return sqrt(2 * down(g) / G)
+
+
+def tap_ratio(g):
+    return (g.c3 - g.c2) / (g.c2 - g.c1)
+
+
 # Lessons 3 and 7: the plate stands upright, v2y on arrival, time for a fall that begins with it
 
 
@@ -172,6 +191,36 @@ def by_alpha(g):
 
 
 MISTAKES = {
+    ("film-a-ball", 1): {
+        "ratio of heights for ε": lambda g: (g.y1 - g.r) / (g.y0 - g.r),
+        "radius forgotten": lambda g: sqrt(g.y1 / g.y0),
+        "ratio of heights, radius forgotten": lambda g: g.y1 / g.y0,
+        "upside down": lambda g: sqrt((g.y0 - g.r) / (g.y1 - g.r)),
+        "squared instead of the root": lambda g: (g.y1 - g.r) ** 2 / (g.y0 - g.r) ** 2,
+        "share lost for share kept": lambda g: 1 - keeps(g),
+    },
+    ("film-a-ball", 2): {
+        "a root where there is none": lambda g: sqrt(tap_ratio(g)),
+        "squared": lambda g: tap_ratio(g) ** 2,
+        "upside down": lambda g: (g.c2 - g.c1) / (g.c3 - g.c2),
+        "times on the clock for times of flight": lambda g: g.c2 / g.c3,
+        "share lost for share kept": lambda g: 1 - tap_ratio(g),
+    },
+    ("film-a-ball", 3): {
+        "radius forgotten": lambda g: 2 * g.y0 * (g.f / g.n) ** 2,
+        "slow motion for real time": lambda g: 2 * down(g) * (30 / g.n) ** 2,
+        "square forgotten": lambda g: 2 * down(g) * g.f / g.n,
+        "frames for seconds": lambda g: 2 * down(g) / g.n**2,
+        "a ½ too many": lambda g: down(g) * (g.f / g.n) ** 2,
+        "a fall taken for up and down": lambda g: 2 * down(g) / (g.n / g.f / 2) ** 2,
+    },
+    ("film-a-ball", 4): {
+        "up or down forgotten": lambda g: first_fall(g) * (1 + keeps(g) / (1 - keeps(g))),
+        "a way up before the first fall": lambda g: 2 * first_fall(g) / (1 - keeps(g)),
+        "the first fall forgotten": lambda g: 2 * first_fall(g) * keeps(g) / (1 - keeps(g)),
+        "radius forgotten": lambda g: sqrt(2 * g.y0 / G) * (1 + 2 * keeps(g) / (1 - keeps(g))),
+        "the first fall alone": first_fall,
+    },
     ("the-parabola", 1): {
         "square root forgotten": lambda g: 2 * g.h / G,
         "a 2 forgotten": lambda g: sqrt(g.h / G),

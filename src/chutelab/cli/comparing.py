@@ -62,7 +62,7 @@ def _point(text: str) -> tuple[float, float]:
     metavar="X,Y",
     default="0,0",
     type=_point,
-    help="The pulley's axis, in the units of the file.",
+    help="The origin of the scene, such as the pulley's axis, in the units of the file.",
 )
 @click.option("--flip-y", is_flag=True, help="y is counted downward in the file, as pixels are.")
 @click.option(

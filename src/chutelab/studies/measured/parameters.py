@@ -24,7 +24,8 @@ class Parameter:
     Attributes
     ----------
     key, unit : str
-        Its full path in the scene, or a key of `placements`; "" for the unit of a pure number.
+        What it is called: a full path in the scene as it was given, or a key of `placements`; ""
+        for the unit of a pure number.
     start : float
         Its value in the scene or the placement.
     low, high : float
@@ -64,6 +65,7 @@ def resolve(scene: Scene, track: Track, keys: Sequence[str]) -> tuple[Parameter,
         With all keys that are unknown, no number, without a value to start from, or given twice.
     """
     document, placed = as_written(scene, defaults=True), placements(track)
+    names = names_of(document)
     faults: list[Fault] = []
     found: list[Parameter] = []
     if not keys:
@@ -72,7 +74,7 @@ def resolve(scene: Scene, track: Track, keys: Sequence[str]) -> tuple[Parameter,
         known = placed.get(key) or _of_scene(document, key, placed)
         if isinstance(known, str):
             faults.append(Fault(f"fit {key}", None, known))
-        elif any(known.key == other.key for other in found):
+        elif any(parts_of(key, names) == parts_of(other.key, names) for other in found):
             faults.append(Fault(f"fit {key}", None, "given twice"))
         else:
             found.append(known)
@@ -121,7 +123,7 @@ def _of_scene(document: Mapping[str, Any], key: str, others: Iterable[str]) -> P
         return f"has no value in this scene; give one to start from, --set {path}=..."
     if limits is None or isinstance(value, (str, bool)):
         return f"{shown(value)} is not a number that can vary continuously"
-    return Parameter(path, rule.get("x-unit", ""), float(value), *limits)
+    return Parameter(key, rule.get("x-unit", ""), float(value), *limits)
 
 
 def numbers(document: Mapping[str, Any]) -> Iterator[str]:

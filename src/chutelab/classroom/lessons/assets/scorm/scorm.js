@@ -69,6 +69,7 @@
     if (["not attempted", "unknown", ""].includes(get("cmi.core.lesson_status"))) {
       set("cmi.core.lesson_status", "incomplete");
     }
+    tried = null;
     const student = name.slice(0, LONGEST_NAME), suspended = get("cmi.suspend_data");
     page.postMessage({ chutelab: "begin", student, suspend_data: suspended }, "*");
   }

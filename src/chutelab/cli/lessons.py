@@ -41,6 +41,15 @@ lessons_argument = click.argument(
 )
 
 
+language_option = click.option(
+    "--language",
+    metavar="LANGUAGE",
+    default="en",
+    show_default=True,
+    help="Of the texts: en, or de where they are translated; the rest is in English.",
+)
+
+
 @click.group(
     cls=InOrder,
     short_help="Lessons: list, show, build, start, grade, bundle, package.",
@@ -79,13 +88,15 @@ def list_lessons(as_json: bool) -> None:
     help="Print one sheet to hand out, as Markdown: the student's (nothing of the answer on it),"
     " the teacher's (key, mistakes, goals), or the explanation.",
 )
+@language_option
 @json_option()
-def show(wanted: str, sheet: str | None, as_json: bool) -> None:
+def show(wanted: str, sheet: str | None, language: str, as_json: bool) -> None:
     """Show one lesson: its question, scenes and quantities, its files, and the worksheet.
 
     \b
     chutelab lesson show 3
     chutelab lesson show 3 --sheet student > student.md
+    chutelab lesson show 3 --language de
     chutelab lesson show the-bounce
     chutelab lesson show ./my-lesson
     """  # noqa: D301 - click wants the backspace
@@ -95,9 +106,10 @@ def show(wanted: str, sheet: str | None, as_json: bool) -> None:
     from chutelab.classroom.lessons import find, scene_of
     from chutelab.classroom.lessons.reading import unit_in
     from chutelab.classroom.lessons.texts import plain_of
+    from chutelab.classroom.words import words
     from chutelab.util.tables import Sheet
 
-    found = find(wanted)
+    found, say = find(wanted, language), words(language).say
     if sheet is not None:
         from chutelab.classroom.lessons.sheets import sheet as sheet_of
 
@@ -109,14 +121,22 @@ def show(wanted: str, sheet: str | None, as_json: bool) -> None:
         console.show_json({"format": 1, **_plain(found)})
         return
     number = "" if found.number is None else f"{found.number}  "
-    about = f"\n{found.question}\n{found.level}, about {found.minutes} minutes"
+    level = say("show-about", level=say(f"level-{found.level}"), minutes=found.minutes)
+    about = f"\n{found.question}\n{level}"
     head = Text(f"{number}{found.title}", style="bold").append(about, style="not bold")
     scenes = tuple((name, scene_of(found, name).title) for name in found.scenes)
-    console.show(head, Sheet("Scenes", ("scene", "what it shows"), scenes, texts=2))
+    if found.untranslated:
+        console.show(Text(f"{say('untranslated')}\n"))
+    heads = (say("show-scene"), say("show-shows"))
+    console.show(head, Sheet(say("show-scenes"), heads, scenes, texts=2))
     if found.quantities:
-        rows = tuple((name, unit_in(found, name), what) for name, what in found.quantities.items())
-        console.show(Sheet("Quantities", ("quantity", "unit", "what it is"), rows, texts=3))
-    console.show(Text(f"\nFiles in {found.folder}\n"))
+        unit = words(language).unit
+        rows = tuple(
+            (name, unit(unit_in(found, name)), what) for name, what in found.quantities.items()
+        )
+        columns = (say("show-quantity"), say("show-unit"), say("show-meaning"))
+        console.show(Sheet(say("show-quantities"), columns, rows, texts=3))
+    console.show(Text(f"\n{say('show-files', folder=found.folder)}\n"))
     console.show(Markdown(plain_of(found.text("README")), hyperlinks=False))
 
 
@@ -186,8 +206,9 @@ def new(name: Path, model: str | None) -> None:
 @lesson.command(short_help="Bundle the lessons as web pages that need no server.")
 @lessons_argument
 @out_option("The folder; files that are there are replaced.", "-o", required=True)
+@language_option
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing, and show no progress bar.")
-def page(wanted: tuple[str, ...], out: Path, quiet: bool) -> None:
+def page(wanted: tuple[str, ...], out: Path, language: str, quiet: bool) -> None:
     """Bundle lessons (without LESSON: all that are shipped) into a folder of web pages.
 
     index.html, and for each lesson its worksheet, animation, files, and a live page, which offers
@@ -197,7 +218,7 @@ def page(wanted: tuple[str, ...], out: Path, quiet: bool) -> None:
     from chutelab.classroom.lessons.building import bundle
 
     with writing(instead="another folder"), progress("making the pages", quiet=quiet) as update:
-        made = bundle(_lessons(wanted), out, update)
+        made = bundle(_lessons(wanted, language), out, update)
     if not quiet:
         size = sum(path.stat().st_size for path in made)
         console.say(f"wrote {len(made)} files, {size / 1e6:.1f} MB; open {out / 'index.html'}")
@@ -215,13 +236,7 @@ def page(wanted: tuple[str, ...], out: Path, quiet: bool) -> None:
     help="The folder for the packages, NN-name.scorm.zip each, by default this one; or, for one"
     " lesson, the zip file itself. Files that are there are replaced.",
 )
-@click.option(
-    "--language",
-    metavar="CODE",
-    default="en",
-    show_default=True,
-    help="Of the page and its exercise, where they are translated.",
-)
+@language_option
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing, and show no progress bar.")
 def scorm(
     wanted: tuple[str, ...], everything: bool, out: Path, language: str, quiet: bool
@@ -234,15 +249,13 @@ def scorm(
     asks for nothing from the network; students install nothing.
 
     \b
-    Moodle   Turn editing on; Add an activity or resource; SCORM package; drag the zip into
-             "Package file". Appearance: "New window", or "Current window" and a height
-             of 900. Grade: "Learning objects" off, "Highest grade", 100. Attempts:
-             unlimited, "Force new attempt: No", or students begin anew each time.
-             Save and display. Results: the activity's "Reports".
-    ILIAS    Add new item; Learning Module SCORM; Upload: the zip; type SCORM 1.2.
-             Settings: Online; "Fullscreen", or a new window. Results: "Tracking Data".
-             Learning Progress: "Tracked SCOs".
-    others   Import as SCORM 1.2. The platform has to show the page with scripts on.
+    Moodle  "Add an activity", "SCORM package", and the zip into "Package file".
+            Appearance: "New window" gives it room. Grade: "Highest grade", maximum 100.
+            Attempts: "Force new attempt" stays "No", so that students go on where they
+            were. Results: "Reports" of the activity.
+    ILIAS   "Add New Item", "Learning Module SCORM", and the zip. Settings: online.
+            Results: "Learning Progress" and "Tracking Data" of the module.
+    others  Import it as SCORM 1.2.
 
     If no platform is found, as when index.html is opened from a folder, a line on the page says so;
     students then hand in the result file for `chutelab lesson grade`. A score from a browser can be
@@ -257,7 +270,7 @@ def scorm(
 
     if everything == bool(wanted):
         raise RefusedError("give lessons, such as: chutelab lesson scorm 3; or --all")
-    lessons = _lessons(wanted)
+    lessons = _lessons(wanted, language)
     is_file = out.suffix.lower() == ".zip"
     if is_file and len(lessons) > 1:
         raise RefusedError(f"--out {out}: {len(lessons)} lessons go into a folder, not one zip")
@@ -273,11 +286,11 @@ def scorm(
                 console.say(f"wrote {made}, {made.stat().st_size / 1000:.0f} kB")
 
 
-def _lessons(wanted: tuple[str, ...]) -> list[Lesson]:
+def _lessons(wanted: tuple[str, ...], language: str = "en") -> list[Lesson]:
     """Return the lessons that are named, or all that are shipped."""
     from chutelab.classroom.lessons import find, shipped_lessons
 
-    return [find(name) for name in wanted] or shipped_lessons()
+    return [find(name, language) for name in wanted] or shipped_lessons(language)
 
 
 def _plain(lesson: Lesson) -> dict[str, object]:

@@ -27,6 +27,7 @@ from PIL.GifImagePlugin import GifImageFile
 
 from chutelab.classroom.lessons.reading import Lesson, LessonError, read, scene_of, split, unusable
 from chutelab.classroom.lessons.texts import INDEX, html_of, words_for
+from chutelab.classroom.words import Words, words
 from chutelab.engines.simulation import simulate
 from chutelab.scene import Fault, to_dict
 from chutelab.util.files import aside, refuse_other, together
@@ -78,6 +79,7 @@ def build(
         If the file cannot be written.
     """
     path = (lesson.folder if folder is None else folder) / PICTURE
+    lesson = _in_english(lesson)
     wanted = stamp_of(lesson)
     made = force or comment_of(path) != wanted
     if made:
@@ -93,6 +95,11 @@ def build(
     return Built(path, path.stat().st_size, made)
 
 
+def _in_english(lesson: Lesson) -> Lesson:
+    """Return a lesson as its film has it, which speaks English whatever the lesson speaks."""
+    return lesson if lesson.language == "en" else read(lesson.folder)
+
+
 def is_current(lesson: Lesson) -> bool:
     """Tell whether a lesson's picture shows what the lesson says, with whatever versions made."""
     found, wanted = comment_of(lesson.folder / PICTURE), stamp_of(lesson)
@@ -105,6 +112,7 @@ def stamp_of(lesson: Lesson) -> str:
     That is a hash of the scene that is filmed and of the picture's settings, then the versions of
     all that simulates and draws.
     """
+    lesson = _in_english(lesson)
     scene = to_dict(scene_of(lesson, lesson.picture.scene, lesson.picture.set))
     for table in ("expect", "live"):  # neither shows in its picture
         scene.pop(table, None)
@@ -235,8 +243,10 @@ def bundle(
             cards += _lesson(lesson, made / lesson.folder.name, before, after)
             if progress is not None:
                 progress((i + 1) / len(lessons))
-        many = "One lesson" if len(lessons) == 1 else f"{len(lessons)} lessons"
-        (made / INDEX).write_text(_page("index.html", cards=cards, count=many), encoding="utf-8")
+        said = words(lessons[0].language if lessons else "en")
+        key = "page-count-one" if len(lessons) == 1 else "page-count"
+        values = {"cards": cards, "count": said.say(key, count=len(lessons))}
+        (made / INDEX).write_text(_page("index.html", said, **values), encoding="utf-8")
         for name in _SHARED:
             shutil.copyfile(_HERE / "assets" / name, made / name)
         files = [path.relative_to(made) for path in made.rglob("*") if path.is_file()]
@@ -278,42 +288,47 @@ def _lesson(lesson: Lesson, folder: Path, before: str, after: str) -> str:
         film.seek(film.n_frames - 1)
         film.convert("RGB").quantize(255).save(folder / STILL, optimize=True)
         width, height = film.size
+    said = words(lesson.language)
+    say = said.say
     # What there is to play with, and to take along.
     doors = []
     if lesson.page is not None:
         from chutelab.pictures.live.page import write
 
         scene = scene_of(lesson, lesson.page.scene, lesson.page.settings)
-        write(scene, folder / LIVE, home=(f"Back to the lesson: {lesson.title}", INDEX))
-        doors.append(f'<li><a class="main" href="{LIVE}">Try it: change the machine</a></li>')
+        home = (say("page-back", title=lesson.title), INDEX)
+        write(scene, folder / LIVE, language=lesson.language, home=home)
+        doors.append(f'<li><a class="main" href="{LIVE}">{say("page-try")}</a></li>')
     if (folder / "exercise.ipynb").is_file():
-        doors.append('<li><a href="exercise.ipynb" download>Exercise (Jupyter notebook)</a></li>')
+        door = f'<li><a href="exercise.ipynb" download>{say("page-notebook")}</a></li>'
+        doors.append(door)
     for name in lesson.scenes:
         if (folder / name).is_file():
-            door = f'<li><a href="{_address(name)}" download>Scene {escape(name)}</a></li>'
-            doors.append(door)
+            scene_door = escape(say("page-scene", name=name))
+            doors.append(f'<li><a href="{_address(name)}" download>{scene_door}</a></li>')
     worksheet, explanation = lesson.text("README"), lesson.text("explanation")
+    note = f"<p><em>{say('untranslated')}</em></p>\n" if lesson.untranslated else ""
     facts = {
         "folder": _address(lesson.folder.name),
         "title": heading(lesson),
         "question": escape(lesson.question),
-        "level": lesson.level,
-        "minutes": str(lesson.minutes),
+        "about": say("show-about", level=say(f"level-{lesson.level}"), minutes=lesson.minutes),
         "width": str(width),
         "height": str(height),
     }
     page = _page(
         "lesson.html",
+        said,
         **facts,
         alt=escape(words_for(PICTURE, explanation) or lesson.title),
-        worksheet=html_of(worksheet),
+        worksheet=note + html_of(worksheet),
         explanation=html_of(explanation),
         doors="\n".join(doors),
         before=before,
         after=after,
     )
     (folder / INDEX).write_text(page, encoding="utf-8")
-    return _page("card.html", **facts)
+    return _page("card.html", said, **facts)
 
 
 def heading(lesson: Lesson) -> str:
@@ -326,6 +341,15 @@ def _link(lesson: Lesson, relation: str, form: str) -> str:
     return f'<a rel="{relation}" href="../{_address(lesson.folder.name, INDEX)}">{text}</a>'
 
 
-def _page(name: str, **values: str) -> str:
+def _page(name: str, said: Words, **values: str) -> str:
+    """Fill in a page: ``$page_all`` is what the catalogue has for "page-all"."""
     page = Template((_HERE / "assets" / name).read_text(encoding="utf-8"))
-    return page.substitute(values, version=escape(own_version()))
+    version = own_version()
+    values |= {
+        name: escape(said.say(name.replace("_", "-")))
+        for name in page.get_identifiers()
+        if name.startswith("page_")
+    }
+    made_with = escape(said.say("page-made-with", version=version))
+    known = {"language": said.language, "version": escape(version), "made_with": made_with}
+    return page.substitute(values, **known)

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from chutelab.classroom.exercises import EXERCISES
+from chutelab.classroom.exercises.in_page import data_of
 from chutelab.pictures.live.page import LANGUAGES, joined
 
 LIVE = Path(__file__).parent / "live"
@@ -77,3 +79,12 @@ def test_every_word_in_the_catalogue_is_said():
         if f'"{word}"' not in said:
             assert family in families, word
             assert re.search(rf"\b{own.rpartition('.')[2]}\b", said), word
+
+
+def test_every_word_of_an_exercise_is_in_its_catalogue():
+    told = data_of(EXERCISES["the-bounce"])["words"]
+    for name in ("draw.js", "judging.js", "task.js", "exercise.js"):
+        text = (ASSETS / name).read_text(encoding="utf-8")
+        said = re.findall(r'\b(?:worded\((?:exercise, )?|its\()"([\w-]+)"', text)
+        assert said
+        assert set(said) <= set(told), name

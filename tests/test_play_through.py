@@ -106,7 +106,7 @@ def test_a_lesson_is_played_through(name, way, language, most, opened, tmp_path,
     said = words(language)
     _, cases = draw(EXERCISES[name], STUDENT)
     path = tmp_path / "page.html"
-    live_page(find(name), path, language=language)
+    live_page(find(name, language), path)
     page = opened(path, viewport={"width": 1366, "height": 900})
     page.evaluate(DONE)
     hand = {"mouse": Mouse, "keyboard": Keys}[way](page)

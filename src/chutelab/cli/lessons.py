@@ -15,7 +15,7 @@ from chutelab.cli.console import progress
 from chutelab.cli.output import check_file
 from chutelab.cli.parameters import FileName, Number, file_option, json_option, out_option
 from chutelab.cli.program import InOrder, RefusedError
-from chutelab.util.files import write_lines, writing
+from chutelab.util.files import whole, write_lines, writing
 
 if TYPE_CHECKING:
     from chutelab.classroom.grading import Grade
@@ -80,26 +80,61 @@ def list_lessons(as_json: bool) -> None:
     console.tell({"lessons": [_plain(one) for one in found]}, table, as_json=as_json)
 
 
-@lesson.command(short_help="Show one lesson, with its worksheet.")
-@click.argument("wanted", metavar="LESSON", type=FileName(), shell_complete=complete_lesson)
+@lesson.command(short_help="Show one lesson, or print its sheets.")
+@click.argument(
+    "wanted", metavar="[LESSON]", required=False, type=FileName(), shell_complete=complete_lesson
+)
 @click.option(
     "--sheet",
     type=click.Choice(["student", "teacher", "explanation"]),
-    help="Print one sheet to hand out, as Markdown: the student's (nothing of the answer on it),"
-    " the teacher's (key, mistakes, goals), or the explanation.",
+    help="One sheet to hand out: the student's (nothing of the answer on it), the teacher's (key,"
+    " mistakes, goals), or the explanation.",
 )
+@file_option(
+    "-o",
+    "--out",
+    text="Write the sheet into this file: its ending, .md, .html or .pdf, says what it is to be. Or"
+    " into a folder.",
+)
+@click.option(
+    "--format",
+    "kind",
+    type=click.Choice(["md", "html", "pdf"]),
+    help="Markdown, a web page in one file, or A4 to print (which needs the extra chutelab[pdf]);"
+    " default: as the file's name says, in a folder pdf.",
+)
+@click.option("--all", "every", is_flag=True, help="The sheet of every shipped lesson.")
 @language_option
 @json_option()
-def show(wanted: str, sheet: str | None, language: str, as_json: bool) -> None:
+def show(
+    wanted: str | None,
+    sheet: str | None,
+    out: Path | None,
+    kind: str | None,
+    every: bool,
+    language: str,
+    as_json: bool,
+) -> None:
     """Show one lesson: its question, scenes and quantities, its files, and the worksheet.
+
+    With --sheet it is one sheet; without -o it is printed, as Markdown in plain characters.
 
     \b
     chutelab lesson show 3
-    chutelab lesson show 3 --sheet student > student.md
+    chutelab lesson show 3 --sheet student -o sheet.pdf
+    chutelab lesson show --all --sheet teacher -o sheets/
     chutelab lesson show 3 --language de
-    chutelab lesson show the-bounce
     chutelab lesson show ./my-lesson
     """  # noqa: D301 - click wants the backspace
+    if (wanted is None) is not every:
+        raise RefusedError("name one LESSON, as in: chutelab lesson show 3; or give --all")
+    if sheet is not None or out is not None or kind is not None or every:
+        if as_json:
+            raise RefusedError("--sheet is a text, and --json is not: give one of them")
+        if sheet is None:
+            raise RefusedError("say which one: --sheet student, teacher or explanation")
+        _hand_out(_lessons((wanted,) if wanted else (), language), sheet, out, kind)
+        return
     from rich.markdown import Markdown
     from rich.text import Text
 
@@ -109,14 +144,7 @@ def show(wanted: str, sheet: str | None, language: str, as_json: bool) -> None:
     from chutelab.classroom.words import words
     from chutelab.util.tables import Sheet
 
-    found, say = find(wanted, language), words(language).say
-    if sheet is not None:
-        from chutelab.classroom.lessons.sheets import sheet as sheet_of
-
-        if as_json:
-            raise RefusedError("--sheet is Markdown, and --json is not: give one of them")
-        console.say(sheet_of(found, sheet), end="")
-        return
+    found, say = find(wanted or "", language), words(language).say
     if as_json:
         console.show_json({"format": 1, **_plain(found)})
         return
@@ -138,6 +166,34 @@ def show(wanted: str, sheet: str | None, language: str, as_json: bool) -> None:
         console.show(Sheet(say("show-quantities"), columns, rows, texts=3))
     console.show(Text(f"\n{say('show-files', folder=found.folder)}\n"))
     console.show(Markdown(plain_of(found.text("README")), hyperlinks=False))
+
+
+def _hand_out(lessons: list[Lesson], sheet: str, out: Path | None, kind: str | None) -> None:
+    """Print one sheet of each lesson, or write it into a file or a folder."""
+    from chutelab.classroom.lessons.printing import FORMATS, printed
+    from chutelab.classroom.lessons.texts import without_tex
+
+    if out is None:
+        if kind == "pdf" or len(lessons) > 1:
+            raise RefusedError("say where to: -o sheet.pdf, or a folder: -o sheets/")
+        made = printed(lessons[0], sheet, kind or "md").decode("utf-8")
+        console.say(made if kind else without_tex(made), end="")
+        return
+    ending = out.suffix.removeprefix(".").lower()
+    into = out.is_dir() or len(lessons) > 1 or not ending
+    if not into and ending not in FORMATS:
+        raise RefusedError(f"{out.name}: allowed are files that end in .md, .html or .pdf")
+    if not into and kind not in (None, ending):
+        raise RefusedError(f"{out.name} ends in .{ending}, and --format says {kind}")
+    how = kind or ("pdf" if into else ending)
+    with writing(instead="another place: -o"):
+        for one in lessons:
+            path = out / f"{one.folder.name}-{sheet}.{how}" if into else out
+            content = printed(one, sheet, how)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with whole(path) as unfinished:
+                unfinished.write_bytes(content)
+            console.say(f"wrote {path}")
 
 
 @lesson.command(short_help="Make the picture of each lesson that changed.")
@@ -205,7 +261,7 @@ def new(name: Path, model: str | None) -> None:
 
 @lesson.command(short_help="Bundle the lessons as web pages that need no server.")
 @lessons_argument
-@out_option("The folder; files that are there are replaced.", "-o", required=True)
+@out_option("The folder, or FILE.html; files that are there are replaced.", "-o", required=True)
 @language_option
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing, and show no progress bar.")
 def page(wanted: tuple[str, ...], out: Path, language: str, quiet: bool) -> None:
@@ -213,10 +269,23 @@ def page(wanted: tuple[str, ...], out: Path, language: str, quiet: bool) -> None
 
     index.html, and for each lesson its worksheet, animation, files, and a live page, which offers
     what [page.live] of lesson.toml says. All links are relative: the folder works from a memory
-    stick, from any static web server, and on a phone.
-    """
-    from chutelab.classroom.lessons.building import bundle
+    stick, from any static web server, and on a phone. A live page has the lesson's exercise in it,
+    with numbers of one's own, and saves what is to be handed in.
 
+    With one LESSON and a FOLDER that ends in .html, only that lesson's live page is written, into a
+    file of that name.
+    """
+    from chutelab.classroom.lessons.building import bundle, live_page
+
+    if out.suffix == ".html":
+        lessons = _lessons(wanted, language)
+        if len(lessons) != 1:
+            raise click.UsageError("a single page is of one lesson: name it, or a folder")
+        with writing(instead="another file"):
+            size = live_page(lessons[0], out)
+        if not quiet:
+            console.say(f"wrote {out}, {size / 1e3:.0f} kB")
+        return
     with writing(instead="another folder"), progress("making the pages", quiet=quiet) as update:
         made = bundle(_lessons(wanted, language), out, update)
     if not quiet:
@@ -279,7 +348,7 @@ def scorm(
             out.mkdir(parents=True, exist_ok=True)
         for i, one in enumerate(lessons, 1):
             target = out if is_file else out / f"{one.folder.name}.scorm.zip"
-            made = package(one, target, language=language)
+            made = package(one, target)
             if update is not None:
                 update(i / len(lessons))
             if not quiet:

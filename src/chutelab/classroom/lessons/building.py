@@ -25,6 +25,9 @@ from urllib.parse import quote
 
 from PIL.GifImagePlugin import GifImageFile
 
+from chutelab.classroom.exercises import EXERCISES
+from chutelab.classroom.exercises.catalogue import told
+from chutelab.classroom.exercises.in_page import data_of
 from chutelab.classroom.lessons.reading import Lesson, LessonError, read, scene_of, split, unusable
 from chutelab.classroom.lessons.texts import INDEX, html_of, words_for
 from chutelab.classroom.words import Words, words
@@ -293,11 +296,8 @@ def _lesson(lesson: Lesson, folder: Path, before: str, after: str) -> str:
     # What there is to play with, and to take along.
     doors = []
     if lesson.page is not None:
-        from chutelab.pictures.live.page import write
-
-        scene = scene_of(lesson, lesson.page.scene, lesson.page.settings)
         home = (say("page-back", title=lesson.title), INDEX)
-        write(scene, folder / LIVE, language=lesson.language, home=home)
+        live_page(lesson, folder / LIVE, home=home)
         doors.append(f'<li><a class="main" href="{LIVE}">{say("page-try")}</a></li>')
     if (folder / "exercise.ipynb").is_file():
         door = f'<li><a href="exercise.ipynb" download>{say("page-notebook")}</a></li>'
@@ -329,6 +329,39 @@ def _lesson(lesson: Lesson, folder: Path, before: str, after: str) -> str:
     )
     (folder / INDEX).write_text(page, encoding="utf-8")
     return _page("card.html", said, **facts)
+
+
+def live_page(lesson: Lesson, path: str | Path, home: tuple[str, str] | None = None) -> int:
+    """Write the live page of a lesson with its exercise, in its language; return the size in bytes.
+
+    Parameters
+    ----------
+    lesson
+        One with a table ``[page]``.
+    path
+        A file; one that is there is replaced.
+    home
+        Text and address of a link back.
+
+    Raises
+    ------
+    LessonError
+        If the lesson says of no page what it is to offer.
+    InputError
+        If its scene cannot be shown as a live page.
+    OSError
+        If the page cannot be written.
+    """
+    from chutelab.pictures.live.page import write
+
+    if lesson.page is None:
+        text = "is missing: what the lesson's page offers; an empty table offers everything"
+        raise LessonError(str(lesson.folder), [Fault("page", None, text)])
+    scene = scene_of(lesson, lesson.page.scene, lesson.page.settings)
+    exercise = None
+    if lesson.name in EXERCISES:
+        exercise = data_of(told(lesson.name, lesson.language), explain=lesson.question)
+    return write(scene, path, language=lesson.language, home=home, exercise=exercise)
 
 
 def heading(lesson: Lesson) -> str:

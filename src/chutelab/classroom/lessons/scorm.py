@@ -29,8 +29,8 @@ _EPOCH: Final = (1980, 1, 1, 0, 0, 0)
 """When all files in a package were made: the same lesson makes the same bytes."""
 
 
-def package(lesson: Lesson, path: str | Path, *, language: str = "en") -> Path:
-    """Write the SCORM 1.2 package of a lesson: a zip file, whole or not at all.
+def package(lesson: Lesson, path: str | Path) -> Path:
+    """Write the SCORM 1.2 package of a lesson, in its language: a zip file, whole or not at all.
 
     Raises
     ------
@@ -46,13 +46,13 @@ def package(lesson: Lesson, path: str | Path, *, language: str = "en") -> Path:
         # An XML name begins with a letter and has no spaces.
         "identifier": "chutelab-" + re.sub(r"[^A-Za-z0-9_.-]", "-", lesson.name),
         "title": printable(heading(lesson)),
-        "language": language,
+        "language": lesson.language,
         "page": LIVE,
-        "alone": escape(words(language).say("scorm-alone")),
+        "alone": escape(words(lesson.language).say("scorm-alone")),
     }
     with whole(path) as made:
         page = made.with_name(LIVE)
-        live_page(lesson, page, language=language)
+        live_page(lesson, page)
         with ZipFile(made, "w", ZIP_DEFLATED) as archive:
             for name in _FILES:
                 info = ZipInfo(name, _EPOCH)

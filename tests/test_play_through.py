@@ -19,9 +19,9 @@ from live.browser import DONE
 
 STUDENT = "Zoë O'Neil"
 NONSENSE = ["two metres", "", "  ", "NaN", "1/0", "2..5", "<b>1</b>", "9" * 400, "😀", "x = 3"]
-WRITTEN = "Die Platte nimmt ½ m v² (1 - ε²).\n<b>Not</b> g, \\ or \"it\"."
+WRITTEN = 'Die Platte nimmt ½ m v² (1 - ε²).\n<b>Not</b> g, \\ or "it".'
 
-QUICK = [("the-bounce", "mouse", "en", 2), ("the-parabola", "keyboard", "en", 2)]
+QUICK = [("the-bounce", "mouse", "en", 1), ("the-parabola", "keyboard", "en", 1)]
 WHOLE = [(name, way, "en", 99) for name in EXERCISES for way in ("mouse", "keyboard")]
 GERMAN = [("the-bounce", "mouse", "de", 99)]
 

@@ -1,11 +1,10 @@
-"""SCORM 1.2 packages: what is in them, and played through against a learning platform's stand-in."""
+"""SCORM 1.2 packages: their manifest, and lessons played through in a platform's stand-in."""
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
-from xml.etree import ElementTree
+from xml.etree import ElementTree as ET
 from zipfile import ZipFile
 
 import pytest
@@ -77,7 +76,7 @@ def check_structure(element):
 
 def check_manifest(xml, files):
     """What the schemas cannot say is right too: names are names, and lead to something."""
-    root = ElementTree.fromstring(xml)
+    root = ET.fromstring(xml)
     assert root.tag == f"{CP}manifest"
     check_structure(root)
     assert root.findtext(f"{CP}metadata/{CP}schema") == "ADL SCORM"
@@ -205,7 +204,7 @@ def platform(browser, tmp_path):
         files["/elsewhere"] = b"<!doctype html><title>Elsewhere</title>"
 
         def answer(route):
-            path = route.request.url.removeprefix("http://lms.test")
+            path = route.request.url.removeprefix("http://lms.test").partition("?")[0]
             found = files.get(path)
             if found is None:
                 said.append(path)
@@ -305,3 +304,36 @@ def test_a_lesson_is_left_resumed_and_completed_in_a_platform(platform, name):
     # None of what was asked of the platform was an error.
     assert calls[0][:2] == ["LMSInitialize", ""]
     assert {str(call[-1]) for call in calls} == {"0"}
+
+
+# Quotes and line ends are two characters each in JSON.
+LONG = 500 * 'ü\n"'
+
+
+def test_a_long_explanation_and_a_long_name_come_back(platform):
+    platform.start("the-bounce")
+    name = 100 * "Zoë "
+    page = platform(f"/?name={name}")
+    exercise_of(page).locator("#explain").fill(LONG)
+    page.goto("http://lms.test/elsewhere")
+    assert 3000 < len(kept(page)["suspend_data"]) <= 4096
+    page.close()
+    page = platform(f"/?name={name}")
+    assert exercise_of(page).locator("#explain").input_value() == LONG
+    assert {call[-1] for call in page.evaluate("calls")} == {"0"}
+
+
+def test_platforms_that_refuse_or_are_none_are_told_of(platform):
+    platform.start("the-bounce")
+    page = platform("/package/index.html")
+    alone = page.locator("#alone")
+    assert "No learning platform was found" in alone.inner_text()
+    frame = page.frame_locator("iframe")
+    frame.locator("#show-all").click()
+    frame.locator("#student").fill("Ada")
+    frame.locator("#begin").click()
+    assert check(frame, 1, answers_of("the-bounce", "Ada")["1"]) == "right"
+    page.close()
+    page = platform("/?refuses")
+    frame = page.frame_locator("iframe")
+    frame.locator("#alone").wait_for()

@@ -307,9 +307,7 @@ def page(wanted: tuple[str, ...], out: Path, language: str, quiet: bool) -> None
 )
 @language_option
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing, and show no progress bar.")
-def scorm(
-    wanted: tuple[str, ...], everything: bool, out: Path, language: str, quiet: bool
-) -> None:
+def scorm(wanted: tuple[str, ...], everything: bool, out: Path, language: str, quiet: bool) -> None:
     """Make a SCORM 1.2 package of each LESSON: its live page with its exercise, for a course.
 
     The platform tells the page each student's name, from which the numbers are drawn, and keeps the

@@ -5,6 +5,7 @@
 - `texts`: a lesson's Markdown as HTML and for a terminal, its formulas too.
 - `sheets`: the student's sheet, the teacher's and the explanation.
 - `building`: ``lesson.gif``, a new lesson from a template, all lessons as web pages.
+- `scorm`: a lesson's live page as a package for learning platforms.
 
 A lesson is a folder ``NN-name`` with ``lesson.toml``, the worksheet ``README.md``, the explanation
 ``explanation.md``, the film ``lesson.gif``, and the notebook ``exercise.ipynb``; scene files of its

@@ -307,7 +307,7 @@ def test_a_lesson_is_left_resumed_and_completed_in_a_platform(platform, name):
 
 
 # Quotes and line ends are two characters each in JSON.
-LONG = 500 * 'ü\n"'
+LONG = "ü" + 749 * '\n"'
 
 
 def test_a_long_explanation_and_a_long_name_come_back(platform):

@@ -196,7 +196,7 @@ def _hand_out(lessons: list[Lesson], sheet: str, out: Path | None, kind: str | N
             console.say(f"wrote {path}")
 
 
-@lesson.command(short_help="Make the picture of each lesson that changed.")
+@lesson.command(short_help="Make film and notebook of each lesson that changed.")
 @lessons_argument
 @out_option(
     "Write each picture into a folder NN-name in here, not into the lesson's own: for an"
@@ -205,14 +205,16 @@ def _hand_out(lessons: list[Lesson], sheet: str, out: Path | None, kind: str | N
 @click.option("--force", is_flag=True, help="Make them anew, changed or not.")
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing, and show no progress bar.")
 def build(wanted: tuple[str, ...], out: Path | None, force: bool, quiet: bool) -> None:
-    """Make lesson.gif of each LESSON (without one: of all that are shipped), where it changed.
+    """Make lesson.gif and exercise.ipynb of each LESSON (default: all shipped), where they changed.
+
+    The notebook is made of README.md (Predict, Run, Compare), notebook.py and the exercise.
 
     A picture is up to date if it was made from the same scene and settings with the same versions
     of chutelab, numpy, pymunk, matplotlib and pillow; the GIF says so in a comment. The same makes
     the same bytes.
     """
     from chutelab.classroom.lessons.building import build as build_lesson
-    from chutelab.classroom.lessons.building import check_inside
+    from chutelab.classroom.lessons.building import build_notebook, check_inside
 
     for one in _lessons(wanted):
         with (
@@ -222,10 +224,12 @@ def build(wanted: tuple[str, ...], out: Path | None, force: bool, quiet: bool) -
             target = out / one.folder.name if out else None
             if target is not None:
                 check_inside(target)
-            built = build_lesson(one, target, force=force, progress=update)
-        if not quiet:
-            done = "written" if built.made else "up to date"
-            console.say(f"{built.path}: {done}, {built.size / 1000:.0f} kB")
+            film = build_lesson(one, target, force=force, progress=update)
+            notebook = build_notebook(one, target)
+        for built in (film, notebook):
+            if built is not None and not quiet:
+                done = "written" if built.made else "up to date"
+                console.say(f"{built.path}: {done}, {built.size / 1000:.0f} kB")
 
 
 @lesson.command(short_help="Start a lesson of your own.")

@@ -199,4 +199,6 @@ function drawnFor(exercise, student) {
   throw new Error(`${exercise.name}: no draw fits`);
 }
 
-export { Case, DrawnNumbers, STANDARD_GRAVITY, TOLERANCE, drawnFor, plainName, shownNumber, worded };
+export {
+  Case, DrawnNumbers, STANDARD_GRAVITY, TOLERANCE, drawnFor, plainName, shownNumber, worded,
+};

@@ -10,6 +10,7 @@
 - `wheel`: the package itself, for those who get the pages.
 - `building`: ``lesson.gif``, ``exercise.ipynb``, a new lesson from a template, all lessons as web
   pages.
+- `scorm`: a lesson's live page as a package for learning platforms.
 
 A lesson is a folder ``NN-name`` with ``lesson.toml``, the worksheet ``README.md``, the explanation
 ``explanation.md``, the film ``lesson.gif``, and the notebook ``exercise.ipynb``; scene files of its

@@ -349,7 +349,7 @@ def _lesson(lesson: Lesson, folder: Path, before: str, after: str, *, wheel: boo
     note = f"<p><em>{say('untranslated')}</em></p>\n" if lesson.untranslated else ""
     facts = {
         "folder": _address(lesson.folder.name),
-        "title": _heading(lesson),
+        "title": heading(lesson),
         "question": escape(lesson.question),
         "about": say("show-about", level=say(f"level-{lesson.level}"), minutes=lesson.minutes),
         "width": str(width),
@@ -403,12 +403,13 @@ def live_page(lesson: Lesson, path: str | Path, home: tuple[str, str] | None = N
     return write(scene, path, language=lesson.language, home=home, exercise=exercise)
 
 
-def _heading(lesson: Lesson) -> str:
+def heading(lesson: Lesson) -> str:
+    """Return number and title of a lesson, as HTML."""
     return escape(lesson.title if lesson.number is None else f"{lesson.number}. {lesson.title}")
 
 
 def _link(lesson: Lesson, relation: str, form: str) -> str:
-    text = form.format(_heading(lesson))
+    text = form.format(heading(lesson))
     return f'<a rel="{relation}" href="../{_address(lesson.folder.name, INDEX)}">{text}</a>'
 
 

@@ -110,15 +110,10 @@ def test_what_is_written_in_words_is_collected(tmp_path):
     checked = f"task.check(1, {given.e * given.v0})"
     path = saved(tmp_path, "words.ipynb", OPEN.format("Ada"), checked)
     found = json.loads(path.read_text(encoding="utf-8"))
-    shipped_words = next(
-        one for one in shipped("the-bounce")["cells"] if one["id"] == "explanation"
-    )
-    for added, words in (
-        ([], {}),
-        (["\nA smooth plate ", "only pushes."], {"explain": "A smooth plate only pushes."}),
-    ):
-        cell = {**shipped_words, "source": [*shipped_words["source"], *added]}
-        path.write_text(json.dumps({**found, "cells": [*found["cells"], cell]}), encoding="utf-8")
+    (cell,) = [one for one in shipped("the-bounce")["cells"] if one["id"] == "explanation"]
+    for added, words in (([], {}), (["\nIt only ", "pushes."], {"explain": "It only pushes."})):
+        written = {**cell, "source": [*cell["source"], *added]}
+        path.write_text(json.dumps({**found, "cells": [*found["cells"], written]}))
         (row,) = grade([path])
         assert row.words == words
         assert row.mistakes == {1: "sign or direction"}

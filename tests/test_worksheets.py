@@ -327,9 +327,9 @@ STATED = {
     0: {
         "the height has ε = {0.71}": sqrt(0.5),
         "in all: {4.06} s for": sqrt(2.0 / G) * 1.8 / 0.2,
-        "at a quarter, {2.45} m/s²": G / 4.0,
-        "tell ε to ± {0.002};": 0.4 * MARK * hypot(1.0 / 0.64, 1.0 / 0.64**2),
-        "to a frame, to ± {0.03}": FRAME / 0.8 / sqrt(8.0 / G) * sqrt(1.0 + 1.8**2 + 0.8**2),
+        "a quarter of the truth, {2.45} m/s²": G / 4.0,
+        "give ε to ± {0.002};": 0.4 * MARK * hypot(1.0 / 0.64, 1.0 / 0.64**2),
+        "the nearest frame, to ± {0.03}": FRAME / 0.8 / sqrt(8.0 / G) * sqrt(1.0 + 1.8**2 + 0.8**2),
         "it comes out {5} % too large": 100.0 * (1.05 - 1.0),
     },
     1: {
@@ -337,7 +337,7 @@ STATED = {
         "{0.808} m at 2 m/s": 2.0 * FALL,
         "{1.615} m at 4 m/s": 4.0 * FALL,
         "g t = {3.96} m/s": G * FALL,
-        "makes that {4.44} m/s": hypot(2.0, G * FALL),
+        "that makes {4.44} m/s": hypot(2.0, G * FALL),
         "here {63.2}°": degrees(atan(G * FALL / 2.0)),
         "the fall takes {0.994} s": sqrt(2.0 * 0.8 / 1.62),
     },
@@ -351,7 +351,7 @@ STATED = {
         "negative, {-0.0217} J": 0.008 * (1.5**2 - G * RC),
     },
     3: {
-        "energy of {16} mJ": 500.0 * 0.008 * 4.0,
+        "the particle had {16} mJ": 500.0 * 0.008 * 4.0,
         "(1 - ε²) = {12} mJ": 500.0 * 0.008 * 4.0 * 0.75,
         "you found {0.146},": B1[2][2],
         "0.146, {0.138} and": B2[2][2],
@@ -392,8 +392,8 @@ STATED = {
         "8.0 mJ and {0.8} mJ": belt(2.0, plate(60)[1])[1],
         "forward there, with {0.29} m/s": plate(20, 0.0, v=1.0)[1],
         "20 mm, with {0.07} m/s": plate(20, 0.02, v=1.0)[1],
-        "It turns at {17.9}°": leaving_at(0.0, 0.02, v=1.0),
-        "the point at {14.2}°": leaving_at(0.0, 0.0, v=1.0),
+        "direction changes at {17.9}°": leaving_at(0.0, 0.02, v=1.0),
+        "the point's at {14.2}°": leaving_at(0.0, 0.0, v=1.0),
         "so from tan α = v0² / (2 g d1) on, {59.5}° at": degrees(atan(4.0 / (2.0 * G * 0.12))),
         "touches up to {66.1}°": matching(BALL, 0.12),
     },
@@ -404,9 +404,9 @@ STATED = {
         "work {16} mJ": belt(1.0)[0],
         "heat {16} mJ": belt(1.0)[1],
         "(µ g) = {3.06} s": 3.0 / (0.1 * G),
-        "with {4.28} m/s downward": DOWN,
+        "at {4.28} m/s downward": DOWN,
         "times {4.28} m/s at once": DOWN,
-        "left takes {2.62} s": (3.0 / 0.1 - DOWN) / G,
+        "The rest takes {2.62} s": (3.0 / 0.1 - DOWN) / G,
         "it takes {0.58} s": (3.0 / 0.3 - DOWN) / G,
         "second that is {9.6} W": 0.008 * 200.0 * 2.0 * 3.0,
         "it {20} mJ a particle": 500.0 * 0.008 * (1.0 + 4.0),
@@ -451,7 +451,7 @@ STATED = {
         "makes it {-4.4} mJ": belt(1.0, plate(60)[1])[0],
         "it is zero at {47.83}°": leaving_at(1.0),
         "and {1.2} mJ at 60°": belt(1.0, plate(60)[1])[1],
-        "one plate in {3} stands": 1.0 / erfc(sqrt(0.5)),
+        "one plate in {3} is": 1.0 / erfc(sqrt(0.5)),
         "It is least, {16} mJ": 500.0 * 0.008 * 4.0,
     },
     "physics": {
@@ -675,8 +675,8 @@ KEYS = {
     "4.28 = {0.70}": 3.0 / DOWN,
     "of them: at {23.2}°": degrees(slipping(0.5, U0)[0]),
     "{16} mm, twice its diameter": 4e3 * 0.004,
-    "two keys: {44.4}°": TWO_KEYS[0],
-    "ε = {0.276} land": TWO_KEYS[1],
+    "keys: at {44.4}°": TWO_KEYS[0],
+    "ε = {0.276} the particle lands": TWO_KEYS[1],
 }
 
 

@@ -269,12 +269,11 @@ class ExercisePanel {
     const { progress, result } = task, { done, total } = progress;
     this.count.textContent = words.say("exercise-count", { done, total });
     const suspended = JSON.stringify(result);
-    if (this.isHosted || parent !== window) {
-      parent.postMessage({
-        chutelab: "progress", ...progress, suspend_data: suspended, result,
-      }, "*");
+    if (this.isHosted) {
+      const news = { chutelab: "progress", ...progress, suspend_data: suspended, result };
+      parent.postMessage(news, "*");
+      return;
     }
-    if (this.isHosted) return;
     try {
       kept()?.setItem("chutelab/student", task.student);
       kept()?.setItem(this.placeOf(task.student), suspended);

@@ -238,6 +238,7 @@ def answers_of(name, student=ADA):
 def exercise_of(page):
     """The lesson's page, in a frame of a frame, once it has begun."""
     frame = page.frame_locator("iframe").frame_locator("iframe")
+    frame.locator("#show-all").click()
     frame.locator(".question").first.wait_for()
     return frame
 

@@ -50,7 +50,7 @@ def test_worksheet_and_notebook_ask_the_same(lesson):
     opening = re.search(r"^# .*?\n(.*?)^## ", text, re.MULTILINE | re.DOTALL)[1]
     assert words_of(opening) in words_of(cells["title"])
     assert "In a terminal" not in " ".join(cells.values())
-    assert "Write the decimal point, 0.05" in cells["questions-text"]
+    assert "Write a decimal point, 0.05" in cells["questions-text"]
 
 
 @pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.name)

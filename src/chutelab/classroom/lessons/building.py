@@ -38,6 +38,9 @@ from chutelab.util.versions import own_version, version_of
 
 _HERE: Final = Path(__file__).parent
 PICTURE: Final = "lesson.gif"
+MACHINE: Final = "machine.png"
+"""The film, and the machine before anything has happened."""
+
 MOST_PIXELS: Final = 3840 * 2160
 """Of a picture, as `Picture` in `reading` has it."""
 
@@ -61,7 +64,7 @@ def build(
     force: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> Built:
-    """Make the picture of a lesson, unless it is there already, made from the same.
+    """Make film and machine picture of a lesson, unless they are there, made from the same.
 
     The same lesson and versions give the same bytes.
 
@@ -84,9 +87,10 @@ def build(
     path = (lesson.folder if folder is None else folder) / PICTURE
     lesson = _in_english(lesson)
     wanted = stamp_of(lesson)
-    made = force or comment_of(path) != wanted
+    machine = path.with_name(MACHINE)
+    made = force or comment_of(path) != wanted or not machine.is_file()
     if made:
-        from chutelab.pictures.animation import animate
+        from chutelab.pictures.animation import animate, still
 
         with aside(path.parent, path):
             refuse_other(path)
@@ -94,7 +98,8 @@ def build(
         recording = simulate(scene, progress=progress)
         settings = lesson.picture.model_dump(exclude={"scene", "set"})
         path.parent.mkdir(parents=True, exist_ok=True)
-        animate(recording, path, question=lesson.question, comment=wanted, **settings)
+        animate(recording, path, question=lesson.question, predict=True, comment=wanted, **settings)
+        still(recording, machine, width=lesson.picture.width, height=lesson.picture.height)
     return Built(path, path.stat().st_size, made)
 
 
@@ -121,7 +126,7 @@ def stamp_of(lesson: Lesson) -> str:
         scene.pop(table, None)
     # Without defaults: they belong to the version.
     settings = lesson.picture.model_dump(exclude_unset=True, exclude={"scene", "set"})
-    inputs = {"scene": scene, "picture": settings, "question": lesson.question}
+    inputs = {"scene": scene, "picture": settings, "question": lesson.question, "predict": True}
     text = json.dumps(inputs, sort_keys=True, ensure_ascii=True)
     digest = hashlib.sha256(text.encode("ascii")).hexdigest()[:32]
     versions = ", ".join(f"{name} {version_of(name) or 'unknown'}" for name in LIBRARIES)

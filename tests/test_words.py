@@ -51,9 +51,10 @@ def test_every_sentence_of_the_catalogue_is_said_somewhere():
     sources += [*(package / "pictures" / "live").rglob("*.js"), package / "cli" / "lessons.py"]
     code = "\n".join(path.read_text(encoding="utf-8") for path in sources)
     said = set(re.findall(r"""["'`]([\w-]+)["'`]""", code))
-    # What is put together from a verdict, a unit, or for whom a lesson is.
+    # What is put together from a verdict, a unit, or for whom a lesson or a sheet is.
     built = {f"verdict-{one.name.lower()}" for one in Verdict} | {"unit-degrees"}
     built |= {"level-start", "level-core", "level-advanced"}
+    built |= {"sheet-kind-student", "sheet-kind-teacher", "sheet-kind-explanation"}
     pages = "\n".join(path.read_text(encoding="utf-8") for path in CLASSROOM.rglob("*.html"))
     said |= {name.replace("_", "-") for name in re.findall(r"\$(page_\w+)", pages)}
     unused = catalogue("en").keys() - said

@@ -263,14 +263,16 @@ def new(name: Path, model: str | None) -> None:
 @lessons_argument
 @out_option("The folder, or FILE.html; files that are there are replaced.", "-o", required=True)
 @language_option
+@click.option("--wheel/--no-wheel", default=True, help="With what students install, or without.")
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing, and show no progress bar.")
-def page(wanted: tuple[str, ...], out: Path, language: str, quiet: bool) -> None:
+def page(wanted: tuple[str, ...], out: Path, language: str, wheel: bool, quiet: bool) -> None:
     """Bundle lessons (without LESSON: all that are shipped) into a folder of web pages.
 
     index.html, and for each lesson its worksheet, animation, files, and a live page, which offers
     what [page.live] of lesson.toml says. All links are relative: the folder works from a memory
     stick, from any static web server, and on a phone. A live page has the lesson's exercise in it,
-    with numbers of one's own, and saves what is to be handed in.
+    with numbers of one's own, and saves what is to be handed in. The wheel of this chutelab is
+    beside them, and index.html says how to install it, for the notebooks.
 
     With one LESSON and a FOLDER that ends in .html, only that lesson's live page is written, into a
     file of that name.
@@ -287,7 +289,7 @@ def page(wanted: tuple[str, ...], out: Path, language: str, quiet: bool) -> None
             console.say(f"wrote {out}, {size / 1e3:.0f} kB")
         return
     with writing(instead="another folder"), progress("making the pages", quiet=quiet) as update:
-        made = bundle(_lessons(wanted, language), out, update)
+        made = bundle(_lessons(wanted, language), out, update, wheel=wheel)
     if not quiet:
         size = sum(path.stat().st_size for path in made)
         console.say(f"wrote {len(made)} files, {size / 1e6:.1f} MB; open {out / 'index.html'}")

@@ -30,6 +30,7 @@ from chutelab.classroom.exercises.catalogue import told
 from chutelab.classroom.exercises.in_page import data_of
 from chutelab.classroom.lessons.reading import Lesson, LessonError, read, scene_of, split, unusable
 from chutelab.classroom.lessons.texts import INDEX, html_of, words_for
+from chutelab.classroom.lessons.wheel import write_wheel
 from chutelab.classroom.words import Words, words
 from chutelab.engines.simulation import simulate
 from chutelab.scene import Fault, to_dict
@@ -210,6 +211,8 @@ def bundle(
     lessons: Sequence[Lesson],
     folder: str | Path,
     progress: Callable[[float], None] | None = None,
+    *,
+    wheel: bool = True,
 ) -> list[Path]:
     """Write web pages into a folder: an index of the lessons, and a folder with a page for each.
 
@@ -223,6 +226,8 @@ def bundle(
         Made if need be.
     progress
         Called with the share that is done, 0 to 1.
+    wheel
+        Put the wheel of this chutelab in, and how to install from it.
 
     Returns
     -------
@@ -233,6 +238,8 @@ def bundle(
     ------
     InputError
         If a lesson's scene cannot be run, or shown as a live page.
+    MissingLibraryError
+        If chutelab is not installed, so that there is no wheel.
     OSError
         If it cannot be written.
     """
@@ -248,12 +255,15 @@ def bundle(
         for i, lesson in enumerate(lessons):
             before = _link(lessons[i - 1], "prev", "← {}") if i > 0 else ""
             after = _link(lessons[i + 1], "next", "{} →") if i + 1 < len(lessons) else ""
-            cards += _lesson(lesson, made / lesson.folder.name, before, after)
+            cards += _lesson(lesson, made / lesson.folder.name, before, after, wheel=wheel)
             if progress is not None:
                 progress((i + 1) / len(lessons))
         said = words(lessons[0].language if lessons else "en")
         key = "page-count-one" if len(lessons) == 1 else "page-count"
         values = {"cards": cards, "count": said.say(key, count=len(lessons))}
+        values["install"] = (
+            _page("install.html", said, wheel=write_wheel(made).name) if wheel else ""
+        )
         (made / INDEX).write_text(_page("index.html", said, **values), encoding="utf-8")
         for name in _SHARED:
             shutil.copyfile(_HERE / "assets" / name, made / name)
@@ -284,7 +294,7 @@ def _address(*names: str) -> str:
     return "/".join(quote(os.fsencode(name)) for name in names)
 
 
-def _lesson(lesson: Lesson, folder: Path, before: str, after: str) -> str:
+def _lesson(lesson: Lesson, folder: Path, before: str, after: str, *, wheel: bool) -> str:
     """Make the folder of one lesson, with links to its neighbours; return its card."""
     folder.mkdir()
     for file in files_of(lesson):
@@ -307,6 +317,8 @@ def _lesson(lesson: Lesson, folder: Path, before: str, after: str) -> str:
     if (folder / "exercise.ipynb").is_file():
         door = f'<li><a href="exercise.ipynb" download>{say("page-notebook")}</a></li>'
         doors.append(door)
+        if wheel:
+            doors.append(f'<li><a href="../{INDEX}#get">{say("page-get-door")}</a></li>')
     for name in lesson.scenes:
         if (folder / name).is_file():
             scene_door = escape(say("page-scene", name=name))

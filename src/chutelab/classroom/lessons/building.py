@@ -13,9 +13,11 @@ import os
 import re
 import shutil
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from errno import ELOOP, ENOTDIR
 from html import escape
+from importlib.util import find_spec
 from io import BytesIO
 from math import prod
 from pathlib import Path
@@ -28,6 +30,7 @@ from PIL.GifImagePlugin import GifImageFile
 from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises.catalogue import told
 from chutelab.classroom.exercises.in_page import data_of
+from chutelab.classroom.lessons.printing import printed
 from chutelab.classroom.lessons.reading import Lesson, LessonError, read, scene_of, split, unusable
 from chutelab.classroom.lessons.texts import INDEX, html_of, words_for
 from chutelab.classroom.lessons.wheel import write_wheel
@@ -203,7 +206,14 @@ def files_of(lesson: Lesson) -> list[Path]:
 
 
 LIVE: Final = "page.html"
+EXPLANATION: Final = "explanation.html"
 STILL: Final = "still.png"
+END: Final = "end.png"
+"""The first picture of the film, and the last one: the answer is in it."""
+
+_NOT_GIVEN: Final = re.compile(r"lesson(\..+)?\.toml")
+"""The key for the teacher is in it."""
+
 _SHARED: Final = ("style.css", "picture.js")
 
 
@@ -298,22 +308,30 @@ def _lesson(lesson: Lesson, folder: Path, before: str, after: str, *, wheel: boo
     """Make the folder of one lesson, with links to its neighbours; return its card."""
     folder.mkdir()
     for file in files_of(lesson):
-        shutil.copyfile(file, folder / file.name)
+        if not _NOT_GIVEN.fullmatch(file.name):
+            shutil.copyfile(file, folder / file.name)
     if not is_current(lesson):
         build(lesson, folder, force=True)
     with GifImageFile(folder / PICTURE) as film:
-        # On the last frame everything has happened.
-        film.seek(film.n_frames - 1)
-        film.convert("RGB").quantize(255).save(folder / STILL, optimize=True)
+        for name, index in ((STILL, 0), (END, film.n_frames - 1)):
+            film.seek(index)
+            shown = film.convert("RGB").quantize(255)
+            shown.info.pop("transparency", None)
+            shown.save(folder / name, optimize=True)
         width, height = film.size
     said = words(lesson.language)
     say = said.say
+    worksheet, explanation = lesson.text("README"), lesson.text("explanation")
     # What there is to play with, and to take along.
     doors = []
     if lesson.page is not None:
         home = (say("page-back", title=lesson.title), INDEX)
         live_page(lesson, folder / LIVE, home=home)
         doors.append(f'<li><a class="main" href="{LIVE}">{say("page-try")}</a></li>')
+    kind = "pdf" if find_spec("typst") else "html"
+    with suppress(LessonError):  # a worksheet of other parts is on the page alone
+        (folder / f"worksheet.{kind}").write_bytes(printed(lesson, "student", kind))
+        doors.append(f'<li><a href="worksheet.{kind}">{say("page-print")}</a></li>')
     if (folder / "exercise.ipynb").is_file():
         door = f'<li><a href="exercise.ipynb" download>{say("page-notebook")}</a></li>'
         doors.append(door)
@@ -323,7 +341,6 @@ def _lesson(lesson: Lesson, folder: Path, before: str, after: str, *, wheel: boo
         if (folder / name).is_file():
             scene_door = escape(say("page-scene", name=name))
             doors.append(f'<li><a href="{_address(name)}" download>{scene_door}</a></li>')
-    worksheet, explanation = lesson.text("README"), lesson.text("explanation")
     note = f"<p><em>{say('untranslated')}</em></p>\n" if lesson.untranslated else ""
     facts = {
         "folder": _address(lesson.folder.name),
@@ -337,14 +354,22 @@ def _lesson(lesson: Lesson, folder: Path, before: str, after: str, *, wheel: boo
         "lesson.html",
         said,
         **facts,
-        alt=escape(words_for(PICTURE, explanation) or lesson.title),
+        alt=escape(words_for(MACHINE, worksheet) or lesson.title),
         worksheet=note + html_of(worksheet),
-        explanation=html_of(explanation),
         doors="\n".join(doors),
         before=before,
         after=after,
     )
     (folder / INDEX).write_text(page, encoding="utf-8")
+    page = _page(
+        "explanation.html",
+        said,
+        **facts,
+        alt=escape(words_for(PICTURE, explanation) or lesson.title),
+        explanation=html_of(explanation),
+        back=escape(say("page-back", title=lesson.title)),
+    )
+    (folder / EXPLANATION).write_text(page, encoding="utf-8")
     return _page("card.html", said, **facts)
 
 

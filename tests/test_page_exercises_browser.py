@@ -147,6 +147,7 @@ def test_a_page_around_it_says_who_it_is_and_hears_what_becomes_of_it(opened, tm
         assert told == {
             "chutelab": "progress", "lesson": "the-bounce", "student": "Lovelace, Ada",
             "done": done, "total": 4, "score": 25 * done, "status": "incomplete",
+            "verdicts": {str(n): "right" if n <= done else "blank" for n in range(1, 5)},
         }  # fmt: skip
         suspended = heard[-1]["suspend_data"]
         assert len(suspended) < 4000

@@ -327,9 +327,9 @@ STATED = {
     0: {
         "the height has ε = {0.71}": sqrt(0.5),
         "in all: {4.06} s for": sqrt(2.0 / G) * 1.8 / 0.2,
-        "at a quarter, {2.45} m/s²": G / 4.0,
-        "tell ε to ± {0.002};": 0.4 * MARK * hypot(1.0 / 0.64, 1.0 / 0.64**2),
-        "to a frame, to ± {0.03}": FRAME / 0.8 / sqrt(8.0 / G) * sqrt(1.0 + 1.8**2 + 0.8**2),
+        "a quarter of the truth, {2.45} m/s²": G / 4.0,
+        "give ε to ± {0.002};": 0.4 * MARK * hypot(1.0 / 0.64, 1.0 / 0.64**2),
+        "the nearest frame, to ± {0.03}": FRAME / 0.8 / sqrt(8.0 / G) * sqrt(1.0 + 1.8**2 + 0.8**2),
         "it comes out {5} % too large": 100.0 * (1.05 - 1.0),
     },
     1: {

@@ -52,7 +52,7 @@ language_option = click.option(
 
 @click.group(
     cls=InOrder,
-    short_help="Lessons: list, show, build, start, grade, bundle.",
+    short_help="Lessons: list, show, build, start, grade, bundle, package.",
     epilog="Begin with: chutelab lesson list, then: chutelab lesson show 1",
 )
 def lesson() -> None:
@@ -196,7 +196,7 @@ def _hand_out(lessons: list[Lesson], sheet: str, out: Path | None, kind: str | N
             console.say(f"wrote {path}")
 
 
-@lesson.command(short_help="Make the picture of each lesson that changed.")
+@lesson.command(short_help="Make film and notebook of each lesson that changed.")
 @lessons_argument
 @out_option(
     "Write each picture into a folder NN-name in here, not into the lesson's own: for an"
@@ -205,14 +205,16 @@ def _hand_out(lessons: list[Lesson], sheet: str, out: Path | None, kind: str | N
 @click.option("--force", is_flag=True, help="Make them anew, changed or not.")
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing, and show no progress bar.")
 def build(wanted: tuple[str, ...], out: Path | None, force: bool, quiet: bool) -> None:
-    """Make lesson.gif of each LESSON (without one: of all that are shipped), where it changed.
+    """Make lesson.gif and exercise.ipynb of each LESSON (default: all shipped), where they changed.
+
+    The notebook is made of README.md (Predict, Run, Compare), notebook.py and the exercise.
 
     A picture is up to date if it was made from the same scene and settings with the same versions
     of chutelab, numpy, pymunk, matplotlib and pillow; the GIF says so in a comment. The same makes
     the same bytes.
     """
     from chutelab.classroom.lessons.building import build as build_lesson
-    from chutelab.classroom.lessons.building import check_inside
+    from chutelab.classroom.lessons.building import build_notebook, check_inside
 
     for one in _lessons(wanted):
         with (
@@ -222,10 +224,12 @@ def build(wanted: tuple[str, ...], out: Path | None, force: bool, quiet: bool) -
             target = out / one.folder.name if out else None
             if target is not None:
                 check_inside(target)
-            built = build_lesson(one, target, force=force, progress=update)
-        if not quiet:
-            done = "written" if built.made else "up to date"
-            console.say(f"{built.path}: {done}, {built.size / 1000:.0f} kB")
+            film = build_lesson(one, target, force=force, progress=update)
+            notebook = build_notebook(one, target)
+        for built in (film, notebook):
+            if built is not None and not quiet:
+                done = "written" if built.made else "up to date"
+                console.say(f"{built.path}: {done}, {built.size / 1000:.0f} kB")
 
 
 @lesson.command(short_help="Start a lesson of your own.")
@@ -293,6 +297,66 @@ def page(wanted: tuple[str, ...], out: Path, language: str, wheel: bool, quiet: 
     if not quiet:
         size = sum(path.stat().st_size for path in made)
         console.say(f"wrote {len(made)} files, {size / 1e6:.1f} MB; open {out / 'index.html'}")
+
+
+@lesson.command(short_help="Package lessons for a learning platform (SCORM 1.2).")
+@lessons_argument
+@click.option("--all", "everything", is_flag=True, help="All lessons that are shipped.")
+@click.option(
+    "--out",
+    "-o",
+    metavar="DIR|FILE.zip",
+    type=FileName(path_type=Path),
+    default=Path(),
+    help="The folder for the packages, NN-name.scorm.zip each, by default this one; or, for one"
+    " lesson, the zip file itself. Files that are there are replaced.",
+)
+@language_option
+@click.option("--quiet", "-q", is_flag=True, help="Print nothing, and show no progress bar.")
+def scorm(wanted: tuple[str, ...], everything: bool, out: Path, language: str, quiet: bool) -> None:
+    """Make a SCORM 1.2 package of each LESSON: its live page with its exercise, for a course.
+
+    The platform tells the page each student's name, from which the numbers are drawn, and keeps the
+    score (0 to 100, a share of right answers), whether the lesson is completed (every question is
+    right, or its working was shown), each answer, the time, and where to go on next time. The page
+    asks for nothing from the network; students install nothing.
+
+    \b
+    Moodle  "Add an activity", "SCORM package", and the zip into "Package file".
+            Appearance: "New window" gives it room. Grade: "Highest grade", maximum 100.
+            Attempts: "Force new attempt" stays "No", so that students go on where they
+            were. Results: "Reports" of the activity.
+    ILIAS   "Add New Item", "Learning Module SCORM", and the zip. Settings: online.
+            Results: "Learning Progress" and "Tracking Data" of the module.
+    others  Import it as SCORM 1.2.
+
+    If no platform is found, as when index.html is opened from a folder, a line on the page says so;
+    students then hand in the result file for `chutelab lesson grade`. A score from a browser can be
+    forged, as on every platform: use it to see where a class stands, not as an exam.
+
+    \b
+    chutelab lesson scorm 3
+    chutelab lesson scorm 1 2 3 --language de -o packages/
+    chutelab lesson scorm --all -o packages/
+    """  # noqa: D301 - click wants the backspace
+    from chutelab.classroom.lessons.scorm import package
+
+    if everything == bool(wanted):
+        raise RefusedError("give lessons, such as: chutelab lesson scorm 3; or --all")
+    lessons = _lessons(wanted, language)
+    is_file = out.suffix.lower() == ".zip"
+    if is_file and len(lessons) > 1:
+        raise RefusedError(f"--out {out}: {len(lessons)} lessons go into a folder, not one zip")
+    with writing(instead="another place"), progress("packaging", quiet=quiet) as update:
+        if not is_file:
+            out.mkdir(parents=True, exist_ok=True)
+        for i, one in enumerate(lessons, 1):
+            target = out if is_file else out / f"{one.folder.name}.scorm.zip"
+            made = package(one, target)
+            if update is not None:
+                update(i / len(lessons))
+            if not quiet:
+                console.say(f"wrote {made}, {made.stat().st_size / 1000:.0f} kB")
 
 
 def _lessons(wanted: tuple[str, ...], language: str = "en") -> list[Lesson]:

@@ -1,4 +1,4 @@
-"""What is made of lessons: their pictures, new lessons, and all of them as web pages.
+"""What is made of lessons: films and notebooks, new lessons, and all of them as web pages.
 
 ``lesson.gif`` is made anew only if what it is made from has changed; the stamp that tells is kept
 in a comment of the GIF itself. A new lesson comes from the template or is a copy of another: it
@@ -30,6 +30,7 @@ from PIL.GifImagePlugin import GifImageFile
 from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises.catalogue import told
 from chutelab.classroom.exercises.in_page import data_of
+from chutelab.classroom.lessons.cells import NOTEBOOK, notebook_of
 from chutelab.classroom.lessons.printing import printed
 from chutelab.classroom.lessons.reading import Lesson, LessonError, read, scene_of, split, unusable
 from chutelab.classroom.lessons.texts import INDEX, html_of, words_for
@@ -37,7 +38,7 @@ from chutelab.classroom.lessons.wheel import write_wheel
 from chutelab.classroom.words import Words, words
 from chutelab.engines.simulation import simulate
 from chutelab.scene import Fault, to_dict
-from chutelab.util.files import aside, refuse_other, together
+from chutelab.util.files import aside, refuse_other, together, whole
 from chutelab.util.versions import own_version, version_of
 
 _HERE: Final = Path(__file__).parent
@@ -54,7 +55,7 @@ LIBRARIES: Final = ("chutelab", "numpy", "pymunk", "matplotlib", "pillow")
 
 @dataclass(frozen=True)
 class Built:
-    """A lesson's picture after `build`: where it is, its size, and whether it had to be made."""
+    """A lesson's film, or its notebook, after `build`: where, its size, and whether it was made."""
 
     path: Path
     size: int
@@ -104,6 +105,30 @@ def build(
         path.parent.mkdir(parents=True, exist_ok=True)
         animate(recording, path, question=lesson.question, predict=True, comment=wanted, **settings)
         still(recording, machine, width=lesson.picture.width, height=lesson.picture.height)
+    return Built(path, path.stat().st_size, made)
+
+
+def build_notebook(lesson: Lesson, folder: Path | None = None) -> Built | None:
+    """Make the notebook of a lesson, unless it is there already; None if there is none to make.
+
+    That is so if its worksheet has not all the parts of a notebook, see `cells`.
+
+    Raises
+    ------
+    LessonError
+        If a cell of the lesson's own belongs to no part.
+    OSError
+        If the file cannot be written.
+    """
+    text = notebook_of(lesson)
+    if not text:
+        return None
+    path = (lesson.folder if folder is None else folder) / NOTEBOOK
+    made = not path.is_file() or path.read_text(encoding="utf-8") != text
+    if made:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with whole(path) as unfinished:
+            unfinished.write_text(text, encoding="utf-8", newline="\n")
     return Built(path, path.stat().st_size, made)
 
 
@@ -193,7 +218,9 @@ def start(path: str | Path, model: Lesson | None = None) -> Path:
         else:
             for file in files_of(model):
                 shutil.copyfile(file, unfinished / file.name)
-        read(unfinished)
+        made_lesson = read(unfinished)
+        if model is None:
+            build_notebook(made_lesson)
         path.parent.mkdir(parents=True, exist_ok=True)
         unfinished.rename(path)
     return path
@@ -344,7 +371,7 @@ def _lesson(lesson: Lesson, folder: Path, before: str, after: str, *, wheel: boo
     note = f"<p><em>{say('untranslated')}</em></p>\n" if lesson.untranslated else ""
     facts = {
         "folder": _address(lesson.folder.name),
-        "title": _heading(lesson),
+        "title": heading(lesson),
         "question": escape(lesson.question),
         "about": say("show-about", level=say(f"level-{lesson.level}"), minutes=lesson.minutes),
         "width": str(width),
@@ -406,12 +433,13 @@ def live_page(lesson: Lesson, path: str | Path, home: tuple[str, str] | None = N
     return write(scene, path, language=lesson.language, home=home, exercise=exercise)
 
 
-def _heading(lesson: Lesson) -> str:
+def heading(lesson: Lesson) -> str:
+    """Return number and title of a lesson, as HTML."""
     return escape(lesson.title if lesson.number is None else f"{lesson.number}. {lesson.title}")
 
 
 def _link(lesson: Lesson, relation: str, form: str) -> str:
-    text = form.format(_heading(lesson))
+    text = form.format(heading(lesson))
     return f'<a rel="{relation}" href="../{_address(lesson.folder.name, INDEX)}">{text}</a>'
 
 

@@ -158,6 +158,7 @@ class Task {
     return {
       lesson: this.exercise.name, student: this.student, done, total,
       score: Math.round((100 * done) / total), status: isOver ? "completed" : "incomplete",
+      verdicts: Object.fromEntries(standings.map(({ verdict }, n) => [String(n + 1), verdict])),
     };
   }
 

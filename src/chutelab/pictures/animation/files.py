@@ -250,14 +250,15 @@ def still(recording: Recording, path: str | Path, *, width: int = 800, height: i
     OSError
         If the file cannot be written.
     """
-    size = {"width": STILL * width, "height": STILL * height}
-    layout = lay_out(recording, **size, question="?", shows=frozenset(("velocity", "energy")))
+    shows = frozenset(("velocity", "energy"))
+    wide, high = STILL * width, STILL * height
+    layout = lay_out(recording, width=wide, height=high, question="?", shows=shows)
     begin = span(recording, layout.window)[0]
     stage = Stage(recording, layout, (Moment(begin, 0, ""),), slow=1.0, ask=begin)
-    left, bottom, wide, high = layout.view
-    shares = np.array([left, 1.0 - bottom - high, left + wide, 1.0 - bottom])
-    corners = np.rint(shares * np.tile([layout.width, layout.height], 2)).astype(int).tolist()
+    left, bottom, across, up = layout.view
+    top = 1.0 - bottom - up
+    corners = (left * wide, top * high, (left + across) * wide, (top + up) * high)
     with whole(Path(path)) as unfinished:
-        picture = stage.frame(0).crop(tuple(corners)).quantize(64, dither=Image.Dither.NONE)
+        picture = stage.frame(0).crop(corners).quantize(64, dither=Image.Dither.NONE)
         picture.save(unfinished, format="PNG", optimize=True)
     return Path(path)

@@ -291,7 +291,11 @@ def _after(ax: Axes, gid: str, there: Bools) -> list[Moving]:
     found = [line for line in ax.lines if line.get_gid() == gid]
     for line in found:
         line.set_animated(True)
-    return [(line, lambda index, line=line: line.set_visible(bool(there[index]))) for line in found]
+
+    def moving(line: Line2D) -> Moving:
+        return line, lambda index: line.set_visible(bool(there[index]))
+
+    return list(map(moving, found))
 
 
 ALWAYS = 5

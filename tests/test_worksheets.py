@@ -94,6 +94,9 @@ def test_commands_of_worksheets_run_as_they_stand(number, line, tmp_path, monkey
     only = ["--only", "csv"] if "--out" in line and "compare" not in line else []
     result = chutelab(*line.split()[1:], *only)
     assert result.exit_code == 0, result.output
+    if line.startswith("chutelab run") and "--details" not in line:
+        # Nothing of rounding: no zero has a sign, nothing is a trillionth.
+        assert not re.search(r"(?<![\w.])-0(?![.\d])|\de-1\d|turned over|engine", result.stdout)
 
 
 @pytest.mark.slow

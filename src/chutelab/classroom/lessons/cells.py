@@ -79,6 +79,8 @@ def notebook_of(lesson: Lesson) -> str:
         return ""
     own = _own(lesson)
     title, _, opening = opening.partition("\n")
+    # The notebook draws the machine itself: it may be all that a student has.
+    opening = re.sub(r"^!\[.*\n+", "", opening, flags=re.MULTILINE)
     needs = _NEEDS.search(_source(lesson))
     opened = f"{title}\n\n{_prose(opening)}"
     cells = list(_cells(lesson, parts, own, needs[1] if needs else "notebook", opened))

@@ -56,9 +56,9 @@ QUESTIONS: Final = """
 ## Questions with your numbers
 
 Replace `None` by your number (or by a line of Python that computes it) and run the cell. Write a
-decimal point, 0.05: Python reads `0,05` as an error, or as two numbers. The reply says whether it is
-right, or what seems to have gone wrong. `task.hint(1)` gives a hint, and the next one when you run it
-again; `task.reveal(1)` shows the working. Your numbers are at hand as `task.given`, such as
+decimal point, 0.05: Python reads `0,05` as an error, or as two numbers. The reply says whether it
+is right, or what seems to have gone wrong. `task.hint(1)` gives a hint, and the next one when you
+run it again; `task.reveal(1)` shows the working. Your numbers are at hand as `task.given`, such as
 `task.given.{first}`."""
 
 Cell = dict[str, Any]

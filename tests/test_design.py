@@ -708,7 +708,7 @@ def test_the_worksheets_numbers_hold():
     assert "32.0 mJ" in text
     energies = [design.value(chutelab.load(f"inclined-{n}"), "dEk") for n in (20, 40, 60)]
     assert max(energies) == energies[2]
-    assert "the dearest of the three" in text
+    assert "the most expensive of the three" in text
     found = design.uncertainty(
         chutelab.load("inclined-40"),
         ["restitution=0.5±0.05", "plate.angle_deg=±0.5", "plate.distance=±2mm",

@@ -14,6 +14,7 @@ from chutelab.classroom.book import Book
 from chutelab.classroom.lessons import LessonError, read, shipped_lessons
 from chutelab.classroom.lessons.building import build_notebook, start
 from chutelab.classroom.lessons.cells import notebook_of
+from chutelab.classroom.returned import words_of as written_in
 from chutelab.cli import main
 from chutelab.results.quantities import measure
 from chutelab.util.errors import InputError
@@ -25,6 +26,31 @@ LESSONS = shipped_lessons()
 def cells_of(lesson):
     text = (lesson.folder / "exercise.ipynb").read_text(encoding="utf-8")
     return {cell["id"]: "".join(cell["source"]) for cell in json.loads(text)["cells"]}
+
+
+def test_a_translated_worksheet_makes_a_notebook_in_its_language():
+    made = []
+    for english in LESSONS:
+        lesson = read(english.folder, "de")
+        text = notebook_of(lesson)
+        assert bool(text) == ("README.de.md" not in lesson.untranslated)
+        if not text:
+            continue
+        made.append(lesson.number)
+        path = lesson.folder / "exercise.de.ipynb"
+        assert path.read_bytes() == text.encode(), f"run: chutelab lesson build {lesson.number}"
+        cells, theirs = json.loads(text)["cells"], cells_of(english)
+        assert [cell["id"] for cell in cells] == list(theirs)
+        for cell in cells:
+            source = "".join(cell["source"])
+            if cell["cell_type"] == "code":
+                assert source.replace(', language="de"', "") == theirs[cell["id"]]
+            else:
+                assert source != theirs[cell["id"]]
+                assert not re.search(r"\b(?:the|and|with|your)\b", re.sub(r"`.*?`", "", source))
+        assert 'language="de"' in text.replace("\\", "")
+        assert written_in(path) == {}
+    assert {0, 1, 2, 3} <= set(made)
 
 
 def words_of(text):
@@ -52,7 +78,7 @@ def test_worksheet_and_notebook_ask_the_same(lesson):
     opening = re.sub(r"^!\[.*\]\(machine.png\)$", "", opening, flags=re.MULTILINE)
     assert words_of(opening) in words_of(cells["title"])
     assert "In a terminal" not in " ".join(cells.values())
-    assert "Write the decimal point, 0.05" in cells["questions-text"]
+    assert "Write a decimal point, 0.05" in cells["questions-text"]
 
 
 @pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.name)
@@ -112,6 +138,8 @@ def test_a_book_runs_what_is_said_as_on_the_command_line():
     book = Book("the-parabola")
     runs = book.run("throw.toml", "throw.toml --set incoming.speed=4 --set gravity=1.62")
     fall = sqrt(2 * 0.8 / 1.62)
+    assert measure(runs[1], "flight.t") == pytest.approx(fall, rel=1e-12)
+    assert "time of the fall, from one belt to the other, s" in runs._repr_html_()
     assert measure(runs[1], "landing.x") == pytest.approx(4.0 * fall, rel=1e-12)
     assert measure(runs[0], "landing.x") == pytest.approx(2.0 * sqrt(2 * 0.8 / G), rel=1e-12)
     page = runs._repr_html_()

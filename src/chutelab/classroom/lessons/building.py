@@ -404,6 +404,13 @@ def _lesson(lesson: Lesson, folder: Path, before: str, after: str, *, wheel: boo
 def live_page(lesson: Lesson, path: str | Path, home: tuple[str, str] | None = None) -> int:
     """Write the live page of a lesson with its exercise, in its language; return the size in bytes.
 
+    In a frame it tells the page around it, by ``postMessage``, ``{chutelab: "ready", lesson}``. A
+    page that answers ``{chutelab: "begin", student, suspend_data}``, "" for the first time, says
+    who this is and keeps what becomes of it: after each change it is told ``{chutelab: "progress",
+    lesson, student, done, total, score, status, suspend_data, result}``, with a score of 100 for
+    all, the status "incomplete" or "completed", at most 4000 characters of data to go on from, and
+    the result as `chutelab.classroom.grading` takes it.
+
     Parameters
     ----------
     lesson

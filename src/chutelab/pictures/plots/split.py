@@ -22,7 +22,7 @@ LETTERS = 14.0
 """pt; of symbols."""
 
 
-def split(
+def split_velocity(
     recording: Recording, path: str | Path | None = None, *, surface: str = "plate"
 ) -> Picture:
     """Draw the velocities before and after the first impact on a surface, and how they split.
@@ -62,7 +62,7 @@ def split(
     back = normal * (normal @ after)
     _arrow(right, here, after, style.INK, "$v_2'$", after / np.hypot(*after), 1.0)
     _arrow(right, back, after, ALONG, "$v_t' = v_t$", normal)
-    _arrow(right, here, back, INTO, r"$v_n' = \varepsilon v_n$", -tangent, 0.8)
+    _arrow(right, here, back, INTO, r"$v_n' = \varepsilon v_n$", (normal - tangent) / 2.0**0.5, 1.0)
     foot = min(ends.tolist(), key=lambda end: end[1])
     leaning, up = -np.array(foot), np.array([0.0, 1.0])
     if abs(leaning[0]) > 1e-9 * speed:

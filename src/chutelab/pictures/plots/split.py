@@ -75,17 +75,21 @@ def split_velocity(
     return figure
 
 
+def _pair(place: Floats) -> tuple[float, float]:
+    return float(place[0]), float(place[1])
+
+
 def _arrow(
     ax: Axes, tail: Floats, tip: Floats, color: str, said: str, aside: Floats, at: float = 0.5
 ) -> None:
     """Draw an arrow, and its symbol on the side to which `aside` points, at a share of its way."""
     look = {"arrowstyle": "-|>", "color": color, "lw": 2.2, "shrinkA": 0.0, "shrinkB": 0.0}
-    ax.annotate("", tip, tail, arrowprops={**look, "mutation_scale": 14.0})
+    ax.annotate("", _pair(tip), _pair(tail), arrowprops={**look, "mutation_scale": 14.0})
     across, up = (0 if abs(part) < 0.3 else int(np.sign(part)) for part in aside)
     ax.annotate(
         said,
-        tail + at * (tip - tail),
-        (8.0 if across else 13.0) * aside,
+        _pair(tail + at * (tip - tail)),
+        _pair((8.0 if across else 13.0) * aside),
         textcoords="offset points",
         color=color,
         fontsize=LETTERS,
@@ -102,5 +106,5 @@ def _angle(ax: Axes, at: Floats, one: Floats, other: Floats, radius: float, said
     arc = at + radius * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
     ax.plot(*arc.T, color=style.MUTED, lw=1.2)
     middle = first + 0.5 * turn
-    place = at + 0.72 * radius * np.array([np.cos(middle), np.sin(middle)])
-    ax.text(*place, said, color=style.MUTED, fontsize=LETTERS, ha="center", va="center")
+    x, y = at + 0.72 * radius * np.array([np.cos(middle), np.sin(middle)])
+    ax.text(x, y, said, color=style.MUTED, fontsize=LETTERS, ha="center", va="center")

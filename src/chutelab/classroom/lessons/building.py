@@ -44,7 +44,8 @@ from chutelab.util.versions import own_version, version_of
 _HERE: Final = Path(__file__).parent
 PICTURE: Final = "lesson.gif"
 MACHINE: Final = "machine.png"
-"""The film, and the machine before anything has happened."""
+SPLIT: Final = "split.png"
+"""The film, the machine before anything has happened, and the velocity at the plate."""
 
 MOST_PIXELS: Final = 3840 * 2160
 """Of a picture, as `Picture` in `reading` has it."""
@@ -96,15 +97,18 @@ def build(
     made = force or comment_of(path) != wanted or not machine.is_file()
     if made:
         from chutelab.pictures.animation import animate, still
+        from chutelab.pictures.plots.split import split_velocity
 
         with aside(path.parent, path):
             refuse_other(path)
         scene = scene_of(lesson, lesson.picture.scene, lesson.picture.set)
         recording = simulate(scene, progress=progress)
-        settings = lesson.picture.model_dump(exclude={"scene", "set"})
+        settings = lesson.picture.model_dump(exclude={"scene", "set", "split"})
         path.parent.mkdir(parents=True, exist_ok=True)
         animate(recording, path, question=lesson.question, predict=True, comment=wanted, **settings)
         still(recording, machine, width=lesson.picture.width, height=lesson.picture.height)
+        if lesson.picture.split:
+            split_velocity(recording, path.with_name(SPLIT))
     return Built(path, path.stat().st_size, made)
 
 

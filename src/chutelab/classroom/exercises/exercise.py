@@ -411,8 +411,8 @@ def attempt(exercise: Exercise, student: str, number: int) -> tuple[Case, ...] |
     cases = tuple(Case(n, asked, numbers) for n, asked in enumerate(exercise.questions, start=1))
     try:
         fits = all(map(numbers.of, exercise.fits)) and all(case.clear for case in cases)
-    except ValueError:
-        # A mistake may lead out of a function's domain, such as arccos of more than 1.
+    except (ValueError, ArithmeticError):
+        # A mistake may lead out of a function's domain, such as arccos of more than 1 or 1 / 0.
         return None
     return cases if fits else None
 

@@ -125,7 +125,7 @@ def _of_all(presets: list[Preset], numbers: dict[str, int]) -> list[Sheet]:
     heads = ("", "", "kg/m³", "spread", "source")
     return [
         Sheet("Materials, and their density", heads, densities, texts=2, tail=1),
-        pairs("Coefficient of restitution e", "restitution"),
+        pairs("Coefficient of restitution ε", "restitution"),
         pairs("Coefficient of friction µ", "friction", _listed(numbers)),
     ]
 

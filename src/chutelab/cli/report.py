@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
-from math import isnan
+from math import ceil, isnan
 
 import numpy as np
 from rich.console import RenderableType
@@ -29,6 +29,9 @@ from chutelab.util.tables import Sheet, number, wrapped
 
 STATIONS = 6
 """Contacts of particle 0 that are listed where no theory speaks of them."""
+
+FLOW = 8
+"""Particles that must have left for a word about how fast they came."""
 
 
 def report(
@@ -71,6 +74,14 @@ def report(
             0,
             f"{landed:.0f} landed on the outgoing belt, at x = {number(mean)} m on average, with a"
             f" spread of {1e3 * spread:.3g} mm (standard deviation)",
+        )
+    left = np.sort(recording.select(Kind.EXIT)["t"])
+    if recording.machine.interact and len(left) >= FLOW:
+        quarters = [f"{left[ceil(part * len(left) / 4) - 1]:.3f}" for part in (1, 2, 3, 4)]
+        notes.insert(
+            0,
+            "{} fell out of the machine: a quarter of them by {} s, half of them by {} s, three"
+            " quarters by {} s, the last at {} s".format(len(left), *quarters),
         )
     parts += [Sheet("", (), (), notes=(f"{note[0].upper()}{note[1:]}.",)) for note in notes]
     if accuracy is not None:

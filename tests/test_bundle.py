@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
+import subprocess
+import sys
 from html.parser import HTMLParser
 from urllib.parse import unquote
+from zipfile import ZipFile
 
 import pytest
 from click.testing import CliRunner
@@ -63,7 +67,10 @@ def test_a_bundle_has_an_index_and_a_page_for_each_lesson(web):
 
 def broken_links(web):
     """Addresses in the pages of a bundle that are not relative, or lead nowhere."""
-    elsewhere = ("#", "data:,", "https://doi.org/", "https://jupyter.org")
+    elsewhere = (
+        *("#", "data:,", "https://doi.org/", "https://jupyter.org", "https://www.python.org"),
+        "https://opensourcephysics.github.io/tracker-website/",
+    )
     broken = set()
     for page in (web / "index.html", *web.glob("*/index.html")):
         for address in Links(page.read_text(encoding="utf-8")).addresses:
@@ -86,7 +93,37 @@ def test_the_bundle_of_all_lessons_is_whole_and_small(tmp_path):
     pages = {path.parent.name: path.stat().st_size for path in tmp_path.rglob("page.html")}
     assert len(pages) == len(shipped_lessons())
     assert max(pages.values()) <= 400_000
-    assert sum(path.stat().st_size for path in tmp_path.rglob("*.*")) < 8_000_000
+    assert (
+        sum(path.stat().st_size for path in tmp_path.rglob("*.*")) < 12_000_000
+    )  # of it the wheel 2 million
+
+
+def test_a_bundle_brings_the_tool_and_says_how_to_install_it(web, tmp_path):
+    (wheel,) = web.glob("*.whl")
+    index = (web / "index.html").read_text(encoding="utf-8")
+    for python in (r".venv\Scripts\python", ".venv/bin/python"):
+        assert f'{python} -m pip install "./{wheel.name}[notebook]" notebook' in index
+    assert "../index.html#get" in (web / "02-letting-go" / "index.html").read_text("utf-8")
+    # Installed from it, here without the libraries it needs, chutelab makes the same wheel again.
+    pip = [sys.executable, "-m", "pip", "install", "--no-deps", "--no-index", "--no-compile"]
+    there = tmp_path / "there"
+    subprocess.run([*pip, "--quiet", "--target", there, wheel], check=True)
+    page = [sys.executable, "-m", "chutelab", "lesson", "page", "2", "-o", tmp_path / "web"]
+    subprocess.run(page, check=True, cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(there)})
+    assert (tmp_path / "web" / wheel.name).read_bytes() == wheel.read_bytes()
+    with ZipFile(wheel) as opened:
+        assert opened.testzip() is None
+        names = set(opened.namelist())
+        assert not [name for name in names if name.endswith((".c", ".h", ".pyc"))]
+        assert {"chutelab/data/scenes/slip.toml", "chutelab/data/lessons/README.md"} <= names
+
+
+def test_a_bundle_without_the_wheel_says_nothing_of_it(tmp_path):
+    result = chutelab("lesson", "page", "2", "--no-wheel", "-o", tmp_path / "web")
+    assert result.exit_code == 0
+    assert list((tmp_path / "web").glob("*.whl")) == []
+    for page in (tmp_path / "web").glob("**/index.html"):
+        assert "#get" not in page.read_text(encoding="utf-8")
 
 
 def test_a_bundle_is_not_put_in_place_of_a_file(tmp_path):

@@ -111,6 +111,9 @@ def test_every_public_name_is_in_the_reference(site):
 
 
 def test_formulas_are_mathematics(site):
+    physics = (site / "docs" / "physics.html").read_text(encoding="utf-8")
+    assert physics.count("<math") > 150
+    assert re.search(r"<mi>cos</mi>\s*<mspace", physics)  # "cos φ", not "cosφ"
     for path in pages(site):
         assert re.search(r"\$[^$]+\$", Page(path).text) is None, path
 

@@ -10,11 +10,14 @@ from pathlib import Path
 
 import pytest
 
+from chutelab.classroom.exercises import EXERCISES
+from chutelab.classroom.exercises.in_page import data_of
 from chutelab.pictures.live.page import LANGUAGES, joined
 
 LIVE = Path(__file__).parent / "live"
 NODE = shutil.which("node")
 ASSETS = LIVE.parents[1] / "src" / "chutelab" / "pictures" / "live" / "assets"
+SCORM = ASSETS.parents[2] / "classroom" / "lessons" / "assets" / "scorm"
 
 needs_node = pytest.mark.skipif(NODE is None, reason="needs node")
 needs_tools = pytest.mark.skipif(
@@ -35,7 +38,7 @@ def test_types_and_style():
     root, config = LIVE.parents[1], "tests/live/eslint.config.js"
     for tool, *arguments in (
         ("typescript/bin/tsc", "-p", "tests/live"),
-        ("eslint/bin/eslint.js", "-c", config, str(ASSETS.relative_to(root)), "tests/live"),
+        ("eslint/bin/eslint.js", "-c", config, ASSETS, SCORM, "tests/live"),
     ):
         done = subprocess.run(
             [str(NODE), LIVE / "node_modules" / tool, *arguments],
@@ -77,3 +80,12 @@ def test_every_word_in_the_catalogue_is_said():
         if f'"{word}"' not in said:
             assert family in families, word
             assert re.search(rf"\b{own.rpartition('.')[2]}\b", said), word
+
+
+def test_every_word_of_an_exercise_is_in_its_catalogue():
+    told = data_of(EXERCISES["the-bounce"])["words"]
+    for name in ("draw.js", "judging.js", "task.js", "exercise.js"):
+        text = (ASSETS / name).read_text(encoding="utf-8")
+        said = re.findall(r'\b(?:worded\((?:exercise, )?|its\()"([\w-]+)"', text)
+        assert said
+        assert set(said) <= set(told), name

@@ -87,13 +87,16 @@ def recording():
 
 def test_a_recording_says_what_it_holds(recording):
     rows = dict(recording.sheet().rows)
-    assert rows["engine"] == "exact"
+    assert not {"engine", "knots", "run time"} & set(rows)
+    details = dict(recording.sheet(details=True).rows)
+    assert details.items() >= rows.items()
+    assert details["engine"] == "exact"
     assert rows["particles"] == "3"
     assert rows["events"] == "3 release, 3 separation, 3 impact, 3 landing"
     assert rows["ended"] == "3 landed"
     # Belt 1 m at 2 m/s, 0.29685 s to the plate, then 1 m of fall in all; two more, 5 ms apart.
     assert rows["time"] == "0 to 0.945955 s"
-    assert repr(recording).startswith("Perpendicular damping plate, 2 m/s\nengine     exact\n")
+    assert repr(recording).startswith("Perpendicular damping plate, 2 m/s\nparticles  3\n")
 
 
 def test_a_recording_that_never_began_says_so(recording):
@@ -118,7 +121,8 @@ def test_a_ledger_closes_in_its_own_table(recording):
     numbers = [[float(cell) for cell in row[1:]] for row in sheet.rows]
     total = [float(cell) for cell in sheet.foot[0][1:]]
     assert [sum(column) for column in zip(*numbers, strict=True)] == pytest.approx(total, rel=1e-5)
-    assert sheet.notes[1].startswith("residual ")
+    assert sheet.notes[1].endswith("cannot explain: 0.000 %")
+    assert ledger(recording).sheet(details=True).notes[1].startswith("residual ")
 
 
 def test_the_papers_tables_mark_what_differs():

@@ -9,16 +9,20 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 from chutelab.classroom import exercises as package
 from chutelab.classroom.exercises import EXERCISES, Verdict, lesson
 from chutelab.classroom.exercises.exercise import draw, translated
+from chutelab.classroom.lessons import reading
 from chutelab.classroom.words import LANGUAGES, STRINGS, LanguageError, words
+from chutelab.cli import main
 from chutelab.util.errors import InputError
 
 EXERCISE_FILES = Path(package.__file__).parent
 TRANSLATIONS = sorted(EXERCISE_FILES.glob("*.*.toml"))
 CLASSROOM = STRINGS.parent
+LESSONS = Path(__file__).parent.parent / "lessons"
 
 
 def catalogue(language):
@@ -43,13 +47,17 @@ def test_every_language_says_all_that_english_says_with_the_same_numbers_in_it()
 
 def test_every_sentence_of_the_catalogue_is_said_somewhere():
     sources = [*CLASSROOM.rglob("*.py"), *CLASSROOM.rglob("*.js")]
-    sources += (CLASSROOM.parent / "pictures" / "live").rglob("*.js")
+    package = CLASSROOM.parent
+    sources += [*(package / "pictures" / "live").rglob("*.js"), package / "cli" / "lessons.py"]
     code = "\n".join(path.read_text(encoding="utf-8") for path in sources)
-    # What is put together from a verdict or a unit.
+    said = set(re.findall(r"""["'`]([\w-]+)["'`]""", code))
+    # What is put together from a verdict, a unit, or for whom a lesson or a sheet is.
     built = {f"verdict-{one.name.lower()}" for one in Verdict} | {"unit-degrees"}
-    unused = {
-        key for key in catalogue("en") if not re.search(f"[\"'`]{re.escape(key)}[\"'`]", code)
-    }
+    built |= {"level-start", "level-core", "level-advanced"}
+    built |= {"sheet-kind-student", "sheet-kind-teacher", "sheet-kind-explanation"}
+    pages = "\n".join(path.read_text(encoding="utf-8") for path in CLASSROOM.rglob("*.html"))
+    said |= {name.replace("_", "-") for name in re.findall(r"\$(page_\w+)", pages)}
+    unused = catalogue("en").keys() - said
     assert unused == built
 
 
@@ -166,3 +174,90 @@ def test_what_is_not_translated_is_in_english_and_that_is_said(tmp_path):
     assert " ".join(note.split()) in " ".join(repr(task).split())
     assert note in task._repr_html_()
     assert note not in repr(lesson("a-stream", "Ada"))
+
+
+def lessons_in(language):
+    """Names of the lessons' folders that have a plan in that language."""
+    return sorted(path.parent.name for path in LESSONS.glob(f"*/lesson.{language}.toml"))
+
+
+@pytest.mark.parametrize("folder", lessons_in("de"))
+def test_a_translated_lesson_has_all_its_texts_and_the_same_numbers(folder):
+    english, german = (reading.read(LESSONS / folder, language) for language in ("en", "de"))
+    assert german.untranslated == ()
+    assert german.title != english.title
+    assert german.scenes == english.scenes
+    assert set(german.quantities) == set(english.quantities)
+    for key in ("goals", "predictions"):
+        assert len(getattr(german.teacher, key)) == len(getattr(english.teacher, key))
+    pairs = [(english.text(name), german.text(name)) for name in ("README", "explanation")]
+    pairs += [
+        (str(getattr(english.teacher, key)), str(getattr(german.teacher, key)))
+        for key in ("goals", "predictions", "basic", "stretch", "curriculum")
+    ]
+    for said, translation in pairs:
+        assert translation != said
+        # What is typed is the same, and so are the formulas and the numbers in the text.
+        for pattern in (r"```.*?```", r"`[^`\n]+`", r"\]\([^)]*\)"):
+            typed = re.findall(pattern, translation.replace(".de.md", ".md"), re.DOTALL)
+            assert sorted(typed) == sorted(re.findall(pattern, said, re.DOTALL))
+        assert formulas_in(translation) == formulas_in(said)
+        assert numbers_in(translation) == numbers_in(said)
+
+
+def without_code(text):
+    return re.sub(r"```.*?```|`[^`\n]+`|\]\([^)]*\)", "", text, flags=re.DOTALL)
+
+
+def formulas_in(text):
+    return Counter(re.findall(r"\$\$?[^$]+\$\$?", without_code(text)))
+
+
+def numbers_in(text):
+    """Numbers with a decimal mark, as a point; a decimal point is no German."""
+    plain = re.sub(r"\$\$?[^$]+\$\$?", "", without_code(text))
+    return Counter(found.replace(",", ".") for found in re.findall(r"\d+[.,]\d+", plain))
+
+
+def test_a_lesson_that_is_not_translated_is_in_english_and_that_is_said(tmp_path):
+    folder = tmp_path / "my-lesson"
+    assert CliRunner().invoke(main, ["lesson", "new", str(folder)]).exit_code == 0
+    lesson = reading.read(folder, "de")
+    english = reading.read(folder)
+    assert (lesson.title, lesson.text("README")) == (english.title, english.text("README"))
+    assert {"title", "question", "README.de.md"} <= set(lesson.untranslated)
+    note = words("de").say("untranslated")
+    for more in ([], ["--sheet", "student"], ["--sheet", "teacher"]):
+        args = ["lesson", "show", str(folder), *more]
+        assert note in CliRunner().invoke(main, [*args, "--language", "de"]).output
+        assert words("en").say("untranslated") not in CliRunner().invoke(main, args).output
+    (folder / "lesson.de.toml").write_text('title = "Meine"\nscenes = ["nothing.toml"]\n', "utf-8")
+    lesson = reading.read(folder, "de")
+    assert (lesson.title, lesson.scenes) == ("Meine", english.scenes)
+    (folder / "lesson.de.toml").write_text("title = 3\n", "utf-8")
+    with pytest.raises(reading.LessonError, match="title"):
+        reading.read(folder, "de")
+
+
+def test_the_sheets_of_a_translated_lesson_are_german():
+    for sheet in ("student", "teacher", "explanation"):
+        args = ["lesson", "show", "3", "--sheet", sheet, "--language", "de"]
+        text = CliRunner().invoke(main, args).output
+        prose = without_code(text).replace("the-bounce", "").replace("„your name“", "")
+        assert not re.findall(r"(?i)\b(?:the|and|of|with|is|for|from)\b", prose)
+    assert CliRunner().invoke(main, ["lesson", "show", "3", "--language", "fr"]).exit_code != 0
+
+
+def test_pages_of_lessons_are_german_around_what_is_translated(tmp_path):
+    args = ["lesson", "page", "1", "--language", "de", "--out", str(tmp_path / "de")]
+    ran = CliRunner().invoke(main, args)
+    assert ran.exit_code == 0, ran.output
+    index = (tmp_path / "de" / "index.html").read_text(encoding="utf-8")
+    page = (tmp_path / "de" / "01-the-parabola" / "index.html").read_text(encoding="utf-8")
+    live = (tmp_path / "de" / "01-the-parabola" / "page.html").read_text(encoding="utf-8")
+    assert all('<html lang="de">' in text for text in (index, page, live))
+    assert "Eine Lektion" in index
+    assert "Alle Lektionen" in page
+    assert "Zurück zur Lektion" in live
+    prose = re.sub(r"<code.*?</code>|<pre.*?</pre>|<math.*?</math>|<[^>]*>", " ", page, flags=re.S)
+    assert not re.findall(r"\b(?:the|and|with|when|lessons)\b", prose)

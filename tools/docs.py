@@ -114,7 +114,7 @@ def lessons(pages: Path, extra: Path) -> None:
     """Make a page of each worksheet, of its explanation, and the live pages."""
     shipped = shipped_lessons()
     with tempfile.TemporaryDirectory(prefix="chutelab-docs-") as folder:
-        bundle(shipped, folder)
+        bundle(shipped, folder, wheel=False)
         for one in shipped:
             page = Path(folder) / one.folder.name / LIVE
             if page.is_file():

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from latex2mathml.converter import convert
+from docutils.nodes import SkipNode
 
 from chutelab import __version__
+from chutelab.classroom.lessons.texts import mathml
 
 if TYPE_CHECKING:
     from docutils import nodes
@@ -46,19 +47,17 @@ html_math_renderer = "mathml"
 
 def inline(writer: HTML5Translator, node: nodes.math) -> None:
     """Write a formula in a line as MathML, which browsers set without script or network."""
-    writer.body.append(convert(node.astext()))
+    writer.body.append(mathml(node.astext()))
+    raise SkipNode
 
 
 def displayed(writer: HTML5Translator, node: nodes.math_block) -> None:
     """Write a formula on a line of its own, which scrolls by itself where it is too wide."""
-    formula = convert(node.astext(), display="block")
+    formula = mathml(node.astext(), display=True)
     writer.body.append(f'<div class="formula" tabindex="0">{formula}</div>')
+    raise SkipNode
 
 
 def setup(app: Sphinx) -> None:
     """Add what sets formulas."""
-    app.add_html_math_renderer("mathml", (inline, _nothing), (displayed, _nothing))
-
-
-def _nothing(writer: HTML5Translator, node: nodes.Element) -> None:
-    pass
+    app.add_html_math_renderer("mathml", (inline, None), (displayed, None))

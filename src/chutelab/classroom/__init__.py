@@ -2,7 +2,9 @@
 
 - `lessons`: a question, a worksheet, an exercise, a picture, and scenes to run.
 - `exercises`: exercises that answer back, with each student's own numbers.
+- `book`: what a lesson's notebook calls: its machine, its runs.
 - `words`: what a learner is told, in each language (`strings`, a file a language).
-- `grading`: marks from returned notebooks.
+- `grading`: marks from what students returned, which `returned` reads.
+- `class_report`: what a class did, lesson by lesson.
 - `kernel`: their cells, run in a process of their own, with limits.
 """

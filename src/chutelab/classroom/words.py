@@ -30,7 +30,7 @@ class Words:
 
     def __init__(self, language: str, catalogue: Mapping[str, str]) -> None:
         self.language = language
-        self._catalogue = catalogue
+        self.catalogue = catalogue
 
     def say(self, key: str, /, **values: object) -> str:
         """Return a template with its names filled in.
@@ -38,7 +38,7 @@ class Words:
         >>> words("en").say("question-title", number=2, title="the fall")
         'Question 2: the fall'
         """
-        return re.sub(r"\{(\w+)\}", lambda match: str(values[match[1]]), self._catalogue[key])
+        return re.sub(r"\{(\w+)\}", lambda match: str(values[match[1]]), self.catalogue[key])
 
     def local(self, number: str) -> str:
         """Return a number's digits as this language writes them.
@@ -46,11 +46,11 @@ class Words:
         >>> words("de").local("0.35")
         '0,35'
         """
-        return number.replace(".", self._catalogue["decimal-mark"])
+        return number.replace(".", self.catalogue["decimal-mark"])
 
     def unit(self, unit: str) -> str:
         """Return a unit as it is written behind a number."""
-        return self._catalogue.get(f"unit-{unit}", unit)
+        return self.catalogue.get(f"unit-{unit}", unit)
 
 
 @cache

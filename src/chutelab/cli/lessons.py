@@ -15,7 +15,7 @@ from chutelab.cli.console import progress
 from chutelab.cli.output import check_file
 from chutelab.cli.parameters import FileName, Number, file_option, json_option, out_option
 from chutelab.cli.program import InOrder, RefusedError
-from chutelab.util.files import write_lines, writing
+from chutelab.util.files import whole, write_lines, writing
 
 if TYPE_CHECKING:
     from chutelab.classroom.grading import Grade
@@ -41,9 +41,18 @@ lessons_argument = click.argument(
 )
 
 
+language_option = click.option(
+    "--language",
+    metavar="LANGUAGE",
+    default="en",
+    show_default=True,
+    help="Of the texts: en, or de where they are translated; the rest is in English.",
+)
+
+
 @click.group(
     cls=InOrder,
-    short_help="Lessons: list, show, build, start, grade, bundle.",
+    short_help="Lessons: list, show, build, start, grade, bundle, package.",
     epilog="Begin with: chutelab lesson list, then: chutelab lesson show 1",
 )
 def lesson() -> None:
@@ -71,56 +80,123 @@ def list_lessons(as_json: bool) -> None:
     console.tell({"lessons": [_plain(one) for one in found]}, table, as_json=as_json)
 
 
-@lesson.command(short_help="Show one lesson, with its worksheet.")
-@click.argument("wanted", metavar="LESSON", type=FileName(), shell_complete=complete_lesson)
+@lesson.command(short_help="Show one lesson, or print its sheets.")
+@click.argument(
+    "wanted", metavar="[LESSON]", required=False, type=FileName(), shell_complete=complete_lesson
+)
 @click.option(
     "--sheet",
     type=click.Choice(["student", "teacher", "explanation"]),
-    help="Print one sheet to hand out, as Markdown: the student's (nothing of the answer on it),"
-    " the teacher's (key, mistakes, goals), or the explanation.",
+    help="One sheet to hand out: the student's (nothing of the answer on it), the teacher's (key,"
+    " mistakes, goals), or the explanation.",
 )
+@file_option(
+    "-o",
+    "--out",
+    text="Write the sheet into this file: its ending, .md, .html or .pdf, says what it is to be. Or"
+    " into a folder.",
+)
+@click.option(
+    "--format",
+    "kind",
+    type=click.Choice(["md", "html", "pdf"]),
+    help="Markdown, a web page in one file, or A4 to print (which needs the extra chutelab[pdf]);"
+    " default: as the file's name says, in a folder pdf.",
+)
+@click.option("--all", "every", is_flag=True, help="The sheet of every shipped lesson.")
+@language_option
 @json_option()
-def show(wanted: str, sheet: str | None, as_json: bool) -> None:
+def show(
+    wanted: str | None,
+    sheet: str | None,
+    out: Path | None,
+    kind: str | None,
+    every: bool,
+    language: str,
+    as_json: bool,
+) -> None:
     """Show one lesson: its question, scenes and quantities, its files, and the worksheet.
+
+    With --sheet it is one sheet; without -o it is printed, as Markdown in plain characters.
 
     \b
     chutelab lesson show 3
-    chutelab lesson show 3 --sheet student > student.md
-    chutelab lesson show the-bounce
+    chutelab lesson show 3 --sheet student -o sheet.pdf
+    chutelab lesson show --all --sheet teacher -o sheets/
+    chutelab lesson show 3 --language de
     chutelab lesson show ./my-lesson
     """  # noqa: D301 - click wants the backspace
+    if (wanted is None) is not every:
+        raise RefusedError("name one LESSON, as in: chutelab lesson show 3; or give --all")
+    if sheet is not None or out is not None or kind is not None or every:
+        if as_json:
+            raise RefusedError("--sheet is a text, and --json is not: give one of them")
+        if sheet is None:
+            raise RefusedError("say which one: --sheet student, teacher or explanation")
+        _hand_out(_lessons((wanted,) if wanted else (), language), sheet, out, kind)
+        return
     from rich.markdown import Markdown
     from rich.text import Text
 
     from chutelab.classroom.lessons import find, scene_of
     from chutelab.classroom.lessons.reading import unit_in
     from chutelab.classroom.lessons.texts import plain_of
+    from chutelab.classroom.words import words
     from chutelab.util.tables import Sheet
 
-    found = find(wanted)
-    if sheet is not None:
-        from chutelab.classroom.lessons.sheets import sheet as sheet_of
-
-        if as_json:
-            raise RefusedError("--sheet is Markdown, and --json is not: give one of them")
-        console.say(sheet_of(found, sheet), end="")
-        return
+    found, say = find(wanted or "", language), words(language).say
     if as_json:
         console.show_json({"format": 1, **_plain(found)})
         return
     number = "" if found.number is None else f"{found.number}  "
-    about = f"\n{found.question}\n{found.level}, about {found.minutes} minutes"
+    level = say("show-about", level=say(f"level-{found.level}"), minutes=found.minutes)
+    about = f"\n{found.question}\n{level}"
     head = Text(f"{number}{found.title}", style="bold").append(about, style="not bold")
     scenes = tuple((name, scene_of(found, name).title) for name in found.scenes)
-    console.show(head, Sheet("Scenes", ("scene", "what it shows"), scenes, texts=2))
+    if found.untranslated:
+        console.show(Text(f"{say('untranslated')}\n"))
+    heads = (say("show-scene"), say("show-shows"))
+    console.show(head, Sheet(say("show-scenes"), heads, scenes, texts=2))
     if found.quantities:
-        rows = tuple((name, unit_in(found, name), what) for name, what in found.quantities.items())
-        console.show(Sheet("Quantities", ("quantity", "unit", "what it is"), rows, texts=3))
-    console.show(Text(f"\nFiles in {found.folder}\n"))
+        unit = words(language).unit
+        rows = tuple(
+            (name, unit(unit_in(found, name)), what) for name, what in found.quantities.items()
+        )
+        columns = (say("show-quantity"), say("show-unit"), say("show-meaning"))
+        console.show(Sheet(say("show-quantities"), columns, rows, texts=3))
+    console.show(Text(f"\n{say('show-files', folder=found.folder)}\n"))
     console.show(Markdown(plain_of(found.text("README")), hyperlinks=False))
 
 
-@lesson.command(short_help="Make the picture of each lesson that changed.")
+def _hand_out(lessons: list[Lesson], sheet: str, out: Path | None, kind: str | None) -> None:
+    """Print one sheet of each lesson, or write it into a file or a folder."""
+    from chutelab.classroom.lessons.printing import FORMATS, printed
+    from chutelab.classroom.lessons.texts import without_tex
+
+    if out is None:
+        if kind == "pdf" or len(lessons) > 1:
+            raise RefusedError("say where to: -o sheet.pdf, or a folder: -o sheets/")
+        made = printed(lessons[0], sheet, kind or "md").decode("utf-8")
+        console.say(made if kind else without_tex(made), end="")
+        return
+    ending = out.suffix.removeprefix(".").lower()
+    into = out.is_dir() or len(lessons) > 1 or not ending
+    if not into and ending not in FORMATS:
+        raise RefusedError(f"{out.name}: allowed are files that end in .md, .html or .pdf")
+    if not into and kind not in (None, ending):
+        raise RefusedError(f"{out.name} ends in .{ending}, and --format says {kind}")
+    how = kind or ("pdf" if into else ending)
+    with writing(instead="another place: -o"):
+        for one in lessons:
+            path = out / f"{one.folder.name}-{sheet}.{how}" if into else out
+            content = printed(one, sheet, how)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with whole(path) as unfinished:
+                unfinished.write_bytes(content)
+            console.say(f"wrote {path}")
+
+
+@lesson.command(short_help="Make film and notebook of each lesson that changed.")
 @lessons_argument
 @out_option(
     "Write each picture into a folder NN-name in here, not into the lesson's own: for an"
@@ -129,14 +205,16 @@ def show(wanted: str, sheet: str | None, as_json: bool) -> None:
 @click.option("--force", is_flag=True, help="Make them anew, changed or not.")
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing, and show no progress bar.")
 def build(wanted: tuple[str, ...], out: Path | None, force: bool, quiet: bool) -> None:
-    """Make lesson.gif of each LESSON (without one: of all that are shipped), where it changed.
+    """Make lesson.gif and exercise.ipynb of each LESSON (default: all shipped), where they changed.
+
+    The notebook is made of README.md (Predict, Run, Compare), notebook.py and the exercise.
 
     A picture is up to date if it was made from the same scene and settings with the same versions
     of chutelab, numpy, pymunk, matplotlib and pillow; the GIF says so in a comment. The same makes
     the same bytes.
     """
     from chutelab.classroom.lessons.building import build as build_lesson
-    from chutelab.classroom.lessons.building import check_inside
+    from chutelab.classroom.lessons.building import build_notebook, check_inside
 
     for one in _lessons(wanted):
         with (
@@ -146,10 +224,12 @@ def build(wanted: tuple[str, ...], out: Path | None, force: bool, quiet: bool) -
             target = out / one.folder.name if out else None
             if target is not None:
                 check_inside(target)
-            built = build_lesson(one, target, force=force, progress=update)
-        if not quiet:
-            done = "written" if built.made else "up to date"
-            console.say(f"{built.path}: {done}, {built.size / 1000:.0f} kB")
+            film = build_lesson(one, target, force=force, progress=update)
+            notebook = build_notebook(one, target)
+        for built in (film, notebook):
+            if built is not None and not quiet:
+                done = "written" if built.made else "up to date"
+                console.say(f"{built.path}: {done}, {built.size / 1000:.0f} kB")
 
 
 @lesson.command(short_help="Start a lesson of your own.")
@@ -185,29 +265,105 @@ def new(name: Path, model: str | None) -> None:
 
 @lesson.command(short_help="Bundle the lessons as web pages that need no server.")
 @lessons_argument
-@out_option("The folder; files that are there are replaced.", "-o", required=True)
+@out_option("The folder, or FILE.html; files that are there are replaced.", "-o", required=True)
+@language_option
+@click.option("--wheel/--no-wheel", default=True, help="With what students install, or without.")
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing, and show no progress bar.")
-def page(wanted: tuple[str, ...], out: Path, quiet: bool) -> None:
+def page(wanted: tuple[str, ...], out: Path, language: str, wheel: bool, quiet: bool) -> None:
     """Bundle lessons (without LESSON: all that are shipped) into a folder of web pages.
 
     index.html, and for each lesson its worksheet, animation, files, and a live page, which offers
     what [page.live] of lesson.toml says. All links are relative: the folder works from a memory
-    stick, from any static web server, and on a phone.
-    """
-    from chutelab.classroom.lessons.building import bundle
+    stick, from any static web server, and on a phone. A live page has the lesson's exercise in it,
+    with numbers of one's own, and saves what is to be handed in. The wheel of this chutelab is
+    beside them, and index.html says how to install it, for the notebooks.
 
+    With one LESSON and a FOLDER that ends in .html, only that lesson's live page is written, into a
+    file of that name.
+    """
+    from chutelab.classroom.lessons.building import bundle, live_page
+
+    if out.suffix == ".html":
+        lessons = _lessons(wanted, language)
+        if len(lessons) != 1:
+            raise click.UsageError("a single page is of one lesson: name it, or a folder")
+        with writing(instead="another file"):
+            size = live_page(lessons[0], out)
+        if not quiet:
+            console.say(f"wrote {out}, {size / 1e3:.0f} kB")
+        return
     with writing(instead="another folder"), progress("making the pages", quiet=quiet) as update:
-        made = bundle(_lessons(wanted), out, update)
+        made = bundle(_lessons(wanted, language), out, update, wheel=wheel)
     if not quiet:
         size = sum(path.stat().st_size for path in made)
         console.say(f"wrote {len(made)} files, {size / 1e6:.1f} MB; open {out / 'index.html'}")
 
 
-def _lessons(wanted: tuple[str, ...]) -> list[Lesson]:
+@lesson.command(short_help="Package lessons for a learning platform (SCORM 1.2).")
+@lessons_argument
+@click.option("--all", "everything", is_flag=True, help="All lessons that are shipped.")
+@click.option(
+    "--out",
+    "-o",
+    metavar="DIR|FILE.zip",
+    type=FileName(path_type=Path),
+    default=Path(),
+    help="The folder for the packages, NN-name.scorm.zip each, by default this one; or, for one"
+    " lesson, the zip file itself. Files that are there are replaced.",
+)
+@language_option
+@click.option("--quiet", "-q", is_flag=True, help="Print nothing, and show no progress bar.")
+def scorm(wanted: tuple[str, ...], everything: bool, out: Path, language: str, quiet: bool) -> None:
+    """Make a SCORM 1.2 package of each LESSON: its live page with its exercise, for a course.
+
+    The platform tells the page each student's name, from which the numbers are drawn, and keeps the
+    score (0 to 100, a share of right answers), whether the lesson is completed (every question is
+    right, or its working was shown), each answer, the time, and where to go on next time. The page
+    asks for nothing from the network; students install nothing.
+
+    \b
+    Moodle  "Add an activity", "SCORM package", and the zip into "Package file".
+            Appearance: "New window" gives it room. Grade: "Highest grade", maximum 100.
+            Attempts: "Force new attempt" stays "No", so that students go on where they
+            were. Results: "Reports" of the activity.
+    ILIAS   "Add New Item", "Learning Module SCORM", and the zip. Settings: online.
+            Results: "Learning Progress" and "Tracking Data" of the module.
+    others  Import it as SCORM 1.2.
+
+    If no platform is found, as when index.html is opened from a folder, a line on the page says so;
+    students then hand in the result file for `chutelab lesson grade`. A score from a browser can be
+    forged, as on every platform: use it to see where a class stands, not as an exam.
+
+    \b
+    chutelab lesson scorm 3
+    chutelab lesson scorm 1 2 3 --language de -o packages/
+    chutelab lesson scorm --all -o packages/
+    """  # noqa: D301 - click wants the backspace
+    from chutelab.classroom.lessons.scorm import package
+
+    if everything == bool(wanted):
+        raise RefusedError("give lessons, such as: chutelab lesson scorm 3; or --all")
+    lessons = _lessons(wanted, language)
+    is_file = out.suffix.lower() == ".zip"
+    if is_file and len(lessons) > 1:
+        raise RefusedError(f"--out {out}: {len(lessons)} lessons go into a folder, not one zip")
+    with writing(instead="another place"), progress("packaging", quiet=quiet) as update:
+        if not is_file:
+            out.mkdir(parents=True, exist_ok=True)
+        for i, one in enumerate(lessons, 1):
+            target = out if is_file else out / f"{one.folder.name}.scorm.zip"
+            made = package(one, target)
+            if update is not None:
+                update(i / len(lessons))
+            if not quiet:
+                console.say(f"wrote {made}, {made.stat().st_size / 1000:.0f} kB")
+
+
+def _lessons(wanted: tuple[str, ...], language: str = "en") -> list[Lesson]:
     """Return the lessons that are named, or all that are shipped."""
     from chutelab.classroom.lessons import find, shipped_lessons
 
-    return [find(name) for name in wanted] or shipped_lessons()
+    return [find(name, language) for name in wanted] or shipped_lessons(language)
 
 
 def _plain(lesson: Lesson) -> dict[str, object]:

@@ -1,37 +1,14 @@
-"""A recording's summary as tables for people."""
+"""A recording's summary for people, in a terminal."""
 
 from __future__ import annotations
 
-from collections import Counter
-from dataclasses import replace
-from math import ceil, isnan
-
-import numpy as np
 from rich.console import RenderableType
 from rich.text import Text
 
-from chutelab.results import REASONS, Kind, Recording
-from chutelab.results.comparison import compare
-from chutelab.results.ledger import ledger
-from chutelab.results.quantities import (
-    air_drag,
-    doubtful,
-    measure,
-    plugged,
-    rolling,
-    squeezed,
-    steady,
-    stopped,
-    waits,
-)
+from chutelab.results import Recording
+from chutelab.results.report import facts, sheets
 from chutelab.studies.accuracy import Accuracy, written
-from chutelab.util.tables import Sheet, number, wrapped
-
-STATIONS = 6
-"""Contacts of particle 0 that are listed where no theory speaks of them."""
-
-FLOW = 8
-"""Particles that must have left for a word about how fast they came."""
+from chutelab.util.tables import wrapped
 
 
 def report(
@@ -41,49 +18,9 @@ def report(
 
     With `details` also the engine and its steps, and errors down to rounding.
     """
-    counted = Counter(recording.ended.tolist())
     head = Text(recording.title, style="bold")
-    facts = [_many(recording.count, "particle"), _many(recording.contacts, "contact")]
-    if details:
-        steps = f"{recording.steps} {'rounds' if recording.engine == 'exact' else 'steps'}"
-        facts = [f"engine {recording.engine}", *facts, steps]
-    if not isnan(recording.seconds):
-        facts.append(f"computed in {recording.seconds:.3g} s")
-    head.append(
-        f"\n{', '.join(facts)}\n"
-        f"ended: {', '.join(f'{counted[k]} {REASONS[k]}' for k in sorted(counted))}",
-        style="not bold",
-    )
-    compared = compare(recording).sheet(details=details)
-    parts: list[RenderableType] = [head, compared]
-    if compared.notes and (way := _way(recording)).rows:
-        parts.append(way)
-    until = recording.scene.run.until
-    # Belt work goes on after the landing: `belt_work` above is until nothing slips any more.
-    ends = {"landed": "the landing", "settled": "all have settled"}.get(
-        str(until), f"t = {until} s"
-    )
-    books = ledger(recording).sheet(details=details)
-    parts.append(replace(books, title=f"Energy ledger until {ends}, J"))
-    tell = (stopped, doubtful, plugged, waits, squeezed, rolling, steady, air_drag)
-    notes = [str(note) for one in tell if (note := one(recording)) is not None]
-    landed = measure(recording, "landing.count")
-    if landed > 1:
-        mean, spread = (measure(recording, f"landing.x.{what}") for what in ("mean", "spread"))
-        notes.insert(
-            0,
-            f"{landed:.0f} landed on the outgoing belt, at x = {number(mean)} m on average, with a"
-            f" spread of {1e3 * spread:.3g} mm (standard deviation)",
-        )
-    left = np.sort(recording.select(Kind.EXIT)["t"])
-    if recording.machine.interact and len(left) >= FLOW:
-        quarters = [f"{left[ceil(part * len(left) / 4) - 1]:.3f}" for part in (1, 2, 3, 4)]
-        notes.insert(
-            0,
-            "{} fell out of the machine: a quarter of them by {} s, half of them by {} s, three"
-            " quarters by {} s, the last at {} s".format(len(left), *quarters),
-        )
-    parts += [Sheet("", (), (), notes=(f"{note[0].upper()}{note[1:]}.",)) for note in notes]
+    head.append(f"\n{facts(recording, details=details)}", style="not bold")
+    parts: list[RenderableType] = [head, *sheets(recording, details=details)]
     if accuracy is not None:
         what = "relative error" if accuracy.unit == "relative" else "error of places"
         said = "cannot be told"
@@ -94,25 +31,3 @@ def report(
         how = wrapped(f"how it is known: {accuracy.method}")
         parts += [Text("\nAccuracy", style="bold"), Text("\n".join([*found, *how]))]
     return parts
-
-
-def _many(count: int, what: str) -> str:
-    return f"{count} {what}" if count == 1 else f"{count} {what}s"
-
-
-def _way(recording: Recording) -> Sheet:
-    """Return where and when particle 0 touched or left something first, as no theory says it."""
-    own = recording.events[recording.events["particle"] == 0]
-    own = own[np.isin(own["kind"], [Kind.SEPARATION, Kind.IMPACT, Kind.LANDING])][:STATIONS]
-    rows = []
-    for event in own:
-        name = recording.surfaces[event["surface"]]
-        what = "leaves" if event["kind"] == Kind.SEPARATION else "meets"
-        numbers = (event["t"], *event["position"], *event["velocity_before"])
-        rows.append((f"{what} {name}", *(number(float(value)) for value in numbers)))
-    heads = ("", "t, s", "x, m", "y, m", "vx, m/s", "vy, m/s")
-    notes: tuple[str, ...] = ()
-    if len(own) > 1 and own["kind"][0] == Kind.SEPARATION:
-        flown = float(own["t"][1] - own["t"][0])
-        notes = (f"time of flight, from the first to the second: {number(flown)} s",)
-    return Sheet("Particle 0, its first contacts", heads, tuple(rows), notes=notes)

@@ -5,6 +5,7 @@
 - `ledger`: where the energy went, in total and by surface.
 - `quantities`: the one reader of a run's numbers, by name and by particle.
 - `comparison`: `compare`, particle 0 against the theory.
+- `report`: what a run leaves to read, as tables.
 - `summary`: all of it as the JSON object of ``chutelab run --json``.
 - `storage`: recordings as files.
 """

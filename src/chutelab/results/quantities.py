@@ -159,6 +159,19 @@ def measure(recording: Recording, name: str) -> float:
     return float(each(recording, name)[0])
 
 
+def layers(recording: Recording) -> tuple[float, float] | None:
+    """Return where the lowest and the highest layer of a bed land on the outgoing belt, x, m.
+
+    None if all are released at one height, or one of the two does not land there.
+    """
+    if recording.count < 2 or recording.scene.stream.bed_height == 0.0:
+        return None
+    landed = each(recording, "landing.x")[recording.released]
+    heights = recording.ends()[0]["position"][:, 1]
+    ends = landed[[np.argmin(heights), np.argmax(heights)]]
+    return (float(ends[0]), float(ends[1])) if np.isfinite(ends).all() else None
+
+
 def observed(recording: Recording) -> dict[str, float]:
     """Return the `QUANTITIES` of particle 0, see `symbols`."""
     return {name: float(values[0]) for name, values in symbols(recording).items()}

@@ -9,6 +9,7 @@
   `progress`; all exercises by name.
 - `exercise`: what an exercise is made of: parameters, drawn from a name, questions, known mistakes.
 - `judging`: a number read and judged: right, a known mistake, or how far off; replies.
+- `in_page`: an exercise as data for a live page, which judges as this package does.
 - ``the-parabola.toml`` and so on: the exercises themselves, a file a lesson: what is drawn,
   questions, and each answer and mistake as a formula.
 

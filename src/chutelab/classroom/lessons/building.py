@@ -1,4 +1,4 @@
-"""What is made of lessons: their pictures, new lessons, and all of them as web pages.
+"""What is made of lessons: films and notebooks, new lessons, and all of them as web pages.
 
 ``lesson.gif`` is made anew only if what it is made from has changed; the stamp that tells is kept
 in a comment of the GIF itself. A new lesson comes from the template or is a copy of another: it
@@ -25,11 +25,17 @@ from urllib.parse import quote
 
 from PIL.GifImagePlugin import GifImageFile
 
+from chutelab.classroom.exercises import EXERCISES
+from chutelab.classroom.exercises.catalogue import told
+from chutelab.classroom.exercises.in_page import data_of
+from chutelab.classroom.lessons.cells import NOTEBOOK, notebook_of
 from chutelab.classroom.lessons.reading import Lesson, LessonError, read, scene_of, split, unusable
 from chutelab.classroom.lessons.texts import INDEX, html_of, words_for
+from chutelab.classroom.lessons.wheel import write_wheel
+from chutelab.classroom.words import Words, words
 from chutelab.engines.simulation import simulate
 from chutelab.scene import Fault, to_dict
-from chutelab.util.files import aside, refuse_other, together
+from chutelab.util.files import aside, refuse_other, together, whole
 from chutelab.util.versions import own_version, version_of
 
 _HERE: Final = Path(__file__).parent
@@ -43,7 +49,7 @@ LIBRARIES: Final = ("chutelab", "numpy", "pymunk", "matplotlib", "pillow")
 
 @dataclass(frozen=True)
 class Built:
-    """A lesson's picture after `build`: where it is, its size, and whether it had to be made."""
+    """A lesson's film, or its notebook, after `build`: where, its size, and whether it was made."""
 
     path: Path
     size: int
@@ -78,6 +84,7 @@ def build(
         If the file cannot be written.
     """
     path = (lesson.folder if folder is None else folder) / PICTURE
+    lesson = _in_english(lesson)
     wanted = stamp_of(lesson)
     made = force or comment_of(path) != wanted
     if made:
@@ -93,6 +100,35 @@ def build(
     return Built(path, path.stat().st_size, made)
 
 
+def build_notebook(lesson: Lesson, folder: Path | None = None) -> Built | None:
+    """Make the notebook of a lesson, unless it is there already; None if there is none to make.
+
+    That is so if its worksheet has not all the parts of a notebook, see `cells`.
+
+    Raises
+    ------
+    LessonError
+        If a cell of the lesson's own belongs to no part.
+    OSError
+        If the file cannot be written.
+    """
+    text = notebook_of(lesson)
+    if not text:
+        return None
+    path = (lesson.folder if folder is None else folder) / NOTEBOOK
+    made = not path.is_file() or path.read_text(encoding="utf-8") != text
+    if made:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with whole(path) as unfinished:
+            unfinished.write_text(text, encoding="utf-8", newline="\n")
+    return Built(path, path.stat().st_size, made)
+
+
+def _in_english(lesson: Lesson) -> Lesson:
+    """Return a lesson as its film has it, which speaks English whatever the lesson speaks."""
+    return lesson if lesson.language == "en" else read(lesson.folder)
+
+
 def is_current(lesson: Lesson) -> bool:
     """Tell whether a lesson's picture shows what the lesson says, with whatever versions made."""
     found, wanted = comment_of(lesson.folder / PICTURE), stamp_of(lesson)
@@ -105,6 +141,7 @@ def stamp_of(lesson: Lesson) -> str:
     That is a hash of the scene that is filmed and of the picture's settings, then the versions of
     all that simulates and draws.
     """
+    lesson = _in_english(lesson)
     scene = to_dict(scene_of(lesson, lesson.picture.scene, lesson.picture.set))
     for table in ("expect", "live"):  # neither shows in its picture
         scene.pop(table, None)
@@ -173,7 +210,9 @@ def start(path: str | Path, model: Lesson | None = None) -> Path:
         else:
             for file in files_of(model):
                 shutil.copyfile(file, unfinished / file.name)
-        read(unfinished)
+        made_lesson = read(unfinished)
+        if model is None:
+            build_notebook(made_lesson)
         path.parent.mkdir(parents=True, exist_ok=True)
         unfinished.rename(path)
     return path
@@ -194,6 +233,8 @@ def bundle(
     lessons: Sequence[Lesson],
     folder: str | Path,
     progress: Callable[[float], None] | None = None,
+    *,
+    wheel: bool = True,
 ) -> list[Path]:
     """Write web pages into a folder: an index of the lessons, and a folder with a page for each.
 
@@ -207,6 +248,8 @@ def bundle(
         Made if need be.
     progress
         Called with the share that is done, 0 to 1.
+    wheel
+        Put the wheel of this chutelab in, and how to install from it.
 
     Returns
     -------
@@ -217,6 +260,8 @@ def bundle(
     ------
     InputError
         If a lesson's scene cannot be run, or shown as a live page.
+    MissingLibraryError
+        If chutelab is not installed, so that there is no wheel.
     OSError
         If it cannot be written.
     """
@@ -232,11 +277,16 @@ def bundle(
         for i, lesson in enumerate(lessons):
             before = _link(lessons[i - 1], "prev", "← {}") if i > 0 else ""
             after = _link(lessons[i + 1], "next", "{} →") if i + 1 < len(lessons) else ""
-            cards += _lesson(lesson, made / lesson.folder.name, before, after)
+            cards += _lesson(lesson, made / lesson.folder.name, before, after, wheel=wheel)
             if progress is not None:
                 progress((i + 1) / len(lessons))
-        many = "One lesson" if len(lessons) == 1 else f"{len(lessons)} lessons"
-        (made / INDEX).write_text(_page("index.html", cards=cards, count=many), encoding="utf-8")
+        said = words(lessons[0].language if lessons else "en")
+        key = "page-count-one" if len(lessons) == 1 else "page-count"
+        values = {"cards": cards, "count": said.say(key, count=len(lessons))}
+        values["install"] = (
+            _page("install.html", said, wheel=write_wheel(made).name) if wheel else ""
+        )
+        (made / INDEX).write_text(_page("index.html", said, **values), encoding="utf-8")
         for name in _SHARED:
             shutil.copyfile(_HERE / "assets" / name, made / name)
         files = [path.relative_to(made) for path in made.rglob("*") if path.is_file()]
@@ -266,7 +316,7 @@ def _address(*names: str) -> str:
     return "/".join(quote(os.fsencode(name)) for name in names)
 
 
-def _lesson(lesson: Lesson, folder: Path, before: str, after: str) -> str:
+def _lesson(lesson: Lesson, folder: Path, before: str, after: str, *, wheel: bool) -> str:
     """Make the folder of one lesson, with links to its neighbours; return its card."""
     folder.mkdir()
     for file in files_of(lesson):
@@ -278,53 +328,100 @@ def _lesson(lesson: Lesson, folder: Path, before: str, after: str) -> str:
         film.seek(film.n_frames - 1)
         film.convert("RGB").quantize(255).save(folder / STILL, optimize=True)
         width, height = film.size
+    said = words(lesson.language)
+    say = said.say
     # What there is to play with, and to take along.
     doors = []
     if lesson.page is not None:
-        from chutelab.pictures.live.page import write
-
-        scene = scene_of(lesson, lesson.page.scene, lesson.page.settings)
-        write(scene, folder / LIVE, home=(f"Back to the lesson: {lesson.title}", INDEX))
-        doors.append(f'<li><a class="main" href="{LIVE}">Try it: change the machine</a></li>')
+        home = (say("page-back", title=lesson.title), INDEX)
+        live_page(lesson, folder / LIVE, home=home)
+        doors.append(f'<li><a class="main" href="{LIVE}">{say("page-try")}</a></li>')
     if (folder / "exercise.ipynb").is_file():
-        doors.append('<li><a href="exercise.ipynb" download>Exercise (Jupyter notebook)</a></li>')
+        door = f'<li><a href="exercise.ipynb" download>{say("page-notebook")}</a></li>'
+        doors.append(door)
+        if wheel:
+            doors.append(f'<li><a href="../{INDEX}#get">{say("page-get-door")}</a></li>')
     for name in lesson.scenes:
         if (folder / name).is_file():
-            door = f'<li><a href="{_address(name)}" download>Scene {escape(name)}</a></li>'
-            doors.append(door)
+            scene_door = escape(say("page-scene", name=name))
+            doors.append(f'<li><a href="{_address(name)}" download>{scene_door}</a></li>')
     worksheet, explanation = lesson.text("README"), lesson.text("explanation")
+    note = f"<p><em>{say('untranslated')}</em></p>\n" if lesson.untranslated else ""
     facts = {
         "folder": _address(lesson.folder.name),
-        "title": _heading(lesson),
+        "title": heading(lesson),
         "question": escape(lesson.question),
-        "level": lesson.level,
-        "minutes": str(lesson.minutes),
+        "about": say("show-about", level=say(f"level-{lesson.level}"), minutes=lesson.minutes),
         "width": str(width),
         "height": str(height),
     }
     page = _page(
         "lesson.html",
+        said,
         **facts,
         alt=escape(words_for(PICTURE, explanation) or lesson.title),
-        worksheet=html_of(worksheet),
+        worksheet=note + html_of(worksheet),
         explanation=html_of(explanation),
         doors="\n".join(doors),
         before=before,
         after=after,
     )
     (folder / INDEX).write_text(page, encoding="utf-8")
-    return _page("card.html", **facts)
+    return _page("card.html", said, **facts)
 
 
-def _heading(lesson: Lesson) -> str:
+def live_page(lesson: Lesson, path: str | Path, home: tuple[str, str] | None = None) -> int:
+    """Write the live page of a lesson with its exercise, in its language; return the size in bytes.
+
+    Parameters
+    ----------
+    lesson
+        One with a table ``[page]``.
+    path
+        A file; one that is there is replaced.
+    home
+        Text and address of a link back.
+
+    Raises
+    ------
+    LessonError
+        If the lesson says of no page what it is to offer.
+    InputError
+        If its scene cannot be shown as a live page.
+    OSError
+        If the page cannot be written.
+    """
+    from chutelab.pictures.live.page import write
+
+    if lesson.page is None:
+        text = "is missing: what the lesson's page offers; an empty table offers everything"
+        raise LessonError(str(lesson.folder), [Fault("page", None, text)])
+    scene = scene_of(lesson, lesson.page.scene, lesson.page.settings)
+    exercise = None
+    if lesson.name in EXERCISES:
+        exercise = data_of(told(lesson.name, lesson.language), explain=lesson.question)
+    return write(scene, path, language=lesson.language, home=home, exercise=exercise)
+
+
+def heading(lesson: Lesson) -> str:
+    """Return number and title of a lesson, as HTML."""
     return escape(lesson.title if lesson.number is None else f"{lesson.number}. {lesson.title}")
 
 
 def _link(lesson: Lesson, relation: str, form: str) -> str:
-    text = form.format(_heading(lesson))
+    text = form.format(heading(lesson))
     return f'<a rel="{relation}" href="../{_address(lesson.folder.name, INDEX)}">{text}</a>'
 
 
-def _page(name: str, **values: str) -> str:
+def _page(name: str, said: Words, **values: str) -> str:
+    """Fill in a page: ``$page_all`` is what the catalogue has for "page-all"."""
     page = Template((_HERE / "assets" / name).read_text(encoding="utf-8"))
-    return page.substitute(values, version=escape(own_version()))
+    version = own_version()
+    values |= {
+        name: escape(said.say(name.replace("_", "-")))
+        for name in page.get_identifiers()
+        if name.startswith("page_")
+    }
+    made_with = escape(said.say("page-made-with", version=version))
+    known = {"language": said.language, "version": escape(version), "made_with": made_with}
+    return page.substitute(values, **known)

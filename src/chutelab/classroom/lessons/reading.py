@@ -15,6 +15,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, Field, PrivateAttr, ValidationError
 
+from chutelab.classroom.words import words
 from chutelab.scene import MISSING, Fault, Scene, SceneError, load, shipped
 from chutelab.scene.overrides import Override, at_path, joined
 from chutelab.scene.rules import suggestion, unit_of
@@ -128,11 +129,23 @@ class Lesson(Table):
     )
 
     _folder: Path = PrivateAttr()
+    _language: str = PrivateAttr("en")
+    _untranslated: tuple[str, ...] = PrivateAttr(())
 
     @property
     def folder(self) -> Path:
         """Where the lesson's files are."""
         return self._folder
+
+    @property
+    def language(self) -> str:
+        """Of its texts."""
+        return self._language
+
+    @property
+    def untranslated(self) -> tuple[str, ...]:
+        """What there is in English only: keys of ``lesson.toml``, and files."""
+        return self._untranslated
 
     @property
     def name(self) -> str:
@@ -144,12 +157,12 @@ class Lesson(Table):
         """The number its folder begins with; None for one that has none."""
         return split(self._folder)[0]
 
-    def text(self, name: str, language: str = "en") -> str:
+    def text(self, name: str) -> str:
         """Return ``README`` or ``explanation``, in Markdown; "" if the lesson has none.
 
-        It is in English where there is none in that language.
+        It is in English where there is none in the lesson's language.
         """
-        for file in (f"{name}.{language}.md", f"{name}.md"):
+        for file in (f"{name}.{self._language}.md", f"{name}.md"):
             if (path := self._folder / file).is_file():
                 return path.read_text(encoding="utf-8")
         return ""
@@ -165,9 +178,9 @@ TABLES: Final[dict[str, type[Table]]] = {"picture": Picture, "page": Page, "teac
 """Model of each table by its key."""
 
 
-def shipped_lessons() -> list[Lesson]:
+def shipped_lessons(language: str = "en") -> list[Lesson]:
     """Return the shipped lessons in the order of their numbers."""
-    return [read(folder) for folder in _folders()]
+    return [read(folder, language) for folder in _folders()]
 
 
 PLAN: Final = "lesson.toml"
@@ -185,14 +198,25 @@ def unusable(place: object, text: str) -> LessonError:
     return LessonError(str(place), [Fault("", None, text)])
 
 
-def read(folder: str | Path) -> Lesson:
+def read(folder: str | Path, language: str = "en") -> Lesson:
     """Read and validate the lesson in a folder.
+
+    Parameters
+    ----------
+    folder
+        Where ``lesson.toml`` is.
+    language
+        Of its texts: those of ``lesson.LANGUAGE.toml`` are laid over it, and ``README`` and
+        ``explanation`` are read from ``README.LANGUAGE.md`` and so on. What is not there is in
+        English.
 
     Raises
     ------
     LessonError
         With all faults of ``lesson.toml``, those of its scenes and settings included, or if it
         cannot be read.
+    LanguageError
+        If there is no such language.
     """
     source = Path(folder) / PLAN
     if source.is_file():
@@ -202,14 +226,15 @@ def read(folder: str | Path) -> Lesson:
             raise unusable(source, f"too large: it has at most {LARGEST} bytes")
     elif source.exists():
         raise unusable(source, "cannot be read: it is no regular file")
-    try:
-        document = tomllib.loads(source.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise unusable(source, f"cannot be read: {error.strerror or error}") from None
-    except UnicodeDecodeError:
-        raise unusable(source, "not UTF-8 text; save the file as UTF-8") from None
-    except (ValueError, RecursionError) as error:
-        raise unusable(source, f"not TOML: {error}") from None
+    document = _document(source)
+    untranslated: list[str] = []
+    if words(language).language != "en":
+        over = source.with_name(f"lesson.{language}.toml")
+        document = _laid_over(document, _document(over) if over.is_file() else {}, untranslated)
+        for name in ("README", "explanation"):
+            file = source.with_name(f"{name}.{language}.md")
+            if source.with_name(f"{name}.md").is_file() and not file.is_file():
+                untranslated.append(file.name)
     faults: list[Fault] = []
     sound = document
     try:
@@ -222,6 +247,7 @@ def read(folder: str | Path) -> Lesson:
         needed = {"title": "-", "level": "start", "question": "-", "scenes": ["-"]}
         lesson = Lesson.model_validate(needed | sound)
     lesson._folder = source.parent.resolve()
+    lesson._language, lesson._untranslated = language, tuple(untranslated)
     if "scenes" in sound:
         faults += _misfits(lesson)
     for text in sorted(source.parent.glob("*.md")):
@@ -229,6 +255,39 @@ def read(folder: str | Path) -> Lesson:
     if faults:
         raise LessonError(str(source), faults)
     return lesson
+
+
+def _document(source: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(source.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise unusable(source, f"cannot be read: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise unusable(source, "not UTF-8 text; save the file as UTF-8") from None
+    except (ValueError, RecursionError) as error:
+        raise unusable(source, f"not TOML: {error}") from None
+
+
+TEXTS: Final = ("title", "question", "quantities", "teacher")
+"""The keys of ``lesson.LANGUAGE.toml``; of the tables, each line replaces one of English."""
+
+
+def _laid_over(
+    english: dict[str, Any], texts: Mapping[str, Any], untranslated: list[str]
+) -> dict[str, Any]:
+    """Lay the texts of a language over a plan; append the keys that are in English only."""
+    made = dict(english)
+    for key in TEXTS:
+        said, there = english.get(key), texts.get(key)
+        if isinstance(said, dict):
+            there = there if isinstance(there, dict) else {}
+            made[key] = said | there
+            untranslated += [joined((key, name)) for name in said if name not in there]
+        elif there is not None:
+            made[key] = there
+        elif said is not None:
+            untranslated.append(key)
+    return made
 
 
 def _unread(text: Path) -> Iterator[Fault]:
@@ -351,7 +410,7 @@ def _faults(error: ValidationError, document: Mapping[str, Any]) -> list[Fault]:
     return list(faults.values())
 
 
-def find(wanted: str | int | Path) -> Lesson:
+def find(wanted: str | int | Path, language: str = "en") -> Lesson:
     """Return one lesson.
 
     Parameters
@@ -359,6 +418,8 @@ def find(wanted: str | int | Path) -> Lesson:
     wanted
         A number (3, "3" or "03"), a name ("the-bounce" or "03-the-bounce"), or a folder that holds
         a ``lesson.toml``.
+    language
+        Of its texts, see `read`.
 
     Raises
     ------
@@ -370,12 +431,12 @@ def find(wanted: str | int | Path) -> Lesson:
     for folder in folders:
         number, name = split(folder)
         if said.lower() in (name, folder.name) or (said.isdecimal() and int(said) == number):
-            return read(folder)
+            return read(folder, language)
     path = Path(said)
     if (path / PLAN).is_file():
-        return read(path)
+        return read(path, language)
     if path.name == PLAN and path.is_file():
-        return read(path.parent)
+        return read(path.parent, language)
     names = [split(folder)[1] for folder in folders]
     listed = ", ".join(folder.name for folder in folders)
     advice = did_you_mean(said.lower(), names, f"there are {listed}", most=2)

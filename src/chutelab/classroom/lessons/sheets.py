@@ -2,7 +2,7 @@
 
 The student's is the worksheet, `README.md`, with a line for the name; it says nothing of what comes
 out. The explanation is `explanation.md`. The teacher's comes of the table ``[teacher]`` of
-``lesson.toml`` and of the exercise.
+``lesson.toml`` and of the exercise. All three are in the lesson's language.
 """
 
 from __future__ import annotations
@@ -12,12 +12,15 @@ from collections.abc import Iterator
 from typing import Final
 
 from chutelab.classroom.exercises import EXERCISES
-from chutelab.classroom.exercises.catalogue import UNNAMED
+from chutelab.classroom.exercises.catalogue import UNNAMED, told
 from chutelab.classroom.exercises.exercise import draw, shown
+from chutelab.classroom.exercises.judging import with_unit
 from chutelab.classroom.lessons.reading import Lesson, Teacher, unusable
+from chutelab.classroom.words import Words, words
 
 SHEETS: Final = ("student", "teacher", "explanation")
-PARTS: Final = ("Predict", "Run", "Compare")
+PARTS: Final = ("part-predict", "part-run", "part-compare")
+"""What a worksheet has, by the keys of their headings."""
 
 
 def sheet(lesson: Lesson, which: str) -> str:
@@ -29,67 +32,77 @@ def sheet(lesson: Lesson, which: str) -> str:
         If the lesson's worksheet has not the parts "Predict", "Run" and "Compare", or if it has no
         explanation.
     """
+    say = words(lesson.language).say
     match which:
         case "student":
             text = lesson.text("README")
             heads = re.findall(r"^## (.*)$", text, flags=re.MULTILINE)
-            if missing := [name for name in PARTS if name not in heads]:
+            # A worksheet that is not translated has the English ones.
+            for language in dict.fromkeys((lesson.language, "en")):
+                parts = [words(language).say(key) for key in PARTS]
+                if not (missing := [name for name in parts if name not in heads]):
+                    break
+            else:
                 said = f"a sheet needs the parts ## {', ## '.join(missing)} of the worksheet"
                 raise unusable(lesson.folder / "README.md", said)
             title, _, rest = text.partition("\n")
-            return f"{title}\n\nName: ____________________  Date: ____________\n{rest}"
+            made = f"{title}\n\n{say('sheet-name')}\n{rest}"
         case "explanation":
-            if found := lesson.text("explanation"):
-                return found
-            raise unusable(lesson.folder / "explanation.md", "is not there, or empty")
+            made = lesson.text("explanation")
+            if not made:
+                raise unusable(lesson.folder / "explanation.md", "is not there, or empty")
         case _:
-            number = "" if lesson.number is None else f"Lesson {lesson.number}. "
-            head = f"# {number}{lesson.title}: for the teacher"
-            return "\n\n".join([head, *_for_the_teacher(lesson)]) + "\n"
+            title = lesson.title
+            if lesson.number is not None:
+                title = say("sheet-title", number=lesson.number, title=title)
+            head = f"# {say('sheet-teacher', title=title)}"
+            made = "\n\n".join([head, *_for_the_teacher(lesson)]) + "\n"
+    if lesson.untranslated:
+        title, _, rest = made.partition("\n")
+        made = f"{title}\n\n*{say('untranslated')}*\n{rest}"
+    return made
 
 
 def _for_the_teacher(lesson: Lesson) -> Iterator[str]:
-    yield f"{lesson.question}\n\nLevel: {lesson.level}. Time as taught: {lesson.minutes} minutes."
+    said = words(lesson.language)
+    say = said.say
+    level = say("sheet-level", level=say(f"level-{lesson.level}"), minutes=lesson.minutes)
+    yield f"{lesson.question}\n\n{level}"
     teacher = lesson.teacher or Teacher()
     if teacher.goals:
-        yield "## Goals\n\n" + "\n".join(f"- {goal}" for goal in teacher.goals)
+        yield f"## {say('sheet-goals')}\n\n" + "\n".join(f"- {goal}" for goal in teacher.goals)
     if teacher.say:
-        yield f"## What to say\n\n{teacher.say}"
+        yield f"## {say('sheet-say')}\n\n{teacher.say}"
     if teacher.predictions:
         key = "\n".join(f"{n}. {answer}" for n, answer in enumerate(teacher.predictions, 1))
-        yield f"## Key to the predictions\n\n{key}"
-    yield from _of_exercise(lesson)
-    lengths = (("Basic", teacher.basic), ("Stretch", teacher.stretch))
-    if said := [f"- {name}: {text}" for name, text in lengths if text]:
-        yield "## Shorter and longer\n\n" + "\n".join(said)
+        yield f"## {say('sheet-predictions')}\n\n{key}"
+    yield from _of_exercise(lesson, said)
+    lengths = (("sheet-basic", teacher.basic), ("sheet-stretch", teacher.stretch))
+    if lines := [f"- {say(key)}: {text}" for key, text in lengths if text]:
+        yield f"## {say('sheet-lengths')}\n\n" + "\n".join(lines)
     if teacher.curriculum:
-        yield f"## Where it sits\n\n{teacher.curriculum}"
+        yield f"## {say('sheet-curriculum')}\n\n{teacher.curriculum}"
 
 
-def _of_exercise(lesson: Lesson) -> Iterator[str]:
+def _of_exercise(lesson: Lesson, said: Words) -> Iterator[str]:
     """Yield the key to the exercise, and the mistakes that its replies name."""
-    exercise = EXERCISES.get(lesson.name)
-    if exercise is None:
+    if lesson.name not in EXERCISES:
         return
+    exercise, say = told(lesson.name, lesson.language), said.say
     given, cases = draw(exercise, UNNAMED)
     lines = []
     for case in cases:
         asked = case.question
         way = "; ".join(case.numbers.text(line) for line in asked.working.strip().splitlines())
-        answer = f"{shown(case.right)} {asked.unit}".strip()
-        lines.append(f"{case.number}. *{asked.title}*: {way}. Answer: {answer}.")
-    yield (
-        "## Key to the exercise\n\nEach name has its own numbers; `chutelab lesson grade` knows"
-        f" them all. As shipped, for “{UNNAMED}”: {given}.\n\n" + "\n".join(lines)
-    )
+        answer = say("answer", answer=with_unit(case.right, asked.unit, said))
+        lines.append(f"{case.number}. *{asked.title}*: {way}. {answer}.")
+    numbers = "; ".join(f"{name} = {said.local(shown(given[name]))}" for name in given)
+    shipped = say("sheet-shipped", name=UNNAMED, numbers=numbers)
+    yield f"## {say('sheet-key')}\n\n{shipped}\n\n" + "\n".join(lines)
     rows = [
-        f"| {case.number} | {known.name} | {case.numbers.text(known.says)} |"
+        f"| {case.number} | {known.called or known.name} | {case.numbers.text(known.says)} |"
         for case in cases
         for known in case.question.mistakes
     ]
-    head = "| question | mistake, as the reply names it | what the reply says |\n|---|---|---|\n"
-    yield (
-        "## Mistakes to expect\n\nBesides these, the replies name a wrong sign, a power of ten, a ½"
-        " too many or too few, two of them at once, and the right answer for somebody else's"
-        " numbers.\n\n" + head + "\n".join(rows)
-    )
+    head = f"| {say('sheet-columns')} |\n|---|---|---|\n"
+    yield f"## {say('sheet-mistakes')}\n\n{say('sheet-besides')}\n\n{head}" + "\n".join(rows)

@@ -1,8 +1,6 @@
-r"""A lesson's Markdown as HTML, as text for a terminal, and the words it has for a picture.
+"""A lesson's Markdown as HTML, as text for a terminal, and the words it has for a picture.
 
-Formulas stand between dollar signs, in the part of TeX that MathML, matplotlib and Jupyter share:
-letters, ``_`` and ``^``, ``\frac``, ``\sqrt``, ``\dot``, functions such as ``\sin``, and the
-symbols in `SYMBOLS`.
+Formulas stand between dollar signs, in the part of TeX that `formulas` describes.
 """
 
 from __future__ import annotations
@@ -15,20 +13,13 @@ from markdown_it import MarkdownIt
 from markdown_it.tree import SyntaxTreeNode
 from mdit_py_plugins.dollarmath import dollarmath_plugin
 
+from chutelab.classroom.lessons.formulas import parsed, plain
+
 INDEX: Final = "index.html"
 _ADDRESSES: Final = (
-    (r"(^|/)README\.md(?=$|#)", rf"\1{INDEX}"),
-    (r"\bexplanation\.md$", "#explanation"),
+    (r"(^|/)README(\.\w+)?\.md(?=$|#)", rf"\1{INDEX}"),
+    (r"\bexplanation(\.\w+)?\.md$", "#explanation"),
 )
-
-SYMBOLS: Final = {
-    "alpha": "α", "varepsilon": "ε", "mu": "µ", "varphi": "φ", "omega": "ω", "pi": "π",
-    "rho": "ρ", "sigma": "σ", "Delta": "Δ", "cdot": "·", "le": "≤", "ge": "≥", "approx": "≈",
-    "ne": "≠", "to": "→", "infty": "∞", "pm": "±", "circ": "°",
-    "sin": "sin ", "cos": "cos ", "tan": "tan ", "arctan": "arctan ", "arccos": "arccos ",
-    "log": "log ", "ln": "ln ",
-}  # fmt: skip
-"""What each name after a backslash is in plain text."""
 
 _FORMULA: Final = re.compile(
     r"(```.*?```|`[^`]*`)|\$\$(.+?)\$\$|(?<![\\\w$])\$(?![\s$])([^$]+?)(?<![\s\\])\$(?!\w)",
@@ -39,11 +30,25 @@ _FORMULA: Final = re.compile(
 def parser() -> MarkdownIt:
     """Return a parser of lessons' Markdown, for which raw HTML is text."""
     made = MarkdownIt("commonmark", {"html": False}).enable("table")
-    return made.use(dollarmath_plugin, allow_space=False, allow_digits=False, renderer=_mathematics)
+    return made.use(dollarmath_plugin, allow_space=False, renderer=_mathematics)
 
 
 def _mathematics(tex: str, options: dict[str, bool]) -> str:
-    return convert(tex.strip(), display="block" if options["display_mode"] else "inline")
+    return mathml(tex, display=options["display_mode"])
+
+
+_NAMED: Final = r"(?:<mi>[a-z]{2,}</mi>|<(msu[bp])><mi>[a-z]{2,}</mi>.*?</\1>)"
+_BESIDE: Final = re.compile(rf"{_NAMED}(?=<m[isf])|</m(?!o)\w+>(?={_NAMED.replace('1', '2')})")
+
+
+def mathml(tex: str, *, display: bool = False) -> str:
+    r"""Return a formula as MathML; functions such as cos stand apart from what is beside them.
+
+    >>> mathml(r"2 \sin x").count("<mspace")
+    2
+    """
+    made: str = convert(tex.strip(), display="block" if display else "inline")
+    return _BESIDE.sub(r'\g<0><mspace width="0.167em" />', made)
 
 
 def html_of(markdown: str) -> str:
@@ -89,40 +94,9 @@ def without_tex(markdown: str) -> str:
 
     def written(found: re.Match[str]) -> str:
         code, display, inline = found.groups()
-        return str(code) if code else _plain(display or inline)
+        return str(code) if code else plain(parsed(display or inline))
 
     return _FORMULA.sub(written, markdown)
-
-
-def _plain(tex: str) -> str:
-    """Return a formula in plain characters; what it does not know stays as it is."""
-    text = re.sub(r"\\([A-Za-z]+)", _symbol, tex.strip()).replace(r"\,", " ")
-    before = ""
-    while text != before:  # from the innermost braces outwards
-        before = text
-        text = re.sub(r"\\(frac)\{([^{}]*)\}\{([^{}]*)\}", _fraction, text)
-        text = re.sub(r"\\sqrt\{([^{}]*)\}", lambda m: f"√{_grouped(m[1])}", text)
-        text = re.sub(r"\\dot ?\{?(\w)\}?", "\\1\N{COMBINING DOT ABOVE}", text)
-        text = re.sub(r"\^\{([^{}]*)\}", lambda m: f"^{_grouped(m[1])}", text)
-        text = re.sub(r"_\{([^{}]*)\}", r"_\1", text)
-    text = re.sub(r"_(?=\d)", "", text)
-    text = re.sub(r"\^(\d)(?!\d)", lambda m: "⁰¹²³⁴⁵⁶⁷⁸⁹"[int(m[1])], text)
-    text = re.sub(r"(sin|cos|tan) ([²³])", r"\1\2 ", text)
-    text = re.sub(r"(sin|cos|tan|log|ln) \(", r"\1(", text)
-    return re.sub(r" +", " ", text).strip()
-
-
-def _symbol(found: re.Match[str]) -> str:
-    return SYMBOLS.get(found[1], found[0])
-
-
-def _grouped(text: str) -> str:
-    return text if re.fullmatch(r"-?[\w.^]+", text) else f"({text})"
-
-
-def _fraction(found: re.Match[str]) -> str:
-    above, below = found[2], found[3]
-    return "½" if (above, below) == ("1", "2") else f"{_grouped(above)}/{_grouped(below)}"
 
 
 def words_for(picture: str, markdown: str) -> str | None:

@@ -6,8 +6,10 @@
 - ``assets``: HTML, CSS, the catalogues of words, and the modules of JavaScript. Without a screen:
   ``trig.js``, ``random.js``, ``scene.js``, ``machine.js`` (keys become surfaces), ``transfer.js``
   (the closed form), ``core.js`` and ``worker.js`` (the contact engine in its thread),
-  ``engine.js``, ``recording.js``, ``lab.js``, ``handles.js``, ``view.js``, ``words.js``. With one:
-  ``stage.js``, ``transport.js`` and ``app.js``, which joins all.
+  ``engine.js``, ``recording.js``, ``lab.js``, ``handles.js``, ``view.js``, ``words.js``; and of a
+  lesson's exercise, as `chutelab.classroom.exercises` has it, ``formula.js``, ``draw.js``,
+  ``judging.js``, ``task.js``. With one: ``exercise.js``, ``stage.js``, ``transport.js`` and
+  ``app.js``, which joins all.
 """
 
 from __future__ import annotations

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import re
+import zlib
 from base64 import b64encode
+from collections.abc import Mapping
 from functools import cache
 from hashlib import sha256
 from html import escape
 from importlib.resources import files
 from pathlib import Path
 from string import Template
+from typing import Any
 
 from chutelab.pictures.live.describe import describe
 from chutelab.pictures.plots import style
@@ -22,7 +25,13 @@ from chutelab.util.versions import own_version
 LANGUAGES = ("en", "de")
 
 
-def html(scene: Scene, *, language: str = "en", home: tuple[str, str] | None = None) -> str:
+def html(
+    scene: Scene,
+    *,
+    language: str = "en",
+    home: tuple[str, str] | None = None,
+    exercise: Mapping[str, Any] | None = None,
+) -> str:
     """Return the live page of a scene; the same scene and version give the same bytes.
 
     Parameters
@@ -33,6 +42,8 @@ def html(scene: Scene, *, language: str = "en", home: tuple[str, str] | None = N
         Of all that the page says; what the scene says stands as it is.
     home : tuple of str, optional
         Text and address of a link back, for a page that is one of several.
+    exercise : mapping, optional
+        What `chutelab.classroom.exercises.in_page.data_of` makes of an exercise.
 
     Raises
     ------
@@ -53,7 +64,8 @@ def html(scene: Scene, *, language: str = "en", home: tuple[str, str] | None = N
         "language": language,
         "strings": json.loads(_asset(f"strings/{language}.json")),
         "layout": json.loads((core / "layout.json").read_text(encoding="utf-8")),
-        "wasm": b64encode((core / "core.wasm").read_bytes()).decode("ascii"),
+        **({} if exercise is None else {"exercise": exercise}),
+        "wasm": b64encode(zlib.compress((core / "core.wasm").read_bytes(), 9)).decode("ascii"),
     }
     # Within a script element nothing but an end tag must look like one.
     packed = json.dumps(data, allow_nan=False, separators=(",", ":"), ensure_ascii=False)
@@ -78,12 +90,13 @@ def write(
     *,
     language: str = "en",
     home: tuple[str, str] | None = None,
+    exercise: Mapping[str, Any] | None = None,
 ) -> int:
     """Write the live page of a scene, whole or not at all, and return its size in bytes.
 
     See `html`; a file that is there is replaced, its folder must be there.
     """
-    data = html(scene, language=language, home=home).encode("utf-8")
+    data = html(scene, language=language, home=home, exercise=exercise).encode("utf-8")
     with whole(Path(path)) as unfinished:
         unfinished.write_bytes(data)
     return len(data)

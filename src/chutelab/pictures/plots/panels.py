@@ -30,7 +30,7 @@ from chutelab.pictures.plots.scenery import (
     upright,
 )
 from chutelab.results import Recording
-from chutelab.results.quantities import measure
+from chutelab.results.quantities import each, layers, measure
 from chutelab.scene import Scene
 from chutelab.theory import Transfer
 from chutelab.theory.separation import separation
@@ -273,6 +273,30 @@ def draw_velocity(
 def _beyond(times: Floats) -> float:
     """Return a time a little after the end, so that a jump at the end can be seen."""
     return float(times[-1] + (0.04 * (times[-1] - times[0]) or 1e-3))
+
+
+def draw_landings(ax: Axes, recording: Recording, title: str) -> Axes:
+    """Draw how many particles land where on the outgoing belt, with the mean and the spread.
+
+    Of a bed, the landings of the lowest and the highest layer are marked.
+    """
+    found = each(recording, "landing.x")
+    found = found[np.isfinite(found)]
+    style.dress(ax, "place of the landing x, m", "particles", title)
+    if len(found) == 0:
+        return ax
+    mean, deviation = float(found.mean()), float(found.std())
+    # All that land in one place still make a bar.
+    edges = 24 if np.ptp(found) > 1e-9 else [mean - 5e-4, mean + 5e-4]
+    ax.hist(found, bins=edges, color=style.STREAM)
+    ax.axvspan(mean - deviation, mean + deviation, color=style.MUTED, alpha=0.2, gid="spread")
+    ax.axvline(mean, color=style.INK, lw=1.6, gid="mean")
+    style.note(ax, f"mean {mean:.4f} m, spread {1e3 * deviation:.2f} mm")
+    if (ends := layers(recording)) is not None:
+        for x, layer, dashes in zip(ends, ("lowest", "highest"), ("--", ":"), strict=True):
+            ax.axvline(x, color=style.STRIKE, lw=1.6, ls=dashes, gid=layer, label=f"{layer} layer")
+        ax.legend(fontsize=style.SMALL, loc="upper left", framealpha=0.85)
+    return ax
 
 
 SHOWN = 1e-9

@@ -14,7 +14,7 @@
     say();
   };
   const say = () => {
-    button.textContent = runs ? "Stop the animation" : "Start the animation";
+    button.textContent = runs ? button.dataset.stop : button.dataset.start;
   };
   button.hidden = false;
   say();

@@ -5,6 +5,7 @@ import { Engine } from "./engine.js";
 import { Arrows } from "./arrows.js";
 import { CurvesPanel } from "./curves.js";
 import { EnergyPanel } from "./energy.js";
+import { ExercisePanel } from "./exercise.js";
 import { Inspector } from "./inspector.js";
 import { Keep } from "./keep.js";
 import { listenToKeys } from "./keyboard.js";
@@ -57,8 +58,10 @@ function start() {
     const name = panel.id || "tools";
     if (data.live?.panels && !data.live.panels.includes(name)) panel.classList.add("unwanted");
   }
+  const exercise = data.exercise
+    && new ExercisePanel(byId("panels"), stage, lab, words, data.exercise);
   Object.assign(globalThis, {
-    chutelab: { lab, stage, panels, toml: () => toToml(/** @type {any} */ (lab.given)) },
+    chutelab: { lab, stage, panels, exercise, toml: () => toToml(/** @type {any} */ (lab.given)) },
   });
 }
 

@@ -29,6 +29,7 @@ import { arcCos, atan2, lengthOf, sinCos } from "./trig.js";
  * @property {number} [incline] rad
  * @property {number} [plateFriction]
  * @property {number} [interval] time per particle
+ * @property {boolean} [asPrinted] Eq. (9) as it is printed, for an upright plate without friction
  * @property {boolean} [unboundedPlate] false: do not object to what its line would do elsewhere
  */
 
@@ -115,7 +116,8 @@ function separationOf(speed, rideRadius, gravity, incline) {
 export function transfer({
   speed, pulleyRadius, distance, angle = 0.0, pivotHeight = pulleyRadius, restitution = 0.5,
   drop = 0.5, beltSpeed = speed, particleRadius = 0.0, mass = 0.008, gravity = 9.81, spin = false,
-  inertia = 0.5, incline = 0.0, plateFriction = 0.0, interval, unboundedPlate = true,
+  inertia = 0.5, incline = 0.0, plateFriction = 0.0, interval, asPrinted = false,
+  unboundedPlate = true,
 }) {
   const found = unanswered();
   const { numbers } = found;
@@ -178,14 +180,17 @@ export function transfer({
   // Leave the plate. Coulomb: the impulse that stops the slip, or as much as friction can give.
   require("restitution", restitution >= 0.0 && restitution <= 1.0);
   require("plateFriction", plateFriction >= 0.0);
+  require("asPrinted", !asPrinted || (plateFriction === 0.0 && angle === 0.0));
   const limit = plateFriction * (1.0 + restitution) * normal;
   const share = spin ? inertia / (1.0 + inertia) : 1.0;
   const impulse = Math.min(Math.max((tangential - rim) * share, -limit), limit);
-  const away = restitution * normal;
-  const down = tangential - impulse;
+  let away = restitution * normal;
+  let down = tangential - impulse;
   rim += spin ? impulse / inertia : 0.0;
-  // Eqs. (8), (9)
-  keep({ phi2r: atan2(away, down), v2r: lengthOf(away, down), omega2: turning(rim) });
+  const phi2r = atan2(away, down); // Eq. (8)
+  const v2r = asPrinted ? lengthOf(normal, restitution * tangential) : lengthOf(away, down);
+  if (asPrinted) [away, down] = sinCos(phi2r).map((part) => v2r * part);
+  keep({ phi2r, v2r, omega2: turning(rim) }); // Eq. (9)
 
   // Fall on the outgoing belt, and be taken along by it.
   require("drop", drop >= 0.0 && drop < Infinity);

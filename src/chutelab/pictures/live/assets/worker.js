@@ -1,7 +1,8 @@
 // The engine's own thread: runs machines, so that the picture never waits for them.
 //
-// In:  {type: "load", wasm, layout}; {type: "run", id, machine, until} begins a run and ends the
-//      one before; {type: "until", id, until} lets it go on to a later time (s).
+// In:  {type: "load", wasm, layout}, the core compressed by zlib; {type: "run", id, machine, until}
+//      begins a run and ends the one before; {type: "until", id, until} lets it go on to a later
+//      time (s).
 // Out: {type: "chunk", id, knots, tips, events, now, state, books, reasons}, where state
 //      is "running", "done", "stalled" or "failed"; books and reasons come with the end.
 
@@ -87,7 +88,9 @@ let ready;
 
 /** @param {{wasm: ArrayBuffer, layout: import("./core.js").Layout}} parts */
 async function load({ wasm, layout }) {
-  core = await startCore(await WebAssembly.compile(wasm), layout);
+  const plain = new Blob([wasm]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const bytes = await new Response(plain).arrayBuffer();
+  core = await startCore(await WebAssembly.compile(bytes), layout);
 }
 
 addEventListener("message", async ({ data }) => {

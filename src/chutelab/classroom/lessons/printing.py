@@ -1,0 +1,195 @@
+"""Sheets as files: Markdown, a web page in one file, and a PDF on A4 that Typst sets."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable, Iterator
+from html import escape
+from importlib.util import find_spec
+from pathlib import Path
+from string import Template
+from tempfile import TemporaryDirectory
+from typing import Final
+
+from markdown_it.tree import SyntaxTreeNode
+from PIL import Image
+
+from chutelab.classroom.lessons.formulas import parsed, typeset
+from chutelab.classroom.lessons.reading import Lesson
+from chutelab.classroom.lessons.sheets import sheet
+from chutelab.classroom.lessons.texts import parser
+from chutelab.classroom.words import words
+from chutelab.util.errors import MissingLibraryError
+from chutelab.util.versions import own_version
+
+FORMATS: Final = ("md", "html", "pdf")
+_ASSETS: Final = Path(__file__).parent / "assets"
+
+
+class PrintError(MissingLibraryError):
+    """A sheet cannot be printed, and what to do about it."""
+
+
+def printed(lesson: Lesson, which: str, kind: str) -> bytes:
+    """Return one of the `SHEETS` of a lesson as a file of one of `FORMATS`, in its language.
+
+    Raises
+    ------
+    LessonError
+        If the lesson has no such sheet.
+    PrintError
+        If it is to be a PDF, and the extra that sets it is not installed.
+    """
+    markdown = sheet(lesson, which)
+    if kind == "md":
+        return markdown.encode("utf-8")
+    tree = SyntaxTreeNode(parser().parse(markdown))
+    lists = _to_be_answered(tree) if which == "student" else []
+    if kind == "html":
+        return _page(lesson, tree, lists).encode("utf-8")
+    return _pdf(lesson, tree, lists, words(lesson.language).say(f"sheet-kind-{which}"))
+
+
+def _to_be_answered(tree: SyntaxTreeNode) -> list[SyntaxTreeNode]:
+    """Return the numbered lists of the first part: what is predicted has to be written down."""
+    heads = [i for i, node in enumerate(tree.children) if node.tag == "h2"]
+    first = slice(*heads[:2]) if len(heads) > 1 else slice(0)
+    return [node for node in tree.children[first] if node.type == "ordered_list"]
+
+
+def _title(tree: SyntaxTreeNode) -> str:
+    heads = [node for node in tree.children if node.tag == "h1"]
+    return "".join(node.content for one in heads[:1] for node in one.walk() if node.type == "text")
+
+
+def _pictures(lesson: Lesson, tree: SyntaxTreeNode) -> Iterator[tuple[SyntaxTreeNode, Path]]:
+    """Yield the pictures of a text that lie beside it, each with its file."""
+    for node in tree.walk():
+        if node.type == "image":
+            path = lesson.folder / str(node.attrs["src"])
+            if path.suffix in (".png", ".gif") and path in lesson.folder.iterdir():
+                yield node, path
+
+
+# A web page --------------------------------------------------------------------------------------
+
+
+def _page(lesson: Lesson, tree: SyntaxTreeNode, lists: list[SyntaxTreeNode]) -> str:
+    """Return a page that is whole: pictures are in it."""
+    for node in lists:
+        node.attrs["class"] = "predict"
+    for node, path in _pictures(lesson, tree):
+        data = base64.b64encode(path.read_bytes()).decode("ascii")
+        node.attrs["src"] = f"data:image/{path.suffix[1:]};base64,{data}"
+    read = parser()
+    body = str(read.renderer.render(tree.to_tokens(), read.options, {}))
+    page = Template((_ASSETS / "sheet.html").read_text(encoding="utf-8"))
+    title, version = escape(_title(tree)), escape(own_version())
+    return page.substitute(body=body, title=title, language=lesson.language, version=version)
+
+
+# A PDF -------------------------------------------------------------------------------------------
+
+
+def _pdf(lesson: Lesson, tree: SyntaxTreeNode, lists: list[SyntaxTreeNode], kind: str) -> bytes:
+    if find_spec("typst") is None:
+        raise PrintError(
+            'a sheet as PDF needs what is not installed: pip install "chutelab[pdf]"; a web page'
+            " needs nothing: --format html"
+        )
+    import typst
+
+    with TemporaryDirectory() as made:
+        folder = Path(made)
+        found = dict(_pictures(lesson, tree))
+        for node in tree.walk():
+            if node.type == "image" and node not in found:
+                node.attrs["src"] = ""  # its words stand for it
+        for node, path in found.items():
+            with Image.open(path) as picture:
+                # Of a film its end, when all has happened.
+                picture.seek(getattr(picture, "n_frames", 1) - 1)
+                picture.convert("RGB").save(folder / f"{path.stem}.png")
+            node.attrs["src"] = f"{path.stem}.png"
+        look = (_ASSETS / "sheet.typ").read_text(encoding="utf-8")
+        said = {"title": _title(tree), "kind": kind, "language": lesson.language}
+        options = ", ".join(f"{name}: {_text(text)}" for name, text in said.items())
+        body = _blocks(tree.children, lists)
+        source = folder / "sheet.typ"
+        source.write_text(f"{look}\n#show: sheet.with({options})\n{body}", encoding="utf-8")
+        # The fonts are Typst's own, and no time is in the file: it is the same everywhere.
+        return typst.compile(source, format="pdf", ignore_system_fonts=True, timestamp=0)
+
+
+def _text(text: str) -> str:
+    """Return a text as Typst writes one, in which nothing is markup."""
+    kept = "".join(sign for sign in text if sign.isprintable() or sign == "\n")
+    escaped = kept.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    return f'"{escaped}"'
+
+
+def _blocks(nodes: Iterable[SyntaxTreeNode], lists: list[SyntaxTreeNode]) -> str:
+    """Return blocks of Markdown as Typst has them, with room to write after items of `lists`."""
+    made = []
+    for node in nodes:
+        match node.type:
+            case "heading":
+                made.append(f"#heading(level: {node.tag[1]})[{_inline(node)}]")
+            case "bullet_list" | "ordered_list":
+                room = "#room" if node in lists else ""
+                items = "".join(
+                    f"[{_blocks(item.children, lists)}{room}]" for item in node.children
+                )
+                name = "list" if node.type == "bullet_list" else "enum"
+                made.append(f"#{name}{items}")
+            case "fence" | "code_block":
+                made.append(f"#raw({_text(node.content.rstrip())}, block: true)")
+            case "math_block":
+                made.append(f"$ {typeset(parsed(node.content))} $")
+            case "table":
+                made.append(_table(node))
+            case "hr":
+                made.append("#line(length: 100%)")
+            case "blockquote":
+                made.append(f"#quote(block: true)[{_blocks(node.children, lists)}]")
+            case _:
+                made.append(_inline(node))
+    return "\n\n".join(made)
+
+
+def _table(table: SyntaxTreeNode) -> str:
+    """Return a table; columns with cells to be filled in share what room there is."""
+    rows = [
+        [_inline(cell) for cell in row.children] for part in table.children for row in part.children
+    ]
+    blank = [not all(cells) for cells in zip(*rows[1:], strict=True)]
+    columns = ", ".join("1fr" if one else "auto" for one in blank)
+    head, *body = ("".join(f"[{cell or '#blank'}]" for cell in row) for row in rows)
+    made = f"#table(columns: ({columns},), table.header{head}){''.join(body)}"
+    # Whoever fills it in has it on one page.
+    return f"#block(breakable: false)[{made}]" if any(blank) else made
+
+
+def _inline(node: SyntaxTreeNode) -> str:
+    """Return what is within a block as Typst has it."""
+    inside = "".join(_inline(child) for child in node.children)
+    match node.type:
+        case "text":
+            return f"#{_text(node.content)};"
+        case "softbreak":
+            return " "
+        case "hardbreak":
+            return "#linebreak()"
+        case "strong" | "em":
+            return f"#{'strong' if node.type == 'strong' else 'emph'}[{inside}]"
+        case "code_inline":
+            return f"#raw({_text(node.content)})"
+        case "math_inline":
+            return f"${typeset(parsed(node.content))}$"
+        case "link" if str(node.attrs["href"]).startswith("https://"):
+            return f"#link({_text(str(node.attrs['href']))})[{inside}]"
+        case "image" if node.attrs["src"]:
+            name = str(node.attrs["src"])
+            return f"#align(center, image({_text(name)}, width: 78%, alt: {_text(node.content)}))"
+        case _:
+            return inside

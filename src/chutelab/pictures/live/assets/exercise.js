@@ -1,0 +1,272 @@
+// The lesson's exercise beside the machine: a name gives the numbers; questions, hints, replies,
+// and what is handed in. What is kept is kept in this browser, or by the page that this one is part
+// of.
+
+import { plainName } from "./draw.js";
+import { card, html } from "./panels.js";
+import { download, fileStem } from "./share.js";
+import { LONGEST_NAME, LONGEST_WORDS, Task } from "./task.js";
+
+/**
+ * @typedef {import("./lab.js").Lab} Lab
+ * @typedef {import("./stage.js").Stage} Stage
+ * @typedef {import("./words.js").Words} Words
+ * @typedef {import("./draw.js").Exercise} Exercise
+ * @typedef {import("./judging.js").Verdict} Verdict
+ */
+
+/** Signs of verdicts; the words always say it too. */
+const MARKS = /** @type {Record<Verdict, string>} */ ({
+  blank: "○", right: "✓", mistake: "✗", off: "✗", unread: "?",
+});
+
+/** What this browser keeps between two visits, if it does. */
+function kept() {
+  try {
+    return localStorage;
+  } catch {
+    // A frame without an origin has none.
+    return null;
+  }
+}
+
+/** @param {string | null | undefined} text JSON @returns {any} */
+function parsed(text) {
+  try {
+    return JSON.parse(text ?? "null");
+  } catch {
+    return null;
+  }
+}
+
+class ExercisePanel {
+  /** @param {Element} home @param {Stage} stage @param {Lab} lab @param {Words} words
+   * @param {Exercise} exercise */
+  constructor(home, stage, lab, words, exercise) {
+    this.words = words;
+    this.exercise = exercise;
+    this.place = `chutelab/${exercise.name}/`;
+    this.count = html("span", { class: "note" });
+    this.panel = card("exercise", words.say("exercise"),
+      html("p", { class: "note" }, words.say("exercise-after")));
+    this.panel.querySelector("summary").append(" ", this.count);
+    this.body = this.panel.querySelector(".body");
+    home.prepend(this.panel);
+    const open = () => {
+      if (!stage.blind) this.askName();
+    };
+    stage.painters.push(open);
+    addEventListener("beforeprint", () => {
+      for (const { section } of this.rows ?? []) section.open = true;
+    });
+    const student = kept()?.getItem("chutelab/student") ?? "";
+    if (student && kept()?.getItem(this.placeOf(student))) this.begin(student);
+    else open();
+    if (parent === window) return;
+    addEventListener("message", ({ source, data }) => {
+      if (source !== parent || data?.chutelab !== "begin") return;
+      const { student: name, suspend_data: suspended = "" } = data;
+      if (typeof name !== "string" || typeof suspended !== "string" || !name.trim()) return;
+      this.isHosted = true;
+      this.begin(name, suspended);
+    });
+    parent.postMessage({ chutelab: "ready", lesson: exercise.name }, "*");
+  }
+
+  /** @type {Task | undefined} */
+  task;
+
+  /** Whether another page said who this is, and keeps what becomes of it. */
+  isHosted = false;
+
+  /** Whether the name is asked for. */
+  asks = false;
+
+  /** @param {string} student */
+  placeOf(student) {
+    return this.place + plainName(student);
+  }
+
+  /** @param {string} id @param {string} text @param {() => void} act @param {string} [kind] */
+  button(id, text, act, kind = "") {
+    const made = html("button", { type: "button", class: kind }, text);
+    if (id) made.id = id;
+    made.addEventListener("click", act);
+    return made;
+  }
+
+  askName() {
+    if (this.task || this.asks) return;
+    this.asks = true;
+    const { words } = this;
+    const name = html("input", {
+      type: "text", id: "student", maxlength: String(LONGEST_NAME), autocomplete: "name",
+      "aria-describedby": "student-note",
+    });
+    name.value = kept()?.getItem("chutelab/student") ?? "";
+    const begin = () => {
+      if (name.value.trim()) this.begin(name.value.trim()).focus();
+      else name.focus();
+    };
+    name.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
+      if (event.key === "Enter") begin();
+    });
+    this.body.replaceChildren(
+      html("p", {}, this.exercise.title),
+      html("label", { for: "student" }, words.say("exercise-name")),
+      html("div", { class: "row" }, name,
+        this.button("begin", words.say("exercise-begin"), begin, "main")),
+      html("p", { class: "note", id: "student-note" }, words.say("exercise-name-note")));
+  }
+
+  /** Hand out a student's numbers, and go on from where that got.
+   * @param {string} student @param {string} [suspended] what `suspend_data` was
+   * @returns {HTMLElement} the first thing to read */
+  begin(student, suspended) {
+    const name = student.trim().slice(0, LONGEST_NAME), { exercise, words } = this;
+    const task = new Task(exercise, name, () => this.names());
+    this.task = task;
+    this.asks = false;
+    task.goOn(parsed(this.isHosted ? suspended : kept()?.getItem(this.placeOf(name))));
+    const head = html("h2", { tabindex: "-1" }, task.worded("numbers-of", { student: name }));
+    this.rows = exercise.questions.map((_, n) => this.question(task, n));
+    const again = this.button("rename", words.say("exercise-rename"), () => {
+      this.task = undefined;
+      this.askName();
+      document.getElementById("student")?.focus();
+    });
+    this.body.replaceChildren(head,
+      html("table", { class: "given" }, html("tbody", {}, ...task.rows.map(([symbol, value, meaning]) =>
+        html("tr", {}, html("th", { scope: "row" }, html("b", {}, symbol), ` ${meaning}`),
+          html("td", {}, value))))),
+      html("p", {}, task.story),
+      ...(exercise.whole ? [] : [html("p", { class: "note" }, task.worded("untranslated"))]),
+      ...this.rows.map(({ section }) => section), ...this.explanation(task),
+      html("div", { class: "row" },
+        this.button("result", words.say("exercise-result"), () => this.save(), "main"),
+        ...(this.isHosted ? [] : [again])),
+      html("p", { class: "note" }, words.say("exercise-result-note")));
+    this.tell();
+    const next = task.standings.findIndex(({ verdict }) => verdict !== "right");
+    if (next >= 0) this.rows[next].section.open = true;
+    return head;
+  }
+
+  /** Other names that were here. @returns {string[]} */
+  names() {
+    const store = kept();
+    if (!store || this.isHosted) return [];
+    return Object.keys(store).filter((key) => key.startsWith(this.place))
+      .map((key) => parsed(store.getItem(key))?.student)
+      .filter((name) => typeof name === "string");
+  }
+
+  /** @param {Task} task @param {number} n */
+  question(task, n) {
+    const { words } = this, { unit, hints } = this.exercise.questions[n], id = `question-${n + 1}`;
+    const { title, text, needed } = task.asked(n), standing = task.standings[n];
+    const mark = html("span", { class: "mark", "aria-hidden": "true" });
+    const state = html("p", { class: "note state" });
+    const reply = html("p", { class: "reply", role: "status", id: `${id}-reply` });
+    const told = html("div", { class: "told", "aria-live": "polite" });
+    const input = html("input", {
+      type: "text", id: `${id}-answer`, inputmode: "text", autocomplete: "off", autocapitalize: "off",
+      spellcheck: "false", "aria-label": title, "aria-describedby": `${id}-needed ${id}-reply`,
+    });
+    if (standing.answer !== null) input.value = words.plain(standing.answer).replace("−", "-");
+    const check = () => {
+      const { verdict, heading, text: said, unread } = task.check(n, input.value);
+      const sentence = unread ? words.say(`typed-${unread.why}`, { text: unread.text })
+        : verdict === "blank" ? words.say("exercise-blank") : said;
+      reply.replaceChildren(html("b", {}, `${MARKS[verdict]} ${heading}. `), sentence);
+      reply.setAttribute("data-verdict", verdict);
+      reply.className = `reply ${verdict}`;
+      this.tell();
+    };
+    const showHint = (/** @type {number} */ hint) => {
+      const { title: which, text: said, last } = task.hintAt(n, hint);
+      told.append(html("p", {}, html("b", {}, which), html("br"), said));
+      if (last) told.append(html("p", { class: "note" }, task.worded("hint-last")));
+    };
+    const showWorking = () => {
+      const { title: which, lines } = task.reveal(n);
+      told.append(html("p", { class: "lines" }, html("b", {}, which),
+        ...lines.flatMap((line) => [html("br"), line])));
+    };
+    const hint = this.button("", words.say("exercise-hint"), () => {
+      task.hint(n);
+      showHint(standing.hints);
+      this.tell();
+    }, "hint");
+    const working = this.button("", words.say("exercise-working"), () => {
+      showWorking();
+      this.tell();
+    }, "working");
+    for (let one = 1; one <= standing.hints; one += 1) showHint(one);
+    if (standing.revealed) showWorking();
+    input.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
+      if (event.key === "Enter") check();
+    });
+    const section = html("details", { class: "question", "data-question": String(n + 1) },
+      html("summary", {}, mark, " ", title), html("p", {}, text),
+      html("p", { class: "note", id: `${id}-needed` }, needed),
+      html("div", { class: "row" }, input, html("span", {}, unit),
+        this.button("", words.say("exercise-check"), check, "check"), hint, working),
+      reply, told, state);
+    const update = () => {
+      const { verdict, hints: read, revealed } = standing;
+      mark.textContent = MARKS[verdict];
+      mark.className = `mark ${verdict}`;
+      state.textContent = task.state(n);
+      hint.disabled = read === hints.length;
+      // Whoever read all hints, or is right, may see how it goes.
+      working.hidden = !(read === hints.length || verdict === "right" || revealed);
+      working.disabled = revealed;
+    };
+    return { section, update };
+  }
+
+  /** What is explained in one's own words. @param {Task} task */
+  explanation(task) {
+    if (!this.exercise.explain) return [];
+    const field = html("textarea", { id: "explain", maxlength: String(LONGEST_WORDS), rows: "4" });
+    field.value = task.explained;
+    field.addEventListener("input", () => {
+      task.explained = field.value;
+      this.tell();
+    });
+    return [html("label", { for: "explain" },
+      html("b", {}, this.words.say("exercise-explain")), html("br"), this.exercise.explain), field];
+  }
+
+  /** Something has changed: show it, keep it, and tell whoever keeps the score. */
+  tell() {
+    const { task, words } = this;
+    if (!task) return;
+    for (const { update } of this.rows ?? []) update();
+    const { progress, result } = task, { done, total } = progress;
+    this.count.textContent = words.say("exercise-count", { done, total });
+    const suspended = JSON.stringify(result);
+    if (this.isHosted || parent !== window) {
+      parent.postMessage({
+        chutelab: "progress", ...progress, suspend_data: suspended, result,
+      }, "*");
+    }
+    if (this.isHosted) return;
+    try {
+      kept()?.setItem("chutelab/student", task.student);
+      kept()?.setItem(this.placeOf(task.student), suspended);
+    } catch {
+      // It is full: what is typed is handed in all the same.
+    }
+  }
+
+  save() {
+    const { task } = this;
+    if (!task) return;
+    download(`${this.exercise.name}-${fileStem(task.student)}.chutelab.json`,
+      `${JSON.stringify(task.result, null, 2)}\n`, "application/json");
+  }
+}
+
+export { ExercisePanel };

@@ -1,0 +1,193 @@
+"""A whole exercise in the page of its lesson, in a real browser."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from chutelab.classroom.exercises import lesson
+from chutelab.classroom.exercises.catalogue import EXERCISES
+from chutelab.classroom.exercises.exercise import draw
+from chutelab.classroom.lessons import find
+from chutelab.classroom.lessons.building import live_page
+from live.browser import DONE
+
+AXE = Path(__file__).parent / "live" / "node_modules" / "axe-core" / "axe.min.js"
+
+
+@pytest.fixture
+def page_of(opened, tmp_path):
+    """Open the live page of a lesson."""
+
+    def open_(number, language="en", **options):
+        path = tmp_path / f"{number}-{language}.html"
+        live_page(find(number, language), path)
+        page = opened(path, **options)
+        page.evaluate(DONE)
+        return page
+
+    return open_
+
+
+def begin(page, student):
+    """Predict by keyboard, then begin with a name."""
+    page.locator(".guess").focus()
+    page.keyboard.press("ArrowLeft")
+    page.keyboard.press("Space")
+    page.locator("#student").fill(student)
+    page.keyboard.press("Enter")
+
+
+def says(page, number, typed):
+    """Type an answer; return verdict and reply."""
+    question = page.locator(f'[data-question="{number}"]')
+    if question.get_attribute("open") is None:
+        question.locator("summary").click()
+    question.locator("input").fill(typed)
+    question.locator("input").press("Enter")
+    reply = question.locator(".reply")
+    return reply.get_attribute("data-verdict"), reply.inner_text()
+
+
+def test_a_whole_exercise_is_done_and_handed_in(page_of):
+    page = page_of(3)
+    assert page.locator("#student").count() == 0
+    assert page.locator("#exercise").inner_text().count("?") == 0
+    begin(page, "Ada Lovelace")
+    task = lesson("the-bounce", "Ada Lovelace")
+    _, cases = draw(EXERCISES["the-bounce"], "Ada Lovelace")
+    assert "Numbers of Ada Lovelace:" in page.locator("#exercise").inner_text()
+    assert f"{task.given.v0:g} m/s" in page.locator(".given").inner_text()
+    wrong = task.check(1, -cases[0].right)
+    assert says(page, 1, f"{-cases[0].right:.4g}") == (
+        "mistake",
+        f"✗ {wrong.heading}. {wrong.text}",
+    )
+    assert says(page, 1, "about 2")[0] == "unread"
+    assert says(page, 1, "  ")[0] == "blank"
+    first = page.locator('[data-question="1"]')
+    for n in range(3):
+        assert first.locator(".working").is_hidden()
+        first.locator(".hint").click()
+        assert task.hint(1).text.split("\n")[0] in first.inner_text(), n
+    first.locator(".working").click()
+    assert task.reveal(1).text.split("\n")[0] in first.inner_text()
+    for n, case in enumerate(cases, 1):
+        typed = f"{case.right:.5g}".replace(".", ",") + f" {case.question.unit}"
+        assert says(page, n, typed) == ("right", says_right(task, n, float(f"{case.right:.5g}")))
+    assert "4 of 4 done" in page.locator("#exercise summary").first.inner_text()
+    page.locator("#explain").fill("Die Platte ist glatt. ½ ε ✓")
+    with page.expect_download() as waiting:
+        page.locator("#result").click()
+    handed = waiting.value
+    assert handed.suggested_filename == "the-bounce-Ada-Lovelace.chutelab.json"
+    result = json.loads(Path(handed.path()).read_text(encoding="utf-8"))
+    answers = result.pop("answers")
+    assert answers == pytest.approx(
+        {str(n): case.right for n, case in enumerate(cases, 1)}, rel=1e-4
+    )
+    assert result == {
+        "chutelab_result": 1, "lesson": "the-bounce", "student": "Ada Lovelace",
+        "tries": {"1": 3, "2": 1, "3": 1, "4": 1}, "hints": {"1": 3}, "revealed": [1],
+        "words": {"explain": "Die Platte ist glatt. ½ ε ✓"}, "language": "en",
+    }  # fmt: skip
+    # It is kept, and open at once.
+    page.reload()
+    page.evaluate(DONE)
+    assert "4 of 4 done" in page.locator("#exercise summary").first.inner_text()
+    assert page.locator("#explain").input_value() == "Die Platte ist glatt. ½ ε ✓"
+    first = page.locator('[data-question="1"]')
+    first.locator("summary").click()
+    assert "3 tries, 3 hints, working shown" in first.inner_text()
+
+
+def says_right(task, number, answer):
+    reply = task.check(number, answer)
+    return f"✓ {reply.heading}. {reply.text}"
+
+
+# A page with the live page in a frame, and what it hears.
+FRAME = """<!doctype html><title>frame</title><iframe src="{page}" {sandbox}></iframe><script>
+globalThis.heard = [];
+const frame = document.querySelector("iframe");
+addEventListener("message", ({{ data }}) => {{
+  heard.push(data);
+  if (data.chutelab !== "ready") return;
+  const begin = (more) => frame.contentWindow.postMessage({{ chutelab: "begin", ...more }}, "*");
+  for (const odd of [null, 7, {{}}]) frame.contentWindow.postMessage(odd, "*");
+  for (const student of [undefined, 3, " "]) begin({{ student }});
+  begin({{ student: "x", suspend_data: 3 }});
+  begin({{ student: "Lovelace, Ada", suspend_data: {suspended} }});
+}});
+</script>"""
+
+
+@pytest.mark.parametrize("sandbox", ["", 'sandbox="allow-scripts allow-downloads"'])
+def test_a_page_around_it_says_who_it_is_and_hears_what_becomes_of_it(opened, tmp_path, sandbox):
+    live_page(find(3), tmp_path / "page.html")
+    cases = draw(EXERCISES["the-bounce"], "Lovelace, Ada")[1]
+    suspended = ""
+    for done in (1, 2):
+        outer = tmp_path / "frame.html"
+        html = FRAME.format(page="page.html", sandbox=sandbox, suspended=json.dumps(suspended))
+        outer.write_text(html, encoding="utf-8")
+        page = opened(outer)
+        frame = page.frame_locator("iframe")
+        frame.locator("#exercise h2").wait_for()
+        assert frame.locator("#rename").count() == 0
+        question = frame.locator(f'[data-question="{done}"]')
+        question.locator("input").fill(f"{cases[done - 1].right:.4g}")
+        question.locator(".check").click()
+        question.locator(".reply.right").wait_for()
+        heard = page.evaluate("heard")
+        assert heard[0] == {"chutelab": "ready", "lesson": "the-bounce"}
+        told = {key: heard[-1][key] for key in heard[-1] if key not in ("suspend_data", "result")}
+        assert told == {
+            "chutelab": "progress", "lesson": "the-bounce", "student": "Lovelace, Ada",
+            "done": done, "total": 4, "score": 25 * done, "status": "incomplete",
+            "verdicts": {str(n): "right" if n <= done else "blank" for n in range(1, 5)},
+        }  # fmt: skip
+        suspended = heard[-1]["suspend_data"]
+        assert len(suspended) < 4000
+        assert list(heard[-1]["result"]["answers"]) == ["1", "2"][:done]
+
+
+def test_what_was_kept_in_a_bad_way_is_left_out(page_of):
+    page = page_of(3)
+    page.evaluate("""() => {
+      localStorage.setItem("chutelab/the-bounce/seven", JSON.stringify({student: 7}));
+      localStorage.setItem("chutelab/student", "Ada");
+      localStorage.setItem("chutelab/the-bounce/ada", JSON.stringify({
+        chutelab_result: 1, lesson: "the-bounce", student: 7, answers: {1: "x", 2: null, 9: 3},
+        tries: {1: -3, 2: 1.5, 3: "a"}, hints: {1: 99}, revealed: 4, words: {explain: {}},
+      }));
+      localStorage.setItem("chutelab/the-bounce/odd", "{");
+    }""")
+    page.reload()
+    page.evaluate(DONE)
+    assert "0 of 4 done" in page.locator("#exercise summary").first.inner_text()
+    assert "3 hints" in page.locator('[data-question="1"]').inner_text()
+    # No mistake: looked up among the numbers of all who have been here.
+    assert says(page, 1, "0")[0] == "off"
+
+
+@pytest.mark.skipif(not AXE.is_file(), reason="needs npm ci in tests/live")
+@pytest.mark.parametrize(
+    ("language", "scheme", "size"), [("en", "light", (1366, 620)), ("de", "dark", (360, 740))]
+)
+def test_axe_finds_nothing_in_an_exercise(page_of, language, scheme, size):
+    page = page_of(
+        3, language, color_scheme=scheme, viewport={"width": size[0], "height": size[1]}
+    )  # fmt: skip
+    begin(page, "Ada")
+    for number, typed in enumerate(("5", "x", "1e-3"), 1):
+        says(page, number, typed)
+    page.locator('[data-question="1"] .hint').click()
+    wide = page.evaluate("document.documentElement.scrollWidth")
+    assert wide <= size[0]
+    page.evaluate(AXE.read_text(encoding="utf-8"))
+    found = page.evaluate("axe.run().then(({violations}) => violations.map(({id, nodes}) =>"
+                          " [id, nodes.map(({html}) => html.slice(0, 200))]))")  # fmt: skip
+    assert found == []

@@ -1,0 +1,175 @@
+"""Every lesson's page, played through by mouse and by keyboard: it says what Python says."""
+
+from __future__ import annotations
+
+import json
+from collections import deque
+from pathlib import Path
+
+import pytest
+
+from chutelab.classroom.exercises import EXERCISES, Verdict, catalogue, lesson
+from chutelab.classroom.exercises.exercise import draw
+from chutelab.classroom.exercises.judging import MARKS
+from chutelab.classroom.grading import grade
+from chutelab.classroom.lessons import find
+from chutelab.classroom.lessons.building import live_page
+from chutelab.classroom.words import words
+from live.browser import DONE
+
+STUDENT = "Zoë O'Neil"
+NONSENSE = ["two metres", "", "  ", "NaN", "1/0", "2..5", "<b>1</b>", "9" * 400, "😀", "x = 3"]
+WRITTEN = 'Die Platte nimmt ½ m v² (1 - ε²).\n<b>Not</b> g, \\ or "it".'
+
+QUICK = [("the-bounce", "mouse", "en", 1), ("the-parabola", "keyboard", "en", 1)]
+WHOLE = [(name, way, "en", 99) for name in EXERCISES for way in ("mouse", "keyboard")]
+GERMAN = [("the-bounce", "mouse", "de", 99)]
+
+
+class Mouse:
+    """Clicks on what is there; letters come from a keyboard all the same."""
+
+    def __init__(self, page):
+        self.page = page
+
+    def press(self, locator):
+        locator.click()
+
+    def predict(self):
+        box = self.page.locator(".guess .room").bounding_box()
+        x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+        self.page.mouse.move(x, y)
+        self.page.mouse.down()
+        self.page.mouse.move(x - 20, y, steps=3)
+        self.page.mouse.up()
+
+    def write(self, field, text):
+        field.click()
+        self.page.keyboard.press("Control+A")
+        self.page.keyboard.press("Delete")
+        self.page.keyboard.insert_text(text)
+
+    def answer(self, question, typed):
+        self.write(question.locator("input"), typed)
+        question.locator(".check").click()
+
+
+class Keys(Mouse):
+    """Tab to what is there; no mouse, and no focus that the page did not give."""
+
+    def to(self, locator):
+        for _ in range(400):
+            if locator.evaluate("(found) => found === document.activeElement"):
+                return
+            self.page.keyboard.press("Tab")
+        raise AssertionError(f"no key leads to {locator}")
+
+    def press(self, locator):
+        self.to(locator)
+        self.page.keyboard.press("Enter")
+
+    def predict(self):
+        self.to(self.page.locator(".guess"))
+        self.page.keyboard.press("ArrowLeft")
+
+    def write(self, field, text):
+        self.to(field)
+        self.page.keyboard.press("Control+A")
+        self.page.keyboard.press("Delete")
+        self.page.keyboard.insert_text(text)
+
+    def answer(self, question, typed):
+        self.write(question.locator("input"), typed)
+        self.page.keyboard.press("Enter")
+
+
+def one_line(text):
+    return " ".join(text.split())
+
+
+def answers_to(case, most):
+    """Wrong ones, up to `most` that have a name and as many that are just off, and the right one.
+
+    The question's own mistakes come before those that any question knows.
+    """
+    off = [factor * case.right for factor in (1.03, 1.5, 1.2e4)]
+    return [*(trace.number for trace in case.mistakes[:most]), *[*off, 0.0][:most], case.right]
+
+
+@pytest.mark.parametrize(
+    ("name", "way", "language", "most"),
+    [*QUICK, *(pytest.param(*one, marks=pytest.mark.slow) for one in [*WHOLE, *GERMAN])],
+)
+def test_a_lesson_is_played_through(name, way, language, most, opened, tmp_path, monkeypatch):
+    monkeypatch.setattr(catalogue, "OPENED", deque())
+    task = lesson(name, STUDENT, language)
+    said = words(language)
+    _, cases = draw(EXERCISES[name], STUDENT)
+    path = tmp_path / "page.html"
+    live_page(find(name, language), path)
+    page = opened(path, viewport={"width": 1366, "height": 900})
+    page.evaluate(DONE)
+    hand = {"mouse": Mouse, "keyboard": Keys}[way](page)
+    # Nothing is asked before there is a prediction.
+    assert page.locator("#student").count() == 0
+    assert page.locator(".question").count() == 0
+    hand.predict()
+    hand.press(page.locator("#play"))
+    hand.write(page.locator("#student"), STUDENT)
+    hand.press(page.locator("#begin"))
+    for case in cases:
+        n = case.number
+        question = page.locator(f'.question[data-question="{n}"]')
+        reply = question.locator(".reply")
+        if not question.locator("input").is_visible():
+            hand.press(question.locator("summary"))
+        assert one_line(task.question(n).text) in one_line(question.inner_text())
+        for typed in NONSENSE[:most]:
+            hand.answer(question, typed)
+            verdict = task.check(n, typed).verdict
+            assert verdict in (Verdict.BLANK, Verdict.UNREAD)
+            assert reply.get_attribute("data-verdict") == verdict.name.lower(), typed
+            assert len(reply.inner_text()) > 20
+            assert reply.locator("b").count() == 1  # no markup but the page's own
+        for hint in case.question.hints:
+            hand.press(question.locator(".hint"))
+            told = task.hint(n).text.split("\n")[0]
+            assert one_line(told) in one_line(question.inner_text()), hint
+        verdicts = set()
+        for value in answers_to(case, most):
+            typed = f"{value:.3g}" if value == case.right else f"{value:.6g}"
+            wanted = task.check(n, float(typed))
+            verdicts.add(wanted.verdict)
+            hand.answer(question, said.local(typed))
+            advice = said.say("python-hint", number=n)
+            text = wanted.text.removesuffix(advice)
+            expected = f"{MARKS[wanted.verdict][0]} {wanted.heading}. {text}"
+            assert one_line(reply.inner_text()) == one_line(expected), typed
+            assert reply.get_attribute("data-verdict") == wanted.verdict.name.lower()
+        assert verdicts == {Verdict.RIGHT, Verdict.MISTAKE, Verdict.OFF}
+    second = page.locator('.question[data-question="2"]')
+    hand.press(second.locator(".working"))
+    for line in task.reveal(2).text.split("\n"):
+        assert one_line(line) in one_line(second.inner_text())
+    for row in task.progress().rows:
+        state = page.locator(f'.question[data-question="{row.number}"] .state')
+        assert one_line(state.text_content()) == row.state
+    explain = page.locator("#explain")
+    wrote = explain.count() == 1
+    if wrote:
+        hand.write(explain, WRITTEN)
+    with page.expect_download() as waiting:
+        hand.press(page.locator("#result"))
+    returned = tmp_path / waiting.value.suggested_filename
+    assert returned.name.endswith(".chutelab.json")
+    waiting.value.save_as(returned)
+    result = json.loads(Path(returned).read_text(encoding="utf-8"))
+    assert result["tries"] == {str(row.number): row.tries for row in task.progress().rows}
+    [row] = grade([returned])
+    assert (row.student, row.lesson, row.reason) == (STUDENT, name, "")
+    assert row.marks == (1,) * len(cases)
+    assert row.revealed == (2,)
+    assert row.words == ({"explain": WRITTEN} if wrote else {})
+    page.reload()
+    page.evaluate(DONE)
+    assert page.locator(".question .mark.right").count() == len(cases)

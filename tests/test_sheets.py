@@ -1,0 +1,196 @@
+"""The sheets of lessons: printed, and as files in Markdown, HTML and PDF."""
+
+from __future__ import annotations
+
+import re
+import sys
+from html.parser import HTMLParser
+
+import pytest
+import typst
+from click.testing import CliRunner
+from PIL import Image
+
+from chutelab.classroom.lessons import find, read
+from chutelab.classroom.lessons.building import start
+from chutelab.classroom.lessons.formulas import parsed, plain, typeset
+from chutelab.classroom.lessons.printing import printed
+from chutelab.classroom.lessons.sheets import SHEETS, sheet
+from chutelab.classroom.lessons.texts import html_of, without_tex
+from chutelab.cli import main
+
+
+def chutelab(*arguments):
+    return CliRunner().invoke(main, [str(argument) for argument in arguments])
+
+
+def pages(pdf):
+    """Count the pages of a PDF: each has its own object."""
+    return len(re.findall(rb"/Type\s*/Page\b", pdf))
+
+
+class Page(HTMLParser):
+    """Tags, addresses and text of a page."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.addresses, self.text, self.classes = [], [], "", []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.addresses += [value for key, value in attrs if key in ("src", "href")]
+        self.classes += [value for key, value in attrs if key == "class"]
+
+    def handle_data(self, data):
+        self.text += data
+
+
+def test_sheets_are_printed_and_refuse_what_cannot_be(tmp_path):
+    for which in SHEETS:
+        said = sheet(find(1), which)
+        assert chutelab("lesson", "show", 1, "--sheet", which).output == without_tex(said)
+        raw = chutelab("lesson", "show", 1, "--sheet", which, "--format", "md").output
+        assert raw == said
+    made = start(tmp_path / "mine")
+    assert "for the teacher" in chutelab("lesson", "show", made, "--sheet", "teacher").output
+    (made / "README.md").write_text("# Mine\n\n## Predict\n\nx\n", encoding="utf-8")
+    result = chutelab("lesson", "show", made, "--sheet", "student")
+    assert result.exit_code == 2
+    assert "a sheet needs the parts ## Run, ## Compare" in result.output
+    (made / "explanation.md").unlink()
+    result = chutelab("lesson", "show", made, "--sheet", "explanation")
+    assert result.exit_code == 2
+    assert "explanation.md: is not there, or empty" in result.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ((), "name one LESSON"),
+        ((1, "--all"), "name one LESSON"),
+        (("--all",), "--sheet student, teacher or explanation"),
+        ((1, "-o", "x.pdf"), "--sheet student, teacher or explanation"),
+        ((1, "--sheet", "student", "--json"), "give one of them"),
+        ((1, "--sheet", "student", "--format", "pdf"), "say where to: -o sheet.pdf"),
+        (("--all", "--sheet", "student"), "say where to"),
+        ((1, "--sheet", "student", "-o", "sheet.doc"), "end in .md, .html or .pdf"),
+        ((1, "--sheet", "student", "-o", "a.html", "--format", "pdf"), "--format says pdf"),
+    ],
+)
+def test_what_cannot_be_printed_is_said(arguments, said):
+    result = chutelab("lesson", "show", *arguments)
+    assert result.exit_code == 2
+    assert said in result.output
+
+
+def test_the_ending_of_a_file_says_what_it_is(tmp_path):
+    starts = {"md": b"# Lesson 3. The bounce", "html": b"<!doctype html>", "pdf": b"%PDF-"}
+    for kind, begins in starts.items():
+        path = tmp_path / f"sheet.{kind}"
+        result = chutelab("lesson", "show", 3, "--sheet", "student", "-o", path)
+        assert result.output == f"wrote {path}\n"
+        assert path.read_bytes().startswith(begins)
+        assert path.read_bytes() == printed(find(3), "student", kind)
+
+
+def test_sheets_go_into_a_folder_with_names_of_their_own(tmp_path):
+    out = tmp_path / "new"
+    assert chutelab("lesson", "show", 2, "--sheet", "teacher", "-o", out).exit_code == 0
+    result = chutelab("lesson", "show", "--all", "--sheet", "student", "--format", "md", "-o", out)
+    assert result.exit_code == 0
+    names = sorted(path.name for path in out.iterdir())
+    assert "02-letting-go-teacher.pdf" in names
+    assert {"01-the-parabola-student.md", "09-design-student.md"} <= set(names)
+
+
+def test_without_the_library_a_pdf_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "typst", None)
+    monkeypatch.setattr("chutelab.classroom.lessons.printing.find_spec", lambda name: None)
+    result = chutelab("lesson", "show", 1, "--sheet", "student", "-o", tmp_path / "a.pdf")
+    assert result.exit_code == 2
+    assert 'pip install "chutelab[pdf]"' in result.output
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("which", SHEETS)
+@pytest.mark.parametrize("number", range(1, 10))
+def test_every_sheet_is_a_page_that_is_whole_and_a_pdf_of_a_page_or_two(number, which):
+    lesson = find(number)
+    page = Page(printed(lesson, which, "html").decode("utf-8"))
+    assert page.tags.count("h1") == 1
+    assert all(one.startswith(("data:", "https://doi.org/")) or ".md" in one or ".ipynb" in one
+               for one in page.addresses)  # fmt: skip
+    assert "$" not in page.text
+    assert "\\" not in page.text
+    assert page.tags.count("math") == html_of(sheet(lesson, which)).count("<math")
+    assert page.classes.count("predict") == (which == "student")
+    pdf = printed(lesson, which, "pdf")
+    assert pages(pdf) <= 3
+    assert pdf == printed(lesson, which, "pdf")
+
+
+@pytest.mark.parametrize(
+    ("tex", "characters", "set_as"),
+    [
+        ("v_{3x}", "v3x", "attach(v, b: 3 x)"),
+        ("v_2'", "v2'", "attach(v, b: 2, t: ′)"),
+        (r"\frac{a}{b + c}", "a/(b + c)", r"frac(a, b \+ c)"),
+        (r"\frac{1}{2} m", "½ m", "frac(1, 2) m"),
+        (r"\sqrt{2 g h}", "√(2 g h)", "sqrt(2 g h)"),
+        (r"\mu \to \infty", "µ → ∞", "μ → ∞"),
+        (r"\sin^2\varphi", "sin² φ", "attach(sin, t: 2) φ"),
+        (r"\cos(x)", "cos(x)", r"cos \( x \)"),
+        (r"\dot m", "m\N{COMBINING DOT ABOVE}", "accent(m, dot)"),
+        ("10^{-3}", "10^-3", "attach(10, t: − 3)"),
+    ],
+)
+def test_formulas_are_written_in_characters_and_for_print(tex, characters, set_as):
+    assert plain(parsed(tex)) == characters
+    assert typeset(parsed(tex)) == set_as
+
+
+@pytest.mark.parametrize(
+    "tex",
+    ["{", "}", "_", "^^", "a_", r"\frac{a", r"\sqrt", "x_{", r"\unknown{x}", "#panic()", "\\", "'"],
+)
+def test_no_formula_is_too_broken_to_be_shown(tex):
+    plain(parsed(tex))
+    typst.compile(f"${typeset(parsed(tex))} x$".encode(), format="pdf")
+
+
+EVIL = '#panic() \\ " ] [ $ * _ ` <x> @y // /* "); #eval("1")'
+
+
+def test_no_text_of_a_lesson_is_a_command_of_the_printer(tmp_path):
+    folder = start(tmp_path / "mine")
+    for name in ("README", "explanation"):
+        file = folder / f"{name}.md"
+        text = file.read_text(encoding="utf-8")
+        table = f"| {EVIL} | b |\n|---|---|\n| {EVIL} | |\n"
+        more = f"\n\n{EVIL}\n\n- {EVIL}\n\n{table}\n`{EVIL.replace('`', '')}`\n"
+        file.write_text(text + more, encoding="utf-8")
+    plan = (folder / "lesson.toml").read_text(encoding="utf-8")
+    (folder / "lesson.toml").write_text(plan.replace('"Mine"', f"'{EVIL}'"), encoding="utf-8")
+    lesson = read(folder)
+    for which in SHEETS:
+        assert pages(printed(lesson, which, "pdf")) >= 1
+        page = Page(printed(lesson, which, "html").decode("utf-8"))
+        assert "x" not in page.tags
+
+
+def test_pictures_beside_a_text_are_in_its_sheets_and_no_others(tmp_path):
+    folder = start(tmp_path / "mine")
+    Image.new("RGB", (20, 10), "#ff0000").save(folder / "red.png")
+    secret = tmp_path / "secret.png"
+    Image.new("RGB", (20, 10)).save(secret)
+    without = printed(read(folder), "student", "pdf")
+    file = folder / "README.md"
+    text = file.read_text(encoding="utf-8")
+    file.write_text(f"{text}\n![red](red.png)\n", encoding="utf-8")
+    assert len(printed(read(folder), "student", "pdf")) > len(without)
+    assert "data:image/png;base64," in printed(read(folder), "student", "html").decode()
+    for name in ("../secret.png", secret, "gone.png", "https://example.com/x.png"):
+        file.write_text(f"{text}\n![it]({name})\n", encoding="utf-8")
+        assert "data:image/png" not in printed(read(folder), "student", "html").decode()
+        printed(read(folder), "student", "pdf")

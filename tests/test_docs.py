@@ -88,7 +88,7 @@ def test_the_chapters_are_there(site):
         page = Page(site / "lessons" / lesson.parent.name / "index.html")
         assert "page.html" in page.parts
     assert "adhesion" in Page(site / "docs" / "physics.html").text
-    for name in ("start", "tour", "accuracy", "CONTRIBUTING", "SECURITY", "CHANGELOG"):
+    for name in ("start", "tour", "accuracy", "CONTRIBUTING", "CODE_OF_CONDUCT", "SECURITY"):
         assert (site / f"{name}.html").is_file()
 
 

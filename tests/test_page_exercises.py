@@ -9,6 +9,7 @@ import subprocess
 import sys
 from hashlib import sha256
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,7 +19,12 @@ from chutelab.classroom.exercises.catalogue import told
 from chutelab.classroom.exercises.exercise import Case, Numbers, draw, plain, shown
 from chutelab.classroom.exercises.in_page import data_of, tree
 from chutelab.classroom.exercises.judging import in_words, judge
+from chutelab.classroom.lessons import find
+from chutelab.classroom.lessons.reading import scene_of
 from chutelab.classroom.words import LANGUAGES, words
+from chutelab.engines.simulation import simulate
+from chutelab.results import Kind
+from chutelab.results.ledger import ENTRIES
 
 HERE = Path(__file__).parent
 NODE = shutil.which("node")
@@ -199,6 +205,47 @@ def compare(task, found, say):
     symbols = [f"{symbol} = {value}" for symbol, value, _ in found["rows"]]
     html = re.sub(r"\s+", " ", task._repr_html_())
     assert all(symbol in html for symbol in symbols)
+
+
+# What machines say
+
+
+KINDS = {"separation": Kind.SEPARATION, "impact": Kind.IMPACT, "landing": Kind.LANDING}
+
+
+def told_by(recording):
+    """The first events of each kind, and energies by surface, as `measured` has them."""
+    told = {
+        name: SimpleNamespace(**dict(zip(ENTRIES, row, strict=True)))
+        for name, row in zip(recording.surfaces, recording.by_surface.tolist(), strict=True)
+    }
+    for name, kind in KINDS.items():
+        for event in recording.events[recording.events["kind"] == kind][:1]:
+            before, after = (
+                SimpleNamespace(vx=event[f"velocity_{when}"][0], vy=event[f"velocity_{when}"][1])
+                for when in ("before", "after")
+            )
+            x, y = event["position"]
+            told[name] = SimpleNamespace(t=event["t"], x=x, y=y, before=before, after=after)
+    return told
+
+
+@pytest.mark.parametrize("many", [2, pytest.param(100, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", [name for name in NAMES if EXERCISES[name].machine])
+def test_the_machine_with_a_students_numbers_gives_the_answers(name, many):
+    exercise, its = EXERCISES[name], find(name)
+    scene = scene_of(its, its.page.scene, its.page.settings)
+    assert sum(bool(question.measured) for question in exercise.questions) >= 3
+    for student in [f"machine {n}" for n in range(many)]:
+        cases = draw(exercise, student)[1]
+        numbers = cases[0].numbers
+        values = {key: numbers.of(formula) for key, formula in exercise.machine.items()}
+        told = told_by(simulate(scene.with_values(values), engine="contact"))
+        for case in cases:
+            if case.question.measured:
+                found = eval(case.question.measured, {**numbers.known, **told}, numbers)
+                # A disk for a point is larger by a share of 1e-6.
+                assert found == pytest.approx(case.right, rel=1e-6, abs=0.0), student
 
 
 # What is typed

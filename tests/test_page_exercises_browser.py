@@ -108,6 +108,39 @@ def says_right(task, number, answer):
     return f"✓ {reply.heading}. {reply.text}"
 
 
+MEASURED = """async () => {
+  const { task } = chutelab.exercise;
+  while (!task.measured.size) await new Promise((done) => setTimeout(done, 5));
+  return [...task.measured].map(([n, value]) => [n, value, task.case(n).right]);
+}"""
+
+
+@pytest.mark.parametrize("name", [one.name for one in EXERCISES.values() if one.machine])
+def test_the_machine_of_a_student_says_what_is_right(page_of, name):
+    page = page_of(name)
+    begin(page, "Ada")
+    _, cases = draw(EXERCISES[name], "Ada")
+    measured = page.evaluate(MEASURED)
+    assert [n for n, *_ in measured] == [
+        n for n, case in enumerate(cases) if case.question.measured
+    ]
+    for n, value, right in measured:
+        assert right == value == pytest.approx(cases[n].right, rel=1e-6, abs=0.0)
+        # It can be looked at as soon as all that it shows was answered.
+        assert page.locator("#machine").is_hidden()
+        says(page, n + 1, "0.123")
+    page.locator("#machine").click()
+    for key, formula in EXERCISES[name].machine.items():
+        expected = cases[0].numbers.of(formula)
+        table, entry = key.split(".")
+        found = page.evaluate(
+            "([table, entry]) => chutelab.lab.given[table][entry]", [table, entry]
+        )
+        assert found == (expected if isinstance(expected, str) else pytest.approx(expected))
+    # Its path can be predicted, too.
+    assert "?" in page.locator("#guess").inner_text()
+
+
 # A page with the live page in a frame, and what it hears.
 FRAME = """<!doctype html><title>frame</title><iframe src="{page}" {sandbox}></iframe><script>
 globalThis.heard = [];

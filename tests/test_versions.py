@@ -64,7 +64,18 @@ def test_nor_does_what_an_extra_brings(tmp_path, monkeypatch):
         versions.library("scipy.optimize", "SciPy is needed", "design")
 
 
-def test_every_dependency_says_its_lowest_version():
+def test_what_is_to_be_cited_is_this_version():
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        project = tomllib.load(file)["project"]
+    cited = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {project['version']}\n" in cited
+    assert f"\nlicense: {project['license']}\n" in cited
+    assert f"  - name: {project['authors'][0]['name']}\n" in cited
+    assert "doi: 10.5194/ms-7-167-2016" in cited
+
+
+def test_every_dependency_says_its_lowest_version(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "tools")
     lowest = runpy.run_path(str(ROOT / "tools" / "versions.py"))["lowest"]
     with (ROOT / "pyproject.toml").open("rb") as file:
         project = tomllib.load(file)["project"]

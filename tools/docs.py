@@ -30,7 +30,7 @@ from chutelab.scene import SceneError, load
 from chutelab.scene.loading import about
 
 ROOT = Path(__file__).resolve().parent.parent
-DEVELOPERS = ("CONTRIBUTING", "SECURITY", "CHANGELOG")
+DEVELOPERS = ("CONTRIBUTING", "CODE_OF_CONDUCT", "SECURITY", "CHANGELOG")
 
 TREE = """\
 ```{{toctree}}
@@ -193,7 +193,7 @@ def gather(pages: Path, extra: Path) -> None:
     kept = shutil.ignore_patterns("site", "gallery.md")
     shutil.copytree(ROOT / "docs", pages / "docs", ignore=kept)
     shutil.copytree(ROOT / "scenes" / "data", pages / "scenes" / "data")
-    for name in (*(f"{one}.md" for one in DEVELOPERS), "LICENSE"):
+    for name in (*(f"{one}.md" for one in DEVELOPERS), "CITATION.cff", "LICENSE"):
         shutil.copyfile(ROOT / name, pages / name)
     gallery(pages, extra)
     lessons(pages, extra)

@@ -1,23 +1,27 @@
-"""Run the tests with the lowest versions that pyproject.toml allows, or with the newest there are.
+"""Install wheel and sdist with the lowest versions that pyproject.toml allows, or the newest.
 
     python tools/versions.py lowest|newest [ARGUMENT...]
 
-Arguments are handed to pytest. A virtual environment of the Python that runs this is made in a
-temporary folder, with chutelab, its extra `test`, and for `lowest` every library at the lowest
-version of its bound; what they need in turn is the newest that fits. Exit code: pytest's.
+Both are built, and all of a lesson is done with each (`tools/fresh.py`); then the tests run with
+what was installed from the wheel, and arguments are handed to pytest. It is done with the Python
+that runs this, in a temporary folder; for `lowest` every library that chutelab or an extra names is
+at the lowest version of its bound, and what they need in turn is the newest that fits. Exit code:
+pytest's.
 """
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
 import tempfile
 import tomllib
-import venv
 from itertools import chain
 from pathlib import Path
 from typing import Any
+
+from fresh import do, environment, lesson
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -44,19 +48,28 @@ def lowest(project: dict[str, Any]) -> list[str]:
 
 
 def main(which: str, arguments: list[str]) -> int:
-    """Make the environment, and run the tests in it."""
+    """Build and install, do the lesson, and run the tests."""
     with (ROOT / "pyproject.toml").open("rb") as file:
         pins = lowest(tomllib.load(file)["project"]) if which == "lowest" else []
-    with tempfile.TemporaryDirectory(prefix="chutelab-versions-") as folder:
-        venv.create(folder, with_pip=True)
-        python = Path(folder) / ("Scripts" if sys.platform == "win32" else "bin") / "python"
-        constraints = Path(folder) / "constraints.txt"
+    with tempfile.TemporaryDirectory(prefix="chutelab-versions-") as aside:
+        folder = Path(aside)
+        build = environment(folder / "build", "build") / "python"
+        do(build, "-m", "build", "--outdir", folder / "dist", ROOT, folder=folder)
+        (wheel,), (sdist,) = ((folder / "dist").glob(one) for one in ("*.whl", "*.tar.gz"))
+        constraints = folder / "constraints.txt"
         constraints.write_text("\n".join(pins) + "\n", encoding="utf-8")
-        install = ("install", "--quiet", "-c", constraints, "-e", f"{ROOT}[test]")
-        subprocess.run([python, "-m", "pip", *install], check=True)
-        subprocess.run([python, "-m", "pip", "list"], check=True)
-        tests = [python, "-m", "pytest", *(LENIENT if pins else ()), *arguments]
-        return subprocess.run(tests, cwd=ROOT).returncode
+        # So that it holds for students' commands, too.
+        os.environ["PIP_CONSTRAINT"] = str(constraints)
+        for file in (sdist, wheel):
+            lesson(file)
+        python = environment(folder / "tests", f"chutelab[test] @ {wheel.as_uri()}") / "python"
+        do(python, "-m", "pip", "list", folder=folder)
+        # What is in `src` here is not to be imported.
+        tests = ("-o", "pythonpath=benchmarks", "-o", "testpaths=tests")
+        lenient = LENIENT if pins else ()
+        about = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+        command = [python, "-m", "pytest", *tests, *lenient, *arguments]
+        return subprocess.run(command, cwd=ROOT, env=about).returncode
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ import re
 import tomllib
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cache, cached_property, partial
 from hashlib import sha256
 from itertools import combinations
@@ -185,6 +185,9 @@ class Question:
     hints: Sequence[str]  # each says more than the one before
     working: str  # the way to the answer, line by line
     source: str  # equation or law behind it
+    # The answer as a formula of what a run of `Exercise.machine` tells: the first ``separation``,
+    # ``impact`` and ``landing``, as in ``impact.after.vx``, and by surface ``outgoing.belt_work``.
+    measured: str = ""
 
 
 @dataclass(frozen=True)
@@ -200,6 +203,9 @@ class Exercise:
     formulas: Mapping[str, str]  # what texts and other formulas need besides
     tell: Sequence[str] = ()  # formulas whose numbers are told to the student too
     fits: Sequence[str] = ()  # conditions of a draw that the lesson is about
+    # Keys of the lesson's scene, and their formulas: a machine with the student's numbers in it.
+    # Where a question has `measured`, the lesson's page lets that machine say what is right.
+    machine: Mapping[str, str] = field(default_factory=dict)
     language: str = "en"  # of the texts
     whole: bool = True  # whether all texts are in that language
 

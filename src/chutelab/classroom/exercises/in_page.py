@@ -110,6 +110,7 @@ def data_of(exercise: Exercise, explain: str = "") -> dict[str, Any]:
         "formulas": {name: tree(formula) for name, formula in exercise.formulas.items()},
         "tell": list(exercise.tell),
         "fits": [tree(condition) for condition in exercise.fits],
+        "machine": {key: tree(formula) for key, formula in exercise.machine.items()},
         "questions": [_question(asked, exercise.language) for asked in exercise.questions],
         "words": {
             key: text for key, text in said.catalogue.items() if not key.startswith(LEFT_OUT)
@@ -125,6 +126,7 @@ def _question(asked: Question, language: str) -> dict[str, Any]:
         "text": _line(asked.text),
         "unit": words(language).unit(asked.unit),
         "answer": tree(asked.answer),
+        "measured": tree(asked.measured) if asked.measured else None,
         "mistakes": [
             [one.called or one.name, tree(one.formula), _line(one.says)] for one in asked.mistakes
         ],

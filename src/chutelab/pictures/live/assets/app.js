@@ -34,15 +34,15 @@ function start() {
   const data = JSON.parse(byId("lab").textContent);
   const words = new Words(data.language, data.strings);
   const source = new Blob([byId("worker").textContent], { type: "text/javascript" });
-  const worker = new Worker(URL.createObjectURL(source));
-  const engine = new Engine(worker, bytesOf(data.wasm).buffer, data.layout);
+  const newEngine = () => new Engine(
+    new Worker(URL.createObjectURL(source)), bytesOf(data.wasm).buffer, data.layout);
   for (const element of document.querySelectorAll("[data-say]")) {
     element.textContent = words.say(/** @type {HTMLElement} */ (element).dataset.say ?? "");
   }
   for (const element of document.querySelectorAll("[data-label]")) {
     element.setAttribute("aria-label", words.say(element.getAttribute("data-label") ?? ""));
   }
-  const lab = new Lab(data, engine);
+  const lab = new Lab(data, newEngine());
   const stage = new Stage(byId("stage"), lab, words);
   const panels = [EnergyPanel, NumbersPanel, LandingPanel, CurvesPanel]
     .map((Panel) => new Panel(byId("panels"), lab, words));
@@ -59,7 +59,7 @@ function start() {
     if (data.live?.panels && !data.live.panels.includes(name)) panel.classList.add("unwanted");
   }
   const exercise = data.exercise
-    && new ExercisePanel(byId("panels"), stage, lab, words, data.exercise);
+    && new ExercisePanel(byId("panels"), stage, lab, words, newEngine);
   Object.assign(globalThis, {
     chutelab: { lab, stage, panels, exercise, toml: () => toToml(/** @type {any} */ (lab.given)) },
   });

@@ -7,13 +7,14 @@ import { sha256 } from "./sha256.js";
 
 /**
  * @typedef {import("./formula.js").Tree} Tree
- * @typedef {{title: string, text: string, unit: string, answer: Tree,
+ * @typedef {{title: string, text: string, unit: string, answer: Tree, measured: Tree | null,
  *   mistakes: [string, Tree, string][], general: string[], hints: string[], working: string[],
  *   source: string}} Question  texts are templates; mistakes have name, formula and reply
  * @typedef {{name: string, number: number, title: string, language: string, whole: boolean,
  *   story: string, explain: string, unnamed: string,
  *   parameters: [string, string, string, string, number[]][], formulas: Record<string, Tree>,
- *   tell: string[], fits: Tree[], questions: Question[], words: Record<string, string>}} Exercise
+ *   tell: string[], fits: Tree[], machine: Record<string, Tree>, questions: Question[],
+ *   words: Record<string, string>}} Exercise
  *   parameters have name, symbol, unit, meaning and the values to draw from
  * @typedef {{called: string, says: string, number: number}} Trace  a wrong number and its mistake
  */
@@ -97,12 +98,12 @@ function generalMistakes(exercise) {
 
 /** One question for one student. */
 class Case {
-  /** @param {Question} question @param {DrawnNumbers} numbers */
-  constructor(question, numbers) {
+  /** @param {Question} question @param {DrawnNumbers} numbers
+   * @param {number} [right] as a machine gives it; else the formula does */
+  constructor(question, numbers, right = numbers.of(question.answer)) {
     this.question = question;
     this.numbers = numbers;
-    /** @type {number} */
-    this.right = numbers.of(question.answer);
+    this.right = right;
     /** The question's own mistakes. @type {Trace[]} */
     this.own = question.mistakes.map(([called, tree, says]) =>
       ({ called, says: numbers.text(says), number: numbers.of(tree) }));
@@ -198,4 +199,6 @@ function drawnFor(exercise, student) {
   throw new Error(`${exercise.name}: no draw fits`);
 }
 
-export { Case, STANDARD_GRAVITY, TOLERANCE, drawnFor, plainName, shownNumber, worded };
+export {
+  Case, DrawnNumbers, STANDARD_GRAVITY, TOLERANCE, drawnFor, plainName, shownNumber, worded,
+};

@@ -3,6 +3,7 @@
 // of.
 
 import { plainName } from "./draw.js";
+import { machineOf, measured } from "./measure.js";
 import { card, html } from "./panels.js";
 import { download, fileStem } from "./share.js";
 import { LONGEST_NAME, LONGEST_WORDS, Task } from "./task.js";
@@ -41,9 +42,13 @@ function parsed(text) {
 
 class ExercisePanel {
   /** @param {Element} home @param {Stage} stage @param {Lab} lab @param {Words} words
-   * @param {Exercise} exercise */
-  constructor(home, stage, lab, words, exercise) {
+   * @param {() => import("./engine.js").Engine} newEngine with a thread of its own */
+  constructor(home, stage, lab, words, newEngine) {
+    /** @type {Exercise} */
+    const exercise = lab.data.exercise;
+    this.lab = lab;
     this.words = words;
+    this.newEngine = newEngine;
     this.exercise = exercise;
     this.place = `chutelab/${exercise.name}/`;
     this.count = html("span", { class: "note" });
@@ -128,8 +133,13 @@ class ExercisePanel {
     this.task = task;
     this.asks = false;
     task.goOn(parsed(this.isHosted ? suspended : kept()?.getItem(this.placeOf(name))));
+    this.measure(task);
     const head = html("h2", { tabindex: "-1" }, task.worded("numbers-of", { student: name }));
     this.rows = exercise.questions.map((_, n) => this.question(task, n));
+    this.machine = this.button("machine", words.say("exercise-machine"), () => {
+      this.lab.replace(machineOf(this.lab.first, task.numbers));
+      this.lab.restart();
+    });
     const again = this.button("rename", words.say("exercise-rename"), () => {
       this.task = undefined;
       this.askName();
@@ -141,7 +151,7 @@ class ExercisePanel {
           html("td", {}, value))))),
       html("p", {}, task.story),
       ...(exercise.whole ? [] : [html("p", { class: "note" }, task.worded("untranslated"))]),
-      ...this.rows.map(({ section }) => section), ...this.explanation(task),
+      ...this.rows.map(({ section }) => section), this.machine, ...this.explanation(task),
       html("div", { class: "row" },
         this.button("result", words.say("exercise-result"), () => this.save(), "main"),
         ...(this.isHosted ? [] : [again])),
@@ -150,6 +160,14 @@ class ExercisePanel {
     const next = task.standings.findIndex(({ verdict }) => verdict !== "right");
     if (next >= 0) this.rows[next].section.open = true;
     return head;
+  }
+
+  /** Have the machine with a student's numbers say what is right. @param {Task} task */
+  async measure(task) {
+    if (!this.exercise.questions.some((question) => question.measured)) return;
+    const engine = this.newEngine(), { first, data } = this.lab;
+    task.measured = await measured(first, data, task.numbers, engine);
+    engine.worker.terminate();
   }
 
   /** Other names that were here. @returns {string[]} */
@@ -244,6 +262,10 @@ class ExercisePanel {
     const { task, words } = this;
     if (!task) return;
     for (const { update } of this.rows ?? []) update();
+    // It shows what its questions ask for.
+    this.machine.hidden = !this.exercise.questions.some(({ measured: tree }) => tree)
+      || this.exercise.questions.some(({ measured: tree }, n) =>
+        tree && task.standings[n].answer === null && !task.standings[n].revealed);
     const { progress, result } = task, { done, total } = progress;
     this.count.textContent = words.say("exercise-count", { done, total });
     const suspended = JSON.stringify(result);

@@ -27,6 +27,8 @@ class Task {
     this.names = names;
     this.numbers = drawnFor(exercise, student);
     this.explained = "";
+    /** Right answers that a machine gave, by question from 0 on. @type {Map<number, number>} */
+    this.measured = new Map();
     /** @type {Standing[]} */
     this.standings = exercise.questions.map(() =>
       ({ verdict: "blank", answer: null, tries: 0, hints: 0, revealed: false }));
@@ -50,7 +52,7 @@ class Task {
   /** A question from 0 on; what is right is worked out for a reply, and forgotten.
    * @param {number} n */
   case(n) {
-    return new Case(this.exercise.questions[n], this.numbers);
+    return new Case(this.exercise.questions[n], this.numbers, this.measured.get(n));
   }
 
   /** What a question asks, and in which unit. @param {number} n */

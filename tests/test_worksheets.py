@@ -467,7 +467,7 @@ STATED = {
         "tan α = µ on, {26.6}° here": degrees(atan(0.5)),
         "With c = 0.3 that is {16.7}°": degrees(atan(0.3)),
         "of the height, {71} %, and": 100.0 / sqrt(2.0),
-        "to 3/√5, about {1.3}°": 3.0 / sqrt(5.0),
+        "to 3 / √5, about {1.3}°": 3.0 / sqrt(5.0),
     },
     "physics": {
         "up to {1} m/s. A faster": sqrt(G * 0.1),
@@ -639,7 +639,7 @@ def test_no_number_of_the_key_is_on_the_students_sheet(number):
     assert stated
     asked = numbers_in(student)
     assert stated & asked <= TOLD.get(number, set())
-    if number < 9:
+    if number != 9:
         _, cases = draw(find_exercise(number), "your name")
         assert {shown(abs(case.right)) for case in cases} & asked <= TOLD.get(number, set())
     teacher = find(number).teacher

@@ -36,7 +36,7 @@ class Links(HTMLParser):
     def handle_starttag(self, tag, attrs):
         attributes = dict(attrs)
         self.addresses += [
-            attributes[key] for key in ("href", "src", "srcset", "data-still") if key in attributes
+            attributes[key] for key in ("href", "src", "data-film") if key in attributes
         ]
         if tag == "img":
             self.alternatives.append(attributes["alt"])
@@ -57,10 +57,15 @@ def test_a_bundle_has_an_index_and_a_page_for_each_lesson(web):
     assert (web / "index.html").is_file()
     for name in ("02-letting-go", "06-grip-or-slip"):
         files = {path.name for path in (web / name).iterdir()}
-        assert files >= {"index.html", "page.html", "lesson.gif", "still.png", "README.md"}
+        assert files >= {"index.html", "page.html", "explanation.html", "worksheet.pdf"}
+        assert files >= {"lesson.gif", "still.png", "machine.png", "end.png"}
+        # The teacher's key is in it.
+        assert "lesson.toml" not in files
         assert (web / name / "page.html").stat().st_size <= 400_000
     page = (web / "06-grip-or-slip" / "index.html").read_text(encoding="utf-8")
-    assert "The textbook angle is the limit" in page
+    assert "The textbook angle is the limit" not in page
+    told = (web / "06-grip-or-slip" / "explanation.html").read_text(encoding="utf-8")
+    assert "The textbook angle is the limit" in told
     assert '<a rel="next" href="../02-letting-go/index.html">2. When does it let go? →</a>' in page
     assert "(lesson.gif)" not in page
 
@@ -72,7 +77,7 @@ def broken_links(web):
         "https://opensourcephysics.github.io/tracker-website/",
     )
     broken = set()
-    for page in (web / "index.html", *web.glob("*/index.html")):
+    for page in (web / "index.html", *web.glob("*/index.html"), *web.glob("*/explanation.html")):
         for address in Links(page.read_text(encoding="utf-8")).addresses:
             target = (page.parent / unquote(address.partition("#")[0])).resolve()
             inside = target.is_relative_to(web.resolve())
@@ -135,7 +140,7 @@ def test_a_bundle_is_not_put_in_place_of_a_file(tmp_path):
 
 
 def test_pages_of_a_bundle_can_be_read_by_everybody(web):
-    for page in (web / "index.html", *web.glob("*/index.html")):
+    for page in (web / "index.html", *web.glob("*/index.html"), *web.glob("*/explanation.html")):
         text = page.read_text(encoding="utf-8")
         found = Links(text)
         assert found.language == "en"
@@ -143,7 +148,8 @@ def test_pages_of_a_bundle_can_be_read_by_everybody(web):
         assert found.headings[0] == 1
         assert all(b <= a + 1 for a, b in zip(found.headings, found.headings[1:], strict=False))
     lesson = Links((web / "02-letting-go" / "index.html").read_text(encoding="utf-8"))
-    assert lesson.alternatives == ["A particle rides round a large pulley until it lets go"]
+    said = "The machine: a belt that ends at a large pulley, and a second belt below"
+    assert lesson.alternatives == [said]
     style = (web / "style.css").read_text(encoding="utf-8")
     assert "prefers-color-scheme: dark" in style
 
@@ -200,12 +206,16 @@ def test_a_bundle_works_from_a_file_in_a_browser(web, opened):
     page = opened(web / "index.html", viewport={"width": 360, "height": 740})
     page.click("text=When does it let go?")
     assert page.evaluate("document.documentElement.scrollWidth") == 360
-    source = "document.querySelector('#picture img').getAttribute('src')"
-    assert page.evaluate(source) == "lesson.gif"
-    page.click("text=Stop the animation")
+    source = "document.querySelector('#picture').getAttribute('src')"
     assert page.evaluate(source) == "still.png"
-    page.click("text=Start the animation")
+    page.click("text=Play the film")
     assert page.evaluate(source) == "lesson.gif"
+    page.click("text=Stop the film")
+    assert page.evaluate(source) == "still.png"
+    page.click("text=Explanation: open it")
+    assert page.evaluate("document.documentElement.scrollWidth") == 360
+    assert page.evaluate(source) == "end.png"
+    page.click("text=Back to the lesson")
     page.click("text=Try it")
     page.wait_for_selector("canvas")
 

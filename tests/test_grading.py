@@ -105,6 +105,20 @@ def test_every_solved_notebook_earns_full_marks(name, tmp_path):
     ]
 
 
+def test_what_is_written_in_words_is_collected(tmp_path):
+    given = lesson("the-bounce", "Ada").given
+    checked = f"task.check(1, {given.e * given.v0})"
+    path = saved(tmp_path, "words.ipynb", OPEN.format("Ada"), checked)
+    found = json.loads(path.read_text(encoding="utf-8"))
+    (cell,) = [one for one in shipped("the-bounce")["cells"] if one["id"] == "explanation"]
+    for added, words in (([], {}), (["\nIt only ", "pushes."], {"explain": "It only pushes."})):
+        written = {**cell, "source": [*cell["source"], *added]}
+        path.write_text(json.dumps({**found, "cells": [*found["cells"], written]}))
+        (row,) = grade([path])
+        assert row.words == words
+        assert row.mistakes == {1: "sign or direction"}
+
+
 def first_of(student):
     """A cell with the right answer to question 1 of lesson 3."""
     given = lesson("the-bounce", student).given

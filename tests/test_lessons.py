@@ -152,7 +152,11 @@ def test_all_faults_of_a_file_are_in_one_message(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('x3 = "way', 'x9 = "way', 'quantities.x9 = "way back from the plate to the landing": no'),
+        (
+            'x3 = "distance',
+            'x9 = "distance',
+            'quantities.x9 = "distance back from',
+        ),
         ("set = []", 'set = ["plate.tilt=3"]', "picture.set = "),
         ('["plate.restitution"]', '["plate.tilt"]', 'page.live.controls[0] = "plate.tilt": unk'),
         ("[page.live]", "live = 3\n[other]", "page.live = 3: must be a table such as [live] of"),

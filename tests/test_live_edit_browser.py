@@ -341,7 +341,7 @@ def test_without_a_belt_nothing_is_said_of_one(shown, tmp_path):
 def test_values_have_no_more_digits_than_are_read(shown):
     page = shown()
     page.evaluate("chutelab.lab.change({ 'outgoing.drop': 0.93222821234 })")
-    drop = field(page, "outgoing belt: height of the drop")
+    drop = field(page, "outgoing belt: drop height")
     assert drop.input_value() == "0.932228"
     # What was only looked at keeps them all.
     drop.press("Enter")

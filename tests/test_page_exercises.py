@@ -16,7 +16,17 @@ import pytest
 
 from chutelab.classroom.exercises import EXERCISES, catalogue, lesson
 from chutelab.classroom.exercises.catalogue import told
-from chutelab.classroom.exercises.exercise import Case, Numbers, draw, plain, shown
+from chutelab.classroom.exercises.exercise import (
+    Case,
+    Exercise,
+    Mistake,
+    Numbers,
+    Parameter,
+    Question,
+    draw,
+    plain,
+    shown,
+)
 from chutelab.classroom.exercises.in_page import data_of, tree
 from chutelab.classroom.exercises.judging import in_words, judge
 from chutelab.classroom.lessons import find
@@ -115,6 +125,27 @@ def test_a_name_draws_the_same_numbers(name, many):
         assert list(found) == list(given)
         for key in given:
             assert found[key] == pytest.approx(given[key], rel=1e-12, abs=0.0), (student, key)
+
+
+def test_a_draw_in_which_a_number_is_missing_is_no_draw():
+    """Of a text alone, too: Python's functions raise an error where JavaScript's have NaN."""
+    says, x = "That is {angle}.", Parameter("x", "x", "", "a share", [0.5, 2.0, 3.0])
+    asked = Question("t", "How large?", "", "7 * x", [Mistake("m", "9 * x", says)], ["h"], "w", "s")
+    for formula in (
+        "acos(x)",
+        "asin(x)",
+        "sqrt(1 - x)",
+        "log(1 - x)",
+        "log10(2 - x) + sqrt(2 - x)",
+    ):
+        made = Exercise(1, "made", "t", "story", [x], [asked], {"angle": formula})
+        students = [f"missing {n}" for n in range(8)]
+        found = ask(exercises=[data_of(made)], drawn=[[0, student] for student in students])[
+            "drawn"
+        ]
+        assert (
+            found == [{"x": draw(made, student)[0].x} for student in students] == 8 * [{"x": 0.5}]
+        )
 
 
 def answers_to(case, rng):

@@ -168,6 +168,11 @@ def test_a_page_around_it_says_who_it_is_and_hears_what_becomes_of_it(opened, tm
         outer.write_text(html, encoding="utf-8")
         page = opened(outer)
         frame = page.frame_locator("iframe")
+        page.wait_for_function("heard.length")
+        if not suspended:
+            # First it is to be predicted, whoever it is.
+            assert frame.locator(".question").count() == 0
+            frame.locator("#show-all").click()
         frame.locator("#exercise h2").wait_for()
         assert frame.locator("#rename").count() == 0
         question = frame.locator(f'[data-question="{done}"]')

@@ -106,7 +106,7 @@ def test_a_recording_that_never_began_says_so(recording):
 
 def test_a_comparison_shows_what_one_of_the_two_has(recording):
     rows = {row[0]: row[1:] for row in chutelab.compare(recording).sheet().rows}
-    assert rows["x2"][:3] == ("way forward to the plate, m", "0.5937", "0.5937")
+    assert rows["x2"][:3] == ("distance forward to the plate, m", "0.5937", "0.5937")
     assert rows["phi2"][0] == "angle to the plate, before, °"
     assert rows["belt_work"][1] == "-"
     assert rows["belt_work"][3] == ""

@@ -24,7 +24,7 @@ from sphinx.pycode import ModuleAnalyzer
 
 import chutelab
 from chutelab.classroom.lessons import Lesson, shipped_lessons
-from chutelab.classroom.lessons.building import LIVE, bundle
+from chutelab.classroom.lessons.building import LIVE, live_page
 from chutelab.pictures.live.page import write
 from chutelab.scene import SceneError, load
 from chutelab.scene.loading import about
@@ -113,19 +113,15 @@ def gallery(pages: Path, extra: Path) -> None:
 def lessons(pages: Path, extra: Path) -> None:
     """Make a page of each worksheet, of its explanation, and the live pages."""
     shipped = shipped_lessons()
-    with tempfile.TemporaryDirectory(prefix="chutelab-docs-") as folder:
-        bundle(shipped, folder, wheel=False)
-        for one in shipped:
-            page = Path(folder) / one.folder.name / LIVE
-            if page.is_file():
-                target = extra / "lessons" / one.folder.name
-                target.mkdir(parents=True)
-                shutil.copyfile(page, target / LIVE)
     shutil.copytree(
         ROOT / "lessons", pages / "lessons", ignore=shutil.ignore_patterns("*.de.*", ".*")
     )
     for one in shipped:
-        lesson_page(one, pages / "lessons" / one.folder.name)
+        name = one.folder.name
+        if one.page is not None:
+            (extra / "lessons" / name).mkdir(parents=True)
+            live_page(one, extra / "lessons" / name / LIVE)
+        lesson_page(one, pages / "lessons" / name)
     start = pages / "lessons" / "README.md"
     listed = tree(*(f"{one.folder.name}/index" for one in shipped))
     start.write_text(f"{start.read_text(encoding='utf-8')}\n{listed}", encoding="utf-8")
@@ -136,9 +132,10 @@ def lesson_page(lesson: Lesson, folder: Path) -> None:
     worksheet = folder / "README.md"
     text = worksheet.read_text(encoding="utf-8")
     if lesson.page is not None:
-        text += "\n## In the page\n\n" + PLAY.format(page=LIVE, title=lesson.title)
-    beside = [path.stem for path in sorted(folder.glob("*.md")) if path != worksheet]
-    worksheet.write_text(f"{text}\n{tree(*beside)}", encoding="utf-8")
+        text += "\n## Try it\n\n" + PLAY.format(page=LIVE, title=lesson.title)
+    beside = sorted(path.stem for path in folder.glob("*.md") if path != worksheet)
+    listed = tree(*(f"{name.capitalize()} <{name}>" for name in beside))
+    worksheet.write_text(f"{text}\n{listed}", encoding="utf-8")
 
 
 def reference(pages: Path) -> None:

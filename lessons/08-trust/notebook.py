@@ -17,7 +17,7 @@ from chutelab.checks.workprecision import measure
 from chutelab.pictures.plots.workprecision import workprecision
 
 scene = book.scene("perpendicular")
-workprecision(measure(scene, repeats=1, max_seconds=8), scene.title, {})
+workprecision(measure(scene, repeats=1, max_seconds=2), scene.title, {})
 
 # %% [markdown] Try it live
 # A page has no steps to change: its engine ends its steps at impacts. Compare it with the dashed line, which is the closed form, at any distance of the plate. Could you see from the picture alone that a result is wrong by 1 %? What would you look at instead?

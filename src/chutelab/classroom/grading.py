@@ -21,7 +21,7 @@ from chutelab.classroom.exercises.catalogue import LONGEST_NAME, OPENED, UNNAMED
 from chutelab.classroom.exercises.exercise import draw, plain
 from chutelab.classroom.exercises.judging import is_rounded, judge
 from chutelab.classroom.kernel import ForgedError, run
-from chutelab.classroom.returned import ReturnedError, code_of, is_result, result_of
+from chutelab.classroom.returned import ReturnedError, code_of, is_result, result_of, words_of
 from chutelab.util.errors import MissingLibraryError, printable, printable_lines
 from chutelab.util.files import csv_lines
 from chutelab.util.versions import too_old
@@ -191,6 +191,7 @@ def _of_notebook(file: str, time_limit: float) -> Grade:
     work = max(reversed(works), key=lambda one: len(one.answers))
     others = (one for one in works if one is not work and one.answers)
     also = (f"also answered {one.lesson} as {one.student}" for one in others)
+    work.words = words_of(Path(file))
     return _marked(file, work, [ran.trouble, *also])
 
 

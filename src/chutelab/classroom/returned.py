@@ -11,6 +11,7 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
 
 from chutelab.classroom.exercises.catalogue import LONGEST_NAME
+from chutelab.classroom.lessons.cells import EXPLANATION, WORDS
 from chutelab.util.errors import InputError, cut
 
 LARGEST: Final = 25 << 20
@@ -75,6 +76,24 @@ def code_of(path: Path) -> list[str | None]:
     except (AttributeError, LookupError, TypeError):
         raise ReturnedError("not a notebook: it has no cells") from None
     return list(map(_text, sources))
+
+
+def words_of(path: Path) -> dict[str, str]:
+    """Return what was written into a notebook's cell for words, as "explain"; {} without any.
+
+    Raises
+    ------
+    ReturnedError
+        If the notebook cannot be read.
+    """
+    found = _content(path, "notebook", LARGEST)
+    written = {}
+    for cell in found["cells"]:
+        if cell.get("cell_type") == "markdown" and cell.get("id") == EXPLANATION:
+            said = (_text(cell.get("source", "")) or "").replace(WORDS, "").strip()
+            if said:
+                written["explain"] = said[:LONGEST_TEXT]
+    return written
 
 
 def _text(source: Any) -> str | None:

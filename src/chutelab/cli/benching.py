@@ -73,17 +73,17 @@ def bench(
     """Measure how long each engine takes on SCENE with each step, and how wrong it is.
 
     SCENE is a scene file or the name of a shipped one. Its run.engine, run.dt and run.align are
-    not kept to.
+    ignored.
 
     Errors are relative, the largest of all answers of a run, against one that the engine had no
     part in, as with `run --accuracy`: the closed form where it speaks of the whole run, else an
     engine that shares no formula with the first. Of particles that meet, only totals are compared.
     A step may be right by luck, where it happens to end at a contact: look at several. Of many
     particles there are fewer steps, and fixed is left out unless it is asked for. Long steps come
-    first; what there is no time for is told.
+    first; what there is no time for is listed.
 
-    The first run is told apart from the median of the repeats (what is over in less than 20 ms
-    runs several times in a row); imports are never timed.
+    The first run is reported separately from the median of the repeats (what is over in less than
+    20 ms runs several times in a row); imports are never timed.
 
     How to read the diagram: a point is one run with one step, further left is more accurate,
     further down is faster, and both axes count powers of ten. A line is an engine: where it lies

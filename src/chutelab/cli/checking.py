@@ -31,8 +31,8 @@ def check(scenes: tuple[str, ...], overrides: tuple[str, ...], as_json: bool) ->
 
     Says what will be built and what is skipped, which engine runs and why, what a run will cost in
     time and memory, what the closed form covers, and for each warning what to change. What a run
-    costs comes from a trial of the whole of it, cut off after 1 s: longer ones are told from how
-    far it got, or not at all.
+    costs comes from a trial of the whole of it, cut off after 1 s: the cost of longer ones is
+    estimated from how far it got, or not given.
     """
     from chutelab.checks.preflight import Preflight, preflight
     from chutelab.scene import SceneError, load
@@ -116,11 +116,11 @@ def stress(
 ) -> None:
     """Run SCENE and judge the run by laws that it must keep, whatever the scene.
 
-    Nobody passes a surface, sinks into one or bounces off nothing; energy never rises but by a
+    No particle passes a surface, sinks into one or bounces off nothing; energy rises only by a
     belt's work; ledger and momentum close. Each law that has something to say about the scene is a
-    line, with what was found and what it must not exceed. What the engine does not promise for
-    such a scene is told with the reason. Exit code 1 if a law is broken. For scenes of disks
-    without strings.
+    line, with what was found and what it must not exceed. What the engine does not promise for such
+    a scene is listed with the reason. Exit code 1 if a law is broken. For scenes of disks without
+    strings.
     """
     from chutelab.checks.stress import Evidence, judge, need_judged
     from chutelab.engines.simulation import simulate

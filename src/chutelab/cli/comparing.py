@@ -29,7 +29,7 @@ def _point(text: str) -> tuple[float, float]:
     return x, y
 
 
-@click.command(short_help="Lay measured points over a scene; fit the scene to them.")
+@click.command(short_help="Compare measured points with a scene; fit the scene to them.")
 @scene_argument
 @click.option(
     "--data",
@@ -99,7 +99,7 @@ def compare(
     out: Path | None,
     as_json: bool,
 ) -> None:
-    """Lay the points of a film over SCENE, and say how far they lie off.
+    """Lay the points of a film over SCENE, and say how far off they are.
 
     FILE is a table with a line that names its columns t, x and y, such as the video-analysis
     program Tracker exports: tabs, semicolons or commas between cells, decimal points or commas,
@@ -121,9 +121,9 @@ def compare(
     coordinate. So it is known what a fit to it should find.
 
     --fit takes any number of the scene, which starts at the scene's value and stays within what the
-    scene allows, and t0 (which is looked for everywhere), scale, origin.x and origin.y. What the
-    points cannot tell is refused by name. The uncertainties are standard deviations,
-    s² (JᵀJ)⁻¹ from how the points respond to the parameters (J) and how much they scatter (s): they
+    scene allows, and t0 (which is searched for everywhere), scale, origin.x and origin.y. What the
+    points cannot determine is refused by name. The uncertainties are standard deviations, s²
+    (JᵀJ)⁻¹ from how the points respond to the parameters (J) and how much they scatter (s): they
     hold if errors are independent and the model is right. Needs pip install "chutelab[fit]".
     """  # noqa: D301 - click wants the backspace
     from rich.console import RenderableType

@@ -58,7 +58,7 @@ language_option = click.option(
 def lesson() -> None:
     """Teach with chutelab: lessons with a worksheet, an exercise and an animation each.
 
-    A lesson goes by its number (3), its name (the-bounce), or the folder of one that you wrote
+    A lesson is given by its number (3), its name (the-bounce), or the folder of one that you wrote
     yourself. The worksheet says what to predict, what to run, what to compare and what to explain.
     """
 

@@ -73,11 +73,11 @@ def run(
 ) -> None:
     """Simulate SCENE, a scene file or the name of a shipped one, and print a summary.
 
-    Without --out nothing is written. With --accuracy, --engine is kept to and --dt is the longest
-    step that is tried; if the accuracy cannot be reached, everything is printed and written all
-    the same, and the exit code is 1. A run that --max-seconds ends is a run: its summary and files
-    are of what is recorded, particles that had not ended have "stopped" as their end, and the exit
-    code is 0.
+    Without --out nothing is written. With --accuracy, --engine is kept, and --dt is the longest
+    step that is tried; if the accuracy cannot be reached, everything is printed and written all the
+    same, and the exit code is 1. A run that --max-seconds ends counts as a run: its summary and
+    files are of what was recorded, particles that had not ended have "stopped" as their end, and
+    the exit code is 0.
     """
     from chutelab.engines.simulation import simulate
     from chutelab.results.recorder import StalledError

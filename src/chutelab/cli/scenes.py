@@ -229,7 +229,7 @@ NUMBERS = (1, 3, 4, 5)
     help="Compute with Eq. (9) as the paper prints it (the default here).",
 )
 @click.option(
-    "--corrected", "rebound", flag_value="corrected", help="Compute with Eq. (9) put right."
+    "--corrected", "rebound", flag_value="corrected", help="Compute with Eq. (9) corrected."
 )
 @json_option()
 def tables(number: str | None, rebound: Literal["as-printed", "corrected"], as_json: bool) -> None:
@@ -245,15 +245,15 @@ def tables(number: str | None, rebound: Literal["as-printed", "corrected"], as_j
     console.tell({"tables": told}, *found, as_json=as_json)
 
 
-@click.command(short_help="Draw the paper's figures anew, printed beside corrected.")
+@click.command(short_help="Draw the paper's figures again, as printed and corrected.")
 @click.argument("number", type=int, metavar="NUMBER")
 @out_option("Write the picture, its numbers and its scenes into this folder.")
 @json_option()
 def figure(number: int, out: Path | None, as_json: bool) -> None:
     """Compute Figure 6, 7, 8, 9, 11, 12 or 13 of the paper anew.
 
-    Beside each other: what follows from Eq. (9) as the paper prints it, and what follows from it
-    put right; and in words what the misprint does to the figure's conclusion. What the paper's text
+    Side by side: what follows from Eq. (9) as the paper prints it, and what follows from it
+    corrected; and in words what the misprint does to the figure's conclusion. What the paper's text
     does not give is said, not guessed.
 
     \b

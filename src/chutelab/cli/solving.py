@@ -40,8 +40,8 @@ FILES = ("overlay.png", "scan.png", "solution.toml", "nearest.toml", "solve.json
     help="What should be: VALUE is a number, with or without unit, a key of the scene or another"
     " quantity. May be repeated with as many --vary.",
 )
-@click.option("--minimize", metavar="QUANTITY", help="Make this as small as it gets.")
-@click.option("--maximize", metavar="QUANTITY", help="Make this as large as it gets.")
+@click.option("--minimize", metavar="QUANTITY", help="Make this as small as possible.")
+@click.option("--maximize", metavar="QUANTITY", help="Make this as large as possible.")
 @click.option(
     "--points",
     metavar="N",
@@ -78,7 +78,7 @@ def solve(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Change SCENE until a quantity is what it should be, or as small or as large as it gets.
+    """Change SCENE until a quantity has the value wanted, or is as small or as large as it can be.
 
     \b
     chutelab solve inclined-20 --vary plate.angle_deg=0:80 --target landing.vx=1
@@ -92,9 +92,9 @@ def solve(
     friction_loss. Belt work falls steadily as particles land faster, and is negative above the
     belt's speed; what is least at that speed is slip_heat.
 
-    With one key all solutions in its range are found, and jumps are told from them. The exit code
-    is 1 if there is no solution; the nearest thing to one is shown then. It needs
-    pip install "chutelab[design]".
+    With one key all solutions in its range are found, and jumps are not taken for solutions. The
+    exit code is 1 if there is no solution; the nearest thing to one is shown then. It needs pip
+    install "chutelab[design]".
     """  # noqa: D301 - click wants the backspace
     from rich.text import Text
 

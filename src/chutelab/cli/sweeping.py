@@ -58,8 +58,8 @@ def _complete_column(
     metavar="KEY=VALUE±SPREAD",
     multiple=True,
     help="Instead of --vary: what is not exactly known, such as plate.restitution=0.5±0.05, where"
-    " 0.05 is the standard deviation (with :uniform at the end the half-width). Says how far that"
-    " makes landing and belt work uncertain, and which key matters most.",
+    " 0.05 is the standard deviation (with :uniform at the end the half-width). Says how uncertain"
+    " that makes landing and belt work, and which key matters most.",
 )
 @click.option(
     "--sample",
@@ -118,12 +118,12 @@ def sweep(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Simulate all variants of SCENE and say what came of each.
+    """Simulate all variants of SCENE and say what happened in each.
 
-    A variant that cannot be, or misses the outgoing belt, is a row with its reason. Rows that are
-    finished are kept beside --out FILE until all are: --resume goes on after an interruption, and
-    writes the same file as a sweep that was not interrupted. Rows that were changed meanwhile are
-    refused, and so is a file that another sweep is writing.
+    A variant that is impossible, or misses the outgoing belt, is a row with its reason. Rows that
+    are finished are kept beside --out FILE until all are: --resume goes on after an interruption,
+    and writes the same file as a sweep that was not interrupted. Rows that were changed meanwhile
+    are refused, and so is a file that another sweep is writing.
 
     Columns are the varied keys, then, in SI units: landing.x, landing.y, landing.vx, landing.vy
     (mean over the particles; x, vx and vy also with _spread, the standard deviation), landing.t and

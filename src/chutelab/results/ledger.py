@@ -16,6 +16,9 @@ from chutelab.results.recording import ENTRIES, Recording, balance
 from chutelab.util.arrays import Floats
 from chutelab.util.tables import Sheet, Shown, number
 
+ROUNDING = 1e-12
+"""Share of the energy turned over up to which an entry is told as 0, but in detail."""
+
 
 @dataclass(frozen=True, repr=False)
 class Ledger(Shown):
@@ -72,6 +75,11 @@ class Ledger(Shown):
             if details
             else f"share of these energies that the ledger cannot explain: {100.0 * share:.3f} %"
         )
+
+        def told(entry: float) -> str:
+            rounding = abs(entry) <= ROUNDING * self.turned_over and not details
+            return number(0.0 if rounding else entry)
+
         total = (self.belt_work, self.restitution_loss, self.friction_loss)
         moved = (
             f"{name} {number(before)} -> {number(after)} J"
@@ -85,8 +93,8 @@ class Ledger(Shown):
         return Sheet(
             "Energy ledger, J",
             ("", *(name.replace("_", " ") for name in ENTRIES)),
-            tuple((name, *map(number, entries)) for name, entries in rows if any(entries)),
-            foot=(("total", *map(number, total)),),
+            tuple((name, *map(told, entries)) for name, entries in rows if any(entries)),
+            foot=(("total", *map(told, total)),),
             notes=(", ".join(moved), left),
         )
 

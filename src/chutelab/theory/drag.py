@@ -36,6 +36,10 @@ State = tuple[float, float, float, float]
 """x, y (m) and vx, vy (m/s)."""
 
 
+TOLD = 1e-6
+"""m; a shift of less is not told, and one that is NaN."""
+
+
 @dataclass(frozen=True)
 class Drag:
     """What air drag would do, for people as text.
@@ -72,7 +76,7 @@ class Drag:
         said = f"air drag, left out, would be {share} at {self.speed:.3g} m/s"
         if not self.arrives:
             said += ", and air would keep particle 0 from getting there"
-        elif np.isfinite(self.landing_shift):
+        elif abs(self.landing_shift) >= TOLD:
             way = "forward" if self.landing_shift >= 0.0 else "back"
             far = f"{1000.0 * abs(self.landing_shift):.2g} mm farther {way}"
             said += f", and particle 0 would land {far}"

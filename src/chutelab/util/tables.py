@@ -182,12 +182,12 @@ def wrapped(text: str, width: int = WIDTH) -> list[str]:
 
 
 def number(value: float) -> str:
-    """Return a number in six digits, "-" for one that is not finite.
+    """Return a number in six digits, "-" for one that is not finite; no zero has a sign.
 
-    >>> number(0.29800000000000004), number(float("nan"))
-    ('0.298', '-')
+    >>> number(0.29800000000000004), number(float("nan")), number(-0.0)
+    ('0.298', '-', '0')
     """
-    return f"{value:.6g}" if isfinite(value) else "-"
+    return f"{value + 0.0:.6g}" if isfinite(value) else "-"
 
 
 def plain(value: Any) -> Any:

@@ -13,9 +13,11 @@ import os
 import re
 import shutil
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from errno import ELOOP, ENOTDIR
 from html import escape
+from importlib.util import find_spec
 from io import BytesIO
 from math import prod
 from pathlib import Path
@@ -29,6 +31,7 @@ from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises.catalogue import told
 from chutelab.classroom.exercises.in_page import data_of
 from chutelab.classroom.lessons.cells import NOTEBOOK, notebook_of
+from chutelab.classroom.lessons.printing import printed
 from chutelab.classroom.lessons.reading import Lesson, LessonError, read, scene_of, split, unusable
 from chutelab.classroom.lessons.texts import INDEX, html_of, words_for
 from chutelab.classroom.lessons.wheel import write_wheel
@@ -40,6 +43,9 @@ from chutelab.util.versions import own_version, version_of
 
 _HERE: Final = Path(__file__).parent
 PICTURE: Final = "lesson.gif"
+MACHINE: Final = "machine.png"
+"""The film, and the machine before anything has happened."""
+
 MOST_PIXELS: Final = 3840 * 2160
 """Of a picture, as `Picture` in `reading` has it."""
 
@@ -63,7 +69,7 @@ def build(
     force: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> Built:
-    """Make the picture of a lesson, unless it is there already, made from the same.
+    """Make film and machine picture of a lesson, unless they are there, made from the same.
 
     The same lesson and versions give the same bytes.
 
@@ -86,9 +92,10 @@ def build(
     path = (lesson.folder if folder is None else folder) / PICTURE
     lesson = _in_english(lesson)
     wanted = stamp_of(lesson)
-    made = force or comment_of(path) != wanted
+    machine = path.with_name(MACHINE)
+    made = force or comment_of(path) != wanted or not machine.is_file()
     if made:
-        from chutelab.pictures.animation import animate
+        from chutelab.pictures.animation import animate, still
 
         with aside(path.parent, path):
             refuse_other(path)
@@ -96,7 +103,8 @@ def build(
         recording = simulate(scene, progress=progress)
         settings = lesson.picture.model_dump(exclude={"scene", "set"})
         path.parent.mkdir(parents=True, exist_ok=True)
-        animate(recording, path, question=lesson.question, comment=wanted, **settings)
+        animate(recording, path, question=lesson.question, predict=True, comment=wanted, **settings)
+        still(recording, machine, width=lesson.picture.width, height=lesson.picture.height)
     return Built(path, path.stat().st_size, made)
 
 
@@ -147,7 +155,7 @@ def stamp_of(lesson: Lesson) -> str:
         scene.pop(table, None)
     # Without defaults: they belong to the version.
     settings = lesson.picture.model_dump(exclude_unset=True, exclude={"scene", "set"})
-    inputs = {"scene": scene, "picture": settings, "question": lesson.question}
+    inputs = {"scene": scene, "picture": settings, "question": lesson.question, "predict": True}
     text = json.dumps(inputs, sort_keys=True, ensure_ascii=True)
     digest = hashlib.sha256(text.encode("ascii")).hexdigest()[:32]
     versions = ", ".join(f"{name} {version_of(name) or 'unknown'}" for name in LIBRARIES)
@@ -225,7 +233,14 @@ def files_of(lesson: Lesson) -> list[Path]:
 
 
 LIVE: Final = "page.html"
+EXPLANATION: Final = "explanation.html"
 STILL: Final = "still.png"
+END: Final = "end.png"
+"""The first picture of the film, and the last one: the answer is in it."""
+
+_NOT_GIVEN: Final = re.compile(r"lesson(\..+)?\.toml")
+"""The key for the teacher is in it."""
+
 _SHARED: Final = ("style.css", "picture.js")
 
 
@@ -320,22 +335,30 @@ def _lesson(lesson: Lesson, folder: Path, before: str, after: str, *, wheel: boo
     """Make the folder of one lesson, with links to its neighbours; return its card."""
     folder.mkdir()
     for file in files_of(lesson):
-        shutil.copyfile(file, folder / file.name)
+        if not _NOT_GIVEN.fullmatch(file.name):
+            shutil.copyfile(file, folder / file.name)
     if not is_current(lesson):
         build(lesson, folder, force=True)
     with GifImageFile(folder / PICTURE) as film:
-        # On the last frame everything has happened.
-        film.seek(film.n_frames - 1)
-        film.convert("RGB").quantize(255).save(folder / STILL, optimize=True)
+        for name, index in ((STILL, 0), (END, film.n_frames - 1)):
+            film.seek(index)
+            shown = film.convert("RGB").quantize(255)
+            shown.info.pop("transparency", None)
+            shown.save(folder / name, optimize=True)
         width, height = film.size
     said = words(lesson.language)
     say = said.say
+    worksheet, explanation = lesson.text("README"), lesson.text("explanation")
     # What there is to play with, and to take along.
     doors = []
     if lesson.page is not None:
         home = (say("page-back", title=lesson.title), INDEX)
         live_page(lesson, folder / LIVE, home=home)
         doors.append(f'<li><a class="main" href="{LIVE}">{say("page-try")}</a></li>')
+    kind = "pdf" if find_spec("typst") else "html"
+    with suppress(LessonError):  # a worksheet of other parts is on the page alone
+        (folder / f"worksheet.{kind}").write_bytes(printed(lesson, "student", kind))
+        doors.append(f'<li><a href="worksheet.{kind}">{say("page-print")}</a></li>')
     if (folder / "exercise.ipynb").is_file():
         door = f'<li><a href="exercise.ipynb" download>{say("page-notebook")}</a></li>'
         doors.append(door)
@@ -345,7 +368,6 @@ def _lesson(lesson: Lesson, folder: Path, before: str, after: str, *, wheel: boo
         if (folder / name).is_file():
             scene_door = escape(say("page-scene", name=name))
             doors.append(f'<li><a href="{_address(name)}" download>{scene_door}</a></li>')
-    worksheet, explanation = lesson.text("README"), lesson.text("explanation")
     note = f"<p><em>{say('untranslated')}</em></p>\n" if lesson.untranslated else ""
     facts = {
         "folder": _address(lesson.folder.name),
@@ -359,14 +381,22 @@ def _lesson(lesson: Lesson, folder: Path, before: str, after: str, *, wheel: boo
         "lesson.html",
         said,
         **facts,
-        alt=escape(words_for(PICTURE, explanation) or lesson.title),
+        alt=escape(words_for(MACHINE, worksheet) or lesson.title),
         worksheet=note + html_of(worksheet),
-        explanation=html_of(explanation),
         doors="\n".join(doors),
         before=before,
         after=after,
     )
     (folder / INDEX).write_text(page, encoding="utf-8")
+    page = _page(
+        "explanation.html",
+        said,
+        **facts,
+        alt=escape(words_for(PICTURE, explanation) or lesson.title),
+        explanation=html_of(explanation),
+        back=escape(say("page-back", title=lesson.title)),
+    )
+    (folder / EXPLANATION).write_text(page, encoding="utf-8")
     return _page("card.html", said, **facts)
 
 

@@ -46,8 +46,11 @@ EXPLAIN: Final = """
 What came out otherwise than you thought, and why is it so? Write it down before you open the
 explanation."""
 
+EXPLANATION: Final = "explanation"
+"""Id of the cell in which a student writes in words."""
+
 WORDS: Final = "*Double-click here, and write two or three sentences.*"
-"""Where a student writes in words, until it is changed; `lesson grade` collects what is there."""
+"""What is in it until then; `lesson grade` collects what is written."""
 
 QUESTIONS: Final = """
 ## Questions with your numbers
@@ -76,6 +79,8 @@ def notebook_of(lesson: Lesson) -> str:
         return ""
     own = _own(lesson)
     title, _, opening = opening.partition("\n")
+    # The notebook draws the machine itself: it may be all that a student has.
+    opening = re.sub(r"^!\[.*\n+", "", opening, flags=re.MULTILINE)
     needs = _NEEDS.search(_source(lesson))
     opened = f"{title}\n\n{_prose(opening)}"
     cells = list(_cells(lesson, parts, own, needs[1] if needs else "notebook", opened))
@@ -164,7 +169,7 @@ def _cells(
     yield _cell("code", "compare", "book.compare(predictions)")
     yield from added("Compare")
     yield _cell("markdown", "explain-text", _prose(EXPLAIN))
-    yield _cell("markdown", "explanation", WORDS)
+    yield _cell("markdown", EXPLANATION, WORDS)
     if exercise is not None:
         first = exercise.parameters[0].name
         yield _cell("markdown", "questions-text", _prose(QUESTIONS.format(first=first)))

@@ -119,8 +119,8 @@ class Lesson(Table):
     quantities: Annotated[dict[Said, Said], Field(max_length=MOST)] = key(
         {},
         "What one looks at, and what it is in words",
-        f'a table of at most {MOST} lines such as x3 = "way back from the plate"; names with dots'
-        " in quotes",
+        f'a table of at most {MOST} lines such as x3 = "distance back from the plate"; names with'
+        " dots in quotes",
     )
     picture: Picture = key(Picture(), "How lesson.gif is made", "a table of keys and values")
     page: Page | None = key(None, "What its page offers", "a table of keys and values")

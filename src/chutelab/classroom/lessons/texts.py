@@ -54,8 +54,8 @@ def mathml(tex: str, *, display: bool = False) -> str:
 def html_of(markdown: str) -> str:
     """Return the HTML of a worksheet, without its title and its pictures, which the page has.
 
-    Raw HTML is shown, not obeyed; formulas are MathML. Links to worksheets become links to pages,
-    and that to the explanation leads to its place in the page.
+    Raw HTML is shown, not obeyed; formulas are MathML. Links to worksheets and to the explanation
+    become links to pages.
     """
     read = parser()
     worksheet = SyntaxTreeNode(read.parse(markdown))

@@ -15,7 +15,7 @@ from typing import Any, cast
 import numpy as np
 from PIL import Image
 
-from chutelab.pictures.animation.moments import film, slowness, span
+from chutelab.pictures.animation.moments import Moment, asked, film, slowness, span
 from chutelab.pictures.animation.stage import SHOWS, Stage, lay_out
 from chutelab.pictures.plots import style
 from chutelab.results import Recording
@@ -147,6 +147,7 @@ def animate(
     title: str | None = None,
     question: str = "",
     show: Collection[str] = SHOWS,
+    predict: bool = False,
     comment: str = "",
 ) -> Path:
     """Write the lesson picture of a recording, a GIF that loops for ever, or a video.
@@ -174,6 +175,9 @@ def animate(
         Which of `SHOWS` to show: "parabola" (the analytic one, dashed), "trails", "strobe" (dots
         at round times), "velocity" (of particle 0, an arrow with its components) and "energy"
         (the ledger as bars; without it the scene is wider).
+    predict : bool, optional
+        Let whoever watches predict: the film begins without the analytic parabola, and waits as
+        the particle comes to the top of the drive pulley, or as it begins.
     comment : str, optional
         A text that a GIF keeps, not shown.
 
@@ -205,8 +209,9 @@ def animate(
     )
     begin, end = span(recording, layout.window)
     pace = slowness(end - begin) if slow is None else slow
-    moments = film(recording, begin, end, fps=fps, slow=pace)
-    stage = Stage(recording, layout, moments, slow=pace)
+    ask = asked(recording, begin) if predict else None
+    moments = film(recording, begin, end, fps=fps, slow=pace, ask=ask)
+    stage = Stage(recording, layout, moments, slow=pace, ask=ask)
     pictures = map(stage.frame, range(len(moments)))
     delays = [moment.delay for moment in moments]
     with whole(path) as unfinished:
@@ -215,3 +220,45 @@ def animate(
         else:
             write_video(unfinished, kind, fps, pictures, delays)
     return path
+
+
+STILL = 2
+"""Pixels of a still for each of the film's: it is for print."""
+
+
+def still(recording: Recording, path: str | Path, *, width: int = 800, height: int = 450) -> Path:
+    """Write the machine as the film begins, without a path, as a PNG: the scene of the film alone.
+
+    Parameters
+    ----------
+    recording : Recording
+        As for `animate`.
+    path : path
+        Where to; written whole or not at all.
+    width, height : int
+        Pixels of the film.
+
+    Returns
+    -------
+    Path
+        Of the file.
+
+    Raises
+    ------
+    ValueError
+        If the size is not possible.
+    OSError
+        If the file cannot be written.
+    """
+    shows = frozenset(("velocity", "energy"))
+    wide, high = STILL * width, STILL * height
+    layout = lay_out(recording, width=wide, height=high, question="?", shows=shows)
+    begin = span(recording, layout.window)[0]
+    stage = Stage(recording, layout, (Moment(begin, 0, ""),), slow=1.0, ask=begin)
+    left, bottom, across, up = layout.view
+    top = 1.0 - bottom - up
+    corners = (left * wide, top * high, (left + across) * wide, (top + up) * high)
+    with whole(Path(path)) as unfinished:
+        picture = stage.frame(0).crop(corners).quantize(64, dither=Image.Dither.NONE)
+        picture.save(unfinished, format="PNG", optimize=True)
+    return Path(path)

@@ -153,6 +153,9 @@ none with less than this share of the largest impulse."""
 HOLD_TOTAL, HOLD_LONGEST, TAIL = 300, 130, 120
 """Hundredths of a second: all holds together at most, one of them, and the last picture."""
 
+ASKED, ASK = 300, "Predict: what comes next?"
+"""Hundredths of a second that a film waits for a prediction, and what it says meanwhile."""
+
 EDGE = 0.012
 """Share of the window's larger side that particle 0 is inside it as the film begins: all of it."""
 
@@ -175,12 +178,31 @@ class Moment:
     words: str
 
 
+def asked(recording: Recording, begin: float) -> float:
+    """Return when a film that lets one predict stops (s): nothing is decided yet.
+
+    That is as particle 0 comes to the top of the drive pulley, or as the film begins.
+    """
+    track = recording.track(0)
+    times = np.linspace(float(track["t"][0]), action(recording)[0], 2000)
+    over = nominal(recording, times)[0][:, 0] >= -1e-9
+    carried = recording.machine.pulley is not None and not over[0] and over.any()
+    return max(begin, float(times[np.argmax(over)])) if carried else begin
+
+
 def film(
-    recording: Recording, begin: float, end: float, *, fps: int, slow: float
+    recording: Recording,
+    begin: float,
+    end: float,
+    *,
+    fps: int,
+    slow: float,
+    ask: float | None = None,
 ) -> tuple[Moment, ...]:
     """Return the moments from `begin` to `end`: even steps, and a hold at each impact worth it.
 
-    There are `fps` pictures a second; `slow` is seconds on the screen for one of the recording.
+    There are `fps` pictures a second; `slow` is seconds on the screen for one of the recording. At
+    the time `ask`, if it is given, the film holds for whoever watches to predict what comes.
 
     Raises
     ------
@@ -204,11 +226,12 @@ def film(
         mine = mine[:0]
     held = _held(mine)
     stops = mine["t"][held]
+    fixed = stops if ask is None else np.append(stops, ask)
     times = np.linspace(begin, end, max(2, round((end - begin) / step) + 1))
-    if len(stops):
+    if len(fixed):
         # A step that almost coincides with a stop would be a stumble.
-        times = times[np.abs(times[:, None] - stops).min(axis=1) > 0.5 * step]
-    times = np.unique(np.concatenate([[begin], times, stops, [end]]))
+        times = times[np.abs(times[:, None] - fixed).min(axis=1) > 0.5 * step]
+    times = np.unique(np.concatenate([[begin], times, fixed, [end]]))
     hold = min(HOLD_TOTAL // max(len(stops), 1), HOLD_LONGEST)
     delays = np.where(np.isin(times, stops), hold, delay)
     delays[-1] = max(delays[-1], TAIL)
@@ -216,6 +239,9 @@ def film(
         words = _gates(recording.machine, times, slow)
     else:
         words = _words(recording, mine, held, times, slow)
+    if ask is not None:
+        at = int(np.searchsorted(times, ask))
+        delays[at], words[at] = ASKED, ASK
     return tuple(Moment(float(t), int(d), w) for t, d, w in zip(times, delays, words, strict=True))
 
 

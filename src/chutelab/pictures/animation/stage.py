@@ -14,6 +14,7 @@ from matplotlib.transforms import Bbox
 from PIL import Image, ImageDraw
 
 from chutelab.pictures.animation.actors import (
+    Moving,
     Writing,
     arrows,
     bars,
@@ -38,6 +39,7 @@ from chutelab.pictures.plots.scenery import (
 )
 from chutelab.pictures.plots.style import Picture
 from chutelab.results import Recording
+from chutelab.util.arrays import Bools
 
 SHOWS = ("parabola", "trails", "strobe", "velocity", "energy")
 """What a picture can show besides the machine and the particles."""
@@ -163,7 +165,8 @@ TITLE, LINE, CAPTION = 0.942, 0.065, 0.055
 class Stage:
     """Draws the moments of a film: the background once, and for each moment what moves on it.
 
-    `slow` is seconds on the screen for one second of the recording.
+    `slow` is seconds on the screen for one second of the recording. The analytic path is there from
+    the first moment on, or after the time `ask`, s.
 
     Attributes
     ----------
@@ -182,6 +185,7 @@ class Stage:
         moments: tuple[Moment, ...],
         *,
         slow: float,
+        ask: float | None = None,
     ) -> None:
         times, shows = np.array([moment.t for moment in moments]), layout.shows
         # A hundredth of a pixel more: the canvas rounds down.
@@ -205,6 +209,9 @@ class Stage:
             *strung(view, recording, times),
             *others,
         ]
+        if ask is not None:
+            # Below all that moves.
+            self.moving = [*_after(view, "analytic", times > ask), *self.moving]
         # What the legend names, in its order.
         dot: dict[str, Any] = {"ls": "none", "marker": "o", "ms": 6.0}
         handles = [Line2D([], [], **dot, color=style.STRIKE, label="particle 0"), *named]
@@ -277,6 +284,18 @@ class Stage:
             Writing(style.NORMAL, layout.dpi, right, layout.height * high, "rs", times),
             Writing(style.NORMAL, layout.dpi, left, layout.height * low, "lm", words),
         ]
+
+
+def _after(ax: Axes, gid: str, there: Bools) -> list[Moving]:
+    """Take the lines of a name off the background: each is seen at the moments of `there`, (T,)."""
+    found = [line for line in ax.lines if line.get_gid() == gid]
+    for line in found:
+        line.set_animated(True)
+
+    def moving(line: Line2D) -> Moving:
+        return line, lambda index: line.set_visible(bool(there[index]))
+
+    return list(map(moving, found))
 
 
 ALWAYS = 5

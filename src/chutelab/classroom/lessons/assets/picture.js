@@ -1,25 +1,16 @@
-// Stops the animation, and starts it again from the beginning: nothing that moves without end
-// should move against a reader's will.
+// Plays the film and stops it again. It begins when it is asked to: whoever predicts has not seen
+// it, and nothing that moves without end should move against a reader's will.
 (() => {
   "use strict";
-  const image = document.querySelector("#picture img");
-  const calm = document.querySelector("#picture source");
-  const button = document.getElementById("pause");
+  const image = document.querySelector("#picture");
+  const button = document.getElementById("play");
   if (!image || !button) return;
-  const moving = image.getAttribute("src");
-  let runs = !window.matchMedia("(prefers-reduced-motion: reduce)").matches;
-  const show = () => {
-    if (calm) calm.remove();
-    image.src = runs ? moving : image.dataset.still;
-    say();
-  };
-  const say = () => {
-    button.textContent = runs ? button.dataset.stop : button.dataset.start;
-  };
+  const still = image.getAttribute("src");
+  let runs = false;
   button.hidden = false;
-  say();
   button.addEventListener("click", () => {
     runs = !runs;
-    show();
+    image.src = runs ? image.dataset.film : still;
+    button.textContent = runs ? button.dataset.stop : button.dataset.start;
   });
 })();

@@ -52,13 +52,13 @@ class ExercisePanel {
     this.exercise = exercise;
     this.place = `chutelab/${exercise.name}/`;
     this.count = html("span", { class: "note" });
-    this.panel = card("exercise", words.say("exercise"),
-      html("p", { class: "note" }, words.say("exercise-after")));
+    const wait = html("p", { class: "note" }, words.say("exercise-after"));
+    this.panel = card("exercise", words.say("exercise"), wait);
     this.panel.querySelector("summary").append(" ", this.count);
     this.body = this.panel.querySelector(".body");
     home.prepend(this.panel);
     const open = () => {
-      if (!stage.blind) this.askName();
+      if (!stage.blind && !this.task) this.enter();
     };
     stage.painters.push(open);
     addEventListener("beforeprint", () => {
@@ -73,7 +73,11 @@ class ExercisePanel {
       const { student: name, suspend_data: suspended = "" } = data;
       if (typeof name !== "string" || typeof suspended !== "string" || !name.trim()) return;
       this.isHosted = true;
-      this.begin(name, suspended);
+      this.task = undefined;
+      this.body.replaceChildren(wait);
+      this.enter = () => this.begin(name, suspended);
+      if (suspended) this.enter();
+      else open();
     });
     parent.postMessage({ chutelab: "ready", lesson: exercise.name }, "*");
   }
@@ -86,6 +90,9 @@ class ExercisePanel {
 
   /** Whether the name is asked for. */
   asks = false;
+
+  /** What is done as soon as it was predicted where things go. @type {() => void} */
+  enter = () => this.askName();
 
   /** @param {string} student */
   placeOf(student) {
@@ -101,7 +108,7 @@ class ExercisePanel {
   }
 
   askName() {
-    if (this.task || this.asks) return;
+    if (this.asks) return;
     this.asks = true;
     const { words } = this;
     const name = html("input", {
@@ -155,7 +162,7 @@ class ExercisePanel {
       html("div", { class: "row" },
         this.button("result", words.say("exercise-result"), () => this.save(), "main"),
         ...(this.isHosted ? [] : [again])),
-      html("p", { class: "note" }, words.say("exercise-result-note")));
+      ...(this.isHosted ? [] : [html("p", { class: "note" }, words.say("exercise-result-note"))]));
     this.tell();
     const next = task.standings.findIndex(({ verdict }) => verdict !== "right");
     if (next >= 0) this.rows[next].section.open = true;
@@ -269,12 +276,11 @@ class ExercisePanel {
     const { progress, result } = task, { done, total } = progress;
     this.count.textContent = words.say("exercise-count", { done, total });
     const suspended = JSON.stringify(result);
-    if (this.isHosted || parent !== window) {
-      parent.postMessage({
-        chutelab: "progress", ...progress, suspend_data: suspended, result,
-      }, "*");
+    if (this.isHosted) {
+      const news = { chutelab: "progress", ...progress, suspend_data: suspended, result };
+      parent.postMessage(news, "*");
+      return;
     }
-    if (this.isHosted) return;
     try {
       kept()?.setItem("chutelab/student", task.student);
       kept()?.setItem(this.placeOf(task.student), suspended);

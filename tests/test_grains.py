@@ -29,7 +29,7 @@ def explained(number):
 
 def bin_of(width, seed=0, *settings):
     """Run the bin with a slot of this width, m."""
-    slot = (f"surface.slider.from=[{width - 0.018}, 0.0]", f"stream.seed={seed}")
+    slot = (f"surface.slider.from=[{round(width - 0.018, 6)}, 0.0]", f"stream.seed={seed}")
     return simulate(scene_of(find(10), "slot.toml", (*slot, *settings)))
 
 

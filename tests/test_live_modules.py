@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from chutelab.classroom.exercises import EXERCISES
-from chutelab.classroom.exercises.in_page import data_of
+from chutelab.classroom.exercises.in_page import SAID, data_of
 from chutelab.pictures.live.page import LANGUAGES, joined
 
 LIVE = Path(__file__).parent / "live"
@@ -84,6 +84,7 @@ def test_every_word_in_the_catalogue_is_said():
 
 def test_every_word_of_an_exercise_is_in_its_catalogue():
     told = data_of(EXERCISES["the-bounce"])["words"]
+    assert {key.partition("-")[0] for key in told} == set(SAID)
     for name in ("draw.js", "judging.js", "task.js", "exercise.js"):
         text = (ASSETS / name).read_text(encoding="utf-8")
         said = re.findall(r'\b(?:worded\((?:exercise, )?|its\()"([\w-]+)"', text)

@@ -52,7 +52,7 @@ def test_worksheet_and_notebook_ask_the_same(lesson):
     opening = re.sub(r"^!\[.*\]\(machine.png\)$", "", opening, flags=re.MULTILINE)
     assert words_of(opening) in words_of(cells["title"])
     assert "In a terminal" not in " ".join(cells.values())
-    assert "Write the decimal point, 0.05" in cells["questions-text"]
+    assert "Write a decimal point, 0.05" in cells["questions-text"]
 
 
 @pytest.mark.parametrize("lesson", LESSONS, ids=lambda lesson: lesson.name)
@@ -112,6 +112,8 @@ def test_a_book_runs_what_is_said_as_on_the_command_line():
     book = Book("the-parabola")
     runs = book.run("throw.toml", "throw.toml --set incoming.speed=4 --set gravity=1.62")
     fall = sqrt(2 * 0.8 / 1.62)
+    assert measure(runs[1], "flight.t") == pytest.approx(fall, rel=1e-12)
+    assert "time of the fall, from one belt to the other, s" in runs._repr_html_()
     assert measure(runs[1], "landing.x") == pytest.approx(4.0 * fall, rel=1e-12)
     assert measure(runs[0], "landing.x") == pytest.approx(2.0 * sqrt(2 * 0.8 / G), rel=1e-12)
     page = runs._repr_html_()

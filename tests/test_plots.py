@@ -453,6 +453,13 @@ def test_overlay_keeps_what_is_for_experts_to_itself() -> None:
     assert wrong.get_title("left") == "Energy ledger: residual −3e−3 J"
 
 
+def test_overlay_of_a_bed_shows_where_its_layers_land() -> None:
+    bed = scene.load("stream-independent", "stream.count=50")
+    axes = plots.overlay(simulate(bed)).axes
+    (found,) = [ax for ax in axes if ax.get_title("left") == "Where they land"]
+    assert {"mean", "lowest", "highest"} <= {one.get_gid() for one in found.lines}
+
+
 def test_given_axes_get_the_scene_and_keep_what_is_theirs(tmp_path: Path) -> None:
     figure = Figure()
     mine, other = figure.subplots(1, 2)

@@ -90,9 +90,10 @@ def end_times(recording: Recording) -> Floats:
 def each(recording: Recording, name: str) -> Floats:
     """Return a quantity of each particle, (N,), in the unit its name has; NaN without one.
 
-    Names are such as ``x2``, ``landing.x``, ``impact.hood.t``, ``ended.t`` or ``ledger.belt_work``.
-    Of a family of scenes, each particle is a scene of its own; only its recording has
-    ``ledger.by_surface`` of each particle.
+    Names are such as ``x2``, ``landing.x``, ``flight.t`` (from the incoming belt to the plate, or
+    to the outgoing belt), ``impact.hood.t``, ``ended.t`` or ``ledger.belt_work``. Of a family of
+    scenes, each particle is a scene of its own; only its recording has ``ledger.by_surface`` of
+    each particle.
 
     Raises
     ------
@@ -115,6 +116,11 @@ def each(recording: Recording, name: str) -> Floats:
                 return np.zeros(recording.count)
             owner = recording.surface_index(surface)
             return np.asarray(recording.by_surface[:, owner, ENTRIES.index(entry)])
+        case ["flight", "t"]:
+            # From the incoming belt to what is met next.
+            left = column(first(recording, "separation"), "t")
+            met = (column(first(recording, event), "t") for event in ("impact", "landing"))
+            return np.asarray(np.fmin(*met) - left)
         case ["impact", surface, key]:
             return column(first(recording, "impact", surface), key)
         case ["separation" | "impact" | "landing" as event, key]:

@@ -45,7 +45,7 @@ NEEDED: Final = {"separation": "incoming", "impact": "plate", "landing": "outgoi
 def unit_of(name: str, surfaces: Iterable[str], streams: Collection[str] = ()) -> str | None:
     """Return the unit of a quantity, "" for a number of things; None if the scene has none such.
 
-    Names are such as ``x2``, ``landing.x``, ``landing.x.mean``, ``impact.ramp.t``,
+    Names are such as ``x2``, ``landing.x``, ``landing.x.mean``, ``flight.t``, ``impact.ramp.t``,
     ``landing.count``, ``ended.settled``, ``ledger.belt_work``, ``ledger.kinetic.end`` or
     ``ledger.by_surface.outgoing.belt_work``; the surfaces are all that the scene has. What has a
     statistic or a count is also of one stream, by its name: ``by_stream.left.landing.x.mean``.
@@ -73,6 +73,8 @@ def _units(surfaces: tuple[str, ...]) -> dict[str, str]:
     units = dict(SYMBOLS) if {"incoming", "plate"} <= set(surfaces) else {}
     units |= {"contacts": "", **{f"ended.{ending}": "" for ending in ENDINGS}}
     units |= {f"{event}.count": "" for event in events}
+    if "separation" in events and len(events) > 1:
+        events["flight"] = {"t": "s"}
     for event, columns in {**events, "ended": {"t": "s", "x": "m", "y": "m"}}.items():
         for column, unit in columns.items():
             units[f"{event}.{column}"] = unit

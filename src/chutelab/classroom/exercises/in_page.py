@@ -3,7 +3,8 @@
 No page may evaluate text, so Python's own parser turns each formula into a tree that a small
 evaluator (``pictures/live/assets/formula.js``) walks. There is no answer in the data: the page
 draws a student's numbers from the name and computes right and wrong answers from them, as `Task`
-does.
+does. The way to the answer stands there as a template: it says no more than the formulas that the
+page has to know, and has no numbers.
 """
 
 from __future__ import annotations
@@ -16,8 +17,12 @@ from chutelab.classroom.exercises.catalogue import UNNAMED
 from chutelab.classroom.exercises.exercise import Exercise, Question
 from chutelab.classroom.words import words
 
-LEFT_OUT: Final = ("python-", "unread-", "machine-")
-"""How keys begin of what is said of cells, of Python's objects, and by machines that judge."""
+SAID: Final = (
+    "answer", "besides", "decimal", "heading", "hint", "hints", "large", "mistake", "numbers",
+    "off", "pair", "pure", "question", "reply", "right", "small", "source", "tries",
+    "untranslated", "verdict", "working",
+)  # fmt: skip
+"""How keys of the catalogue begin that pages need: with nothing of cells, sheets and packages."""
 
 GENERAL: Final = (
     "mistake-sign", "mistake-half-missing", "mistake-half-too-many", "mistake-ten",
@@ -113,7 +118,7 @@ def data_of(exercise: Exercise, explain: str = "") -> dict[str, Any]:
         "machine": {key: tree(formula) for key, formula in exercise.machine.items()},
         "questions": [_question(asked, exercise.language) for asked in exercise.questions],
         "words": {
-            key: text for key, text in said.catalogue.items() if not key.startswith(LEFT_OUT)
+            key: text for key, text in said.catalogue.items() if key.partition("-")[0] in SAID
         },
     }
 

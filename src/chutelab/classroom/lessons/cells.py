@@ -32,7 +32,7 @@ NAME: Final = """
 ## Your name
 
 Put your name between the quotes and run the cell. It draws your own numbers: the same name always
-has the same ones."""
+gets the same ones."""
 
 PREDICT: Final = """
 Write your predictions into the next cell, a number or words between quotes, before you run anything
@@ -43,7 +43,7 @@ COMPARE: Final = "Double-click here to fill in the table."
 EXPLAIN: Final = """
 ## Explain
 
-What came out otherwise than you thought, and why is it so? Write it down before you open the
+What came out differently from what you expected, and why? Write it down before you open the
 explanation."""
 
 EXPLANATION: Final = "explanation"
@@ -55,10 +55,10 @@ WORDS: Final = "*Double-click here, and write two or three sentences.*"
 QUESTIONS: Final = """
 ## Questions with your numbers
 
-Replace `None` by your number (or by a line of Python that computes it) and run the cell. Write the
-decimal point, 0.05: Python takes `0,05` for a mistake, or for two numbers. The reply says whether
-it is right, or what seems to have gone wrong. `task.hint(1)` gives a hint, once more the next one;
-`task.reveal(1)` shows the working. Your numbers are at hand as `task.given`, such as
+Replace `None` by your number (or by a line of Python that computes it) and run the cell. Write a
+decimal point, 0.05: Python reads `0,05` as an error, or as two numbers. The reply says whether it is
+right, or what seems to have gone wrong. `task.hint(1)` gives a hint, and the next one when you run it
+again; `task.reveal(1)` shows the working. Your numbers are at hand as `task.given`, such as
 `task.given.{first}`."""
 
 Cell = dict[str, Any]

@@ -20,6 +20,7 @@ from chutelab.pictures.plots.panels import (
     Arc,
     analytic_of,
     draw_analytic,
+    draw_landings,
     draw_ledger,
     draw_residual,
     draw_tracks,
@@ -29,6 +30,7 @@ from chutelab.pictures.plots.panels import (
 from chutelab.pictures.plots.scenery import bodily, one_of_many, places, window_of
 from chutelab.pictures.plots.style import Picture
 from chutelab.results import Recording
+from chutelab.results.quantities import layers
 from chutelab.theory import Transfer
 from chutelab.theory.figures import Panel, PaperFigure
 
@@ -64,7 +66,8 @@ def overlay(
     Figure
         That of `ax`; or a new one, with scene and tracks, velocity and energy ledger beside it;
         with `details` the distance from the analytic path beneath it. Where nothing is known
-        analytically, of many particles, boxes or strings: there all particles at four moments.
+        analytically, of many particles, boxes or strings: there all particles at four moments. Of
+        a bed of particles that do not meet: there where they land.
 
     Raises
     ------
@@ -83,7 +86,8 @@ def overlay(
         draw_view(ax, recording, parts, bodies=all_of_them, legend=False)
         return ax.figure.canvas.figure
     figure = Picture(SIZE)
-    ratios = [2.6, 1.0] if all_of_them else [4.2, 1.0] if details else [1.0]
+    spread = not (all_of_them or details) and layers(recording) is not None
+    ratios = [2.6, 1.0] if all_of_them or spread else [4.2, 1.0] if details else [1.0]
     grid = figure.add_gridspec(
         len(ratios), 1, height_ratios=ratios, left=0.06, right=0.56, top=0.88,
         bottom=0.02 if all_of_them else 0.08, hspace=0.28,
@@ -93,6 +97,8 @@ def overlay(
     draw_view(view, recording, parts, bodies=all_of_them)
     if all_of_them:
         draw_moments(figure, grid[1], recording)
+    elif spread:
+        draw_landings(figure.add_subplot(grid[1]), recording, "Where they land")
     elif details:
         draw_residual(figure.add_subplot(grid[1]), recording, parts, start, str(prediction.reason))
     draw_velocity(figure.add_subplot(side[0]), recording, parts, start)

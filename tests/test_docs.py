@@ -93,9 +93,10 @@ def test_the_chapters_are_there(site):
 
 
 def public_names():
-    """What the packages say is public, read from their sources."""
-    for path in (ROOT / "src").rglob("__init__.py"):
-        package = ".".join(path.parent.relative_to(ROOT / "src").parts)
+    """What the modules say is public, read from their sources."""
+    for path in (ROOT / "src").rglob("*.py"):
+        package = ".".join(path.relative_to(ROOT / "src").with_suffix("").parts)
+        package = package.removesuffix(".__init__")
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__":
                 yield from (f"{package}.{name}" for name in ast.literal_eval(node.value))

@@ -14,6 +14,7 @@ from chutelab.classroom.book import Book
 from chutelab.classroom.lessons import LessonError, read, shipped_lessons
 from chutelab.classroom.lessons.building import build_notebook, start
 from chutelab.classroom.lessons.cells import notebook_of
+from chutelab.classroom.returned import words_of as written_in
 from chutelab.cli import main
 from chutelab.results.quantities import measure
 from chutelab.util.errors import InputError
@@ -25,6 +26,31 @@ LESSONS = shipped_lessons()
 def cells_of(lesson):
     text = (lesson.folder / "exercise.ipynb").read_text(encoding="utf-8")
     return {cell["id"]: "".join(cell["source"]) for cell in json.loads(text)["cells"]}
+
+
+def test_a_translated_worksheet_makes_a_notebook_in_its_language():
+    made = []
+    for english in LESSONS:
+        lesson = read(english.folder, "de")
+        text = notebook_of(lesson)
+        assert bool(text) == ("README.de.md" not in lesson.untranslated)
+        if not text:
+            continue
+        made.append(lesson.number)
+        path = lesson.folder / "exercise.de.ipynb"
+        assert path.read_bytes() == text.encode(), f"run: chutelab lesson build {lesson.number}"
+        cells, theirs = json.loads(text)["cells"], cells_of(english)
+        assert [cell["id"] for cell in cells] == list(theirs)
+        for cell in cells:
+            source = "".join(cell["source"])
+            if cell["cell_type"] == "code":
+                assert source.replace(', language="de"', "") == theirs[cell["id"]]
+            else:
+                assert source != theirs[cell["id"]]
+                assert not re.search(r"\b(?:the|and|with|your)\b", re.sub(r"`.*?`", "", source))
+        assert 'language="de"' in text.replace("\\", "")
+        assert written_in(path) == {}
+    assert {0, 1, 2, 3} <= set(made)
 
 
 def words_of(text):

@@ -199,7 +199,8 @@ def test_a_translated_lesson_has_all_its_texts_and_the_same_numbers(folder):
         assert translation != said
         # What is typed is the same, and so are the formulas and the numbers in the text.
         for pattern in (r"```.*?```", r"`[^`\n]+`", r"\]\([^)]*\)"):
-            typed = re.findall(pattern, translation.replace(".de.md", ".md"), re.DOTALL)
+            same = re.sub(r"\.de\.(md|ipynb)", r".\1", translation)
+            typed = re.findall(pattern, same, re.DOTALL)
             assert sorted(typed) == sorted(re.findall(pattern, said, re.DOTALL))
         assert formulas_in(translation) == formulas_in(said)
         assert numbers_in(translation) == numbers_in(said)

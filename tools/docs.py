@@ -10,15 +10,18 @@ called, which takes every warning for an error. Needs ``pip install ".[docs]"``.
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 import sys
 import tempfile
 from importlib import import_module
+from inspect import getdoc
 from pathlib import Path
 from pkgutil import walk_packages
 from types import ModuleType
 
+from pydantic import BaseModel
 from sphinx.cmd.build import build_main
 from sphinx.pycode import ModuleAnalyzer
 
@@ -60,11 +63,12 @@ def sections(markdown: str) -> dict[str, str]:
     return {"": parts[0], **dict(zip(parts[1::2], parts[2::2], strict=True))}
 
 
-def public_packages() -> dict[str, ModuleType]:
-    """Return chutelab and its packages that say what is public, by name."""
-    names = [one.name for one in walk_packages(chutelab.__path__, "chutelab.") if one.ispkg]
-    found = {name: import_module(name) for name in ("chutelab", *sorted(names))}
-    return {name: package for name, package in found.items() if hasattr(package, "__all__")}
+def public_modules() -> dict[str, ModuleType]:
+    """Return chutelab and its packages and modules that say what is public, by name."""
+    names = [one.name for one in walk_packages(chutelab.__path__, "chutelab.")]
+    wanted = ("chutelab", *sorted(name for name in names if not name.endswith("__main__")))
+    found = {name: import_module(name) for name in wanted}
+    return {name: module for name, module in found.items() if hasattr(module, "__all__")}
 
 
 def readme(pages: Path) -> None:
@@ -139,26 +143,27 @@ def lesson_page(lesson: Lesson, folder: Path) -> None:
 
 
 def reference(pages: Path) -> None:
-    """Make a page for each package: all that it says is public."""
-    packages = public_packages()
+    """Make a page for each module that has public names: all of them."""
+    modules = public_modules()
     homes = {
-        id(getattr(package, name)): f"{title}.{name}"
-        for title, package in packages.items()
+        id(getattr(module, name)): f"{title}.{name}"
+        for title, module in modules.items()
         if title != "chutelab"
-        for name in package.__all__
+        for name in module.__all__
     }
     (pages / "api").mkdir()
-    for title, package in packages.items():
+    for title, module in modules.items():
         said = [title, "=" * len(title), "", f".. automodule:: {title}", ""]
-        for name in package.__all__:
-            value = getattr(package, name)
+        for name in module.__all__:
+            value = getattr(module, name)
             home = value.__name__ if isinstance(value, ModuleType) else homes.get(id(value))
             if value is sys.modules.get(f"{title}.{name}"):
                 continue  # it has a page of its own
             if title == "chutelab" and home is not None:
-                said += data(name, [f"See `{home}`."])
+                summary = str(getdoc(value)).partition("\n\n")[0].splitlines()
+                said += data(name, [*summary, "", f"See `{home}`."])
             elif isinstance(value, type):
-                said += [f".. autoclass:: {title}.{name}", "   :members:", ""]
+                said += [f".. autoclass:: {title}.{name}", "   :members:", "", *keys(value), ""]
             elif callable(value):
                 said += [f".. autofunction:: {title}.{name}", ""]
             else:
@@ -166,9 +171,26 @@ def reference(pages: Path) -> None:
         (pages / "api" / f"{title}.rst").write_text("\n".join(said), encoding="utf-8")
     (pages / "api.md").write_text(
         "# Reference\n\nEvery public name, a page for each package.\n\n"
-        + tree(*(f"{title.removeprefix('chutelab.')} <api/{title}>" for title in packages)),
+        + tree(*(f"{title.removeprefix('chutelab.')} <api/{title}>" for title in modules)),
         encoding="utf-8",
     )
+
+
+def keys(table: type) -> list[str]:
+    """Return the keys of a table of scene files, to stand in its class; of others nothing."""
+    if not issubclass(table, BaseModel):
+        return []
+    said = ["   .. list-table::", "      :header-rows: 1", ""]
+    rows = [("key", "default", "what it is")]
+    for key, told in table.model_json_schema()["properties"].items():
+        default = told.get("default")
+        shown = "" if default is None else f"``{json.dumps(default, ensure_ascii=False)}``"
+        rows.append(
+            (f"``{key}``", shown, re.sub(r"([*`|\\_])", r"\\\1", told.get("description", "")))
+        )
+    for first, *others in rows:
+        said += [f"      * - {first}", *(f"        - {cell}" for cell in others)]
+    return said
 
 
 def data(name: str, said: list[str]) -> list[str]:

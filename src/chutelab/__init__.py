@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from chutelab.theory import figures
 
     __version__: str
+    """Of the package that is installed."""
 
 __all__ = [
     "Recording",

@@ -11,7 +11,8 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
 
 from chutelab.classroom.exercises.catalogue import LONGEST_NAME
-from chutelab.classroom.lessons.cells import EXPLANATION, WORDS
+from chutelab.classroom.lessons.cells import EXPLANATION
+from chutelab.classroom.words import LANGUAGES, words
 from chutelab.util.errors import InputError, cut
 
 LARGEST: Final = 25 << 20
@@ -90,9 +91,11 @@ def words_of(path: Path) -> dict[str, str]:
     written = {}
     for cell in found["cells"]:
         if cell.get("cell_type") == "markdown" and cell.get("id") == EXPLANATION:
-            said = (_text(cell.get("source", "")) or "").replace(WORDS, "").strip()
-            if said:
-                written["explain"] = said[:LONGEST_TEXT]
+            said = _text(cell.get("source", "")) or ""
+            for language in LANGUAGES:
+                said = said.replace(words(language).say("notebook-words"), "")
+            if said.strip():
+                written["explain"] = said.strip()[:LONGEST_TEXT]
     return written
 
 

@@ -207,14 +207,17 @@ def _hand_out(lessons: list[Lesson], sheet: str, out: Path | None, kind: str | N
 def build(wanted: tuple[str, ...], out: Path | None, force: bool, quiet: bool) -> None:
     """Make lesson.gif and exercise.ipynb of each LESSON (default: all shipped), where they changed.
 
-    The notebook is made of README.md (Predict, Run, Compare), notebook.py and the exercise.
+    The notebook is made of README.md (Predict, Run, Compare), notebook.py and the exercise. Where
+    there is a README.de.md, exercise.de.ipynb is made, too.
 
     A picture is up to date if it was made from the same scene and settings with the same versions
     of chutelab, numpy, pymunk, matplotlib and pillow; the GIF says so in a comment. The same makes
     the same bytes.
     """
+    from chutelab.classroom.lessons import find
     from chutelab.classroom.lessons.building import build as build_lesson
     from chutelab.classroom.lessons.building import build_notebook, check_inside
+    from chutelab.classroom.words import LANGUAGES
 
     for one in _lessons(wanted):
         with (
@@ -225,8 +228,9 @@ def build(wanted: tuple[str, ...], out: Path | None, force: bool, quiet: bool) -
             if target is not None:
                 check_inside(target)
             film = build_lesson(one, target, force=force, progress=update)
-            notebook = build_notebook(one, target)
-        for built in (film, notebook):
+            told = [find(one.folder, language) for language in LANGUAGES]
+            books = [build_notebook(lesson, target) for lesson in told]
+        for built in (film, *books):
             if built is not None and not quiet:
                 done = "written" if built.made else "up to date"
                 console.say(f"{built.path}: {done}, {built.size / 1000:.0f} kB")

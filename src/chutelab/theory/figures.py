@@ -28,6 +28,8 @@ from chutelab.util.errors import InputError
 from chutelab.util.files import csv_text
 from chutelab.util.tables import Sheet, Shown
 
+__all__ = ["FORMS", "FigureError", "Line", "Panel", "PaperFigure", "figure"]
+
 RESTITUTION: Final = 0.5
 """ε of the plate in all figures."""
 
@@ -35,6 +37,7 @@ GRAVITY: Final = 9.81
 """m/s²."""
 
 FORMS: tuple[Rebound, Rebound] = ("as-printed", "corrected")
+"""Of Eq. (9)."""
 
 SAID: Final = {"as-printed": "Eq. (9) as printed", "corrected": "Eq. (9) corrected"}
 

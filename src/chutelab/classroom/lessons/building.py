@@ -30,7 +30,7 @@ from PIL.GifImagePlugin import GifImageFile
 from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises.catalogue import told
 from chutelab.classroom.exercises.in_page import data_of
-from chutelab.classroom.lessons.cells import NOTEBOOK, notebook_of
+from chutelab.classroom.lessons.cells import name_of, notebook_of
 from chutelab.classroom.lessons.printing import printed
 from chutelab.classroom.lessons.reading import Lesson, LessonError, read, scene_of, split, unusable
 from chutelab.classroom.lessons.texts import INDEX, html_of, words_for
@@ -123,7 +123,7 @@ def build_notebook(lesson: Lesson, folder: Path | None = None) -> Built | None:
     text = notebook_of(lesson)
     if not text:
         return None
-    path = (lesson.folder if folder is None else folder) / NOTEBOOK
+    path = (lesson.folder if folder is None else folder) / name_of(lesson.language)
     made = not path.is_file() or path.read_text(encoding="utf-8") != text
     if made:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -359,8 +359,9 @@ def _lesson(lesson: Lesson, folder: Path, before: str, after: str, *, wheel: boo
     with suppress(LessonError):  # a worksheet of other parts is on the page alone
         (folder / f"worksheet.{kind}").write_bytes(printed(lesson, "student", kind))
         doors.append(f'<li><a href="worksheet.{kind}">{say("page-print")}</a></li>')
-    if (folder / "exercise.ipynb").is_file():
-        door = f'<li><a href="exercise.ipynb" download>{say("page-notebook")}</a></li>'
+    names = (name_of(language) for language in (lesson.language, "en"))
+    if book := next((name for name in names if (folder / name).is_file()), ""):
+        door = f'<li><a href="{book}" download>{say("page-notebook")}</a></li>'
         doors.append(door)
         if wheel:
             doors.append(f'<li><a href="../{INDEX}#get">{say("page-get-door")}</a></li>')

@@ -1,26 +1,23 @@
 # needs: notebook,fit
+
+# %% Run 1
+from chutelab import measured
+
+scene = book.scene("drop.toml")
+film = measured.read(book.file("ball.csv"))
+film
+
 # %% Run 1
 runs = book.run("drop.toml")
 runs
 
-# %% [markdown] Run 1
-# The points of `ball.csv`, and what a fit to all of them says of $g$, ε and the moment of release.
+# %% Run 1
+began = measured.fit(scene, film, ["t0"])
+began
 
 # %% Run 1
-from chutelab import measured
-from chutelab.classroom.lessons import find
-
-film = measured.read(find("film-a-ball").folder / "ball.csv")
-fit = measured.fit(book.scene("drop.toml"), film, ["gravity", "surface.table.restitution", "t0"])
-fit
-
-# %% [markdown] Run 1
-# Noise, or a pattern? The left picture has the points on the fitted path, the right ones what is left of them.
-
-# %% Run 1
-from chutelab.pictures.plots.measured import measured as draw
-
-draw(fit.after, fit)
+found = measured.fit(scene, film, ["gravity", "surface.table.restitution", "t0"])
+found
 
 # %% [markdown] Try it live
-# The ball is pushed sideways, so that its bounces lie beside each other. Where does it stop bouncing? Change ε, or take it to the Moon.
+# The ball is pushed sideways, so that the bounces lie beside each other. Does it stop at once, or after infinitely many bounces? Change ε, or take the ball to the Moon.

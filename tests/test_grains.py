@@ -14,8 +14,7 @@ from chutelab.classroom.lessons.texts import without_tex
 from chutelab.cli import main
 from chutelab.engines.simulation import simulate
 from chutelab.results import Kind
-from chutelab.scene import from_dict
-from chutelab.scene.overrides import value_at
+from chutelab.scene import from_dict, to_dict
 
 SEEDS = range(5)
 
@@ -54,11 +53,9 @@ def emptied():
 
 def test_the_scene_as_it_is_has_the_slot_that_the_worksheet_says(emptied):
     scene = scene_of(find(10), "slot.toml")
-    begins, ends = (
-        value_at(scene, "surface.left.points")[-1],
-        value_at(scene, "surface.slider.from"),
-    )
-    assert ends[0] - begins[0] == pytest.approx(0.036)
+    written = {one["name"]: one for one in to_dict(scene)["surface"]}
+    slot = written["slider"]["from"][0] - written["left"]["points"][-1][0]
+    assert slot == pytest.approx(0.036)
     caught = scene_of(find(10), "hourglass.toml")
     assert [one.name for one in caught.surface] == [*(one.name for one in scene.surface), "tray"]
 

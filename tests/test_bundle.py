@@ -200,6 +200,10 @@ def test_worksheets_cannot_smuggle_html_in():
     assert "<h1>" not in made
     assert "<img" not in made
     assert '<a href="../b/index.html#c">a</a>' in made
+    # A figure is shown, what lies elsewhere is not.
+    assert '<img src="split.png" alt="x" />' in html_of("![x](split.png)")
+    for address in ("https://example.com/x.png", "../x.png", "machine.png"):
+        assert "<img" not in html_of(f"![x]({address})")
 
 
 def test_a_bundle_works_from_a_file_in_a_browser(web, opened):

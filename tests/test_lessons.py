@@ -299,6 +299,19 @@ def test_shipped_pictures_show_what_the_lessons_say(lesson):
         assert film.n_frames > 40
 
 
+def test_a_film_has_the_machine_beside_it_and_the_split_if_wanted(copied):
+    with Image.open(copied / "machine.png") as machine:
+        # The scene of the film alone, at twice its pixels.
+        assert machine.size == pytest.approx((2 * 0.675 * 320, 2 * 0.65 * 180), abs=1)
+    assert not (copied / "split.png").exists()
+    (copied / "machine.png").unlink()
+    plan = (copied / "lesson.toml").read_text(encoding="utf-8")
+    (copied / "lesson.toml").write_text(plan.replace("split = false", "split = true"))
+    assert build(read(copied)).made
+    assert (copied / "machine.png").is_file()
+    assert (copied / "split.png").is_file()
+
+
 def test_build_of_the_command_line_writes_elsewhere_too(copied, tmp_path):
     out = tmp_path / "out"
     first = chutelab("lesson", "build", copied, "--out", out)

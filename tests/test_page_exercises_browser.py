@@ -128,7 +128,9 @@ def test_the_machine_of_a_student_says_what_is_right(page_of, name):
         assert right == value == pytest.approx(cases[n].right, rel=1e-6, abs=0.0)
         # It can be looked at as soon as all that it shows was answered.
         assert page.locator("#machine").is_hidden()
-        says(page, n + 1, "0.123")
+        close = f"{0.97 * right:.6g}"
+        reply = lesson(name, "Ada").check(n + 1, float(close))
+        assert says(page, n + 1, close) == ("off", f"✗ {reply.heading}. {reply.text}")
     page.locator("#machine").click()
     for key, formula in EXERCISES[name].machine.items():
         expected = cases[0].numbers.of(formula)

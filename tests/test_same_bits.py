@@ -44,6 +44,7 @@ EVERY = [
     "lesson show 3",
     "lesson build 1 --out built",
     "lesson page 1 -o pages",
+    "lesson scorm 1 -o scorm.zip",
     "lesson new own",
     "lesson new mine --from 3",
     "lesson grade mine/exercise.ipynb --out class.csv",

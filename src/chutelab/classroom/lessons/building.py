@@ -44,7 +44,8 @@ from chutelab.util.versions import own_version, version_of
 _HERE: Final = Path(__file__).parent
 PICTURE: Final = "lesson.gif"
 MACHINE: Final = "machine.png"
-"""The film, and the machine before anything has happened."""
+SPLIT: Final = "split.png"
+"""The film, the machine before anything has happened, and the velocity at the plate."""
 
 MOST_PIXELS: Final = 3840 * 2160
 """Of a picture, as `Picture` in `reading` has it."""
@@ -96,15 +97,18 @@ def build(
     made = force or comment_of(path) != wanted or not machine.is_file()
     if made:
         from chutelab.pictures.animation import animate, still
+        from chutelab.pictures.plots.split import split_velocity
 
         with aside(path.parent, path):
             refuse_other(path)
         scene = scene_of(lesson, lesson.picture.scene, lesson.picture.set)
         recording = simulate(scene, progress=progress)
-        settings = lesson.picture.model_dump(exclude={"scene", "set"})
+        settings = lesson.picture.model_dump(exclude={"scene", "set", "split"})
         path.parent.mkdir(parents=True, exist_ok=True)
         animate(recording, path, question=lesson.question, predict=True, comment=wanted, **settings)
         still(recording, machine, width=lesson.picture.width, height=lesson.picture.height)
+        if lesson.picture.split:
+            split_velocity(recording, path.with_name(SPLIT))
     return Built(path, path.stat().st_size, made)
 
 
@@ -403,6 +407,13 @@ def _lesson(lesson: Lesson, folder: Path, before: str, after: str, *, wheel: boo
 
 def live_page(lesson: Lesson, path: str | Path, home: tuple[str, str] | None = None) -> int:
     """Write the live page of a lesson with its exercise, in its language; return the size in bytes.
+
+    In a frame it tells the page around it, by ``postMessage``, ``{chutelab: "ready", lesson}``. A
+    page that answers ``{chutelab: "begin", student, suspend_data}``, "" for the first time, says
+    who this is and keeps what becomes of it: after each change it is told ``{chutelab: "progress",
+    lesson, student, done, total, score, status, suspend_data, result}``, with a score of 100 for
+    all, the status "incomplete" or "completed", at most 4000 characters of data to go on from, and
+    the result as `chutelab.classroom.grading` takes it.
 
     Parameters
     ----------

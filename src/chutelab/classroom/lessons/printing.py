@@ -44,17 +44,24 @@ def printed(lesson: Lesson, which: str, kind: str) -> bytes:
     if kind == "md":
         return markdown.encode("utf-8")
     tree = SyntaxTreeNode(parser().parse(markdown))
-    lists = _to_be_answered(tree) if which == "student" else []
+    asked = _to_be_answered(tree) if which == "student" else []
     if kind == "html":
-        return _page(lesson, tree, lists).encode("utf-8")
-    return _pdf(lesson, tree, lists, words(lesson.language).say(f"sheet-kind-{which}"))
+        return _page(lesson, tree, asked).encode("utf-8")
+    return _pdf(lesson, tree, asked, words(lesson.language).say(f"sheet-kind-{which}"))
 
 
 def _to_be_answered(tree: SyntaxTreeNode) -> list[SyntaxTreeNode]:
-    """Return the numbered lists of the first part: what is predicted has to be written down."""
+    """Return what is to be answered in writing.
+
+    That is the items of the first part, the predictions, and a paragraph that asks at the end of
+    the third, the comparison.
+    """
     heads = [i for i, node in enumerate(tree.children) if node.tag == "h2"]
-    first = slice(*heads[:2]) if len(heads) > 1 else slice(0)
-    return [node for node in tree.children[first] if node.type == "ordered_list"]
+    heads.append(len(tree.children))
+    first, third = (tree.children[slice(*heads[i : i + 2])] for i in (0, 2))
+    lists = [node for node in first if node.type == "ordered_list"]
+    asks = third[-1].type == "paragraph" and third[-1].children[0].content.endswith("?")
+    return [item for node in lists for item in node.children] + third[-1:] * asks
 
 
 def _title(tree: SyntaxTreeNode) -> str:
@@ -74,10 +81,10 @@ def _pictures(lesson: Lesson, tree: SyntaxTreeNode) -> Iterator[tuple[SyntaxTree
 # A web page --------------------------------------------------------------------------------------
 
 
-def _page(lesson: Lesson, tree: SyntaxTreeNode, lists: list[SyntaxTreeNode]) -> str:
+def _page(lesson: Lesson, tree: SyntaxTreeNode, asked: list[SyntaxTreeNode]) -> str:
     """Return a page that is whole: pictures are in it."""
-    for node in lists:
-        node.attrs["class"] = "predict"
+    for node in asked:
+        node.attrs["class"] = "answer"
     for node, path in _pictures(lesson, tree):
         data = base64.b64encode(path.read_bytes()).decode("ascii")
         node.attrs["src"] = f"data:image/{path.suffix[1:]};base64,{data}"
@@ -91,7 +98,7 @@ def _page(lesson: Lesson, tree: SyntaxTreeNode, lists: list[SyntaxTreeNode]) -> 
 # A PDF -------------------------------------------------------------------------------------------
 
 
-def _pdf(lesson: Lesson, tree: SyntaxTreeNode, lists: list[SyntaxTreeNode], kind: str) -> bytes:
+def _pdf(lesson: Lesson, tree: SyntaxTreeNode, asked: list[SyntaxTreeNode], kind: str) -> bytes:
     if find_spec("typst") is None:
         raise PrintError(
             'a sheet as PDF needs what is not installed: pip install "chutelab[pdf]"; a web page'
@@ -114,7 +121,7 @@ def _pdf(lesson: Lesson, tree: SyntaxTreeNode, lists: list[SyntaxTreeNode], kind
         look = (_ASSETS / "sheet.typ").read_text(encoding="utf-8")
         said = {"title": _title(tree), "kind": kind, "language": lesson.language}
         options = ", ".join(f"{name}: {_text(text)}" for name, text in said.items())
-        body = _blocks(tree.children, lists)
+        body = _blocks(tree.children, asked)
         source = folder / "sheet.typ"
         source.write_text(f"{look}\n#show: sheet.with({options})\n{body}", encoding="utf-8")
         # The fonts are Typst's own, and no time is in the file: it is the same everywhere.
@@ -128,17 +135,17 @@ def _text(text: str) -> str:
     return f'"{escaped}"'
 
 
-def _blocks(nodes: Iterable[SyntaxTreeNode], lists: list[SyntaxTreeNode]) -> str:
-    """Return blocks of Markdown as Typst has them, with room to write after items of `lists`."""
+def _blocks(nodes: Iterable[SyntaxTreeNode], asked: list[SyntaxTreeNode]) -> str:
+    """Return blocks of Markdown as Typst has them, with room to write after those of `asked`."""
     made = []
     for node in nodes:
         match node.type:
             case "heading":
                 made.append(f"#heading(level: {node.tag[1]})[{_inline(node)}]")
             case "bullet_list" | "ordered_list":
-                room = "#room" if node in lists else ""
                 items = "".join(
-                    f"[{_blocks(item.children, lists)}{room}]" for item in node.children
+                    f"[{_blocks(item.children, asked)}{'#room' * (item in asked)}]"
+                    for item in node.children
                 )
                 name = "list" if node.type == "bullet_list" else "enum"
                 made.append(f"#{name}{items}")
@@ -151,9 +158,9 @@ def _blocks(nodes: Iterable[SyntaxTreeNode], lists: list[SyntaxTreeNode]) -> str
             case "hr":
                 made.append("#line(length: 100%)")
             case "blockquote":
-                made.append(f"#quote(block: true)[{_blocks(node.children, lists)}]")
+                made.append(f"#quote(block: true)[{_blocks(node.children, asked)}]")
             case _:
-                made.append(_inline(node))
+                made.append(f"{_inline(node)}{'#room' * (node in asked)}")
     return "\n\n".join(made)
 
 

@@ -66,6 +66,9 @@ class Picture(Chosen):
         None, "Pictures a second; default: 25, of a stream 20", "10, 20, 25 or 50"
     )
     width: Whole = key(800, "Width, pixels", "a whole number from 320 to 3840", ge=320, le=3840)
+    split: bool = key(
+        False, "Also make split.png: how the velocity at the plate splits", "true or false"
+    )
     height: Whole = key(450, "Height, pixels", "a whole number from 180 to 2160", ge=180, le=2160)
 
 

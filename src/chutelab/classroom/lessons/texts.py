@@ -59,12 +59,9 @@ def html_of(markdown: str) -> str:
     """
     read = parser()
     worksheet = SyntaxTreeNode(read.parse(markdown))
-    kept = []
-    for part in worksheet.children:
-        inside = [one.type for line in part.children for one in line.children]
-        if part.tag != "h1" and (part.type, inside) != ("paragraph", ["image"]):
-            kept.append(part)
-    worksheet.children = kept
+    worksheet.children = [
+        part for part in worksheet.children if part.tag != "h1" and not _elsewhere(part)
+    ]
     for link in worksheet.walk():
         if link.type == "link":
             for file, page in _ADDRESSES:
@@ -72,6 +69,15 @@ def html_of(markdown: str) -> str:
     made = str(read.renderer.render(worksheet.to_tokens(), read.options, {}))
     # What is too wide for a phone scrolls by itself, and with the keyboard.
     return re.sub("<(pre|table)>", r'<\1 tabindex="0">', made)
+
+
+def _elsewhere(part: SyntaxTreeNode) -> bool:
+    """Tell whether a paragraph is a picture that the page shows elsewhere, or is not to show."""
+    inside = [one for line in part.children for one in line.children]
+    if part.type != "paragraph" or [one.type for one in inside] != ["image"]:
+        return False
+    name = str(inside[0].attrs["src"])
+    return name == "machine.png" or not re.fullmatch(r"[\w-]+\.png", name)
 
 
 def plain_of(markdown: str) -> str:

@@ -36,7 +36,8 @@ def write_wheel(folder: Path) -> Path:
     try:
         installed = distribution("chutelab")
     except PackageNotFoundError as error:
-        raise MissingLibraryError("a wheel can be made of an installed chutelab only") from error
+        text = "the wheel for students is made of an installed chutelab; install it, or --no-wheel"
+        raise MissingLibraryError(text) from error
     about = f"chutelab-{installed.version}.dist-info"
     contents = {name: path.read_bytes() for name, path in sorted(_files().items())}
     for name in ("METADATA", "entry_points.txt", "licenses/LICENSE"):

@@ -8,6 +8,7 @@
 `panels`         tracks, parabola, residual, velocity, energy ledger
 `figure`         the overlay; the paper's figures
 `strobe`         a still for print: where the particle is at round times
+`split`          the velocity at an impact, along the surface and into it
 `design`         searches, uncertainty, sweeps
 `measured`       measured points over the model
 `workprecision`  run time against error

@@ -62,6 +62,12 @@ class Answer:
         """By how much the targets are missed."""
         return tuple(f - w for f, w in zip(self.found, self.wanted, strict=True))
 
+    def told(self, quantity: str, value: float) -> float:
+        """Return a quantity as tables have it: 0 if it is rounding, by what it is 1 % away."""
+        near = [s for s in self.sensitivities if s.quantity == quantity]
+        sizes = [abs(side) for s in near for side in (s.lower, s.upper) if isfinite(side)]
+        return 0.0 if sizes and abs(value) <= ROUNDING * max(sizes) else value
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Solution(Shown):
@@ -180,7 +186,8 @@ class Solution(Shown):
                 head = "also" if i else head
             elif len(self.answers) > 1:
                 head += f" {i + 1}"
-            numbers = (f"{value:.{DIGITS}g}" for value in (*answer.values, *answer.found))
+            found = map(answer.told, self.quantities, answer.found)
+            numbers = (f"{value:.{DIGITS}g}" for value in (*answer.values, *found))
             rows.append((head, *numbers, answer.course))
         columns = ("", *keys, *names, "touches")
         return Sheet(self.asked, columns, tuple(rows), notes=tuple(remarks(self)))
@@ -251,9 +258,9 @@ def as_dict(solution: Solution) -> dict[str, Any]:
 MOST: Final = 6
 """Changes of one kind that are spelled out."""
 
-ROUNDING: Final = 1e-10
+ROUNDING: Final = 1e-9
 """Relative change over one per cent of a key that is none: a minimum is found to half of the
-digits, and the slope there is what that leaves."""
+digits, and the slope there is what that leaves; a root of 0 has its rounding left."""
 
 KINK: Final = 1e-4
 """Relative change of a quantity across a change of course that is no jump."""

@@ -26,6 +26,9 @@ class Task {
     this.student = student;
     this.names = names;
     this.numbers = drawnFor(exercise, student);
+    /** Numbers of other names, as they are looked up.
+     * @type {Map<string, import("./draw.js").DrawnNumbers>} */
+    this.theirs = new Map();
     this.explained = "";
     /** Right answers that a machine gave, by question from 0 on. @type {Map<number, number>} */
     this.measured = new Map();
@@ -100,7 +103,9 @@ class Task {
     for (const name of [exercise.unnamed, ...this.names()]) {
       if (seen.has(plainName(name))) continue;
       seen.add(plainName(name));
-      yield [name, new Case(exercise.questions[n], drawnFor(exercise, name)).right];
+      const numbers = this.theirs.get(name) ?? drawnFor(exercise, name);
+      this.theirs.set(name, numbers);
+      yield [name, new Case(exercise.questions[n], numbers).right];
     }
   }
 

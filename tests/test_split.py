@@ -1,0 +1,61 @@
+"""The picture of a velocity that splits along a plate and into it."""
+
+from __future__ import annotations
+
+from math import cos, hypot, radians, sin, sqrt
+
+import numpy as np
+import pytest
+from matplotlib.text import Annotation
+
+import chutelab
+from chutelab.pictures.plots.split import split_velocity
+
+G, BALL = 9.81, 0.0063
+
+
+def arrows(ax):
+    """Ends of the arrows of a picture, from their tails to their tips."""
+    drawn = [one for one in ax.get_children() if isinstance(one, Annotation) and one.arrow_patch]
+    return [np.subtract(one.xy, one.xyann) for one in drawn]
+
+
+def inclined(alpha_deg, v=2.0, d1=0.1):
+    """Velocity of a disk at a plate whose pivot is at the belt's height, and the plate's way down.
+
+    It meets the plate after t, when what is left of the gap across it is used up.
+    """
+    a = radians(alpha_deg)
+    gap, half = d1 * cos(a) - BALL * sin(a) - BALL, 0.5 * G * sin(a)
+    t = 2.0 * gap / (v * cos(a) + sqrt((v * cos(a)) ** 2 - 4.0 * half * gap))
+    return np.array([v, -G * t]), np.array([sin(a), -cos(a)])
+
+
+@pytest.mark.parametrize(("scene", "alpha"), [("inclined-40", 40), ("inclined-60", 60)])
+def test_arrows_are_the_velocities_and_their_parts(scene, alpha):
+    before, down = inclined(alpha)
+    figure = split_velocity(chutelab.simulate(chutelab.load(scene)))
+    left, right = figure.axes
+    along = down * (before @ down)
+    into = before - along
+    for found, wanted in zip(arrows(left), (before, along, into), strict=True):
+        assert found == pytest.approx(wanted, abs=1e-9)
+    after = along - 0.5 * into
+    for found, wanted in zip(arrows(right), (after, along, -0.5 * into), strict=True):
+        assert found == pytest.approx(wanted, abs=1e-9)
+    assert hypot(*(arrows(left)[1] + arrows(left)[2])) == pytest.approx(hypot(*before))
+
+
+def test_symbols_are_written_and_no_number():
+    for scene, more in (("inclined-40", {r"$\alpha$"}), ("perpendicular", set())):
+        figure = split_velocity(chutelab.simulate(chutelab.load(scene)))
+        said = {text.get_text() for ax in figure.axes for text in ax.texts if text.get_text()}
+        assert said == {
+            "$v_2$", "$v_t$", "$v_n$", "$v_2'$", "$v_t' = v_t$", r"$v_n' = \varepsilon v_n$",
+            r"$\varphi_2$", *more,
+        }  # fmt: skip
+
+
+def test_where_nothing_is_struck_it_says_so():
+    with pytest.raises(ValueError, match="no particle hits a surface 'plate'"):
+        split_velocity(chutelab.simulate(chutelab.load("free-fall")))

@@ -54,7 +54,7 @@ def emptied():
 def test_the_scene_as_it_is_has_the_slot_that_the_worksheet_says(emptied):
     scene = scene_of(find(10), "slot.toml")
     written = {one["name"]: one for one in to_dict(scene)["surface"]}
-    slot = written["slider"]["from"][0] - written["left"]["points"][-1][0]
+    slot = written["slider"]["points"][0][0] - written["left"]["points"][-1][0]
     assert slot == pytest.approx(0.036)
     caught = scene_of(find(10), "hourglass.toml")
     assert [one.name for one in caught.surface] == [*(one.name for one in scene.surface), "tray"]

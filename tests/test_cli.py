@@ -289,6 +289,13 @@ def test_a_run_of_a_stream_tells_the_spread_of_the_landings():
     assert f"with a spread of {1e3 * spread:.3g} mm" in said
 
 
+def test_rounding_is_no_spread_of_the_landing():
+    # All are alike, and land at one place but for some 1e-16 m.
+    args = ["run", "slip", "--set", "stream.count=20"]
+    assert "with a spread of 0 mm" in " ".join(call(*args).stdout.split())
+    assert "with a spread of 0 mm" not in " ".join(call(*args, "--details").stdout.split())
+
+
 def test_a_run_says_that_a_disk_rolls_instead_of_being_carried():
     settings = ("--set", "particle.spin=true", "--set", "outgoing.length=8")
     text = " ".join(call("run", "belt-landing", *settings).stdout.split())

@@ -66,6 +66,8 @@ def sheets(recording: Recording, *, details: bool = False) -> list[Sheet]:
     landed = measure(recording, "landing.count")
     if landed > 1:
         mean, spread = (measure(recording, f"landing.x.{what}") for what in ("mean", "spread"))
+        if not details and spread < 1e-9 * abs(mean):  # rounding
+            spread = 0.0
         said = (
             f"{landed:.0f} landed on the outgoing belt, at x = {number(mean)} m on average, with a"
             f" spread of {1e3 * spread:.3g} mm (standard deviation)"

@@ -13,7 +13,7 @@ from typing import Final
 
 from chutelab.classroom.exercises import EXERCISES
 from chutelab.classroom.exercises.catalogue import UNNAMED, told
-from chutelab.classroom.exercises.exercise import draw, shown
+from chutelab.classroom.exercises.exercise import draw
 from chutelab.classroom.exercises.judging import with_unit
 from chutelab.classroom.lessons.reading import Lesson, Teacher, unusable
 from chutelab.classroom.words import Words, words
@@ -96,7 +96,10 @@ def _of_exercise(lesson: Lesson, said: Words) -> Iterator[str]:
         way = "; ".join(case.numbers.text(line) for line in asked.working.strip().splitlines())
         answer = say("answer", answer=with_unit(case.right, asked.unit, said))
         lines.append(f"{case.number}. *{asked.title}*: {way}. {answer}.")
-    numbers = "; ".join(f"{name} = {said.local(shown(given[name]))}" for name in given)
+    numbers = "; ".join(
+        f"{one.symbol} = {with_unit(given[one.name], one.unit, said)}"
+        for one in exercise.parameters
+    )
     shipped = say("sheet-shipped", name=UNNAMED, numbers=numbers)
     yield f"## {say('sheet-key')}\n\n{shipped}\n\n" + "\n".join(lines)
     rows = [

@@ -65,6 +65,8 @@ def test_a_name_draws_the_same_numbers_on_every_machine():
         "a-stream": ("v0", "R", "rate", "grams", "mm", "bed", "d", "e", "d2", "vb"),
         "trust": ("dt1", "ratio", "e1", "e2", "wanted"),
         "design": ("v0", "R", "d", "e", "alpha", "vb", "grams", "paid", "s_e", "s_a"),
+        "the-hopper": ("mm", "W", "k", "t1", "N1", "t2", "N2", "W2", "g2", "q"),
+        "the-heap": ("mm", "b", "h", "mu", "c", "grams", "H"),
     }.items()}  # fmt: skip
     assert found == PINNED
 
@@ -80,6 +82,8 @@ PINNED = {
     "a-stream": [3.2, 0.1, 30.0, 9.0, 6.0, 0.04, 0.4, 0.4, 0.5, 2.6],
     "trust": [0.001, 4.0, 0.0006, 5e-05, 2e-07],
     "design": [2.0, 0.1, 0.12, 0.4, 20.0, 1.8, 13.0, 15.0, 0.05, 1.0],
+    "the-hopper": [5.0, 54.0, 1.4, 1.6, 240.0, 3.0, 1100.0, 68.0, 1.62, 4.2],
+    "the-heap": [6.0, 39.0, 12.0, 0.6, 0.16, 380.0, 60.0],
 }
 
 
@@ -382,6 +386,8 @@ WITHOUT_GRAVITY = {
     "a-stream": {1, 2, 4},
     "trust": {1, 2, 3, 4},
     "design": {1, 2, 3, 4},
+    "the-hopper": {1, 2, 4},
+    "the-heap": {1, 2, 3},
 }
 
 
@@ -638,7 +644,7 @@ def test_html_is_whole_and_takes_the_colours_of_the_page():
 def test_lessons_are_found_by_number_or_name():
     for ask in (3, "3", "the-bounce", "03-the-bounce", "The Bounce", "03"):
         assert find(ask).name == "the-bounce"
-    assert [exercise.number for exercise in EXERCISES.values()] == list(range(10))
+    assert [exercise.number for exercise in EXERCISES.values()] == list(range(12))
     with pytest.raises(ExerciseError, match="Did you mean 'the-bounce'"):
         lesson("the-bonce", "x")
     with pytest.raises(ExerciseError, match=r"no lesson '99'.* 8 trust"):

@@ -1,6 +1,6 @@
 """Every known mistake of every question, made by hand: formulas of the student's numbers."""
 
-from math import acos, asin, atan, cos, degrees, hypot, log10, radians, sin, sqrt, tan
+from math import acos, asin, atan, cos, degrees, hypot, log10, pi, radians, sin, sqrt, tan
 
 G = 9.81
 
@@ -188,6 +188,37 @@ def by_e(g):
 def by_alpha(g):
     small = 1e-3
     return g.s_a * (after(g, g.alpha + small, g.e) - after(g, g.alpha - small, g.e)) / (2 * small)
+
+
+# Lessons 10 and 11
+
+
+def flow(g):
+    return (g.N2 - g.N1) / (g.t2 - g.t1)
+
+
+def wider(g):
+    return (g.W2 - g.k * g.mm) / (g.W - g.k * g.mm)
+
+
+def dead(g, power):
+    """Width of no flow, if the flow goes with W - w to the power of 1 / power."""
+    grown = g.q**power
+    return (grown * g.W2 / 2 - g.W2) / (grown - 1)
+
+
+def slope(g):
+    return g.h / (g.b / 2)
+
+
+def filled(g):
+    """Number of disks whose areas add up to the heap's."""
+    return 100 * g.h * g.b / 2 / (pi * g.mm**2)
+
+
+def poured(g, left):
+    """Heat, J, if the centre of mass ends `left` cm above the floor."""
+    return mass(g) * G * (g.H - left) / 100
 
 
 MISTAKES = {
@@ -476,6 +507,59 @@ MISTAKES = {
         "ε forgotten": by_alpha,
         "degrees for radians": lambda g: hypot(by_e(g), degrees(by_alpha(g))),
         "the variance": lambda g: by_e(g) ** 2 + by_alpha(g) ** 2,
+    },
+    ("the-hopper", 1): {
+        "total for difference": lambda g: g.N2 / g.t2,
+        "first count alone": lambda g: g.N1 / g.t1,
+        "clock not set back": lambda g: (g.N2 - g.N1) / g.t2,
+        "upside down": lambda g: 1 / flow(g),
+    },
+    ("the-hopper", 2): {
+        "in proportion to the width": lambda g: flow(g) * wider(g),
+        "the edge forgotten": lambda g: flow(g) * sqrt(g.W2 / g.W) ** 3,
+        "the edge forgotten, in proportion": lambda g: flow(g) * g.W2 / g.W,
+        "the power of three dimensions": lambda g: flow(g) * sqrt(wider(g)) ** 5,
+        "squared": lambda g: flow(g) * wider(g) ** 2,
+        "upside down": lambda g: flow(g) * sqrt(wider(g)) ** -3,
+    },
+    ("the-hopper", 3): {
+        "gravity without the root": lambda g: g.N2 / flow(g) * G / g.g2,
+        "gravity forgotten": lambda g: g.N2 / flow(g),
+        "gravity upside down": lambda g: g.N2 / flow(g) * sqrt(g.g2 / G),
+        "a missing ½": lambda g: 2 * g.N2 / flow(g) * sqrt(G / g.g2),
+        "flow for time": lambda g: flow(g) * sqrt(g.g2 / G),
+    },
+    ("the-hopper", 4): {
+        "power for its inverse": lambda g: dead(g, 3 / 2),
+        "in proportion to the width": lambda g: dead(g, 1),
+        "squared": lambda g: dead(g, 1 / 2),
+        "a ½ too many": lambda g: dead(g, 2 / 3) / 2,
+        "what is left for what is lost": lambda g: g.W2 - dead(g, 2 / 3),
+    },
+    ("the-heap", 1): {
+        "whole width for half": lambda g: degrees(atan(g.h / g.b)),
+        "upside down": lambda g: 90 - degrees(atan(slope(g))),
+        "sine for tangent": lambda g: degrees(asin(slope(g))),
+        "the tangent, not the angle": slope,
+        "angle at the top": lambda g: 2 * degrees(atan(1 / slope(g))),
+    },
+    ("the-heap", 2): {
+        "sliding for rolling": lambda g: degrees(atan(g.mu)),
+        "both added": lambda g: degrees(atan(g.mu + g.c)),
+        "angle of repose of the heap": lambda g: degrees(atan(slope(g))),
+    },
+    ("the-heap", 3): {
+        "gaps forgotten": filled,
+        "share for its inverse": lambda g: filled(g) / 0.84,
+        "a missing ½": lambda g: 0.84 * 2 * filled(g),
+        "diameter for radius": lambda g: 0.84 * filled(g) / 4,
+        "squares for disks": lambda g: 0.84 * 100 * g.h * g.b / 2 / (2 * g.mm) ** 2,
+    },
+    ("the-heap", 4): {
+        "the heap's own energy forgotten": lambda g: poured(g, 0),
+        "top for centre": lambda g: poured(g, g.h),
+        "what is left for what is lost": lambda g: mass(g) * G * g.h / 300,
+        "half the height for a third": lambda g: poured(g, g.h / 2),
     },
 }
 """By lesson and question: what the mistake is called, and the number that it leads to."""

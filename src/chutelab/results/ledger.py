@@ -19,6 +19,9 @@ from chutelab.util.tables import Sheet, Shown, number
 ROUNDING = 1e-12
 """Share of the energy turned over up to which an entry is told as 0, but in detail."""
 
+UNSEEN = 5e-6
+"""Share of the energy turned over that reads 0.000 %: a heap at rest still trembles by less."""
+
 
 @dataclass(frozen=True, repr=False)
 class Ledger(Shown):
@@ -76,13 +79,13 @@ class Ledger(Shown):
             else f"share of these energies that the ledger cannot explain: {100.0 * share:.3f} %"
         )
 
-        def told(entry: float) -> str:
-            rounding = abs(entry) <= ROUNDING * self.turned_over and not details
+        def told(entry: float, share: float = ROUNDING) -> str:
+            rounding = abs(entry) <= share * self.turned_over and not details
             return number(0.0 if rounding else entry)
 
         total = (self.belt_work, self.restitution_loss, self.friction_loss)
         moved = (
-            f"{name} {number(before)} -> {number(after)} J"
+            f"{name} {told(before, UNSEEN)} -> {told(after, UNSEEN)} J"
             for name, (before, after) in (("kinetic", self.kinetic), ("potential", self.potential))
         )
         rows = [(name, [*entries.values()]) for name, entries in self.by_surface.items()]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
-from math import isnan
+from math import ceil, isnan
 
 import numpy as np
 
@@ -27,6 +27,9 @@ from chutelab.util.tables import Sheet, number
 
 STATIONS = 6
 """Contacts of particle 0 that are listed where no theory speaks of them."""
+
+FLOW = 8
+"""Particles that must have left for a word about how fast they came."""
 
 
 def facts(recording: Recording, *, details: bool = False) -> str:
@@ -77,6 +80,11 @@ def sheets(recording: Recording, *, details: bool = False) -> list[Sheet]:
                 *map(number, layered)
             )
         notes.insert(0, said)
+    left = np.sort(recording.select(Kind.EXIT)["t"])
+    if recording.machine.interact and len(left) >= FLOW:
+        quarters = (f"{left[ceil(part * len(left) / 4) - 1]:.3f}" for part in (1, 2, 3, 4))
+        said = "{} fell out of the machine: a quarter by {} s, half by {} s, three quarters by {} s"
+        notes.insert(0, f"{said}, the last at {{}} s".format(len(left), *quarters))
     return [
         *parts,
         *(Sheet("", (), (), notes=(f"{note[0].upper()}{note[1:]}.",)) for note in notes),

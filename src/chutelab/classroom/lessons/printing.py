@@ -125,7 +125,7 @@ def _pdf(lesson: Lesson, tree: SyntaxTreeNode, asked: list[SyntaxTreeNode], kind
         source = folder / "sheet.typ"
         source.write_text(f"{look}\n#show: sheet.with({options})\n{body}", encoding="utf-8")
         # The fonts are Typst's own, and no time is in the file: it is the same everywhere.
-        return typst.compile(source, format="pdf", ignore_system_fonts=True, timestamp=0)
+        return typst.compile(source, format="pdf", ignore_system_fonts=True)
 
 
 def _text(text: str) -> str:

@@ -185,6 +185,17 @@ def test_table_csv_json_and_report_tell_of_a_class(returned, tmp_path):
     assert "The belt | *gave* it &lt;b&gt;ε&lt;/b&gt; v0." in made
 
 
+def test_a_folder_stands_for_all_in_it_but_hidden_copies(returned, tmp_path):
+    for place in ("Ada_1", "Ben_2/.ipynb_checkpoints"):
+        (tmp_path / "class" / place).mkdir(parents=True)
+    returned("Ada_1/result.json", result())
+    returned("Ben_2/result.json", result("Ben"))
+    returned("Ben_2/.ipynb_checkpoints/result.json", result("Ben"))
+    marking = ["lesson", "grade", str(tmp_path / "class"), "--json"]
+    found = json.loads(CliRunner().invoke(main, marking).output)["grades"]
+    assert [one["student"] for one in found] == ["Ada", "Ben"]
+
+
 def test_a_report_writes_over_no_file_that_was_returned(returned):
     path = returned("x.json", result())
     before = path.read_bytes()

@@ -424,8 +424,9 @@ def grade(
     """Mark each question of the exercises that students returned.
 
     They return notebooks (*.ipynb), or the result files that a lesson's live page writes (*.json);
-    a folder stands for those in it. What a student checked is judged anew against the numbers that
-    belong to that student's name; what a notebook prints, or a file says of itself, does not count.
+    a folder stands for all in it, also in its folders. What a student checked is judged anew
+    against the numbers that belong to that student's name; what a notebook prints, or a file says
+    of itself, does not count.
 
     THIS RUNS THE CODE IN NOTEBOOKS, with all that you may do on this computer. Each notebook has
     processes and a folder of its own, which end with it, and limits of time, memory and processes:
@@ -452,7 +453,11 @@ def grade(
     for file in files:
         found = [file]
         if file.is_dir():
-            found = sorted([*file.glob("*.ipynb"), *file.glob("*.json")])
+            inside = [*file.rglob("*.ipynb"), *file.rglob("*.json")]
+            # Jupyter keeps copies of its own in hidden folders.
+            found = sorted(
+                one for one in inside if "/." not in f"/{one.relative_to(file).as_posix()}"
+            )
         if not found:
             said = "there is no notebook (*.ipynb) and no result file (*.json) in this folder"
             raise RefusedError(f"{file}: {said}")

@@ -33,7 +33,7 @@ from chutelab.classroom.exercises.in_page import data_of
 from chutelab.classroom.lessons.cells import name_of, notebook_of
 from chutelab.classroom.lessons.printing import printed
 from chutelab.classroom.lessons.reading import Lesson, LessonError, read, scene_of, split, unusable
-from chutelab.classroom.lessons.texts import INDEX, html_of, words_for
+from chutelab.classroom.lessons.texts import INDEX, html_of, own_words, words_for
 from chutelab.classroom.lessons.wheel import write_wheel
 from chutelab.classroom.words import Words, words
 from chutelab.engines.simulation import simulate
@@ -296,7 +296,8 @@ def bundle(
         for i, lesson in enumerate(lessons):
             before = _link(lessons[i - 1], "prev", "← {}") if i > 0 else ""
             after = _link(lessons[i + 1], "next", "{} →") if i + 1 < len(lessons) else ""
-            cards += _lesson(lesson, made / lesson.folder.name, before, after, wheel=wheel)
+            folders = [one.folder.name for one in lessons]
+            cards += _lesson(lesson, made, folders, before, after, wheel=wheel)
             if progress is not None:
                 progress((i + 1) / len(lessons))
         said = words(lessons[0].language if lessons else "en")
@@ -335,8 +336,11 @@ def _address(*names: str) -> str:
     return "/".join(quote(os.fsencode(name)) for name in names)
 
 
-def _lesson(lesson: Lesson, folder: Path, before: str, after: str, *, wheel: bool) -> str:
-    """Make the folder of one lesson, with links to its neighbours; return its card."""
+def _lesson(
+    lesson: Lesson, made: Path, folders: Sequence[str], before: str, after: str, *, wheel: bool
+) -> str:
+    """Make the folder of one of the lessons, with links to its neighbours; return its card."""
+    folder = made / lesson.folder.name
     folder.mkdir()
     for file in files_of(lesson):
         if not _NOT_GIVEN.fullmatch(file.name):
@@ -387,7 +391,7 @@ def _lesson(lesson: Lesson, folder: Path, before: str, after: str, *, wheel: boo
         said,
         **facts,
         alt=escape(words_for(MACHINE, worksheet) or lesson.title),
-        worksheet=note + html_of(worksheet),
+        worksheet=note + html_of(worksheet, folders),
         doors="\n".join(doors),
         before=before,
         after=after,
@@ -398,7 +402,7 @@ def _lesson(lesson: Lesson, folder: Path, before: str, after: str, *, wheel: boo
         said,
         **facts,
         alt=escape(words_for(PICTURE, explanation) or lesson.title),
-        explanation=html_of(explanation),
+        explanation=html_of(explanation, folders),
         back=escape(say("page-back", title=lesson.title)),
     )
     (folder / EXPLANATION).write_text(page, encoding="utf-8")
@@ -441,7 +445,8 @@ def live_page(lesson: Lesson, path: str | Path, home: tuple[str, str] | None = N
     scene = scene_of(lesson, lesson.page.scene, lesson.page.settings)
     exercise = None
     if lesson.name in EXERCISES:
-        exercise = data_of(told(lesson.name, lesson.language), explain=lesson.question)
+        asked = own_words(lesson.text("README"))
+        exercise = data_of(told(lesson.name, lesson.language), explain=asked or lesson.question)
     return write(scene, path, language=lesson.language, home=home, exercise=exercise)
 
 

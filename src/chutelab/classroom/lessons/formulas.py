@@ -129,8 +129,8 @@ def _grouped(text: str) -> str:
 def typeset(row: list[Part]) -> str:
     r"""Return a formula in Typst's language, without the dollar signs around it.
 
-    >>> typeset(parsed(r"\frac{v_0^2}{g R_c} < \mu"))
-    'frac(attach(v, b: 0, t: 2), g attach(R, b: c)) \\< µ'
+    >>> typeset(parsed(r"\frac{v_0^2}{g R_c} < \varepsilon"))
+    'frac(attach(v, b: 0, t: 2), g attach(R, b: c)) \\< ε'
     """
     return " ".join(filter(None, map(_typeset, row)))
 

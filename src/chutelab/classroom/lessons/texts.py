@@ -6,6 +6,7 @@ Formulas stand between dollar signs, in the part of TeX that `formulas` describe
 from __future__ import annotations
 
 import re
+from collections.abc import Collection
 from typing import Final
 
 from latex2mathml.converter import convert
@@ -51,11 +52,12 @@ def mathml(tex: str, *, display: bool = False) -> str:
     return _BESIDE.sub(r'\g<0><mspace width="0.167em" />', made)
 
 
-def html_of(markdown: str) -> str:
+def html_of(markdown: str, folders: Collection[str] | None = None) -> str:
     """Return the HTML of a worksheet, without its title and its pictures, which the page has.
 
     Raw HTML is shown, not obeyed; formulas are MathML. Links to worksheets and to the explanation
-    become links to pages.
+    become links to pages. With `folders`, those of the lessons that are there, a link to another
+    one leads nowhere: its words stay.
     """
     read = parser()
     worksheet = SyntaxTreeNode(read.parse(markdown))
@@ -66,6 +68,9 @@ def html_of(markdown: str) -> str:
         if link.type == "link":
             for file, page in _ADDRESSES:
                 link.attrs["href"] = re.sub(file, page, str(link.attrs["href"]))
+            other = re.match(r"\.\./([^/]+)/", str(link.attrs["href"]))
+            if other and folders is not None and other[1] not in folders:
+                del link.attrs["href"]
     made = str(read.renderer.render(worksheet.to_tokens(), read.options, {}))
     # What is too wide for a phone scrolls by itself, and with the keyboard.
     return re.sub("<(pre|table)>", r'<\1 tabindex="0">', made)
@@ -89,6 +94,20 @@ def plain_of(markdown: str) -> str:
     text = re.sub(r"\A# .*\n+|^!\[[^\]]*\]\([^)]*\)\n+", "", markdown, flags=re.MULTILINE)
     text = re.sub(r"(?<!!)\[([^\]]+)\]\((?!https?:)[^)]*\)", r"\1", text)
     return without_tex(text)
+
+
+def own_words(worksheet: str) -> str:
+    r"""Return what a worksheet asks to be answered in words, "" if nothing.
+
+    That is its last paragraph that begins in bold and ends with a question mark.
+
+    >>> own_words("Look.\n\n**In your own words.** What grows,\nand why?\n\n## Afterwards")
+    'What grows, and why?'
+    """
+    paragraphs = re.split(r"\n{2,}", worksheet.strip())
+    asked = [re.fullmatch(r"\*\*[^*]+\*\* (.*\?)", one, re.DOTALL) for one in paragraphs]
+    found = [one[1] for one in asked if one]
+    return without_tex(" ".join(found[-1].split())) if found else ""
 
 
 def without_tex(markdown: str) -> str:

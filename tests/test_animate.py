@@ -616,7 +616,7 @@ def test_bars_add_up_with_the_residual_in_sight(planted: float) -> None:
     assert sum(put_in.values()) == pytest.approx(sum(is_now.values()), rel=1e-12, abs=0.0)
     shown = put_in["residual"] - is_now["residual"]
     assert shown == pytest.approx(-1e3 * planted, rel=1e-9)
-    assert figures(stage, 0)["residual"] == ("−3e−3 J" if planted > 0 else "3e−3 J")
+    assert figures(stage, 0)["residual"] == ("−3.0" if planted > 0 else "3.0")
     left, right = (dict(bar) for bar in stacked(stage))
     assert ("residual" in left) is (planted < 0.0)
     assert ("residual" in right) is (planted > 0.0)

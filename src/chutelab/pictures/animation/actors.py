@@ -299,9 +299,6 @@ SIGNS = {
 }
 """The ledger with everything on one side: start + belt work + residual - K - U - losses = 0."""
 
-ROUNDING = 1e-9
-"""A residual of at most this part of the highest bar is not shown."""
-
 BASE = 0.78
 """Share of a row above the line that its text stands on."""
 
@@ -347,15 +344,12 @@ def bars(ax: Axes, table: Axes, books: dict[str, Floats]) -> tuple[list[Moving],
     table.set_axis_off()
     table.set(xlim=(0.0, 1.0), ylim=(len(SIGNS), 0.0))
     writings = []
-    rounding = np.abs(books["residual"]).max() <= ROUNDING * highest
     for row, name in enumerate(SIGNS):
-        if name == "residual" and rounding:
+        said = [f"{round(factor * value, 1) + 0.0:.1f}" for value in books[name].tolist()]
+        if name == "residual" and set(said) == {"0.0"}:
             continue
         table.add_patch(Rectangle((0.0, row + 0.2), 0.05, 0.6, color=style.ENERGY[name]))
         table.text(0.08, row + BASE, style.ENERGY_LABEL[name], fontsize=style.SMALL)
-        said = [f"{round(factor * value, 1) + 0.0:.1f}" for value in books[name].tolist()]
-        if name == "residual":
-            said = [style.scientific(value, "J") for value in books[name].tolist()]
         right, up = table.transData.transform((1.0, row + BASE))
         place = right, ax.figure.bbox.height - up
         said = [text.replace("-", "−") for text in said]

@@ -233,7 +233,8 @@ class Core {
   }
 
   /** How far those under way have come, as rows of knots; only between steps of a run whose
-   * particles meet. Of what lasts in contact it is the latest state with a balance that closes. */
+   * particles meet. Of what lasts in contact it is the latest state with a balance that closes. A
+   * knot after a blow, which the core holds back while another may follow, comes before it. */
   tips() {
     const { Disk, Track } = this.layout.structs, { Mode } = this.layout.enums;
     /** @type {number[]} */
@@ -246,6 +247,10 @@ class Core {
         this.doubles.subarray(begin >> 3, (begin >> 3) + many);
       const mode = this.ints[(disk + Disk.fields.mode[0]) >> 2];
       if (mode === Mode.WAITING || mode === Mode.GONE) continue;
+      if (this.ints[(track + Track.fields.held_back[0]) >> 2]) {
+        rows.push(...some(track + Track.fields.knot[0], 6),
+          ...some(track + Track.fields.blow_entries[0], 3), i);
+      }
       if (mode === Mode.FREE && this.ints[(track + Track.fields.lasted[0]) >> 2]) {
         rows.push(...some(track + Track.fields.held[0], 6),
           ...some(track + Track.fields.held_entries[0], 3), i);

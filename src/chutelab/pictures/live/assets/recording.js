@@ -25,16 +25,21 @@ class Track {
   /** Where it was looked for last. */
   near = 0;
 
-  /** Whether the last knot only tells how far it has come, until there is another. */
-  tip = false;
+  /** How many of the last knots only tell how far it has come, until there are others. */
+  tip = 0;
 
   /** Whether it is still under way where the run has come to. */
   live = false;
 
+  /** Forget the knots that only tell how far it has come. */
+  dropTips() {
+    this.count -= this.tip;
+    this.tip = 0;
+    this.turns.length = Math.min(this.turns.length, this.count);
+  }
+
   /** @param {Float64Array} row @param {number} shift s @param {number[] | null} entries */
   add(row, shift, entries) {
-    if (this.tip) this.count -= 1;
-    this.tip = false;
     if ((this.count + 1) * KNOT_ROW > this.rows.length) {
       const rows = new Float64Array(2 * this.rows.length);
       rows.set(this.rows);
@@ -54,7 +59,7 @@ class Track {
 
   /** Lowest knot, m. */
   get lowest() {
-    const sure = this.count - Number(this.tip);
+    const sure = this.count - this.tip;
     for (; this.seen < sure; this.seen += 1) {
       this.low = Math.min(this.low, this.at(this.seen, Y));
     }
@@ -98,7 +103,7 @@ class Track {
     const state = this.state(t);
     if (!state) {
       this.count = 0;
-      this.tip = false;
+      this.tip = 0;
     }
     if (!state || this.end <= t) return;
     const { x, y, vx, vy, spin } = state;
@@ -107,7 +112,7 @@ class Track {
     this.low = Infinity;
     this.seen = 0;
     this.near = 0;
-    this.tip = false;
+    this.tip = 0;
     this.add(new Float64Array([t, x, y, vx, vy, spin, ...entries, 0]), 0, null);
   }
 
@@ -204,10 +209,12 @@ class Recording {
         const row = rows.subarray(begin, begin + KNOT_ROW);
         const { index, entries } = its(row[9]);
         const track = this.tracks[index];
-        track.live = rows === tips;
-        if (rows === tips && row[0] + this.shift <= track.end) continue;
+        const isTip = rows === tips;
+        if (!(isTip && track.live)) track.dropTips();
+        track.live = isTip;
+        if (isTip && row[0] + this.shift < track.end) continue;
         track.add(row, this.shift, entries);
-        track.tip = rows === tips;
+        if (isTip) track.tip += 1;
       }
     }
     for (const event of events) {
@@ -269,7 +276,7 @@ class Recording {
         // Whoever still rides the belt goes on riding.
         const carried = release.carried && x < 0 && !this.hasLeft(index, t);
         releases.push({ ...release, x, y, vx, vy, t: 0, carried });
-        track.tip = true;
+        track.tip = 1;
       } else releases.push({ ...release, t: Math.max(0, release.t - t) });
     });
     this.measure();

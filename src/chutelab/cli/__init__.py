@@ -12,7 +12,6 @@
 `benching`       ``bench``
 `parameters`     what several commands take: scenes, overrides, folders
 `output`         files of ``--out``, all of them or none; what ``run`` and ``show`` leave
-`report`         summaries as tables for people
 `console`        text and JSON on standard output, a bar on standard error
 ===============  ==================================================================================
 

@@ -17,9 +17,11 @@ from chutelab.cli.console import progress, say, show, show_json
 from chutelab.cli.parameters import json_option, out_option
 from chutelab.cli.program import RefusedError
 from chutelab.util.files import check, refuse_other, together, writing
-from chutelab.util.tables import plain
+from chutelab.util.tables import plain, wrapped
 
 if TYPE_CHECKING:
+    from rich.console import RenderableType
+
     from chutelab.results import Recording
     from chutelab.studies.accuracy import Accuracy
 
@@ -135,9 +137,7 @@ class Output:
         if self.as_json:
             show_json(_summary(recording, accuracy))
         elif not self.quiet:
-            from chutelab.cli.report import report
-
-            show(*report(recording, accuracy, details=self.details))
+            show(*_report(recording, accuracy, details=self.details))
             if self.out is not None:
                 files = [name for name in self.files if name != "events.csv" or not left_out]
                 say(f"wrote into {self.out}: {', '.join(files)}")
@@ -157,6 +157,33 @@ class Output:
                     f" have over {storage.MOST_ROWS:,} rows",
                     err=self.as_json,
                 )
+
+
+def _report(
+    recording: Recording, accuracy: Accuracy | None, *, details: bool
+) -> list[RenderableType]:
+    """Return what a run leaves to read: particle 0 beside the theory, the ledger, the accuracy.
+
+    With `details` also the engine and its steps, and errors down to rounding.
+    """
+    from rich.text import Text
+
+    from chutelab.results.report import facts, sheets
+    from chutelab.studies.accuracy import written
+
+    head = Text(recording.title, style="bold")
+    head.append(f"\n{facts(recording, details=details)}", style="not bold")
+    parts: list[RenderableType] = [head, *sheets(recording, details=details)]
+    if accuracy is not None:
+        what = "relative error" if accuracy.unit == "relative" else "error of places"
+        said = "cannot be told"
+        if accuracy.reached is not None:
+            said = f"about {written(accuracy.reached, accuracy.unit)} ({accuracy.worst})"
+        met = "reached" if accuracy.met else "NOT REACHED"
+        found = wrapped(f"{what} {said}; asked for {written(accuracy.asked, accuracy.unit)}, {met}")
+        how = wrapped(f"how it is known: {accuracy.method}")
+        parts += [Text("\nAccuracy", style="bold"), Text("\n".join([*found, *how]))]
+    return parts
 
 
 def _summary(recording: Recording, accuracy: Accuracy | None) -> dict[str, Any]:

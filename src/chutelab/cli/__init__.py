@@ -8,7 +8,7 @@
 `comparing`      ``compare``
 `sweeping`       ``sweep``
 `solving`        ``solve``
-`lessons`        ``lesson``: list, show, build, new, grade, page
+`lessons`        ``lesson``: list, show, build, new, page, scorm, grade
 `benching`       ``bench``
 `parameters`     what several commands take: scenes, overrides, folders
 `output`         files of ``--out``, all of them or none; what ``run`` and ``show`` leave
